@@ -1,0 +1,146 @@
+"""Every error tactbench raises on purpose.
+
+::
+
+    TactbenchError
+    ├── UsageError                    what was asked for cannot be: exit code 2
+    │   ├── UnknownNameError          no sensor, rig, task … of that name (carries the nearest names)
+    │   └── ConfigError               a YAML file does not say what it should (carries file and line)
+    ├── PluginError                   a plugin cannot be used
+    │   ├── DuplicateNameError        two distributions give one name
+    │   └── PluginContractError       a plugin does not keep the interface it promised
+    ├── RecordingError                a recording cannot be read or written
+    │   ├── FormatError               (also ValueError) not a recording, or a damaged one
+    │   ├── MissingRecordingError     (also FileNotFoundError)
+    │   └── MappingError              (also ValueError) a foreign table does not fit its mapping: exit code 2
+    ├── RigError                      a rig cannot carry out a scene
+    └── DataError                     (also ValueError) recordings cannot become X and y
+        └── NotApplicable             the cell is skipped, with this reason
+
+Every message names what was given, what was expected and the next step.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+
+class TactbenchError(Exception):
+    """Root of the tree.
+
+    Parameters
+    ----------
+    message
+        What was given and what was expected, in one sentence.
+    hint
+        The next step for the reader, in one sentence.
+    """
+
+    exit_code = 1
+
+    def __init__(self, message: str, *, hint: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.message} {self.hint}".strip()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Errors cross process borders as plain text, whatever arguments a subclass takes.
+        return (_rebuild, (type(self), self.message, self.hint))
+
+
+def _rebuild(kind: type[TactbenchError], message: str, hint: str) -> TactbenchError:
+    error = kind.__new__(kind)
+    TactbenchError.__init__(error, message, hint=hint)
+    return error
+
+
+class UsageError(TactbenchError):
+    """What was asked for cannot be carried out as asked."""
+
+    exit_code = 2
+
+
+def nearest(given: str, known: Iterable[str]) -> list[str]:
+    """Return the names of `known` that look like `given`, best first."""
+    names = sorted(known)
+    folded = {name.casefold(): name for name in names}
+    close = difflib.get_close_matches(given.casefold(), list(folded), n=3, cutoff=0.5)
+    return [folded[name] for name in close]
+
+
+class UnknownNameError(UsageError):
+    """No thing of this kind has this name."""
+
+    def __init__(self, kind: str, given: str, known: Iterable[str]) -> None:
+        names = sorted(known)
+        close = nearest(given, names)
+        meant = f"Did you mean {' or '.join(repr(name) for name in close)}? " if close else ""
+        listing = f"Known: {', '.join(names)}." if names else f"No {kind} is installed."
+        super().__init__(f"There is no {kind} called {given!r}.", hint=f"{meant}{listing}")
+
+
+class ConfigError(UsageError):
+    """A configuration file does not say what it should."""
+
+    def __init__(self, file: str, line: int | None, message: str, *, hint: str = "") -> None:
+        where = f"{file}:{line}" if line else file
+        super().__init__(f"{where}: {message}", hint=hint)
+
+
+class PluginError(TactbenchError):
+    """A plugin cannot be used."""
+
+
+class DuplicateNameError(PluginError):
+    """Two distributions give one name to two things of one kind."""
+
+    exit_code = 2
+
+    def __init__(self, kind: str, name: str, distributions: Sequence[str]) -> None:
+        both = " and ".join(distributions)
+        super().__init__(
+            f"The {kind} {name!r} is defined by {both}; neither is used.",
+            hint="Uninstall one of them, or ask its author to rename it.",
+        )
+
+
+class PluginContractError(PluginError):
+    """A plugin does not keep the interface it promised."""
+
+
+class RecordingError(TactbenchError):
+    """A recording cannot be read or written."""
+
+
+class FormatError(RecordingError, ValueError):
+    """Not a tactbench recording, or a damaged one."""
+
+    exit_code = 2
+
+
+class MissingRecordingError(RecordingError, FileNotFoundError):
+    """There is no such recording."""
+
+    exit_code = 2
+
+
+class MappingError(RecordingError, ValueError):
+    """A foreign table does not fit its mapping."""
+
+    exit_code = 2
+
+
+class RigError(TactbenchError):
+    """A rig cannot carry out a scene."""
+
+
+class DataError(TactbenchError, ValueError):
+    """Recordings cannot be turned into X and y."""
+
+
+class NotApplicable(DataError):  # noqa: N818  (a result, not a failure)
+    """The cell does not apply: its row says ``skipped`` and this reason."""

@@ -1,0 +1,1 @@
+"""How sensors, rigs, tasks, estimators and effects are found."""

@@ -1,0 +1,53 @@
+"""The five hooks: the whole door fits on this screen.
+
+Each hook returns descriptors: a name, a spec, and *where* the code is as an import string, so that listing plugins
+imports nothing heavy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pluggy
+
+from tactbench.core.spec.rig import (
+    EffectDescriptor,
+    EstimatorDescriptor,
+    RigDescriptor,
+    SensorDescriptor,
+    TaskDescriptor,
+)
+
+GROUP = "tactbench"
+"""Entry-point group, and the name of the pluggy project."""
+
+API_VERSION = 1
+"""A plugin module states the version it was written for: ``TACTBENCH_API = 1``."""
+
+hookspec = pluggy.HookspecMarker(GROUP)
+hookimpl = pluggy.HookimplMarker(GROUP)
+
+
+@hookspec
+def tactbench_sensors() -> Sequence[SensorDescriptor]:  # type: ignore[empty-body]
+    """Return the sensors this plugin brings."""
+
+
+@hookspec
+def tactbench_rigs() -> Sequence[RigDescriptor]:  # type: ignore[empty-body]
+    """Return the rigs this plugin brings."""
+
+
+@hookspec
+def tactbench_tasks() -> Sequence[TaskDescriptor]:  # type: ignore[empty-body]
+    """Return the tasks this plugin brings."""
+
+
+@hookspec
+def tactbench_estimators() -> Sequence[EstimatorDescriptor]:  # type: ignore[empty-body]
+    """Return the estimators this plugin brings."""
+
+
+@hookspec
+def tactbench_effects() -> Sequence[EffectDescriptor]:  # type: ignore[empty-body]
+    """Return the simulation effects this plugin brings."""

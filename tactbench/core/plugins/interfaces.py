@@ -1,0 +1,98 @@
+"""What the code behind a descriptor must look like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy.typing as npt
+
+from tactbench.core.samples import Block, FloatArray, SkinGrid, SkinState
+from tactbench.core.spec.recording import PlanEntry, Scalar
+from tactbench.core.spec.rig import EffectDescriptor, SensorDescriptor
+from tactbench.core.spec.scene import Scene
+from tactbench.core.spec.sensor import SensorSpec, StreamSpec
+
+
+class Acquisition(Protocol):
+    """One scene being carried out: iterate it for blocks; the other attributes are valid afterwards too."""
+
+    @property
+    def streams(self) -> tuple[StreamSpec, ...]:
+        """The sensor's streams that will be recorded (those of its spec, perhaps with fewer channels)."""
+
+    @property
+    def reference(self) -> tuple[StreamSpec, ...]:
+        """The reference streams, for example `force_torque` with channel `fz` of kind `force`."""
+
+    @property
+    def plan(self) -> tuple[PlanEntry, ...]:
+        """Effects included and left out, with reasons; empty for a real rig."""
+
+    @property
+    def assumptions(self) -> Mapping[str, Scalar]:
+        """Assumed parameters that decide the result."""
+
+    @property
+    def drawn(self) -> Mapping[str, Scalar]:
+        """What was drawn or achieved, for example the placement."""
+
+    def __iter__(self) -> Iterator[Block]: ...
+
+
+class Rig(Protocol):
+    """Something that carries out scenes."""
+
+    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> AbstractContextManager[Acquisition]:
+        """Prepare `scene` with `sensor`; raises RigError or NotApplicable if it cannot be done."""
+
+
+class Shelf(Protocol):
+    """A rig whose scenes were carried out elsewhere: it hands out recordings that exist."""
+
+    def recordings(self) -> Sequence[Path]:
+        """Return the files, in a fixed order; raises MissingRecordingError if there are none."""
+
+
+class Transducer(Protocol):
+    """Turns skin states into a sensor's noise-free readings, for one grid."""
+
+    def __call__(self, state: SkinState) -> FloatArray:
+        """Return the (n_wanted,) readings in the channels' own units, before noise, rounding and clipping."""
+
+
+class TransducerFactory(Protocol):
+    """What ``SensorDescriptor.transducer`` names."""
+
+    def __call__(self, sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> Transducer:
+        """Prepare for `grid` and the channels named in `wanted`; raises RigError for a channel it cannot give."""
+
+
+class Estimator(Protocol):
+    """scikit-learn's two verbs."""
+
+    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Any:
+        """Learn."""
+
+    def predict(self, X: FloatArray) -> npt.NDArray[Any]:
+        """Answer."""
+
+
+@dataclass(frozen=True)
+class RigContext:
+    """What a rig is built from: ``RigDescriptor.where`` is called with exactly this."""
+
+    effects: tuple[EffectDescriptor, ...] = ()
+    """All installed effects; the twin plans with them."""
+    recordings: Path | None = None
+    """Folder given by ``--recordings``."""
+
+
+class RigFactory(Protocol):
+    """What ``RigDescriptor.where`` names."""
+
+    def __call__(self, context: RigContext) -> Rig | Shelf:
+        """Return the rig; raises UsageError when `context` lacks something it needs."""

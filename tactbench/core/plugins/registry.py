@@ -1,0 +1,241 @@
+"""The registry: every plugin greeted alone, every failure kept as a row.
+
+Three holes of plain pluggy are closed here: a plugin that fails on import stops nobody else; two plugins giving one
+name are refused naming both distributions; a misspelt hook is an error.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import EntryPoint, entry_points
+from types import ModuleType
+from typing import Any, Generic, Literal, TypeVar, cast
+
+import pluggy
+
+from tactbench.core.errors import DuplicateNameError, PluginContractError, PluginError, UnknownNameError
+from tactbench.core.plugins import hookspecs
+from tactbench.core.spec.rig import (
+    EffectDescriptor,
+    EstimatorDescriptor,
+    RigDescriptor,
+    SensorDescriptor,
+    TaskDescriptor,
+)
+
+D = TypeVar("D", SensorDescriptor, RigDescriptor, TaskDescriptor, EstimatorDescriptor, EffectDescriptor)
+
+
+@dataclass(frozen=True)
+class PluginRow:
+    """One entry point, and what became of it."""
+
+    entry_point: str
+    module: str
+    distribution: str
+    version: str
+    status: Literal["loaded", "failed"]
+    brings: tuple[str, ...] = ()
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Owned(Generic[D]):
+    """A descriptor, and the plugin that brought it."""
+
+    descriptor: D
+    module: str
+    distribution: str
+    version: str
+
+
+@dataclass
+class Shelfful(Generic[D]):
+    """All descriptors of one kind, by name."""
+
+    kind: str
+    _found: dict[str, list[Owned[D]]] = field(default_factory=dict)
+
+    def add(self, owned: Owned[D]) -> None:
+        """Remember a descriptor; a name given twice is kept twice and refused when asked for."""
+        self._found.setdefault(owned.descriptor.name, []).append(owned)
+
+    def owned(self, name: str) -> Owned[D]:
+        """Return the descriptor called `name` with its owner.
+
+        Raises
+        ------
+        UnknownNameError
+            If nothing has this name.
+        DuplicateNameError
+            If two distributions give it.
+        """
+        if name not in self._found:
+            raise UnknownNameError(self.kind, name, self.names())
+        owners = self._found[name]
+        if len(owners) > 1:
+            raise DuplicateNameError(self.kind, name, [f"{owner.distribution} ({owner.module})" for owner in owners])
+        return owners[0]
+
+    def __getitem__(self, name: str) -> D:
+        return self.owned(name).descriptor
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._found
+
+    def __iter__(self) -> Iterator[D]:
+        return (owners[0].descriptor for _, owners in sorted(self._found.items()) if len(owners) == 1)
+
+    def names(self) -> list[str]:
+        """Return the names that may be asked for."""
+        return sorted(name for name, owners in self._found.items() if len(owners) == 1)
+
+    def refused(self) -> list[DuplicateNameError]:
+        """Return one error for every name that is given twice."""
+        refused = []
+        for name, owners in sorted(self._found.items()):
+            if len(owners) > 1:
+                where = [f"{owner.distribution} ({owner.module})" for owner in owners]
+                refused.append(DuplicateNameError(self.kind, name, where))
+        return refused
+
+
+@dataclass
+class Registry:
+    """Everything that is installed."""
+
+    sensors: Shelfful[SensorDescriptor] = field(default_factory=lambda: Shelfful("sensor"))
+    rigs: Shelfful[RigDescriptor] = field(default_factory=lambda: Shelfful("rig"))
+    tasks: Shelfful[TaskDescriptor] = field(default_factory=lambda: Shelfful("task"))
+    estimators: Shelfful[EstimatorDescriptor] = field(default_factory=lambda: Shelfful("estimator"))
+    effects: Shelfful[EffectDescriptor] = field(default_factory=lambda: Shelfful("effect"))
+    plugins: list[PluginRow] = field(default_factory=list)
+
+    def shelves(self) -> Mapping[str, Shelfful[Any]]:
+        """Return the five shelves by the name of their hook's plural."""
+        return {
+            "sensors": self.sensors,
+            "rigs": self.rigs,
+            "tasks": self.tasks,
+            "estimators": self.estimators,
+            "effects": self.effects,
+        }
+
+    @property
+    def failures(self) -> list[PluginRow]:
+        """The plugins that could not be used."""
+        return [row for row in self.plugins if row.status == "failed"]
+
+    @property
+    def refused(self) -> list[DuplicateNameError]:
+        """The names that are given twice."""
+        return [error for shelf in self.shelves().values() for error in shelf.refused()]
+
+
+_KINDS: dict[str, type[Any]] = {
+    "sensors": SensorDescriptor,
+    "rigs": RigDescriptor,
+    "tasks": TaskDescriptor,
+    "estimators": EstimatorDescriptor,
+    "effects": EffectDescriptor,
+}
+
+
+def load_registry(points: Iterable[EntryPoint] | None = None) -> Registry:
+    """Load every plugin of the entry-point group, each one alone.
+
+    Parameters
+    ----------
+    points
+        Entry points to load instead of the installed ones.
+
+    Returns
+    -------
+    Registry
+        What could be loaded, and a row for each plugin that could not. Never raises for a bad plugin.
+    """
+    registry = Registry()
+    found = entry_points(group=hookspecs.GROUP) if points is None else points
+    unique = {(point.name, point.value, _owner(point)[0]): point for point in found}
+    for _, point in sorted(unique.items()):
+        _greet(registry, point)
+    return registry
+
+
+def _greet(registry: Registry, point: EntryPoint) -> None:
+    distribution, version = _owner(point)
+    brings: list[str] = []
+    try:
+        offered = _ask(point)
+    except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        reason = str(error) if isinstance(error, PluginError) else f"{type(error).__name__}: {error}"
+        row = PluginRow(point.name, point.value, distribution, version, "failed", (), reason)
+        registry.plugins.append(row)
+        return
+    for family, descriptors in offered.items():
+        for descriptor in descriptors:
+            registry.shelves()[family].add(Owned(descriptor, point.value, distribution, version))
+            brings.append(f"{family[:-1]} {descriptor.name}")
+    registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "loaded", tuple(brings)))
+
+
+def _ask(point: EntryPoint) -> dict[str, list[Any]]:
+    """Import one plugin and collect its descriptors, checking all of them before any is used."""
+    module = cast(ModuleType, point.load())
+    written_for = getattr(module, "TACTBENCH_API", None)
+    if written_for != hookspecs.API_VERSION:
+        raise PluginContractError(
+            f"{point.value} states TACTBENCH_API = {written_for!r}; this tactbench speaks {hookspecs.API_VERSION}.",
+            hint=f"Write TACTBENCH_API = {hookspecs.API_VERSION} in the module, or install a fitting version.",
+        )
+    manager = pluggy.PluginManager(hookspecs.GROUP)
+    manager.add_hookspecs(hookspecs)
+    manager.register(module, name=point.name)
+    manager.check_pending()
+    known = {f"tactbench_{family}" for family in _KINDS}
+    callers = manager.get_hookcallers(module) or []
+    if not callers:
+        raise PluginContractError(
+            f"{point.value} implements none of {', '.join(sorted(known))}.",
+            hint="Decorate a function of that name with tactbench.plugin.hookimpl.",
+        )
+    offered: dict[str, list[Any]] = {}
+    for caller in callers:
+        family = caller.name.removeprefix("tactbench_")
+        (answer,) = caller()
+        descriptors = list(answer)
+        for descriptor in descriptors:
+            if not isinstance(descriptor, _KINDS[family]):
+                raise PluginContractError(
+                    f"{caller.name} of {point.value} returned {type(descriptor).__name__}, "
+                    f"not {_KINDS[family].__name__}.",
+                    hint="Return a list of descriptors from tactbench.plugin.",
+                )
+        offered[family] = descriptors
+    return offered
+
+
+def _owner(point: EntryPoint) -> tuple[str, str]:
+    dist = point.dist
+    return (dist.name, dist.version) if dist is not None else ("unknown", "")
+
+
+def load_object(where: str) -> Any:
+    """Import what a descriptor's ``module:attribute`` names.
+
+    Raises
+    ------
+    PluginError
+        If the module cannot be imported or has no such attribute; the cause is chained.
+    """
+    module, _, attribute = where.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise PluginError(
+            f"{where} cannot be loaded: {error}.", hint="Check the plugin's installation with `tactbench plugins`."
+        ) from error

@@ -1,0 +1,132 @@
+"""The nouns that walk: everything that passes from rig to leaderboard.
+
+``Block`` (from a rig) → ``StreamData`` (in a recording) → ``Table`` (one recording on one clock) → ``Part`` (X and y
+of one role) → ``Fold`` → predictions → score.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntFlag
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.spec.sensor import StreamSpec
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+class Quality(IntFlag):
+    """What is wrong with one sample of one channel; 0 is a good sample."""
+
+    GOOD = 0
+    MISSING = 1
+    """No sample: the stored number means nothing."""
+    SATURATED = 2
+    """The converter stood at its end."""
+    SUSPECT = 4
+    """Parity, checksum or sequence error."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A stretch of samples of one stream, as a rig yields it."""
+
+    stream: str
+    t_ns: IntArray | None
+    """(n,) nanoseconds; None when there is no clock."""
+    data: npt.NDArray[Any]
+    """(n, channels), in the units of the stream's channels."""
+    quality: npt.NDArray[np.uint8] | None = None
+    """(n, channels) of :class:`Quality`; None: all good."""
+    sequence: IntArray | None = None
+    """(n,) the device's own counter, if it has one."""
+
+
+@dataclass(frozen=True)
+class StreamData:
+    """A stream read back from a recording."""
+
+    spec: StreamSpec
+    t_ns: IntArray | None
+    """(n,) nanoseconds, or None when the source has no clock."""
+    data: npt.NDArray[Any]
+    """(n, channels)"""
+    quality: npt.NDArray[np.uint8] | None
+    annotations: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
+    """Row labels: name -> (n,) of str or int."""
+
+
+@dataclass(frozen=True)
+class SkinGrid:
+    """Cell centres of the unrolled skin, millimetres."""
+
+    x_mm: FloatArray
+    """(nx,) axial"""
+    s_mm: FloatArray
+    """(ns,) along the arc"""
+
+    @property
+    def cell_mm(self) -> tuple[float, float]:
+        """Spacing in x and s."""
+        return (
+            float(self.x_mm[1] - self.x_mm[0]),
+            float(self.s_mm[1] - self.s_mm[0]),
+        )
+
+
+@dataclass(frozen=True)
+class SkinState:
+    """The skin under one load: what a transducer may look at. Units mm, N, MPa."""
+
+    grid: SkinGrid
+    force_n: float
+    deflection_mm: FloatArray
+    """(nx, ns), positive towards the core."""
+    pressure_mpa: FloatArray
+    """(nx, ns) contact pressure."""
+    thickness_mm: FloatArray
+    """(nx, ns) film or foam thickness that is left."""
+    depth_mm: float
+    """Approach of the indenter since first touch."""
+    fluid_pressure_mpa: float
+    """Rise over rest; 0 for media without fluid."""
+    contact_radius_mm: float
+    """sqrt(5/2 <r²>) weighted with the contact pressure (exact for Hertz)."""
+    residual: float
+    """Relative residual of the solver."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Rows of one role, ready for an estimator."""
+
+    X: FloatArray
+    """(n, features)"""
+    y: npt.NDArray[Any]
+    """(n,) numbers, or class indices 0 … n_classes-1"""
+    time_s: FloatArray
+    """(n,) seconds since the recording's first sample (row index when there is no clock)"""
+    recording: IntArray
+    """(n,) which recording of the dataset the row is from"""
+    row: IntArray
+    """(n,) which row of that recording"""
+    cluster: IntArray
+    """(n,) unit of replication: session, or the group the split keeps apart"""
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+
+@dataclass(frozen=True)
+class Fold:
+    """One training and one test set, with validation data where the protocol has any."""
+
+    name: str
+    train: Part
+    test: Part
+    validation: Part | None = None

@@ -1,0 +1,1 @@
+"""What things are: frozen models without behaviour, readable on one screen each."""

@@ -1,0 +1,71 @@
+"""A number that says its unit and where it comes from."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, field_validator
+
+from tactbench.core.spec import units
+
+Tag = Literal["sourced", "measured", "derived", "assumed"]
+"""How far a fact may be trusted: stated in a document, measured on real devices, computed from others, guessed."""
+
+
+class Frozen(BaseModel):
+    """A value object: immutable, no unknown fields."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Source(Frozen):
+    """Where a fact comes from."""
+
+    tag: Tag
+    """`assumed` means that nobody has stated it: treat it as a parameter."""
+    reference: str
+    """Document, file or reason."""
+
+
+class Quantity(Frozen):
+    """One number with its unit and its source."""
+
+    value: float
+    """The number as the source states it."""
+    unit: str
+    """A unit of :mod:`tactbench.core.spec.units`."""
+    source: Source
+    """Why this number may be believed."""
+
+    @field_validator("unit")
+    @classmethod
+    def _known_unit(cls, unit: str) -> str:
+        units.parse(unit)
+        return unit
+
+    def to(self, unit: str) -> float:
+        """Return the number in `unit`; raises UsageError when the dimensions differ."""
+        return self.value * units.conversion(self.unit, unit)
+
+    def __str__(self) -> str:
+        return f"{self.value:g} {self.unit}"
+
+
+def sourced(value: float, unit: str, reference: str) -> Quantity:
+    """Return a number that a document states."""
+    return Quantity(value=value, unit=unit, source=Source(tag="sourced", reference=reference))
+
+
+def measured(value: float, unit: str, reference: str) -> Quantity:
+    """Return a number measured on real devices."""
+    return Quantity(value=value, unit=unit, source=Source(tag="measured", reference=reference))
+
+
+def derived(value: float, unit: str, reference: str) -> Quantity:
+    """Return a number computed from others; `reference` says how."""
+    return Quantity(value=value, unit=unit, source=Source(tag="derived", reference=reference))
+
+
+def assumed(value: float, unit: str, reference: str) -> Quantity:
+    """Return a number nobody has stated; `reference` says why it was chosen."""
+    return Quantity(value=value, unit=unit, source=Source(tag="assumed", reference=reference))

@@ -1,0 +1,85 @@
+"""What a rig, an estimator and an effect are, without loading their code."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from tactbench.core.spec.quantity import Frozen
+from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.spec.task import TaskSpec
+
+_WHERE = r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"
+_NAME = r"^[a-z][a-z0-9_-]*$"
+
+
+class SensorDescriptor(Frozen):
+    """A sensor, and where the code for it is."""
+
+    spec: SensorSpec
+    transducer: str | None = Field(default=None, pattern=_WHERE)
+    """``module:callable`` -> :class:`tactbench.plugin.Transducer`; needed on the twin only."""
+    driver: str | None = Field(default=None, pattern=_WHERE)
+    """``module:callable`` for real hardware."""
+
+    @property
+    def name(self) -> str:
+        """The sensor's name."""
+        return self.spec.name
+
+
+class TaskDescriptor(Frozen):
+    """A task: its spec is all of it."""
+
+    spec: TaskSpec
+
+    @property
+    def name(self) -> str:
+        """The task's name."""
+        return self.spec.name
+
+
+class RigDescriptor(Frozen):
+    """A rig, and where its code is."""
+
+    name: str = Field(pattern=_NAME)
+    title: str
+    where: str = Field(pattern=_WHERE)
+    """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a Shelf."""
+    simulated: bool = False
+    """Rows from this rig are marked SIM and never ranked against hardware."""
+
+
+class EstimatorDescriptor(Frozen):
+    """An estimator, and where its code is."""
+
+    name: str = Field(pattern=_NAME)
+    title: str
+    kinds: tuple[Literal["regression", "classification"], ...]
+    where: str = Field(pattern=_WHERE)
+    """``module:callable``, called as ``callable(kind=..., seed=..., threads=..., **params)``: an object with
+    scikit-learn's ``fit(X, y)`` and ``predict(X)``."""
+    params: dict[str, Any] = Field(default_factory=dict)
+    """Defaults; every name a user may set is here."""
+    grid: dict[str, tuple[float, ...]] = Field(default_factory=dict)
+    """Parameters chosen on validation data, and their candidates."""
+    window_grid: tuple[int, ...] = (0,)
+    """Candidates for k of the mean filter over samples t-k … t, chosen together with `grid`."""
+    looks_at: Literal["features", "time", "nothing"] = "features"
+    """`time`: X is the time index alone. `nothing`: X is a column of zeros."""
+    baseline: bool = False
+    """A trivial answer, shown under the results."""
+
+
+class EffectDescriptor(Frozen):
+    """One physical influence the twin may include."""
+
+    name: str = Field(pattern=_NAME)
+    title: str
+    where: str = Field(pattern=_WHERE)
+    """``module:callable``; imported only when a plan includes the effect."""
+    produces: tuple[str, ...] = ()
+    consumes: tuple[str, ...] = ()
+    called_for: str = Field(pattern=_WHERE)
+    """``module:callable`` -> ``callable(scene, sensor) -> Reason``; light, no numerics."""

@@ -1,0 +1,82 @@
+"""What is present and commanded while one recording is made."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from tactbench.core.spec.quantity import Frozen, Quantity, assumed, sourced
+from tactbench.core.spec.sensor import ChannelKind
+
+Role = Literal["train", "validation", "test"]
+
+PAPER = "Karl et al. 2016, ML-based tactile sensor calibration"
+
+
+class Indenter(Frozen):
+    """The body pressed on the sensor: flat, or a spherical cap."""
+
+    radius: Quantity | None = None
+    """Radius of the cap [length]; None is a flat surface."""
+
+    def __str__(self) -> str:
+        return f"cap R {self.radius}" if self.radius else "flat"
+
+
+class Placement(Frozen):
+    """Where the indenter meets the sensor, relative to the sensor's own nominal contact point."""
+
+    x: Quantity = assumed(0.0, "mm", "nominal contact point of the mount")
+    """Axial offset [length]."""
+    s: Quantity = assumed(0.0, "mm", "nominal contact point of the mount")
+    """Offset along the arc [length]."""
+    scatter: Quantity = assumed(0.1, "mm", "repeatability of exchanging a cap; no source states it")
+    """Standard deviation of both offsets from recording to recording [length]."""
+
+
+class ForceRamp(Frozen):
+    """No load for `hold_s`, then a straight rise of the normal force."""
+
+    kind: Literal["ramp"] = "ramp"
+    start: Quantity = sourced(0.0, "N", PAPER)
+    end: Quantity = sourced(5.0, "N", PAPER)
+    hold: Quantity = assumed(7.2, "s", "the paper's first 600 samples: only the initialization of the setup")
+    duration: Quantity = sourced(60.0, "s", PAPER)
+    """Whole recording, the hold included."""
+    samples: int = Field(default=5000, ge=1)
+    """Samples of the reference clock over `duration`."""
+
+
+class Environment(Frozen):
+    """What surrounds the contact, and how far the assumed nuisances are scaled."""
+
+    since_power_on: Quantity = assumed(600.0, "s", "a warm sensor: the paper does not say how long it ran")
+    """Time from switching the sensor on to the first sample of the session [time]."""
+    noise_scale: float = Field(default=1.0, ge=0)
+    """Factor on white noise of the sensor."""
+    drift_scale: float = Field(default=1.0, ge=0)
+    """Factor on offsets, wander and warm-up."""
+    force_noise: Quantity = sourced(
+        0.6875, "N", f"{PAPER}: RMSE of the regression on the time index, read as label noise"
+    )
+    """Standard deviation of the unfiltered force-torque sensor [force]."""
+
+
+class Scene(Frozen):
+    """One recording to be made."""
+
+    name: str
+    """Short and unique within a task, fit for a file name."""
+    indenter: Indenter = Indenter()
+    placement: Placement = Placement()
+    profile: ForceRamp = ForceRamp()
+    environment: Environment = Environment()
+    session: str = "1"
+    """Recordings of one session were made without re-mounting anything."""
+    starts_after_s: float = Field(default=0.0, ge=0)
+    """Seconds from the session's first sample to this recording's first."""
+    observe: tuple[ChannelKind, ...] = ("taxel",)
+    """Kinds of channels that somebody will look at; the reference force is always recorded."""
+    labels: dict[str, str | float | int] = Field(default_factory=dict)
+    """Facts about the recording that a task may ask for, for example {"cap_radius_mm": 5.0}."""

@@ -1,0 +1,157 @@
+"""What a sensor is: streams, channels, where they sit, what they are made of, and who says so."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from tactbench.core.spec import units
+from tactbench.core.spec.quantity import Frozen, Quantity, Source
+from tactbench.core.spec.skin import Skin
+
+ChannelKind = Literal[
+    "taxel", "dc_pressure", "ac_pressure", "dc_temperature", "ac_temperature",
+    "force", "torque", "position", "joint", "other",
+]  # fmt: skip
+"""What a channel measures. Tasks ask for kinds, never for a sensor's own names."""
+
+Vector = tuple[float, float, float]
+
+
+class PhysicalRange(Frozen):
+    """A range in physical units, as a data sheet or a paper states it."""
+
+    lower: float
+    upper: float
+    unit: str
+    source: Source
+
+    def __str__(self) -> str:
+        return f"{self.lower:g}–{self.upper:g} {self.unit}"
+
+
+class ChannelSpec(Frozen):
+    """One number per sample."""
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_.-]*$")
+    """Unique within the sensor."""
+    kind: ChannelKind
+    unit: str = "count"
+    """Unit of the stored numbers; `count` for a raw converter reading."""
+    lower: float | None = None
+    """Smallest value the converter can give."""
+    upper: float | None = None
+    """Largest value the converter can give."""
+    rest: Quantity | None = None
+    """Reading with nothing touching, in `unit`."""
+    sign: Literal[-1, 0, 1] = 0
+    """+1: the reading rises under load; -1: it falls; 0: either, or not known."""
+    position_m: Vector | None = None
+    """Place on the sensor, metres, in the sensor's frame (x towards the tip, -z towards the pad)."""
+    normal: Vector | None = None
+    """Outward unit normal at that place."""
+    position_source: Source | None = None
+    """Who states position and normal."""
+    scale: Quantity | None = None
+    """Physical units per stored unit, if it is linear (36.5 Pa per count)."""
+    measures: PhysicalRange | None = None
+    """Physical range."""
+    band: PhysicalRange | None = None
+    """Frequency band."""
+
+    @field_validator("unit")
+    @classmethod
+    def _known_unit(cls, unit: str) -> str:
+        units.parse(unit)
+        return unit
+
+
+class StreamSpec(Frozen):
+    """Channels that share one clock."""
+
+    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    rate_hz: float | None = Field(default=None, gt=0)
+    """Nominal sample rate; None when nobody states one (never invented)."""
+    rate_source: Source | None = None
+    dtype: Literal["uint8", "uint16", "int16", "int32", "float32", "float64"] = "float64"
+    """How samples are stored."""
+    channels: tuple[ChannelSpec, ...] = Field(min_length=1)
+
+
+class Creep(Frozen):
+    """One exponential term by which the response lags behind the load."""
+
+    fraction: Quantity
+    """Share of the response that arrives late [1]."""
+    tau: Quantity
+    """Its time constant [time]."""
+
+
+class Nuisances(Frozen):
+    """What comes on top of the physics, for all channels of one kind. Counts are the channel's own unit."""
+
+    white: Quantity
+    """Standard deviation of white noise, before rounding."""
+    offset_shared: Quantity
+    """Standard deviation of an offset that all channels of one recording share."""
+    offset_own: Quantity
+    """Standard deviation of each channel's own offset in a recording."""
+    offset_session: Quantity
+    """Standard deviation of each channel's own offset between sessions."""
+    gain_scatter: Quantity
+    """Standard deviation of each channel's gain within one sensor unit [1]."""
+    warm_up: Quantity
+    """How far the shared rest level rises from power-on to equilibrium."""
+    warm_up_tau: Quantity
+    """Time constant of that rise [time]."""
+    warm_up_scatter: Quantity
+    """Standard deviation of the factors with which channels follow it [1]."""
+    wander: Quantity
+    """Standard deviation of free drift (Ornstein–Uhlenbeck)."""
+    wander_tau: Quantity
+    """Its correlation time [time]."""
+    step: Quantity
+    """Step of the converter."""
+    creep: tuple[Creep, ...] = ()
+
+
+class SensorSpec(Frozen):
+    """A tactile sensor. See ``docs/plugins.md`` for a worked example."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    title: str
+    principle: str
+    """How a taxel measures: resistive, capacitive, magnetic …"""
+    principle_source: Source
+    streams: tuple[StreamSpec, ...] = Field(min_length=1)
+    skin: Skin | None = None
+    """None: the sensor cannot be simulated, only recorded or replayed."""
+    parameters: dict[str, Quantity] = Field(default_factory=dict)
+    """What the sensor's own transduction needs."""
+    nuisances: dict[ChannelKind, Nuisances] = Field(default_factory=dict)
+    """Noise and drift by kind of channel, for the twin."""
+    references: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> SensorSpec:
+        names = [channel.name for stream in self.streams for channel in stream.channels]
+        doubled = sorted({name for name in names if names.count(name) > 1})
+        if doubled:
+            raise ValueError(f"channel names must be unique in a sensor; repeated: {', '.join(doubled)}")
+        streams = [stream.name for stream in self.streams]
+        if len(set(streams)) != len(streams):
+            raise ValueError(f"stream names must be unique in a sensor: {', '.join(streams)}")
+        return self
+
+    def channels(self, *kinds: ChannelKind) -> tuple[ChannelSpec, ...]:
+        """Return the channels of the given kinds (all of them without arguments), in order of the streams."""
+        every = (channel for stream in self.streams for channel in stream.channels)
+        return tuple(channel for channel in every if not kinds or channel.kind in kinds)
+
+    def stream_of(self, channel: str) -> StreamSpec:
+        """Return the stream that carries `channel`; KeyError if there is none."""
+        for stream in self.streams:
+            if any(candidate.name == channel for candidate in stream.channels):
+                return stream
+        raise KeyError(channel)

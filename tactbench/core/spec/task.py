@@ -1,0 +1,75 @@
+"""What a task asks of recordings."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from tactbench.core.spec.quantity import Frozen
+from tactbench.core.spec.scene import Role, Scene
+from tactbench.core.spec.sensor import ChannelKind
+
+
+class PlannedScene(Frozen):
+    """A scene and what the recording of it is for."""
+
+    scene: Scene
+    role: Role
+
+
+class ChannelTarget(Frozen):
+    """The number to predict is a channel of the reference, sample by sample."""
+
+    source: Literal["channel"] = "channel"
+    kind: ChannelKind = "force"
+    name: str | None = None
+    """Which one, if a recording has several of this kind; None takes the only one or the one called `normal`."""
+    unit: str = "N"
+
+
+class LabelTarget(Frozen):
+    """The class to predict is a label: of the whole recording, or of each row (an annotation)."""
+
+    source: Literal["label"] = "label"
+    name: str
+    unit: str = "1"
+
+
+class Published(Frozen):
+    """A figure somebody has published for this task."""
+
+    score: float
+    protocol: str
+    """Only rows under this protocol stand beside it."""
+    estimator: str
+    reference: str
+
+
+class TaskSpec(Frozen):
+    """A question asked of recordings: pure data, the core carries it out."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    title: str
+    question: str
+    """One sentence, for people."""
+    kind: Literal["regression", "classification"]
+    features: tuple[ChannelKind, ...] = ("taxel",)
+    """Kinds of channels an estimator may look at."""
+    target: ChannelTarget | LabelTarget
+    metric: str
+    """Name of the primary metric; see docs/glossary.md."""
+    unit: str = "1"
+    """Unit of the primary metric."""
+    scenes: tuple[PlannedScene, ...] = ()
+    """What a rig should record; empty: only recordings made elsewhere can answer."""
+    protocols: tuple[str, ...]
+    """Allowed protocols, the default first."""
+    splits: tuple[str, ...] = ()
+    """Splits that make sense for `deployable`, the default first: roles, session, in-session, or a group's name."""
+    estimators: tuple[str, ...]
+    """What answers when nobody asks for another."""
+    baselines: tuple[str, ...]
+    """Trivial answers that stand in every table; the first is the `baseline` column."""
+    published: dict[str, Published] = Field(default_factory=dict)
+    """By name of sensor."""

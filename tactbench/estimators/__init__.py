@@ -1,0 +1,3 @@
+"""The estimators tactbench brings: descriptors here, code in the modules they name."""
+
+TACTBENCH_API = 1

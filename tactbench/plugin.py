@@ -1,0 +1,106 @@
+"""The door: everything a plugin author imports.
+
+A plugin is a module, named by an entry point of group ``tactbench``, that states ``TACTBENCH_API = 1`` and implements
+one or more of the five hooks. See ``docs/plugins.md``.
+"""
+
+from tactbench.core.errors import (
+    DataError,
+    MissingRecordingError,
+    NotApplicable,
+    RigError,
+    TactbenchError,
+    UsageError,
+)
+from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
+from tactbench.core.plugins.interfaces import (
+    Acquisition,
+    Estimator,
+    Rig,
+    RigContext,
+    Shelf,
+    Transducer,
+    TransducerFactory,
+)
+from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.samples import Block, FloatArray, Quality, SkinGrid, SkinState
+from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
+from tactbench.core.spec.recording import PlanEntry, Scalar
+from tactbench.core.spec.rig import (
+    EffectDescriptor,
+    EstimatorDescriptor,
+    RigDescriptor,
+    SensorDescriptor,
+    TaskDescriptor,
+)
+from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene
+from tactbench.core.spec.sensor import (
+    ChannelKind,
+    ChannelSpec,
+    Creep,
+    Nuisances,
+    PhysicalRange,
+    SensorSpec,
+    StreamSpec,
+)
+from tactbench.core.spec.skin import BondedLayer, FluidBackedShell, FoamPad, SkinSheet
+from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
+
+__all__ = [
+    "API_VERSION",
+    "Acquisition",
+    "Block",
+    "BondedLayer",
+    "ChannelKind",
+    "ChannelSpec",
+    "ChannelTarget",
+    "Creep",
+    "DataError",
+    "EffectDescriptor",
+    "Environment",
+    "Estimator",
+    "EstimatorDescriptor",
+    "FloatArray",
+    "FluidBackedShell",
+    "FoamPad",
+    "ForceRamp",
+    "Indenter",
+    "LabelTarget",
+    "MissingRecordingError",
+    "NotApplicable",
+    "Nuisances",
+    "PhysicalRange",
+    "Placement",
+    "PlanEntry",
+    "PlannedScene",
+    "Published",
+    "Quality",
+    "Quantity",
+    "Rig",
+    "RigContext",
+    "RigDescriptor",
+    "RigError",
+    "Scalar",
+    "Scene",
+    "SensorDescriptor",
+    "SensorSpec",
+    "Shelf",
+    "SkinGrid",
+    "SkinSheet",
+    "SkinState",
+    "Source",
+    "StreamSpec",
+    "TactbenchError",
+    "TaskDescriptor",
+    "TaskSpec",
+    "Transducer",
+    "TransducerFactory",
+    "UsageError",
+    "assumed",
+    "derived",
+    "hookimpl",
+    "load_object",
+    "load_registry",
+    "measured",
+    "sourced",
+]

@@ -1,0 +1,1 @@
+"""Rigs: the simulated twin, replayed recordings."""

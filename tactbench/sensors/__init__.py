@@ -1,0 +1,1 @@
+"""Tactile sensors: one room each."""

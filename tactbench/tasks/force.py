@@ -1,0 +1,53 @@
+"""Normal force from taxels, pressed on a flat surface (Karl et al. 2016, section III-A)."""
+
+from __future__ import annotations
+
+from tactbench.plugin import (
+    ChannelTarget,
+    Indenter,
+    PlannedScene,
+    Published,
+    Scene,
+    TaskDescriptor,
+    TaskSpec,
+    hookimpl,
+)
+
+TACTBENCH_API = 1
+
+_PAPER = "Karl et al. 2016, section III-A"
+
+# Three recordings "to acquire three distinct data sets for training, validation and testing". Each is its own
+# session; the sensor stays on while they follow each other, a minute of recording and a minute of handling apart.
+SCENES = tuple(
+    PlannedScene(
+        role=role,
+        scene=Scene(name=f"flat-{role}", indenter=Indenter(), session=role, starts_after_s=120.0 * order),
+    )
+    for order, role in enumerate(("train", "validation", "test"))
+)
+
+SPEC = TaskSpec(
+    name="force",
+    title="Normal force",
+    question="How large is the normal force?",
+    kind="regression",
+    target=ChannelTarget(kind="force", unit="N"),
+    metric="rmse",
+    unit="N",
+    scenes=SCENES,
+    protocols=("karl2016", "deployable"),
+    splits=("roles", "session", "in-session", "shuffled"),
+    estimators=("lasso",),
+    baselines=("mean", "time-index"),
+    published={
+        "biotac": Published(score=0.7307, protocol="karl2016", estimator="lasso", reference=_PAPER),
+        "icub": Published(score=0.7659, protocol="karl2016", estimator="lasso", reference=_PAPER),
+    },
+)
+
+
+@hookimpl
+def tactbench_tasks() -> list[TaskDescriptor]:
+    """Offer the task."""
+    return [TaskDescriptor(spec=SPEC)]

@@ -1,0 +1,26 @@
+"""Will the grasped object slip when it is lifted? From one static reading before the lift."""
+
+from __future__ import annotations
+
+from tactbench.plugin import LabelTarget, TaskDescriptor, TaskSpec, hookimpl
+
+TACTBENCH_API = 1
+
+SPEC = TaskSpec(
+    name="grasp-stability",
+    title="Grasp stability",
+    question="Will the object slip when it is lifted?",
+    kind="classification",
+    target=LabelTarget(name="slipped"),
+    metric="accuracy",
+    protocols=("deployable",),
+    splits=("object", "session", "roles", "shuffled"),
+    estimators=("forest",),
+    baselines=("majority", "chance"),
+)
+
+
+@hookimpl
+def tactbench_tasks() -> list[TaskDescriptor]:
+    """Offer the task."""
+    return [TaskDescriptor(spec=SPEC)]
