@@ -1,0 +1,135 @@
+"""YAML files checked against a model: every complaint names the file and the line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from tactbench.core.errors import ConfigError, nearest
+
+M = TypeVar("M", bound=BaseModel)
+Path_ = tuple[str | int, ...]
+
+
+def load_yaml(path: Path, model: type[M]) -> M:
+    """Read `path` and return it as a `model`.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, is not YAML, repeats a key, has an unknown or mistyped key (the nearest known one is
+        offered), or a value that `model` refuses. The message starts with ``file:line``.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(
+            str(path), None, f"cannot be read: {error.strerror}.", hint="Check the path and its permissions."
+        ) from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(str(path), None, "is not UTF-8 text.", hint="Save it as UTF-8.") from error
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        problem = getattr(error, "problem", None) or "is not YAML"
+        raise ConfigError(
+            str(path), mark.line + 1 if mark else None, f"{problem}.", hint="Check the syntax."
+        ) from error
+    if node is None:
+        raise ConfigError(str(path), None, "is empty.", hint="See docs/ for an example.")
+    lines: dict[Path_, int] = {}
+    data = _construct(node, (), lines, str(path))
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise _explain(error, str(path), lines, data, model) from error
+
+
+def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -> Any:
+    """Build plain data from `node`, remembering the line of every key and item."""
+    lines.setdefault(at, node.start_mark.line + 1)
+    if isinstance(node, yaml.MappingNode):
+        built: dict[str | int, Any] = {}
+        for key_node, value_node in node.value:
+            key = yaml.SafeLoader("").construct_object(key_node)  # type: ignore[no-untyped-call]
+            line = key_node.start_mark.line + 1
+            if not isinstance(key, str | int | float | bool):
+                raise ConfigError(file, line, "a key must be a word or a number.", hint="Quote it.")
+            if key in built:
+                raise ConfigError(file, line, f"the key {key!r} stands here twice.", hint="Remove one of them.")
+            lines[(*at, key)] = line
+            built[key] = _construct(value_node, (*at, key), lines, file)
+        return built
+    if isinstance(node, yaml.SequenceNode):
+        return [_construct(item, (*at, place), lines, file) for place, item in enumerate(node.value)]
+    try:
+        return yaml.SafeLoader("").construct_object(node)  # type: ignore[no-untyped-call]
+    except (yaml.YAMLError, ValueError) as error:
+        raise ConfigError(
+            file, node.start_mark.line + 1, f"{getattr(node, 'value', '')!r} cannot be read as a plain value.",
+            hint="Only plain YAML is read: no tags that build objects.",
+        ) from error  # fmt: skip
+
+
+def _explain(
+    error: ValidationError, file: str, lines: dict[Path_, int], data: Any, model: type[BaseModel]
+) -> ConfigError:
+    """Turn the first complaint of pydantic into one sentence with a line."""
+    first = error.errors(include_url=False)[0]
+    loc = tuple(first["loc"])
+    at, line = _deepest(loc, lines)
+    name = ".".join(str(part) for part in at) or "the file"
+    if first["type"] == "extra_forbidden":
+        known = _siblings(error, loc, model)
+        close = nearest(str(loc[-1]), known)
+        meant = f"Did you mean {' or '.join(repr(word) for word in close)}? " if close else ""
+        listing = f"Known here: {', '.join(sorted(known))}." if known else ""
+        return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=f"{meant}{listing}".strip())
+    if first["type"] == "missing":
+        return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add it.")
+    given = first.get("input")
+    shown = f" (given: {given!r})" if isinstance(given, str | int | float | bool) else ""
+    message = first["msg"].removeprefix("Value error, ")
+    return ConfigError(file, line, f"{name}: {message}{shown}.", hint="Correct the value.")
+
+
+def _deepest(loc: Path_, lines: dict[Path_, int]) -> tuple[Path_, int | None]:
+    """Return the longest path in the file that `loc` walks; pydantic adds names of union members in between."""
+    at: Path_ = ()
+    for part in loc:
+        if (*at, part) in lines:
+            at = (*at, part)
+    return at, lines.get(at)
+
+
+def _siblings(error: ValidationError, loc: Path_, model: type[BaseModel]) -> set[str]:
+    """Return the keys that the model of the unknown key's parent knows."""
+    current: Any = model
+    for part in loc[:-1]:
+        current = _step(current, part)
+        if current is None:
+            return set()
+    fields = getattr(current, "model_fields", {})
+    return {field.alias or name for name, field in fields.items()}
+
+
+def _step(current: Any, part: str | int) -> Any:
+    """Return the model found under `part`, looking through unions, lists and dicts."""
+    fields = getattr(current, "model_fields", None)
+    if fields is not None:
+        by_alias = {field.alias or name: field for name, field in fields.items()}
+        return by_alias[str(part)].annotation if str(part) in by_alias else current
+    arguments = [argument for argument in getattr(current, "__args__", ()) if argument is not type(None)]
+    models = [argument for argument in arguments if hasattr(argument, "model_fields")]
+    if isinstance(part, str) and len(models) > 1:
+        for candidate in models:
+            tags = [field.default for field in candidate.model_fields.values()]
+            if part in tags or part == candidate.__name__:
+                return candidate
+    if arguments:
+        return _step(arguments[-1], part) if not models else models[0]
+    return None
