@@ -20,8 +20,8 @@ def load_yaml(path: Path, model: type[M]) -> M:
     Raises
     ------
     ConfigError
-        If the file cannot be read, is not YAML, repeats a key, has an unknown or mistyped key (the nearest known one is
-        offered), or a value that `model` refuses. The message starts with ``file:line``.
+        If the file cannot be read, is not YAML, repeats a key, has an unknown or mistyped key (the nearest known one
+        is offered), or a value that `model` refuses. The message starts with ``file:line``.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -52,12 +52,16 @@ def load_yaml(path: Path, model: type[M]) -> M:
 def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -> Any:
     """Build plain data from `node`, remembering the line of every key and item."""
     lines.setdefault(at, node.start_mark.line + 1)
+    if not node.tag.startswith("tag:yaml.org,2002:") or "python" in node.tag:
+        raise ConfigError(
+            file, node.start_mark.line + 1, f"the tag {node.tag!r} is refused.", hint="Only plain YAML is read."
+        )
     if isinstance(node, yaml.MappingNode):
         built: dict[str | int, Any] = {}
         for key_node, value_node in node.value:
-            key = yaml.SafeLoader("").construct_object(key_node)  # type: ignore[no-untyped-call]
+            key = yaml.SafeLoader("").construct_object(key_node)
             line = key_node.start_mark.line + 1
-            if not isinstance(key, str | int | float | bool):
+            if not isinstance(key, str | int):
                 raise ConfigError(file, line, "a key must be a word or a number.", hint="Quote it.")
             if key in built:
                 raise ConfigError(file, line, f"the key {key!r} stands here twice.", hint="Remove one of them.")
@@ -67,7 +71,7 @@ def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -
     if isinstance(node, yaml.SequenceNode):
         return [_construct(item, (*at, place), lines, file) for place, item in enumerate(node.value)]
     try:
-        return yaml.SafeLoader("").construct_object(node)  # type: ignore[no-untyped-call]
+        return yaml.SafeLoader("").construct_object(node)
     except (yaml.YAMLError, ValueError) as error:
         raise ConfigError(
             file, node.start_mark.line + 1, f"{getattr(node, 'value', '')!r} cannot be read as a plain value.",
@@ -79,7 +83,9 @@ def _explain(
     error: ValidationError, file: str, lines: dict[Path_, int], data: Any, model: type[BaseModel]
 ) -> ConfigError:
     """Turn the first complaint of pydantic into one sentence with a line."""
-    first = error.errors(include_url=False)[0]
+    complaints = error.errors(include_url=False)
+    # A misspelt key is both unknown and missing: the unknown one is what the writer sees on the page.
+    first = next((one for one in complaints if one["type"] == "extra_forbidden"), complaints[0])
     loc = tuple(first["loc"])
     at, line = _deepest(loc, lines)
     name = ".".join(str(part) for part in at) or "the file"
