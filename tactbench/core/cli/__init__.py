@@ -1,5 +1,104 @@
-"""The command line: one verb per file."""
+"""The command line: one verb per file, each imported only when it is called."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import Any
+
+import click
+
+import tactbench
+
+# verb -> (module in this folder, one line of help). The help stands here so that `--help` imports no verb.
+VERBS = {
+    "run": ("run", "Acquire, evaluate, rank: the whole of benchmarks.yaml, or what the options select."),
+    "list": ("listing", "List sensors, rigs, tasks, estimators and effects."),
+    "plugins": ("plugins", "List plugins, and why one could not be used."),
+    "show": ("show", "Show sensors side by side, or a task, rig or estimator."),
+    "record": ("record", "Carry out one scene into one recording."),
+    "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
+    "import": ("import_", "Turn foreign tables into recordings, as a mapping file says."),
+    "leaderboard": ("leaderboard", "Show the last run's table again, in any format."),
+}
 
 
-def main() -> None:
-    """Run the command line."""
+class LazyGroup(click.Group):
+    """A group that knows its verbs by name and imports one when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order in which they are used."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import the verb."""
+        if cmd_name not in VERBS:
+            return None
+        module = importlib.import_module(f"tactbench.core.cli.{VERBS[cmd_name][0]}")
+        command: click.Command = module.command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Offer the nearest verb for a misspelt one."""
+        if args and args[0] not in VERBS and not args[0].startswith("-"):
+            from tactbench.core.errors import UnknownNameError
+
+            raise UnknownNameError("command", args[0], VERBS)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of verbs without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in VERBS.items()])
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(tactbench.__version__, prog_name="tactbench")
+def cli() -> None:
+    """Benchmark tactile sensors, and show what each score costs in time.
+
+    Start with:  tactbench run --sensor biotac --task curvature
+    """
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit: 0 every cell done, 1 some cell failed, 2 usage, 130 interrupted."""
+    sys.exit(_exit_code(arguments))
+
+
+def _exit_code(arguments: list[str] | None) -> int:
+    try:
+        code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
+    except click.exceptions.Abort:
+        return _interrupted()
+    except KeyboardInterrupt:
+        return _interrupted()
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except BrokenPipeError:
+        # The reader of our output went away (`| head`): nothing to tell anybody.
+        sys.stderr.close()
+        return 1
+    except Exception as error:
+        return _tell(error)
+    return int(code) if isinstance(code, int) else 0
+
+
+def _interrupted() -> int:
+    click.echo("Interrupted. What was finished is kept; the same command goes on from there.", err=True)
+    return 130
+
+
+def _tell(error: Exception) -> int:
+    from tactbench.core.errors import TactbenchError
+
+    if not isinstance(error, TactbenchError):
+        raise error
+    click.secho("Error: ", fg="red", bold=True, nl=False, err=True)
+    click.echo(error.message, err=True)
+    if error.hint:
+        click.echo(f"  {error.hint}", err=True)
+    return error.exit_code

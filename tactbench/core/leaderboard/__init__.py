@@ -1,1 +1,1 @@
-"""The leaderboard floor."""
+"""The leaderboard: one table object, and the ways to show it."""

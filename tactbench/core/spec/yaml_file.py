@@ -119,7 +119,8 @@ def _siblings(error: ValidationError, loc: Path_, model: type[BaseModel]) -> set
         current = _step(current, part)
         if current is None:
             return set()
-    fields = getattr(current, "model_fields", {})
+    inside = [argument for argument in getattr(current, "__args__", ()) if hasattr(argument, "model_fields")]
+    fields = getattr(inside[0] if len(inside) == 1 else current, "model_fields", {})
     return {field.alias or name for name, field in fields.items()}
 
 

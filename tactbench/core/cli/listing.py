@@ -1,0 +1,37 @@
+"""``tactbench list``: what there is to choose from."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+FAMILIES = ("sensors", "rigs", "tasks", "estimators", "effects")
+
+
+@click.command(name="list")
+@click.argument("family", type=click.Choice(FAMILIES), required=False)
+@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
+def command(family: str | None, shape: str) -> None:
+    """List sensors, rigs, tasks, estimators and effects."""
+    from tactbench.core.plugins.registry import load_registry
+
+    registry = load_registry()
+    families = (family,) if family else FAMILIES
+    found = {
+        name: {
+            descriptor.name: getattr(descriptor, "title", None) or descriptor.spec.title
+            for descriptor in registry.shelves()[name]
+        }
+        for name in families
+    }
+    if shape == "json":
+        click.echo(json.dumps(found, indent=1, ensure_ascii=False))
+        return
+    for name, entries in found.items():
+        click.secho(name, bold=True)
+        width = max((len(entry) for entry in entries), default=0)
+        for entry, title in entries.items():
+            click.echo(f"  {entry:<{width}}  {title}")
+    if registry.failures or registry.refused:
+        click.echo("Some plugins could not be used: see `tactbench plugins`.", err=True)

@@ -1,0 +1,131 @@
+"""``tactbench run``: acquire, evaluate, rank."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from tactbench.core.matrix.run import Outcome
+    from tactbench.core.spec.matrix import MatrixSpec
+
+FORMATS = ("table", "json", "md", "latex", "csv")
+
+
+@click.command(name="run")
+@click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor to test; may be repeated.")
+@click.option("--task", "tasks", multiple=True, metavar="NAME", help="Question to ask; may be repeated.")
+@click.option("--rig", metavar="NAME", help="What carries out the scenes: twin (default), replay …")
+@click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings for --rig replay.")
+@click.option("--protocol", metavar="NAME", help="How recordings become X and y; default: the task's first.")
+@click.option("--split", metavar="NAME", help="What is kept apart: roles, session, in-session, object … shuffled.")
+@click.option("--estimator", "estimators", multiple=True, metavar="NAME", help="What answers; may be repeated.")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="A matrix like benchmarks.yaml.")
+@click.option("--repeats", type=click.IntRange(min=1), metavar="N", help="Repeat everything with N seeds.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")
+@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
+              metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
+@click.option("--format", "shape", type=click.Choice(FORMATS), default="table", show_default=True,
+              help="How the leaderboard is printed.")  # fmt: skip
+@click.pass_context
+def command(ctx: click.Context, jobs: int, out: Path, shape: str, recordings: Path | None, **asked: Any) -> None:
+    """Acquire, evaluate, rank.
+
+    Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.
+    """
+    from tactbench.core.cli.screen import progress
+    from tactbench.core.matrix.run import run_matrix
+    from tactbench.core.matrix.store import Store
+
+    matrix = _matrix(**asked, replaying=recordings is not None)
+    folder = recordings or (Path(matrix.recordings) if matrix.recordings else None)
+    store = Store(out)
+    with progress() as told:
+        outcome = run_matrix(matrix, store, jobs=jobs, recordings=folder, progress=told)
+    _print(outcome, shape)
+    _farewell(outcome, store.folder, shape)
+    ctx.exit(1 if outcome.failures else 0)
+
+
+def _matrix(
+    *,
+    sensors: tuple[str, ...],
+    tasks: tuple[str, ...],
+    rig: str | None,
+    protocol: str | None,
+    split: str | None,
+    estimators: tuple[str, ...],
+    config: Path | None,
+    repeats: int | None,
+    seed: int | None,
+    replaying: bool,
+) -> MatrixSpec:
+    """Return the matrix file with the command line's choices laid over it."""
+    from tactbench.core.cli.config import default_matrix
+    from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+    from tactbench.core.spec.yaml_file import load_yaml
+
+    matrix = load_yaml(config, MatrixSpec) if config else default_matrix()
+    change: dict[str, Any] = {}
+    if rig or replaying:
+        change["rig"] = rig or "replay"
+    if sensors:
+        change["sensors"] = tuple(dict.fromkeys(sensors))
+    elif change.get("rig", matrix.rig) != matrix.rig:
+        change["sensors"] = ()  # the file's sensors are those of its own rig
+    if repeats is not None:
+        change["repeats"] = repeats
+    if seed is not None:
+        change["seed"] = seed
+    chosen = list(matrix.tasks)
+    if tasks:
+        known = {choice.name: choice for choice in matrix.tasks}
+        chosen = [known.get(name, TaskChoice(name=name)) for name in dict.fromkeys(tasks)]
+    over: dict[str, Any] = {}
+    if protocol:
+        over["protocol"] = protocol
+    elif change.get("rig", matrix.rig) != matrix.rig:
+        over["protocol"] = "deployable"  # the paper's protocol needs the paper's three roles
+    if split:
+        over["split"] = split
+    if estimators:
+        over["estimators"] = tuple(EstimatorChoice(name=name) for name in dict.fromkeys(estimators))
+    change["tasks"] = tuple(choice.model_copy(update=over) for choice in chosen)
+    return matrix.model_copy(update=change)
+
+
+def _print(outcome: Outcome, shape: str) -> None:
+    from tactbench.core.cli.screen import console
+    from tactbench.core.leaderboard.formats import FORMATS as TEXTS
+
+    if shape == "table":
+        from tactbench.core.leaderboard.terminal import show
+
+        show(outcome.rows, console())
+    else:
+        click.echo(TEXTS[shape](outcome.rows), nl=False)
+
+
+def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:
+    """Write the table's files; say where they are and what to try next."""
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.leaderboard.formats import FORMATS as TEXTS
+    from tactbench.core.matrix.files import replace_file
+
+    for ending in ("md", "csv", "json"):
+        replace_file(folder / f"leaderboard.{ending}", TEXTS[ending](outcome.rows).encode())
+    cells = len(outcome.rows)
+    remark(f"\n{cells - outcome.computed} of {cells} cells were found finished, {outcome.computed} computed now; "
+           f"{outcome.recorded} recordings made now.")  # fmt: skip
+    remark(f"Files: {folder}/leaderboard.md, .csv, .json; scores.json; recordings/; cells/; run.json")
+    for row in outcome.failures:
+        remark(f"Failed: {row['cell']}: {row['reason']}")
+    if shape == "table":
+        sensor, task = outcome.rows[0]["sensor"], outcome.rows[0]["task"]
+        remark("Try next:")
+        remark("  tactbench run                                 the paper's whole matrix")
+        remark(f"  tactbench run --task {task} --protocol deployable   without looking at test-set statistics")
+        remark(f"  tactbench show {sensor:<30}  what the sensor is, and who says so")

@@ -1,0 +1,35 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+
+def score(value: float | None, unit: str) -> str:
+    """Return a score: four decimals for numbers with a unit, three for shares."""
+    if value is None:
+        return "–"
+    return f"{value:.3f}" if unit == "1" else f"{value:.4f}"
+
+
+def interval(low: float | None, high: float | None, unit: str) -> str:
+    """Return an interval in the digits of its score."""
+    return "–" if low is None or high is None else f"{score(low, unit)} … {score(high, unit)}"
+
+
+def duration(seconds: float | None) -> str:
+    """Return a duration with three significant digits and a unit that fits."""
+    if seconds is None:
+        return "–"
+    for factor, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
+        if seconds * factor >= 0.9995:
+            return f"{_three(seconds * factor)} {unit}"
+    return f"{_three(seconds * 1e6)} µs" if seconds > 0 else "0 s"
+
+
+def whole(value: int | None) -> str:
+    """Return a count with thin groups of three."""
+    return "–" if value is None else f"{value:,}".replace(",", " ")
+
+
+def _three(value: float) -> str:
+    digits = 0 if value >= 99.95 else 1 if value >= 9.995 else 2
+    return f"{value:.{digits}f}"

@@ -1,0 +1,169 @@
+"""One cell to one row, whatever happens in it."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import NotApplicable, TactbenchError
+from tactbench.core.evaluation.cell import CellResult, evaluate
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.store import Row
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.task import TaskSpec
+
+Answer = tuple[Row, Mapping[str, Any]]
+"""A row, and the arrays that go into its shard."""
+
+
+def answer(
+    cell: Cell,
+    registry: Registry,
+    recordings: Sequence[Path],
+    dataset: Callable[[TaskSpec, tuple[Path, ...]], Dataset],
+    working: Callable[[str], None] | None = None,
+) -> Answer:
+    """Evaluate one cell; an exception becomes a row that says ``failed`` or ``skipped``."""
+    task = registry.tasks[cell.task].spec
+    row = opening(cell, task)
+    try:
+        material = dataset(task, tuple(recordings))
+        result = evaluate(
+            task,
+            registry.estimators[cell.estimator],
+            dict(cell.params),
+            cell.protocol,
+            cell.split,
+            recordings,
+            seed=cell.seed,
+            clock=time.perf_counter,
+            threads=1,
+            progress=working,
+            dataset=material,
+        )
+    except NotApplicable as reason:
+        return {**row, "status": "skipped", "reason": str(reason)}, {}
+    except Exception as error:
+        return failed(row, error), {}
+    metas = [material.metas[place] for place in range(len(material.metas))]
+    row.update(_told_by(metas))
+    row.update(_scored(result))
+    row["status"] = "done"
+    arrays = {
+        "y_true": result.y_true,
+        "y_pred": result.y_pred,
+        "recording": result.recording,
+        "row": result.row,
+        "fold": result.fold,
+    }
+    return row, arrays
+
+
+def opening(cell: Cell, task: TaskSpec) -> Row:
+    """Return a row with what is known before anything is computed; every key of the format is there."""
+    published = task.published.get(cell.sensor)
+    beside = published and (published.protocol, published.estimator) == (cell.protocol, cell.estimator)
+    return {
+        "cell": cell.name,
+        "sensor": cell.sensor,
+        "task": cell.task,
+        "rig": cell.rig,
+        "protocol": cell.protocol,
+        "split": cell.split,
+        "estimator": cell.estimator,
+        "params": dict(cell.params),
+        "is_baseline": cell.baseline,
+        "repeat": cell.repeat,
+        "repeats": cell.repeats,
+        "seed": cell.seed,
+        "status": "planned",
+        "reason": "",
+        "metric": task.metric,
+        "unit": task.unit,
+        "score": None,
+        "ci_low": None,
+        "ci_high": None,
+        "ci_method": "",
+        "baseline": None,
+        "published": published.score if published and beside else None,
+        "published_reference": published.reference if published and beside else "",
+        "n_recordings": None,
+        "n_sessions": None,
+        "n_train": None,
+        "n_test": None,
+        "sim_s": None,
+        "search_s": None,
+        "fit_s": None,
+        "predict_s": None,
+        "batch_rows": None,
+        "latency_ms_p50": None,
+        "latency_ms_p95": None,
+        "latency_n": None,
+        "threads": None,
+        "peak_rss_mb": None,
+        "simulated": False,
+        "dagger": False,
+        "stamps": [],
+        "remarks": [],
+        "assumptions": {},
+        "plan": [],
+        "counts": {},
+        "chosen": {},
+        "scores": {},
+        "confusion": None,
+        "classes": [],
+    }
+
+
+def failed(row: Row, error: BaseException) -> Row:
+    """Return `row` saying how the cell failed."""
+    said = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    return {**row, "status": "failed", "reason": said, "traceback": "".join(traceback.format_exception(error))}
+
+
+def _told_by(metas: Sequence[RecordingMeta]) -> Row:
+    """Return what the recordings say that a reader of the row must know."""
+    seconds = [float(meta.provenance["sim_s"]) for meta in metas if "sim_s" in meta.provenance]
+    first = metas[0] if metas else None
+    return {
+        "simulated": any(meta.simulated for meta in metas),
+        "sim_s": sum(seconds) if seconds else None,
+        "assumptions": dict(first.assumptions) if first else {},
+        "plan": [entry.model_dump() for entry in first.plan] if first else [],
+        "remarks": sorted({remark for meta in metas for remark in meta.remarks}),
+    }
+
+
+def _scored(result: CellResult) -> Row:
+    return {
+        "split": result.split,
+        "score": result.score,
+        "ci_low": result.ci_low,
+        "ci_high": result.ci_high,
+        "ci_method": result.ci_method,
+        "n_recordings": result.n_recordings,
+        "n_sessions": result.n_sessions,
+        "n_train": result.n_train,
+        "n_test": result.n_test,
+        "search_s": result.search_s,
+        "fit_s": result.fit_s,
+        "predict_s": result.predict_s,
+        "batch_rows": result.batch_rows,
+        "latency_ms_p50": result.latency_ms_p50,
+        "latency_ms_p95": result.latency_ms_p95,
+        "latency_n": result.latency_n,
+        "threads": result.threads,
+        "peak_rss_mb": result.peak_rss_mb,
+        "dagger": result.dagger,
+        "stamps": list(result.stamps),
+        "counts": dict(result.counts),
+        "chosen": dict(result.chosen),
+        "scores": dict(result.scores),
+        "confusion": None if result.confusion is None else result.confusion.tolist(),
+        "classes": list(result.classes),
+    }

@@ -1,0 +1,141 @@
+"""Carrying out orders and cells, here or in worker processes; the results do not depend on which."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from functools import lru_cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from tactbench.core.acquisition import acquire
+from tactbench.core.errors import NotApplicable, RigError
+from tactbench.core.evaluation.dataset import Dataset, load_dataset
+from tactbench.core.matrix.answer import Answer, answer, failed, opening
+from tactbench.core.matrix.material import Order
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.plugins.interfaces import Rig, RigContext, Shelf
+from tactbench.core.plugins.registry import Registry, load_object, load_registry
+from tactbench.core.spec.task import TaskSpec
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class Workers(Protocol):
+    """Where work is done."""
+
+    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
+        """Yield every item with its result, or with the exception that stopped it, as they come."""
+
+
+class InProcess:
+    """One after the other, here."""
+
+    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
+        """Yield every item with its result or its exception."""
+        for item in items:
+            try:
+                yield item, work(item)
+            except Exception as error:
+                yield item, error
+
+
+class Processes:
+    """Several at once, each in a process of its own that is reused."""
+
+    def __init__(self, pool: ProcessPoolExecutor) -> None:
+        self._pool = pool
+
+    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
+        """Yield every item with its result or its exception, in the order in which they end."""
+        futures: dict[Future[R], T] = {self._pool.submit(work, item): item for item in items}
+        for future in as_completed(futures):
+            error = future.exception()
+            yield futures[future], error if error is not None else future.result()
+
+
+@contextmanager
+def workers(jobs: int) -> Iterator[Workers]:
+    """Open `jobs` workers: this process for one, a pool of fresh interpreters for more."""
+    if jobs == 1:
+        yield InProcess()
+        return
+    # Fresh interpreters: a fork would copy the parent's thread pools in an undefined state.
+    pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent)
+    try:
+        yield Processes(pool)
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in list((pool._processes or {}).values()):
+            process.terminate()
+        raise
+    pool.shutdown()
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@lru_cache(maxsize=1)
+def installed() -> Registry:
+    """Return the registry of this process."""
+    return load_registry()
+
+
+def rig_of(name: str, registry: Registry, recordings: Path | None = None) -> Rig | Shelf:
+    """Build the rig called `name`."""
+    descriptor = registry.rigs[name]
+    built = load_object(descriptor.where)(RigContext(effects=tuple(registry.effects), recordings=recordings))
+    if not (hasattr(built, "open") or hasattr(built, "recordings")):
+        raise RigError(
+            f"The rig {name!r} has neither open() nor recordings().", hint="See docs/plugins.md: a Rig or a Shelf."
+        )
+    return built  # type: ignore[no-any-return]
+
+
+@lru_cache(maxsize=4)
+def _rig(name: str) -> Rig:
+    return rig_of(name, installed())  # type: ignore[return-value]
+
+
+def record(order: Order) -> Path:
+    """Make one recording. Raises whatever the rig raises."""
+    registry = installed()
+    acquire(
+        _rig(order.rig),
+        registry.sensors[order.sensor],
+        registry.rigs[order.rig],
+        order.scene,
+        role=order.role,
+        seed=order.seed,
+        path=order.path,
+        clock=time.perf_counter,
+        provenance={},
+    )
+    return order.path
+
+
+@lru_cache(maxsize=2)
+def _dataset(task: TaskSpec, recordings: tuple[Path, ...]) -> Dataset:
+    return load_dataset(task, recordings)
+
+
+Job = tuple[Cell, tuple[Path, ...], "BaseException | None"]
+"""A cell, its recordings, and why there are none if the rig could not make them."""
+
+
+def solve(job: Job, working: Callable[[str], None] | None = None) -> Answer:
+    """Answer one cell. Never raises for what a plugin or a recording does."""
+    cell, recordings, trouble = job
+    registry = installed()
+    if trouble is not None:
+        row = opening(cell, registry.tasks[cell.task].spec)
+        if isinstance(trouble, NotApplicable):
+            return {**row, "status": "skipped", "reason": str(trouble)}, {}
+        return failed(row, trouble), {}
+    return answer(cell, registry, recordings, _dataset, working)

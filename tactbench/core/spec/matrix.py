@@ -1,0 +1,48 @@
+"""What ``benchmarks.yaml`` says: which tasks are asked of which sensors, and how."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from tactbench.core.spec.quantity import Frozen
+
+
+def _by_name(given: Any) -> Any:
+    """Read a bare word as ``{name: word}``."""
+    return {"name": given} if isinstance(given, str) else given
+
+
+class EstimatorChoice(Frozen):
+    """An estimator, with parameters other than its defaults."""
+
+    name: str
+    params: dict[str, bool | int | float | str | None] = Field(default_factory=dict)
+
+
+class TaskChoice(Frozen):
+    """A task, and how it is to be answered."""
+
+    name: str
+    protocol: str | None = None
+    """None: the task's first."""
+    split: str | None = None
+    """None: the first of the task's splits that the recordings can serve."""
+    estimators: tuple[Annotated[EstimatorChoice, BeforeValidator(_by_name)], ...] = ()
+    """Empty: the task's own. Its baselines are always run."""
+
+
+class MatrixSpec(Frozen):
+    """The matrix: every sensor with every task."""
+
+    version: Literal[1] = 1
+    seed: int = Field(default=1, ge=0)
+    repeats: int = Field(default=1, ge=1)
+    """How often everything is repeated, each time with another seed."""
+    rig: str = "twin"
+    recordings: str | None = None
+    """Folder of recordings for rigs that replay; relative to the file."""
+    sensors: tuple[str, ...] = ()
+    """Empty: all that the rig's recordings hold."""
+    tasks: tuple[Annotated[TaskChoice, BeforeValidator(_by_name)], ...] = Field(min_length=1)
