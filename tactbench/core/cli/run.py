@@ -31,7 +31,7 @@ FORMATS = ("table", "json", "md", "latex", "csv")
 @click.option("--format", "shape", type=click.Choice(FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, jobs: int, out: Path, shape: str, recordings: Path | None, **asked: Any) -> None:
+def command(ctx: click.Context, /, jobs: int, out: Path, shape: str, recordings: Path | None, **asked: Any) -> None:
     """Acquire, evaluate, rank.
 
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.matrix.execution import Job, Workers, installed, record, rig_of, solve, workers
@@ -17,6 +17,7 @@ from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.provenance import gather
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import MatrixSpec
 
@@ -104,7 +105,7 @@ def _material(
 ) -> tuple[list[Cell], _Material]:
     rig = rig_of(matrix.rig, registry, recordings)
     if hasattr(rig, "recordings"):
-        found = on_the_shelf(rig)
+        found = on_the_shelf(cast(Shelf, rig))
         cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
         shelf = {
             (cell.sensor, cell.task, cell.seed): serving(registry.tasks[cell.task].spec, found[cell.sensor])

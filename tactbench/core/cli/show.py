@@ -1,0 +1,87 @@
+"""``tactbench show``: specs side by side."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from tactbench.core.leaderboard.datasheet import Comparison
+    from tactbench.core.plugins.registry import Registry
+    from tactbench.core.spec.sensor import SensorSpec
+
+
+@click.command(name="show")
+@click.argument("names", nargs=-1, required=True)
+@click.option("--all", "everything", is_flag=True, help="Every parameter, and who states it.")
+@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
+def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
+    """Show sensors side by side (the paper's Table I), or a task, rig or estimator."""
+    from tactbench.core.errors import UnknownNameError
+    from tactbench.core.plugins.registry import load_registry
+
+    registry = load_registry()
+    if all(name in registry.sensors for name in names):
+        _sensors([registry.sensors[name].spec for name in names], everything, shape)
+        return
+    shelves = [shelf for shelf in registry.shelves().values() for name in names if name in shelf]
+    for name in names:
+        if not any(name in shelf for shelf in shelves):
+            known = [known for shelf in registry.shelves().values() for known in shelf.names()]
+            raise UnknownNameError("sensor, rig, task, estimator or effect", name, known)
+    for name in names:
+        _one(name, registry)
+
+
+def _one(name: str, registry: Registry) -> None:
+    for shelf in registry.shelves().values():
+        if name in shelf:
+            owned = shelf.owned(name)
+            shown = {
+                "brought by": f"{owned.distribution} {owned.version} ({owned.module})",
+                **owned.descriptor.model_dump(mode="json"),
+            }
+            click.echo(json.dumps(shown, indent=1, ensure_ascii=False))
+
+
+def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
+    from tactbench.core.leaderboard.datasheet import details, table_one
+
+    if shape == "json":
+        click.echo(json.dumps([sensor.model_dump(mode="json") for sensor in sensors], indent=1, ensure_ascii=False))
+        return
+    rows = table_one(sensors)
+    _grid("Sensor comparison (Table I of Karl et al. 2016)", sensors, rows, with_source=everything)
+    more = details(sensors)
+    if everything:
+        _grid("Everything the specs state", sensors, more, with_source=True)
+    else:
+        _grid("Readings", sensors, more[:5], with_source=False)
+        tags = [fact.tag for row in more + rows for fact in row.facts if fact.tag]
+        counted = ", ".join(f"{tags.count(tag)} {tag}" for tag in ("sourced", "measured", "derived", "assumed"))
+        click.echo(f"Facts behind these sensors: {counted}. See them all with --all.")
+
+
+def _grid(title: str, sensors: list[SensorSpec], rows: list[Comparison], *, with_source: bool) -> None:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from tactbench.core.cli.screen import console
+
+    grid = Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+    grid.add_column("")
+    for sensor in sensors:
+        grid.add_column(Text(sensor.title), overflow="fold")
+        if with_source:
+            grid.add_column("source", style="dim", overflow="fold")
+    for row in rows:
+        cells = []
+        for fact in row.facts:
+            cells.append(Text(fact.text))
+            if with_source:
+                cells.append(Text(f"{fact.tag}: {fact.reference}" if fact.tag else ""))
+        grid.add_row(Text(row.title), *cells)
+    console().print(grid)

@@ -1,0 +1,151 @@
+"""Sensors side by side: the rows of the paper's Table I, then what else is known, and who says so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from tactbench.core.spec.quantity import Quantity, Source
+from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, SensorSpec
+
+ABSENT = "-"
+
+# Rows of Table I of Karl et al. 2016: title, kind of channel, and whether its range or its band is meant.
+_TABLE_ONE: tuple[tuple[str, ChannelKind, str], ...] = (
+    ("DC Pressure Range", "dc_pressure", "measures"),
+    ("DC Temp. Range", "dc_temperature", "measures"),
+    ("AC Pressure spectrum", "ac_pressure", "band"),
+    ("AC Temp. spectrum", "ac_temperature", "band"),
+)
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One cell of the comparison."""
+
+    text: str
+    tag: str = ""
+    reference: str = ""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A titled row: one fact a sensor."""
+
+    title: str
+    facts: tuple[Fact, ...]
+
+
+def table_one(sensors: Sequence[SensorSpec]) -> list[Comparison]:
+    """Return the paper's Table I for any sensors."""
+    rows = [
+        _row("# taxels", sensors, lambda sensor: _text(str(len(sensor.channels("taxel"))))),
+        _row("measurement principle", sensors, lambda s: Fact(s.principle, s.principle_source.tag,
+                                                              s.principle_source.reference)),
+    ]  # fmt: skip
+    rows += [
+        Comparison(title, tuple(_range(sensor, kind, which) for sensor in sensors))
+        for title, kind, which in _TABLE_ONE
+    ]
+    return rows
+
+
+def details(sensors: Sequence[SensorSpec]) -> list[Comparison]:
+    """Return what else the specs say: clocks, converters, rest levels, skin, parameters, noise."""
+    rows = [
+        _row("streams", sensors, _streams),
+        _row("taxel reading", sensors, _reading),
+        _row("taxel at rest", sensors, _rest),
+        _row("under load", sensors, _sign),
+        _row("positions", sensors, _positions),
+    ]
+    tables = [_quantities(sensor) for sensor in sensors]
+    titles = dict.fromkeys(title for table in tables for title in table)
+    rows += [
+        Comparison(title, tuple(_quantity(table[title]) if title in table else Fact(ABSENT) for table in tables))
+        for title in titles
+    ]
+    return rows
+
+
+def _row(title: str, sensors: Sequence[SensorSpec], look: Callable[[SensorSpec], Fact]) -> Comparison:
+    return Comparison(title, tuple(look(sensor) for sensor in sensors))
+
+
+def _text(text: str) -> Fact:
+    return Fact(text)
+
+
+def _sourced(text: str, source: Source | None) -> Fact:
+    return Fact(text, source.tag, source.reference) if source else Fact(text)
+
+
+def _range(sensor: SensorSpec, kind: ChannelKind, which: str) -> Fact:
+    for channel in sensor.channels(kind):
+        found = getattr(channel, which)
+        if found is not None:
+            return _sourced(str(found), found.source)
+    return Fact(ABSENT)
+
+
+def _streams(sensor: SensorSpec) -> Fact:
+    parts = []
+    for stream in sensor.streams:
+        rate = f"{stream.rate_hz:g} Hz" if stream.rate_hz else "rate not stated"
+        parts.append(f"{stream.name}: {len(stream.channels)} ch., {rate}")
+    return _sourced("; ".join(parts), sensor.streams[0].rate_source)
+
+
+def _reading(sensor: SensorSpec) -> Fact:
+    taxels = sensor.channels("taxel")
+    if not taxels:
+        return Fact(ABSENT)
+    first = taxels[0]
+    if first.lower is None or first.upper is None:
+        return Fact(first.unit)
+    return Fact(f"{first.lower:g}–{first.upper:g} {first.unit}")
+
+
+def _rest(sensor: SensorSpec) -> Fact:
+    rests = [channel.rest for channel in sensor.channels("taxel") if channel.rest is not None]
+    if not rests:
+        return Fact(ABSENT)
+    values = [rest.value for rest in rests]
+    low, high = min(values), max(values)
+    text = f"{low:g} {rests[0].unit}" if low == high else f"{low:.4g}–{high:.4g} {rests[0].unit}"
+    return _sourced(text, rests[0].source)
+
+
+def _sign(sensor: SensorSpec) -> Fact:
+    words = {1: "rises", -1: "falls", 0: "rises or falls"}
+    return Fact(", ".join(dict.fromkeys(words[channel.sign] for channel in sensor.channels("taxel"))) or ABSENT)
+
+
+def _positions(sensor: SensorSpec) -> Fact:
+    placed: list[ChannelSpec] = [channel for channel in sensor.channels("taxel") if channel.position_m]
+    if not placed:
+        return Fact(ABSENT)
+    return _sourced(f"{len(placed)} of {len(sensor.channels('taxel'))} known", placed[0].position_source)
+
+
+def _quantities(sensor: SensorSpec) -> dict[str, Quantity]:
+    found: dict[str, Quantity] = {}
+    if sensor.skin is not None:
+        found.update(_named("skin", sensor.skin))
+    found.update({f"{name.replace('_', ' ')}": quantity for name, quantity in sensor.parameters.items()})
+    for kind, nuisances in sensor.nuisances.items():
+        found.update(_named(f"{kind.replace('_', ' ')} noise", nuisances))
+    return found
+
+
+def _named(prefix: str, model: object) -> Iterable[tuple[str, Quantity]]:
+    for name in getattr(type(model), "model_fields", {}):
+        value = getattr(model, name)
+        if isinstance(value, Quantity):
+            yield f"{prefix}: {name.replace('_', ' ')}", value
+        elif hasattr(type(value), "model_fields"):
+            yield from _named(f"{prefix} {name.replace('_', ' ')}", value)
+
+
+def _quantity(quantity: Quantity) -> Fact:
+    return Fact(str(quantity), quantity.source.tag, quantity.source.reference)

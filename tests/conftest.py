@@ -1,0 +1,53 @@
+"""What many tests need: the real recordings, and strangers' packages on the path of a fresh interpreter."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+THIRD_PARTY = ROOT / "tests" / "third_party"
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real recordings; tests that need it are skipped where it is not."""
+    path = Path(os.environ.get("TACTBENCH_DATA", ROOT.parent / "shared" / "data"))
+    if not (path / "README.md").is_file():
+        pytest.skip("the real recordings are not beside this checkout; set TACTBENCH_DATA to their folder")
+    return path
+
+
+class Shell:
+    """Runs the command line as a person would, in a fresh interpreter."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __call__(
+        self,
+        *arguments: str,
+        plugins: tuple[str, ...] = (),
+        code: int | None = 0,
+        module: str = "tactbench",
+        timeout=120,
+    ) -> subprocess.CompletedProcess[str]:
+        path = os.pathsep.join(str(THIRD_PARTY / name) for name in plugins)
+        env = {**os.environ, "PYTHONPATH": path, "COLUMNS": "200", "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}
+        done = subprocess.run(
+            [sys.executable, "-m", "tactbench", *arguments],
+            cwd=self.folder, env=env, capture_output=True, text=True, timeout=timeout, stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+        if code is not None:
+            assert done.returncode == code, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done
+
+
+@pytest.fixture
+def shell(tmp_path: Path) -> Shell:
+    """The command line, in an empty folder."""
+    return Shell(tmp_path)

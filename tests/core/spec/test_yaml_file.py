@@ -1,0 +1,58 @@
+import contextlib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tactbench.core.errors import ConfigError
+from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.spec.yaml_file import load_yaml
+
+GOOD = "version: 1\nsensors: [biotac]\ntasks:\n  - force\n  - name: curvature\n    estimators: [forest]\n"
+
+
+def load(tmp_path, text):
+    path = tmp_path / "matrix.yaml"
+    path.write_text(text)
+    return load_yaml(path, MatrixSpec)
+
+
+def test_a_good_file_becomes_a_model(tmp_path):
+    matrix = load(tmp_path, GOOD)
+    assert [task.name for task in matrix.tasks] == ["force", "curvature"]
+    assert matrix.tasks[1].estimators[0].name == "forest"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "says"),
+    [
+        (GOOD.replace("sensors", "sensor"), 2, "Did you mean 'sensors'"),
+        (GOOD.replace("    estimators", "    estimatrs"), 6, "Did you mean 'estimators'"),
+        (GOOD + "repeats: many\n", 7, "repeats: Input should be a valid integer"),
+        (GOOD + "repeats: 0\n", 7, "greater than or equal to 1"),
+        (GOOD + "seed: 1\nseed: 2\n", 8, "stands here twice"),
+        ("tasks: [\n", 2, "expected the node content"),
+        ("version: 1\n", 1, "'tasks' is missing"),
+        ("tasks: !!python/object/apply:os.system [ls]\n", 1, "is refused"),
+    ],
+)
+def test_complaints_name_file_and_line(tmp_path, text, line, says):
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path, text)
+    assert str(caught.value).startswith(f"{tmp_path / 'matrix.yaml'}:{line}:")
+    assert says in str(caught.value)
+
+
+def test_a_missing_file_and_an_empty_one_are_config_errors(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_yaml(tmp_path / "none.yaml", MatrixSpec)
+    with pytest.raises(ConfigError, match="is empty"):
+        load(tmp_path, "")
+
+
+@given(st.text(max_size=200))
+def test_any_text_is_a_model_or_a_config_error(tmp_path_factory, text):
+    path = tmp_path_factory.mktemp("yaml") / "any.yaml"
+    path.write_text(text, encoding="utf-8", errors="replace")
+    with contextlib.suppress(ConfigError):
+        assert isinstance(load_yaml(path, MatrixSpec), MatrixSpec)

@@ -1,0 +1,1 @@
+raise RuntimeError("the vendor library is not installed")

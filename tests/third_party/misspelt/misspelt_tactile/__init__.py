@@ -1,0 +1,10 @@
+"""A plugin whose author misspelt the hook."""
+
+from tactbench.plugin import hookimpl
+
+TACTBENCH_API = 1
+
+
+@hookimpl
+def tactbench_sensor():
+    return []
