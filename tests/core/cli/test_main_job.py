@@ -1,0 +1,145 @@
+"""The whole way from scene to leaderboard, as a person runs it; cheap estimators keep it quick."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+FORCE = ("run", "--sensor", "icub", "--task", "force")
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    from tests.conftest import Shell
+
+    shell = Shell(tmp_path_factory.mktemp("run"))
+    done = shell(*FORCE, "--format", "json")
+    return shell, json.loads(done.stdout), done
+
+
+def test_results_on_stdout_progress_on_stderr(ran):
+    _, rows, done = ran
+    assert {row["estimator"] for row in rows} == {"lasso", "mean", "time-index"}
+    assert "recording" in done.stderr
+    assert "evaluating" in done.stderr
+
+
+def test_a_row_says_what_section_six_promises(ran):
+    _, rows, _ = ran
+    keys = ["cell", "sensor", "task", "rig", "protocol", "estimator", "repeats", "status", "reason", "metric", "score", "ci_low", "ci_high", "baseline", "n_recordings", "n_test", "sim_s", "fit_s", "latency_ms_p50", "latency_ms_p95", "peak_rss_mb"]  # fmt: skip
+    for row in rows:
+        assert set(keys) <= set(row)
+        assert row["status"] == "done"
+        assert row["ci_low"] <= row["score"] <= row["ci_high"]
+        assert row["simulated"]
+        assert row["dagger"]
+        assert row["latency_ms_p50"] > 0
+        assert row["sim_s"] > 0
+    (lasso,) = [row for row in rows if row["estimator"] == "lasso"]
+    assert lasso["published"] == 0.7659
+    assert {"placement_scatter_mm", "drift_scale", "noise_scale"} <= set(lasso["assumptions"])
+
+
+def test_the_time_index_sees_the_label_noise_and_lasso_lies_above_it(ran):
+    _, rows, _ = ran
+    score = {row["estimator"]: row["score"] for row in rows}
+    # 4400 test samples: the standard error of an RMSE is 1/sqrt(2 n) = 1.1 %; three of them.
+    assert score["time-index"] == pytest.approx(0.6875, rel=0.033)
+    assert score["time-index"] < score["lasso"] < score["mean"]
+
+
+def test_the_files_of_a_run(ran):
+    shell, rows, _ = ran
+    out = shell.folder / "tactbench-results"
+    assert json.loads((out / "leaderboard.json").read_text()) == rows
+    with (out / "leaderboard.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(rows)
+    assert "time-index (baseline)" in (out / "leaderboard.md").read_text()
+    assert json.loads((out / "run.json").read_text())["distributions"]["numpy"]
+    assert not list(out.rglob("*.partial"))
+
+
+def test_a_second_run_computes_nothing_and_says_the_same(ran):
+    shell, rows, _ = ran
+    again = shell(*FORCE, "--format", "json")
+    assert "3 of 3 cells were found finished, 0 computed now" in again.stderr
+    assert json.loads(again.stdout) == rows
+
+
+def test_the_same_seed_gives_the_same_bytes_serially_and_with_two_jobs(ran):
+    shell, _, _ = ran
+    serial = (shell.folder / "tactbench-results" / "scores.json").read_bytes()
+    shell(*FORCE, "--jobs", "2", "--out", "parallel")
+    assert (shell.folder / "parallel" / "scores.json").read_bytes() == serial
+    shell(*FORCE, "--seed", "2", "--out", "other")
+    assert (shell.folder / "other" / "scores.json").read_bytes() != serial
+
+
+def test_recordings_of_a_run_can_be_replayed_with_the_same_scores(ran):
+    shell, rows, _ = ran
+    replayed = json.loads(
+        shell("run", "--rig", "replay", "--recordings", "tactbench-results/recordings", "--task", "force",
+              "--protocol", "karl2016", "--format", "json", "--out", "replayed").stdout
+    )  # fmt: skip
+    assert [row["score"] for row in replayed] == [row["score"] for row in rows]
+    assert all(row["simulated"] for row in replayed)
+
+
+def test_a_cell_that_fails_is_a_row_and_stops_nobody(ran):
+    shell, _, _ = ran
+    out = shell.folder / "tactbench-results"
+    for path in (out / "recordings" / "icub").glob("flat-test-*.h5"):
+        damaged = path.read_bytes()[:2000]
+        path.unlink()
+        path.write_bytes(damaged)
+    done = shell("run", "--sensor", "icub", "--sensor", "ideal", "--task", "force", "--format", "json", code=1)
+    rows = json.loads(done.stdout)
+    assert {row["status"] for row in rows if row["sensor"] == "icub"} == {"failed"}
+    assert {row["status"] for row in rows if row["sensor"] == "ideal"} == {"done"}
+    assert all("flat-test" in row["reason"] for row in rows if row["sensor"] == "icub")
+
+
+def test_a_strangers_sensor_runs(shell):
+    done = shell("run", "--sensor", "acme-pad", "--task", "force", "--format", "json", plugins=("good", "broken"))
+    rows = json.loads(done.stdout)
+    assert {row["status"] for row in rows} == {"done"}
+    (lasso,) = [row for row in rows if row["estimator"] == "lasso"]
+    assert lasso["score"] < lasso["baseline"]
+
+
+@pytest.mark.parametrize("stage", ["recording", "evaluating"])
+def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path, stage):
+    command = [sys.executable, "-m", "tactbench", "run", "--sensor", "icub", "--task", "curvature", "--estimator",
+               "logistic", "--estimator", "forest"]  # fmt: skip
+    env = {**os.environ, "PYTHONPATH": ""}
+    running = subprocess.Popen(
+        command, cwd=tmp_path, env=env, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    seen = ""
+    for line in running.stderr:
+        seen += line
+        if line.startswith(f"{stage}: ") and "/" in line.partition(": ")[2].split()[0]:
+            break  # one step of the stage is done, the next is under way
+    running.send_signal(signal.SIGINT)
+    out, err = running.communicate(timeout=60)
+    assert running.returncode == 130, seen + err
+    assert "goes on from there" in err
+    assert "Traceback" not in err
+    assert out == ""
+    results = tmp_path / "tactbench-results"
+    assert not list(results.rglob("*.partial"))
+    finished = {path.name: path.read_bytes() for path in results.rglob("*.h5")}
+    assert finished
+    began = time.monotonic()
+    done = subprocess.run([*command[:-2], "--format", "json"], cwd=tmp_path, env=env, capture_output=True, text=True,
+                          timeout=120, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert time.monotonic() - began < 100
+    for name, content in finished.items():
+        (path,) = results.rglob(name)
+        assert path.read_bytes() == content, "what was finished is reused, not made again"

@@ -1,0 +1,87 @@
+import csv
+import io
+import json
+
+import pytest
+from rich.console import Console
+
+from tactbench.core.leaderboard.formats import JSON_KEYS, to_csv, to_json, to_latex, to_markdown
+from tactbench.core.leaderboard.numbers import duration, score
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.terminal import show
+
+from .rows import row
+
+
+def test_lower_is_better_is_ranked_upwards_and_baselines_have_no_rank():
+    table = build_table([row("a", score=0.7), row("b", score=0.5), row("a", "mean", score=1.4)])
+    (block,) = table.blocks
+    assert [(line.cells[0], line.cells[1], line.kind) for line in block.lines] == [
+        ("1", "b SIM", "result"), ("2", "a SIM", "result"), ("", "a SIM", "baseline"),
+    ]  # fmt: skip
+
+
+def test_higher_is_better_is_ranked_downwards():
+    rows = [row(name, score=value, metric="macro_f1", unit="1") for name, value in (("a", 0.7), ("b", 0.9))]
+    assert [line.cells[1] for line in build_table(rows).blocks[0].lines] == ["b SIM", "a SIM"]
+
+
+def test_equal_scores_share_a_rank():
+    lines = build_table([row("a"), row("b"), row("c", score=0.9)]).blocks[0].lines
+    assert [line.cells[0] for line in lines] == ["1", "1", "3"]
+
+
+def test_sim_and_hardware_protocols_and_splits_never_share_a_block():
+    rows = [row(), row("b", simulated=False), row("c", protocol="karl2016"), row("d", split="shuffled")]
+    assert len(build_table(rows).blocks) == 4
+
+
+def test_a_failed_row_stands_in_the_table_with_its_reason():
+    table = build_table([row(), row("b", status="failed", score=None, reason="the plug was pulled")])
+    assert table.blocks[0].lines[-1].cells[3] == "FAILED"
+    assert any("the plug was pulled" in note for note in table.notes)
+
+
+def test_marks_are_explained():
+    table = build_table([row(dagger=True, stamps=["leaks: rows of one press are on both sides"])])
+    assert table.blocks[0].lines[0].cells[3].endswith("† ‡")
+    assert any(note.startswith("†") for note in table.notes)
+    assert any("rows of one press" in note for note in table.notes)
+    assert any(note.startswith("SIM") for note in table.notes)
+
+
+def test_json_and_csv_hold_every_key_of_every_row():
+    rows = [row(), row("b", status="failed", score=None)]
+    assert [tuple(entry) for entry in json.loads(to_json(rows))] == [JSON_KEYS, JSON_KEYS]
+    read = list(csv.DictReader(io.StringIO(to_csv(rows))))
+    assert float(read[0]["score"]) == 0.5
+    assert read[1]["score"] == ""
+
+
+@pytest.mark.parametrize("text", [to_markdown, to_latex])
+def test_names_from_plugins_cannot_break_a_table(text):
+    shown = text([row("a|b<script>&_%")])
+    assert "<script>" not in shown.replace(r"\&", "") or text is to_latex
+    assert r"a|b" not in shown or text is to_latex
+    if text is to_latex:
+        assert r"\&\_\%" in shown
+        assert r"\toprule" in shown
+
+
+def test_markup_in_a_name_is_text_on_the_terminal():
+    out = io.StringIO()
+    show([row("[bold red]a[/]")], Console(file=out, width=200))
+    assert "[bold red]a[/]" in out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(None, "–"), (12.34, "12.3 s"), (0.01234, "12.3 ms"), (2e-5, "20.0 µs"), (100.4, "100 s"), (0, "0 s"),
+     (0.9999, "1.00 s")],
+)  # fmt: skip
+def test_durations_have_three_digits_and_a_unit(seconds, text):
+    assert duration(seconds) == text
+
+
+def test_scores_with_a_unit_have_four_decimals():
+    assert (score(0.68754, "N"), score(0.60488, "1"), score(None, "1")) == ("0.6875", "0.605", "–")

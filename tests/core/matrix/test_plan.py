@@ -1,0 +1,48 @@
+import pytest
+
+from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.matrix.plan import plan_cells
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+
+
+@pytest.fixture(scope="module")
+def registry():
+    return load_registry()
+
+
+def plan(registry, *tasks, sensors=("biotac",), repeats=1):
+    return plan_cells(MatrixSpec(tasks=tasks, repeats=repeats), sensors, registry)
+
+
+def test_every_sensor_meets_every_task_and_baselines_are_always_there(registry):
+    cells = plan(registry, TaskChoice(name="force"), TaskChoice(name="curvature"), sensors=("biotac", "icub"))
+    assert {(cell.sensor, cell.task) for cell in cells if not cell.baseline} == {
+        (sensor, task) for sensor in ("biotac", "icub") for task in ("force", "curvature")
+    }
+    assert {cell.estimator for cell in cells if cell.baseline} == {"mean", "time-index", "chance", "majority"}
+    assert len({cell.name for cell in cells}) == len(cells)
+
+
+def test_repeats_have_seeds_of_their_own(registry):
+    cells = plan(registry, TaskChoice(name="force"), repeats=3)
+    assert sorted({(cell.repeat, cell.seed) for cell in cells}) == [(1, 1), (2, 2), (3, 3)]
+
+
+@pytest.mark.parametrize(
+    ("choice", "says"),
+    [
+        (TaskChoice(name="forse"), "Did you mean 'force'"),
+        (TaskChoice(name="force", protocol="karl2015"), "Did you mean 'karl2016'"),
+        (TaskChoice(name="force", estimators=(EstimatorChoice(name="laso"),)), "Did you mean 'lasso'"),
+        (TaskChoice(name="force", estimators=(EstimatorChoice(name="forest", params={"trees": 5}),)), "n_estimators"),
+    ],
+)
+def test_a_wrong_name_is_answered_with_the_nearest(registry, choice, says):
+    with pytest.raises(UnknownNameError, match=says):
+        plan(registry, choice)
+
+
+def test_an_estimator_for_another_kind_of_question_is_refused(registry):
+    with pytest.raises(UsageError, match="classification"):
+        plan(registry, TaskChoice(name="curvature", estimators=(EstimatorChoice(name="lasso"),)))
