@@ -83,7 +83,8 @@ def test_listing_loads_no_numerics():
         "import sys\n"
         "from tactbench.core.plugins.registry import load_registry\n"
         "assert not load_registry().failures, load_registry().failures\n"
-        "print('HEAVY', sorted({'h5py', 'sklearn', 'scipy', 'matplotlib', 'serial', 'can', 'rich'} & set(sys.modules)))"
+        "heavy = {'h5py', 'sklearn', 'scipy', 'matplotlib', 'serial', 'can', 'rich'}\n"
+        "print('HEAVY', sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60,
                           env={**os.environ, "PYTHONWARNINGS": "error"})  # fmt: skip
