@@ -1,1 +1,1 @@
-"""The evaluation floor."""
+"""From recordings to a score: dataset, protocol, split, estimator, metric, interval, one cell."""

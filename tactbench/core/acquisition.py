@@ -1,0 +1,90 @@
+"""One scene, on one rig, into one recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.plugins.interfaces import Acquisition, Rig
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
+from tactbench.core.spec.scene import Role, Scene
+
+
+def acquire(
+    rig: Rig,
+    sensor: SensorDescriptor,
+    descriptor: RigDescriptor,
+    scene: Scene,
+    *,
+    role: Role | None,
+    seed: int,
+    path: Path,
+    clock: Callable[[], float],
+    provenance: Mapping[str, Any],
+) -> RecordingMeta:
+    """Carry out `scene` and write what the rig yields to `path`.
+
+    Parameters
+    ----------
+    rig, descriptor
+        The rig, and what it says about itself.
+    role
+        What the recording is for, or None.
+    clock
+        Seconds, monotonic; its difference over the scene becomes ``provenance["sim_s"]`` for a simulated rig and
+        ``provenance["acquisition_s"]`` otherwise. Writing the file is not counted.
+
+    Raises
+    ------
+    RigError, NotApplicable
+        If the rig cannot carry out the scene; nothing is left behind.
+    RecordingError
+        If the file cannot be written.
+    """
+    began = clock()
+    with rig.open(sensor, scene, seed=seed) as acquisition:
+        meta = _meta(acquisition, sensor, descriptor, scene, role, seed)
+        spent = clock() - began
+        with RecordingWriter(path, meta) as writer:
+            blocks = iter(acquisition)
+            while True:
+                began = clock()
+                block = next(blocks, None)
+                spent += clock() - began
+                if block is None:
+                    break
+                writer.append(block)
+            key = "sim_s" if descriptor.simulated else "acquisition_s"
+            writer.revise(
+                plan=tuple(acquisition.plan),
+                assumptions=dict(acquisition.assumptions),
+                drawn=dict(acquisition.drawn),
+                provenance={**provenance, key: spent},
+            )
+        return writer.meta
+
+
+def _meta(
+    acquisition: Acquisition,
+    sensor: SensorDescriptor,
+    descriptor: RigDescriptor,
+    scene: Scene,
+    role: Role | None,
+    seed: int,
+) -> RecordingMeta:
+    return RecordingMeta(
+        name=scene.name,
+        sensor=sensor.spec.model_copy(update={"streams": tuple(acquisition.streams)}),
+        reference=tuple(acquisition.reference),
+        rig=descriptor.name,
+        simulated=descriptor.simulated,
+        clock="device",
+        session=scene.session,
+        role=role,
+        scene=scene,
+        labels=dict(scene.labels),
+        seed=seed,
+    )

@@ -1,0 +1,263 @@
+"""Recordings on one clock each, with what the task asks of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.errors import DataError, NotApplicable
+from tactbench.core.evaluation.alignment import nearest_rows
+from tactbench.core.recording.reader import Recording, open_recording
+from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
+from tactbench.core.spec import units
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec
+
+
+@dataclass(frozen=True)
+class Table:
+    """One recording on the clock of its features. Rows with a missing feature are not in it."""
+
+    meta: RecordingMeta
+    X: FloatArray
+    """(n, features) readings as recorded"""
+    y: npt.NDArray[Any]
+    """(n,) numbers in the task's unit, or class indices; meaningless where `labelled` is False"""
+    labelled: npt.NDArray[np.bool_]
+    """(n,) False where the recording has no label for the row"""
+    force: FloatArray | None
+    """(n,) reference force, if there is one; NaN where it has no sample"""
+    time_s: FloatArray
+    """(n,) seconds since the first sample, or the row index where the recording has no clock"""
+    row: IntArray
+    """(n,) index of the row in its stream"""
+    groups: Mapping[str, npt.NDArray[np.str_]]
+    """Labels by which rows can be kept together: name -> (n,)"""
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """All recordings of a cell."""
+
+    tables: tuple[Table, ...]
+    features: tuple[str, ...]
+    classes: tuple[Any, ...]
+    """Class labels in order of their index; empty for regression"""
+    counts: Mapping[str, int] = field(default_factory=dict)
+    """What was left out, and why"""
+
+    @property
+    def metas(self) -> tuple[RecordingMeta, ...]:
+        """What the recordings say about themselves, in order."""
+        return tuple(table.meta for table in self.tables)
+
+
+def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
+    """Read `recordings` as `task` needs them.
+
+    Raises
+    ------
+    NotApplicable
+        If the sensor has no channel of a kind the task needs, or no recording has the label it asks for.
+    DataError
+        If a channel has no sample at all, the recordings disagree about their channels, or nothing is left.
+    """
+    counts: Counter[str] = Counter()
+    read: list[tuple[RecordingMeta, _Raw]] = []
+    for path in recordings:
+        with open_recording(path) as recording:
+            if recording.meta.excluded:
+                counts[f"recordings left out ({recording.meta.excluded})"] += 1
+                continue
+            read.append((recording.meta, _read(recording, task, counts)))
+    if not read:
+        raise DataError("No recording is left to evaluate.", hint="See what was left out with `tactbench inspect`.")
+    _same_features([(meta, raw.features) for meta, raw in read])
+    classes = _classes([raw for _, raw in read]) if task.kind == "classification" else ()
+    if not any(raw.labelled.any() for _, raw in read):
+        raise NotApplicable(
+            f"Task {task.name!r} asks for {_wanted(task)}, and no recording has it.",
+            hint="State it in the mapping, or choose another task.",
+        )
+    tables = tuple(_table(meta, raw, classes) for meta, raw in read)
+    unlabelled = sum(int((~table.labelled).sum()) for table in tables)
+    if unlabelled:
+        counts[f"of {sum(len(table.row) for table in tables)} rows have no {_wanted(task)} and were left out"] = (
+            unlabelled
+        )
+    return Dataset(tables, read[0][1].features, classes, dict(counts))
+
+
+@dataclass
+class _Raw:
+    features: tuple[str, ...]
+    X: FloatArray
+    y: npt.NDArray[Any]
+    labelled: npt.NDArray[np.bool_]
+    force: FloatArray | None
+    time_s: FloatArray
+    row: IntArray
+    groups: dict[str, npt.NDArray[np.str_]]
+
+
+def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> _Raw:
+    meta = recording.meta
+    stream = _feature_stream(recording, task)
+    data = recording.read(stream)
+    picked = [place for place, channel in enumerate(data.spec.channels) if channel.kind in task.features]
+    X = _numbers(data)[:, picked]
+    names = tuple(data.spec.channels[place].name for place in picked)
+    if len(X) == 0:
+        raise DataError(f"The recording {meta.name!r} has no samples.", hint="Record it again.")
+    empty = [name for name, column in zip(names, X.T, strict=True) if np.isnan(column).all()]
+    if empty:
+        raise DataError(
+            f"In recording {meta.name!r}, {', '.join(empty)} has no sample at all.",
+            hint="Leave the channel out of the mapping, or record it again.",
+        )
+    y, labelled = _target(recording, task, data)
+    force = _force(recording, data)
+    time_s = (data.t_ns - data.t_ns[0]) * 1e-9 if data.t_ns is not None else np.arange(len(X), dtype=np.float64)
+    raw = _Raw(names, X, y, labelled, force, time_s, np.arange(len(X), dtype=np.int64), _groups(meta, data))
+    whole = ~np.isnan(X).any(axis=1)
+    if not whole.all():
+        for name, column in zip(names, X.T, strict=True):
+            if np.isnan(column).any():
+                counts[f"rows left out because {name} has no sample"] += int(np.isnan(column).sum())
+        raw = _rows(raw, whole)
+    return raw
+
+
+def _rows(raw: _Raw, keep: npt.NDArray[np.bool_]) -> _Raw:
+    return _Raw(
+        raw.features, raw.X[keep], raw.y[keep], raw.labelled[keep], None if raw.force is None else raw.force[keep],
+        raw.time_s[keep], raw.row[keep], {name: column[keep] for name, column in raw.groups.items()},
+    )  # fmt: skip
+
+
+def _feature_stream(recording: Recording, task: TaskSpec) -> str:
+    """Return the one stream that carries the features."""
+    own = {stream.name for stream in recording.meta.sensor.streams}
+    for name in recording.stream_names:
+        spec = recording.stream(name).spec
+        if name in own and any(channel.kind in task.features for channel in spec.channels):
+            return name
+    wanted = " or ".join(kind.replace("_", " ") for kind in task.features)
+    raise NotApplicable(
+        f"Task {task.name!r} needs a {wanted} channel; {recording.meta.sensor.name} has none in {recording.meta.name!r}.",
+        hint="See what the sensor has with `tactbench show`.",
+    )
+
+
+def _numbers(data: StreamData) -> FloatArray:
+    """Return the samples as float64, with NaN where there is none."""
+    numbers = data.data.astype(np.float64)
+    if data.quality is not None:
+        numbers[(data.quality & Quality.MISSING) != 0] = np.nan
+    numbers[~np.isfinite(numbers)] = np.nan
+    return numbers
+
+
+def _target(
+    recording: Recording, task: TaskSpec, features: StreamData
+) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]:
+    if isinstance(task.target, LabelTarget):
+        return _label(recording.meta, task.target.name, features)
+    column = _channel(recording, task.target, features)
+    if column is None:
+        n = len(features.data)
+        return np.full(n, np.nan), np.zeros(n, dtype=bool)
+    return column, ~np.isnan(column)
+
+
+def _label(meta: RecordingMeta, name: str, features: StreamData) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]:
+    n = len(features.data)
+    if name in meta.labels:
+        return np.full(n, meta.labels[name]), np.ones(n, dtype=bool)
+    if name in features.annotations:
+        column = features.annotations[name]
+        return column, column != "" if column.dtype.kind == "U" else np.ones(n, dtype=bool)
+    return np.full(n, ""), np.zeros(n, dtype=bool)
+
+
+def _force(recording: Recording, features: StreamData) -> FloatArray | None:
+    return _channel(recording, ChannelTarget(kind="force"), features)
+
+
+def _channel(recording: Recording, target: ChannelTarget, features: StreamData) -> FloatArray | None:
+    """Return a channel on the clock of the features, in the unit of `target`; None if there is none."""
+    found = []
+    for name in recording.stream_names:
+        spec = recording.stream(name).spec
+        for place, channel in enumerate(spec.channels):
+            if channel.kind == target.kind and target.name in (None, channel.name):
+                found.append((name, place, channel))
+    if not found:
+        return None
+    if len(found) > 1:
+        found = [one for one in found if one[2].name in ("normal", "fz")] or found
+    if len(found) > 1:
+        names = ", ".join(channel.name for _, _, channel in found)
+        raise DataError(
+            f"The recording {recording.meta.name!r} has several {target.kind} channels: {names}.",
+            hint="Name one in the task's target.",
+        )
+    name, place, channel = found[0]
+    data = features if name == features.spec.name else recording.read(name)
+    column = _numbers(data)[:, place] * units.conversion(channel.unit, target.unit)
+    picked = nearest_rows(features, data, recording.meta.name)
+    aligned = np.full(len(features.data), np.nan)
+    aligned[picked >= 0] = column[picked[picked >= 0]]
+    return aligned
+
+
+def _groups(meta: RecordingMeta, data: StreamData) -> dict[str, npt.NDArray[np.str_]]:
+    n = len(data.data)
+    constant = {
+        "session": meta.session,
+        "recording": meta.name,
+        **{key: str(value) for key, value in meta.labels.items()},
+    }
+    if meta.trial:
+        constant["trial"] = meta.trial
+    groups = {name: np.full(n, value) for name, value in constant.items()}
+    # A number of a press counts within its session only.
+    for name, column in data.annotations.items():
+        own = column.dtype.kind in "iu"
+        groups[name] = np.array([f"{meta.session}/{value}" if own else str(value) for value in column], dtype=np.str_)
+    return groups
+
+
+def _same_features(read: Sequence[tuple[RecordingMeta, tuple[str, ...]]]) -> None:
+    first, features = read[0]
+    for meta, others in read:
+        if others != features:
+            raise DataError(
+                f"The recordings {first.name!r} and {meta.name!r} have different channels.",
+                hint="Evaluate them apart.",
+            )
+
+
+def _classes(read: Sequence[_Raw]) -> tuple[Any, ...]:
+    found = {
+        value.item() if hasattr(value, "item") else value for raw in read for value in np.unique(raw.y[raw.labelled])
+    }
+    return tuple(sorted(found, key=lambda value: (isinstance(value, str), value)))
+
+
+def _table(meta: RecordingMeta, raw: _Raw, classes: tuple[Any, ...]) -> Table:
+    y = raw.y
+    if classes:
+        index = {label: place for place, label in enumerate(classes)}
+        y = np.array([index.get(value, -1) for value in raw.y.tolist()], dtype=np.int64)
+    return Table(meta, raw.X, y, raw.labelled, raw.force, raw.time_s, raw.row, raw.groups)
+
+
+def _wanted(task: TaskSpec) -> str:
+    return task.target.name if isinstance(task.target, LabelTarget) else f"{task.target.kind} sample"

@@ -1,0 +1,119 @@
+"""Metrics as sums over rows, so that a bootstrap adds up blocks instead of computing anew.
+
+Each metric turns rows into a few numbers that may be summed, and sums into a score.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.errors import UnknownNameError
+from tactbench.core.samples import FloatArray
+
+Rows = Callable[[npt.NDArray[Any], npt.NDArray[Any], int], FloatArray]
+Score = Callable[[FloatArray, int], FloatArray]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One figure of merit."""
+
+    name: str
+    kind: str
+    higher_is_better: bool
+    rows: Rows
+    """(y, prediction, number of classes) -> (n, m) summands"""
+    score: Score
+    """(…, m) sums and the number of classes -> (…,) scores"""
+
+    def of(self, y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int = 0) -> float:
+        """Return the score of `predicted` against `y`."""
+        return float(self.score(self.rows(y, predicted, n_classes).sum(axis=0), n_classes))
+
+
+def _squares(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
+    return np.column_stack([(predicted - y) ** 2, np.ones(len(y))])
+
+
+def _absolutes(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
+    return np.column_stack([np.abs(predicted - y), np.ones(len(y))])
+
+
+def _explained(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
+    centred = y - np.mean(y)  # sums of squares of large offsets would lose all digits
+    return np.column_stack([(predicted - y) ** 2, centred, centred**2, np.ones(len(y))])
+
+
+def _pairs(y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int) -> FloatArray:
+    table = np.zeros((len(y), n_classes * n_classes))
+    table[np.arange(len(y)), y.astype(np.int64) * n_classes + predicted.astype(np.int64)] = 1.0
+    return table
+
+
+def _rmse(sums: FloatArray, _: int) -> FloatArray:
+    return np.asarray(np.sqrt(sums[..., 0] / sums[..., 1]))
+
+
+def _mae(sums: FloatArray, _: int) -> FloatArray:
+    return np.asarray(sums[..., 0] / sums[..., 1])
+
+
+def _r2(sums: FloatArray, _: int) -> FloatArray:
+    spread = sums[..., 2] - sums[..., 1] ** 2 / sums[..., 3]
+    return np.asarray(1.0 - sums[..., 0] / np.where(spread > 0, spread, np.nan))
+
+
+def confusion(sums: FloatArray, n_classes: int) -> FloatArray:
+    """Return (…, true class, predicted class) from sums of a classification metric."""
+    return sums.reshape(*sums.shape[:-1], n_classes, n_classes)
+
+
+def _accuracy(sums: FloatArray, n_classes: int) -> FloatArray:
+    table = confusion(sums, n_classes)
+    return np.asarray(np.trace(table, axis1=-2, axis2=-1) / table.sum(axis=(-2, -1)))
+
+
+def class_f1(sums: FloatArray, n_classes: int) -> FloatArray:
+    """Return (…, classes) F1 of each class; 0 for a class that is neither there nor predicted, as in scikit-learn."""
+    table = confusion(sums, n_classes)
+    hit = np.diagonal(table, axis1=-2, axis2=-1)
+    both = table.sum(axis=-1) + table.sum(axis=-2)
+    return np.asarray(np.divide(2 * hit, both, out=np.zeros_like(both), where=both > 0))
+
+
+def _macro_f1(sums: FloatArray, n_classes: int) -> FloatArray:
+    return np.asarray(class_f1(sums, n_classes).mean(axis=-1))
+
+
+def _balanced(sums: FloatArray, n_classes: int) -> FloatArray:
+    """Return the mean recall over the classes that are there."""
+    table = confusion(sums, n_classes)
+    there = table.sum(axis=-1)
+    hit = np.diagonal(table, axis1=-2, axis2=-1)
+    recall = np.divide(hit, there, out=np.zeros_like(there), where=there > 0)
+    return np.asarray(recall.sum(axis=-1) / (there > 0).sum(axis=-1))
+
+
+METRICS = {
+    metric.name: metric
+    for metric in (
+        Metric("rmse", "regression", False, _squares, _rmse),
+        Metric("mae", "regression", False, _absolutes, _mae),
+        Metric("r2", "regression", True, _explained, _r2),
+        Metric("accuracy", "classification", True, _pairs, _accuracy),
+        Metric("balanced_accuracy", "classification", True, _pairs, _balanced),
+        Metric("macro_f1", "classification", True, _pairs, _macro_f1),
+    )
+}
+
+
+def metric_called(name: str) -> Metric:
+    """Return a metric by name; raises UnknownNameError."""
+    if name not in METRICS:
+        raise UnknownNameError("metric", name, METRICS)
+    return METRICS[name]

@@ -1,0 +1,64 @@
+"""Protocols as data: how recordings become X and y, and on which data each step is fitted."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from tactbench.core.errors import UnknownNameError
+from tactbench.core.spec.quantity import Frozen
+
+
+class ProtocolSpec(Frozen):
+    """What is discarded, scaled and filtered, and on which data each of these is fitted."""
+
+    name: str
+    title: str
+    discard_samples: int = Field(default=0, ge=0)
+    """Samples dropped at the start of every recording."""
+    discard_hold: bool = False
+    """Drop the scene's stated hold (the set-up's initialization, before any load) where a recording has a scene."""
+    three_sigma: bool = False
+    """Drop a sample if a feature or the reference force lies beyond three standard deviations of its set."""
+    scaled_by: Literal["each set", "training set"]
+    """Whose mean and deviation scale a set."""
+    window_over: Literal["kept samples", "consecutive samples"]
+    """What the mean filter runs over; never across recordings or parts."""
+    roles_only: bool = False
+    """Only recordings with the roles train, validation and test can be used."""
+    uses_test_statistics: bool = False
+    """Rows carry a dagger."""
+
+
+KARL2016 = ProtocolSpec(
+    name="karl2016",
+    title="Karl et al. 2016, section III",
+    discard_samples=600,
+    three_sigma=True,
+    scaled_by="each set",
+    window_over="kept samples",
+    roles_only=True,
+    uses_test_statistics=True,
+)
+"""The paper's protocol: "the first 600 samples were discarded"; "if any of the force or taxel responses violated a
+three sigma rule, the sample was discarded"; "each of the training, validation and testing set was divided by its taxel
+wise standard deviation after subtracting its taxel wise mean"."""
+
+DEPLOYABLE = ProtocolSpec(
+    name="deployable",
+    title="Everything fitted on training sessions",
+    discard_hold=True,
+    scaled_by="training set",
+    window_over="consecutive samples",
+)
+"""What a sensor in use can do: no statistic of the test set, causal windows, no row dropped by its label."""
+
+PROTOCOLS = {protocol.name: protocol for protocol in (KARL2016, DEPLOYABLE)}
+
+
+def protocol_called(name: str) -> ProtocolSpec:
+    """Return a protocol by name; raises UnknownNameError."""
+    if name not in PROTOCOLS:
+        raise UnknownNameError("protocol", name, PROTOCOLS)
+    return PROTOCOLS[name]
