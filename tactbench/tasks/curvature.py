@@ -53,9 +53,7 @@ SPEC = TaskSpec(
         "biotac": Published(
             score=0.60488, protocol="karl2016", estimator="forest", reference=f"{_PAPER}, section III-B"
         ),
-        "icub": Published(
-            score=0.79512, protocol="karl2016", estimator="forest", reference=f"{_PAPER}, section III-B"
-        ),
+        "icub": Published(score=0.79512, protocol="karl2016", estimator="forest", reference=f"{_PAPER}, section III-B"),
     },
 )
 

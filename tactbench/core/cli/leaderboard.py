@@ -24,9 +24,7 @@ def command(folder: Path, shape: str) -> None:
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise UsageError(
-            f"{path} cannot be read: {error}.", hint="Make one with `tactbench run --out DIR`."
-        ) from error
+        raise UsageError(f"{path} cannot be read: {error}.", hint="Make one with `tactbench run --out DIR`.") from error
     if not isinstance(rows, list) or not all(isinstance(row, dict) and set(JSON_KEYS) <= set(row) for row in rows):
         raise UsageError(f"{path} is not a leaderboard of this version.", hint="Run `tactbench run` again.")
     if shape == "table":

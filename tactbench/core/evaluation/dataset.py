@@ -125,7 +125,7 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> _Raw:
     force = _force(recording, data)
     time_s = (data.t_ns - data.t_ns[0]) * 1e-9 if data.t_ns is not None else np.arange(len(X), dtype=np.float64)
     raw = _Raw(names, X, y, labelled, force, time_s, np.arange(len(X), dtype=np.int64), _groups(meta, data))
-    whole = ~np.isnan(X).any(axis=1)
+    whole = np.asarray(~np.isnan(X).any(axis=1))
     if not whole.all():
         for name, column in zip(names, X.T, strict=True):
             if np.isnan(column).any():
@@ -149,8 +149,9 @@ def _feature_stream(recording: Recording, task: TaskSpec) -> str:
         if name in own and any(channel.kind in task.features for channel in spec.channels):
             return name
     wanted = " or ".join(kind.replace("_", " ") for kind in task.features)
+    meta = recording.meta
     raise NotApplicable(
-        f"Task {task.name!r} needs a {wanted} channel; {recording.meta.sensor.name} has none in {recording.meta.name!r}.",
+        f"Task {task.name!r} needs a {wanted} channel; {meta.sensor.name} has none in {meta.name!r}.",
         hint="See what the sensor has with `tactbench show`.",
     )
 
@@ -164,9 +165,11 @@ def _numbers(data: StreamData) -> FloatArray:
     return numbers
 
 
-def _target(
-    recording: Recording, task: TaskSpec, features: StreamData
-) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]:
+Labels = tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]
+"""Targets, and which of them are there."""
+
+
+def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Labels:
     if isinstance(task.target, LabelTarget):
         return _label(recording.meta, task.target.name, features)
     column = _channel(recording, task.target, features)
@@ -176,13 +179,13 @@ def _target(
     return column, ~np.isnan(column)
 
 
-def _label(meta: RecordingMeta, name: str, features: StreamData) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]:
+def _label(meta: RecordingMeta, name: str, features: StreamData) -> Labels:
     n = len(features.data)
     if name in meta.labels:
         return np.full(n, meta.labels[name]), np.ones(n, dtype=bool)
     if name in features.annotations:
         column = features.annotations[name]
-        return column, column != "" if column.dtype.kind == "U" else np.ones(n, dtype=bool)
+        return column, np.asarray(column != "") if column.dtype.kind == "U" else np.ones(n, dtype=bool)
     return np.full(n, ""), np.zeros(n, dtype=bool)
 
 

@@ -42,8 +42,9 @@ KARL2016 = ProtocolSpec(
     uses_test_statistics=True,
 )
 """The paper's protocol: "the first 600 samples were discarded"; "if any of the force or taxel responses violated a
-three sigma rule, the sample was discarded"; "each of the training, validation and testing set was divided by its taxel
-wise standard deviation after subtracting its taxel wise mean"."""
+three sigma rule, the sample was discarded"; "each of the training, validation and testing set was divided by its
+taxel wise standard deviation after subtracting its taxel wise mean".
+"""
 
 DEPLOYABLE = ProtocolSpec(
     name="deployable",

@@ -44,8 +44,7 @@ def table_one(sensors: Sequence[SensorSpec]) -> list[Comparison]:
                                                               s.principle_source.reference)),
     ]  # fmt: skip
     rows += [
-        Comparison(title, tuple(_range(sensor, kind, which) for sensor in sensors))
-        for title, kind, which in _TABLE_ONE
+        Comparison(title, tuple(_range(sensor, kind, which) for sensor in sensors)) for title, kind, which in _TABLE_ONE
     ]
     return rows
 

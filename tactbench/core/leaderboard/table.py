@@ -93,9 +93,7 @@ def _lines(members: Sequence[Row]) -> Iterable[Line]:
     sign = 1.0 if members[0]["metric"] in LOWER_IS_BETTER else -1.0
     done = [row for row in members if row["status"] == "done"]
     results = sorted((row for row in done if not row["is_baseline"]), key=lambda row: sign * row["score"])
-    ranked = {
-        row["cell"]: 1 + sum(sign * other["score"] < sign * row["score"] for other in results) for row in results
-    }
+    ranked = {row["cell"]: 1 + sum(sign * other["score"] < sign * row["score"] for other in results) for row in results}
     baselines = sorted(
         (row for row in done if row["is_baseline"]), key=lambda row: (row["sensor"], sign * row["score"])
     )

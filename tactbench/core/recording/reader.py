@@ -38,9 +38,7 @@ class LazyStream:
             t_ns=group["t_ns"][rows] if "t_ns" in group else None,
             data=group["data"][rows],
             quality=group["quality"][rows] if "quality" in group else None,
-            annotations={
-                name: _annotation(group["annotations"][name], rows) for name in group.get("annotations", ())
-            },
+            annotations={name: _annotation(notes[name], rows) for name in notes},
         )
 
 

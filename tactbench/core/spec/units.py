@@ -78,9 +78,7 @@ def parse(unit: str) -> tuple[float, Dimension]:
             if token not in _ATOMS:
                 close = nearest(token, _ATOMS)
                 hint = f"Did you mean {' or '.join(close)}? " if close else ""
-                raise UsageError(
-                    f"The unit {unit!r} is not known.", hint=f"{hint}Units: {', '.join(sorted(_ATOMS))}."
-                )
+                raise UsageError(f"The unit {unit!r} is not known.", hint=f"{hint}Units: {', '.join(sorted(_ATOMS))}.")
             size, dimension = _ATOMS[token]
             factor *= size**sign
             exponents = [have + sign * more for have, more in zip(exponents, dimension, strict=True)]

@@ -1,0 +1,344 @@
+"""One cell: protocol, folds, estimator, score, cost."""
+
+from __future__ import annotations
+
+import importlib
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.errors import DataError, UnknownNameError
+from tactbench.core.evaluation.dataset import Dataset, load_dataset
+from tactbench.core.evaluation.interval import LEVEL, score_interval
+from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
+from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
+from tactbench.core.evaluation.selection import Build, Choice, features_of, scales, select
+from tactbench.core.evaluation.sets import constant_features, keep, part
+from tactbench.core.evaluation.splits import (
+    SHUFFLED_STAMP,
+    Assignment,
+    assert_disjoint,
+    choose_split,
+    make_splits,
+)
+from tactbench.core.evaluation.timing import peak_rss_mb, single_row_latency_s
+from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.plugins.registry import load_object
+from tactbench.core.samples import Fold, IntArray
+from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.task import TaskSpec
+
+
+@dataclass(frozen=True)
+class CellResult:
+    """Everything a row and a shard hold about one cell. Times are seconds unless the name says otherwise."""
+
+    metric: str
+    score: float
+    ci_low: float
+    ci_high: float
+    ci_level: float
+    ci_method: str
+    scores: Mapping[str, float]
+    """other metrics, the score on validation data, of each fold and each class"""
+    confusion: npt.NDArray[np.int64] | None
+    """(true class, predicted class)"""
+    classes: tuple[Any, ...]
+    split: str
+    folds: int
+    n_recordings: int
+    n_sessions: int
+    n_train: int
+    n_test: int
+    counts: Mapping[str, int]
+    chosen: Mapping[str, float]
+    dagger: bool
+    stamps: tuple[str, ...]
+    search_s: float
+    fit_s: float
+    predict_s: float
+    batch_rows: int
+    latency_ms_p50: float
+    latency_ms_p95: float
+    latency_n: int
+    threads: int
+    peak_rss_mb: float | None
+    y_true: npt.NDArray[Any]
+    y_pred: npt.NDArray[Any]
+    recording: IntArray
+    row: IntArray
+    fold: IntArray
+
+
+@dataclass
+class _Answers:
+    """What the folds add up to."""
+
+    y_true: list[npt.NDArray[Any]]
+    y_pred: list[npt.NDArray[Any]]
+    recording: list[IntArray]
+    row: list[IntArray]
+    fold: list[IntArray]
+    scores: dict[str, float]
+    chosen: list[Choice]
+    search_s: float = 0.0
+    fit_s: float = 0.0
+    predict_s: float = 0.0
+    n_train: int = 0
+    model: Estimator | None = None
+    test: Any = None
+
+
+def evaluate(
+    task: TaskSpec,
+    estimator: EstimatorDescriptor,
+    params: Mapping[str, Any],
+    protocol: str,
+    split: str | None,
+    recordings: Sequence[Path],
+    *,
+    seed: int,
+    clock: Callable[[], float],
+    threads: int = 1,
+    progress: Callable[[str], None] | None = None,
+    dataset: Dataset | None = None,
+) -> CellResult:
+    """Answer `task` from `recordings` with `estimator`, and measure how well and at what cost.
+
+    Parameters
+    ----------
+    params
+        Parameters other than the estimator's defaults; they are not searched.
+    protocol, split
+        How recordings become X and y, and what is kept apart; None chooses the task's first fitting split.
+    seed
+        Decides everything random: the same seed gives the same score in any process.
+    clock
+        Seconds, monotonic.
+    threads
+        Threads the estimator and BLAS may use.
+    progress
+        Told what is being done.
+    dataset
+        The recordings, if they have been read already.
+
+    Raises
+    ------
+    NotApplicable
+        If the question cannot be asked of these recordings.
+    UsageError
+        If a parameter is unknown or the split cannot be served.
+    DataError
+        If a set is empty, has one class only, or its labels never change.
+    """
+    say = progress or (lambda _: None)
+    data = dataset if dataset is not None else load_dataset(task, recordings)
+    rules = protocol_called(protocol)
+    metric = metric_called(task.metric)
+    chosen_split = choose_split(task, rules, data, split)
+    assignments = make_splits(data, chosen_split, seed)
+    assert_disjoint(assignments)
+    build = _builder(estimator, params, task, seed, threads)
+    counts: Counter[str] = Counter(data.counts)
+    answers = _Answers([], [], [], [], [], {}, [])
+    with _thread_limit(threads):
+        for number, assignment in enumerate(assignments):
+            say(f"{estimator.name}: {assignment.name}")
+            _fold(answers, number, assignment, estimator, params, build, data, rules, metric, counts, clock)
+        if answers.model is None:
+            raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
+        latency = 1e3 * single_row_latency_s(answers.model, features_of(answers.test, estimator), clock)
+    return _result(task, rules, metric, chosen_split, data, answers, counts, latency, seed, threads)
+
+
+def _builder(
+    estimator: EstimatorDescriptor, params: Mapping[str, Any], task: TaskSpec, seed: int, threads: int
+) -> Build:
+    for name in params:
+        if name not in estimator.params:
+            raise UnknownNameError(f"parameter of estimator {estimator.name!r}", name, estimator.params)
+    make = load_object(estimator.where)  # imports happen here, before any clock is read
+
+    def build(chosen: Mapping[str, Any]) -> Estimator:
+        made: Estimator = make(kind=task.kind, seed=seed, threads=threads, **{**estimator.params, **params, **chosen})
+        return made
+
+    build({})
+    return build
+
+
+def _thread_limit(threads: int) -> AbstractContextManager[Any]:
+    limit: AbstractContextManager[Any] = importlib.import_module("threadpoolctl").threadpool_limits(limits=threads)
+    return limit
+
+
+def _fold(
+    answers: _Answers,
+    number: int,
+    assignment: Assignment,
+    estimator: EstimatorDescriptor,
+    params: Mapping[str, Any],
+    build: Build,
+    data: Dataset,
+    rules: ProtocolSpec,
+    metric: Metric,
+    counts: Counter[str],
+    clock: Callable[[], float],
+) -> None:
+    began = clock()
+    choice = select(estimator, params, build, data, rules, assignment, metric)
+    answers.search_s += clock() - began
+    fold = _prepared(assignment, data, rules, choice.k if choice else estimator.window_grid[0], counts)
+    _worth_answering(fold, data)
+    X_train, X_test = features_of(fold.train, estimator), features_of(fold.test, estimator)
+    model = build(choice.params if choice else {})
+    began = clock()
+    model.fit(X_train, fold.train.y)
+    answers.fit_s += clock() - began
+    began = clock()
+    predicted = np.asarray(model.predict(X_test))
+    answers.predict_s += clock() - began
+    _finite(predicted, estimator.name)
+    n_classes = len(data.classes)
+    answers.scores[f"fold {fold.name}"] = metric.of(fold.test.y, predicted, n_classes)
+    if choice:
+        answers.chosen.append(choice)
+        answers.scores["validation"] = choice.score
+    elif fold.validation is not None:
+        on_validation = np.asarray(model.predict(features_of(fold.validation, estimator)))
+        answers.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
+    answers.y_true.append(fold.test.y)
+    answers.y_pred.append(predicted)
+    answers.recording.append(fold.test.recording)
+    answers.row.append(fold.test.row)
+    answers.fold.append(np.full(len(fold.test), number, dtype=np.int64))
+    answers.n_train += len(fold.train)
+    answers.model, answers.test = model, fold.test
+
+
+def _prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
+    train = keep(data, rules, assignment.train, "training", counts)
+    test = keep(data, rules, assignment.test, "test", counts)
+    for name in constant_features(train, data.features):
+        counts[f"folds in which {name} never changes in training"] += 1
+    scale_train, scale_test = scales(rules, train, test)
+    validation = None
+    if assignment.validation is not None:
+        kept = keep(data, rules, assignment.validation, "validation", counts)
+        validation = part(kept, scales(rules, train, kept)[1], k)
+    return Fold(assignment.name, part(train, scale_train, k), part(test, scale_test, k), validation)
+
+
+def _worth_answering(fold: Fold, data: Dataset) -> None:
+    for what, one in (("training", fold.train), ("test", fold.test)):
+        if len(one) == 0:
+            raise DataError(
+                f"The {what} set of fold {fold.name!r} has no labelled row.", hint="Choose another --split."
+            )
+    values = np.unique(fold.train.y)
+    if len(values) < 2:
+        only = data.classes[int(values[0])] if data.classes else values[0]
+        raise DataError(
+            f"All training labels of fold {fold.name!r} are {only}: there is nothing to learn.",
+            hint="Choose another --split, or check the label column with `tactbench inspect`.",
+        )
+
+
+def _finite(predicted: npt.NDArray[Any], name: str) -> None:
+    if predicted.ndim != 1 or not np.isfinite(predicted.astype(np.float64)).all():
+        raise DataError(
+            f"The estimator {name!r} answered with shape {predicted.shape} or with NaN.",
+            hint="Its predict(X) must return one finite number or class index a row.",
+        )
+
+
+def _result(
+    task: TaskSpec,
+    rules: ProtocolSpec,
+    metric: Metric,
+    split: str,
+    data: Dataset,
+    answers: _Answers,
+    counts: Counter[str],
+    latency_ms: npt.NDArray[np.float64],
+    seed: int,
+    threads: int,
+) -> CellResult:
+    y, predicted = np.concatenate(answers.y_true), np.concatenate(answers.y_pred)
+    recording, row = np.concatenate(answers.recording), np.concatenate(answers.row)
+    fold = np.concatenate(answers.fold)
+    n_classes = len(data.classes)
+    cluster, cluster_name = _clusters(data, split, recording, row)
+    interval = score_interval(metric, y, predicted, recording, cluster, cluster_name, n_classes, seed)
+    scores = dict(answers.scores)
+    for other in METRICS.values():
+        if other.kind == task.kind and other is not metric:
+            scores[other.name] = other.of(y, predicted, n_classes)
+    table = None
+    if n_classes:
+        sums = metric.rows(y, predicted, n_classes).sum(axis=0)
+        table = confusion(sums, n_classes).astype(np.int64)
+        for label, value in zip(data.classes, class_f1(sums, n_classes), strict=True):
+            scores[f"F1 of {label}"] = float(value)
+    return CellResult(
+        metric=metric.name,
+        score=metric.of(y, predicted, n_classes),
+        ci_low=interval.low,
+        ci_high=interval.high,
+        ci_level=LEVEL,
+        ci_method=interval.method,
+        scores=scores,
+        confusion=table,
+        classes=data.classes,
+        split=split,
+        folds=len(answers.y_true),
+        n_recordings=len(data.tables),
+        n_sessions=len({meta.session for meta in data.metas}),
+        n_train=answers.n_train,
+        n_test=len(y),
+        counts=dict(counts),
+        chosen=_chosen(answers.chosen),
+        dagger=rules.uses_test_statistics,
+        stamps=(SHUFFLED_STAMP,) if split == "shuffled" else (),
+        search_s=answers.search_s,
+        fit_s=answers.fit_s,
+        predict_s=answers.predict_s,
+        batch_rows=len(y),
+        latency_ms_p50=float(np.quantile(latency_ms, 0.5)),
+        latency_ms_p95=float(np.quantile(latency_ms, 0.95)),
+        latency_n=len(latency_ms),
+        threads=threads,
+        peak_rss_mb=peak_rss_mb(),
+        y_true=y,
+        y_pred=predicted,
+        recording=recording,
+        row=row,
+        fold=fold,
+    )
+
+
+def _clusters(data: Dataset, split: str, recording: IntArray, row: IntArray) -> tuple[npt.NDArray[Any], str]:
+    """Return the unit of replication of every test row: the group the split keeps apart, else the session."""
+    name = split if all(split in table.groups for table in data.tables) else "session"
+    cluster = np.empty(len(recording), dtype=object)
+    for place, table in enumerate(data.tables):
+        mine = recording == place
+        cluster[mine] = table.groups[name][np.searchsorted(table.row, row[mine])]
+    return cluster.astype(np.str_), name
+
+
+def _chosen(choices: Sequence[Choice]) -> dict[str, float]:
+    """Return what was chosen; over several folds, the median."""
+    if not choices:
+        return {}
+    names = choices[0].params
+    found = {name: [choice.params[name] for choice in choices] for name in names}
+    numbers = {name: values for name, values in found.items() if all(isinstance(v, int | float) for v in values)}
+    numbers["k"] = [choice.k for choice in choices]
+    return {name: float(np.median(values)) for name, values in numbers.items()}

@@ -1,0 +1,164 @@
+"""The interval of a score: resampled by session, or by blocks of time where there are too few sessions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.samples import FloatArray, IntArray
+
+LEVEL = 0.95
+RESAMPLES = 2000
+ENOUGH_CLUSTERS = 5
+"""Fewer than this cannot be resampled: the interval would be their range."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A percentile interval, and how it was found."""
+
+    low: float
+    high: float
+    method: str
+
+
+def score_interval(
+    metric: Metric,
+    y: npt.NDArray[Any],
+    predicted: npt.NDArray[Any],
+    recording: IntArray,
+    cluster: npt.NDArray[Any],
+    cluster_name: str,
+    n_classes: int,
+    seed: int,
+) -> Interval:
+    """Return the interval of ``metric.of(y, predicted)``.
+
+    Parameters
+    ----------
+    y, predicted, recording, cluster
+        (n,) truth, prediction, recording and unit of replication of each test row, rows of a recording in time order.
+    cluster_name
+        What a cluster is, for the text.
+
+    Notes
+    -----
+    With at least five clusters, clusters are drawn with replacement. With fewer, or when a class occurs in fewer than
+    five, time is resampled instead: circular blocks within each recording [1]_, whose length follows from the
+    autocorrelation of the loss [2]_ [3]_. Such an interval knows nothing of the spread between sessions and says so.
+
+    References
+    ----------
+    .. [1] Politis and Romano 1992, A circular block-resampling procedure for stationary data.
+    .. [2] Politis and White 2004, Automatic block-length selection for the dependent bootstrap.
+    .. [3] Patton, Politis and White 2009, correction to [2]_.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))
+    rows = metric.rows(y, predicted, n_classes)
+    names, number = np.unique(cluster, return_inverse=True)
+    if _enough(y, number, n_classes):
+        sums = np.zeros((len(names), rows.shape[1]))
+        np.add.at(sums, number, rows)
+        drawn = rng.integers(0, len(names), size=(RESAMPLES, len(names)))
+        scores = metric.score(sums[drawn].sum(axis=1), n_classes)
+        return _percentiles(scores, f"bootstrap over {len(names)} {cluster_name}s")
+    total = np.zeros((RESAMPLES, rows.shape[1]))
+    lengths = []
+    for one in np.unique(recording):
+        mine = rows[recording == one]
+        loss = _loss(metric, y[recording == one], predicted[recording == one])
+        length = block_length(loss)
+        lengths.append(length)
+        total += _circular_blocks(mine, length, rng)
+    spread = f"{min(lengths)}" if min(lengths) == max(lengths) else f"{min(lengths)}–{max(lengths)}"
+    many = f"{len(lengths)} recording" + ("s" if len(lengths) > 1 else "")
+    method = f"block bootstrap in time within {many} (blocks of {spread} rows): spread between sessions is not in it"
+    return _percentiles(metric.score(total, n_classes), method)
+
+
+def _enough(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> bool:
+    if len(np.unique(cluster)) < ENOUGH_CLUSTERS:
+        return False
+    return all(len(np.unique(cluster[y == one])) >= ENOUGH_CLUSTERS for one in range(n_classes) if (y == one).any())
+
+
+def _loss(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
+    if metric.kind == "classification":
+        return np.asarray(y != predicted, dtype=np.float64)
+    return np.asarray((predicted - y) ** 2)
+
+
+def _circular_blocks(rows: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
+    """Return (RESAMPLES, m) sums of `rows` resampled in circular blocks, each resample as long as the original."""
+    n = len(rows)
+    blocks = -(-n // length)
+    last = n - (blocks - 1) * length
+    total = np.concatenate([np.zeros((1, rows.shape[1])), np.cumsum(np.concatenate([rows, rows[:length]]), axis=0)])
+    starts = rng.integers(0, n, size=(RESAMPLES, blocks))
+    whole = (total[length:] - total[:-length])[:n]
+    # Sums of many blocks: count how often each start was drawn rather than gathering every block.
+    drawn = starts[:, :-1]
+    counts = np.zeros((RESAMPLES, n), dtype=np.float32) if drawn.shape[1] * rows.shape[1] > 4 * n else None
+    if counts is None:
+        summed = whole[drawn].sum(axis=1)
+    else:
+        for column in drawn.T:
+            counts[np.arange(RESAMPLES), column] += 1
+        summed = counts @ whole
+    end = starts[:, -1]
+    return np.asarray(summed + total[end + last] - total[end])
+
+
+def block_length(loss: FloatArray) -> int:
+    """Return the block length for a circular bootstrap of the mean of `loss`, (n,) in time order.
+
+    Notes
+    -----
+    ``b = (2 G² / D)^(1/3) n^(1/3)`` with ``D = 4/3 g(0)²``, the flat-top lag window, and the bandwidth from the last
+    lag whose correlation is significant (Politis and White 2004, with the correction of 2009).
+    """
+    n = len(loss)
+    centred = loss - loss.mean()
+    variance = float(np.mean(centred**2))
+    if n < 8 or variance <= 1e-30 * float(np.mean(loss**2)):
+        return 1
+    reach = max(5, int(np.ceil(np.sqrt(np.log10(n)))))
+    longest = int(np.ceil(np.sqrt(n))) + reach
+    longest = min(longest, n - 1)
+    covariance = _autocovariance(centred, 2 * longest)
+    correlation = covariance[1 : longest + 1] / variance
+    small = np.abs(correlation) < 2.0 * np.sqrt(np.log10(n) / n)
+    last = longest
+    for lag in range(len(small) - reach + 1):
+        if small[lag : lag + reach].all():
+            last = lag
+            break
+    bandwidth = min(2 * max(last, 1), len(covariance) - 1)
+    lags = np.arange(-bandwidth, bandwidth + 1)
+    ratio = np.abs(lags) / bandwidth
+    window = np.where(ratio <= 0.5, 1.0, 2.0 * (1.0 - ratio))
+    weighted = window * covariance[np.abs(lags)]
+    g0 = float(weighted.sum())
+    g = float((np.abs(lags) * weighted).sum())
+    if g0 == 0.0:
+        return 1
+    length = (2.0 * g**2 / (4.0 / 3.0 * g0**2)) ** (1 / 3) * n ** (1 / 3)
+    return int(np.clip(np.ceil(length), 1, min(np.ceil(3 * np.sqrt(n)), max(1, n // 3))))
+
+
+def _autocovariance(centred: FloatArray, lags: int) -> FloatArray:
+    """Return the autocovariance at lags 0 … `lags`, by the fast Fourier transform with padding against wrap-around."""
+    n = len(centred)
+    size = 1 << int(np.ceil(np.log2(2 * n)))
+    spectrum = np.fft.rfft(centred, size)
+    return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size)[: min(lags, n - 1) + 1] / n)
+
+
+def _percentiles(scores: FloatArray, method: str) -> Interval:
+    tail = (1 - LEVEL) / 2
+    low, high = np.quantile(scores, [tail, 1 - tail])
+    return Interval(float(low), float(high), method)

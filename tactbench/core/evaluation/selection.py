@@ -1,0 +1,126 @@
+"""Choosing hyper-parameters on data that is neither trained on nor tested on."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tactbench.core.errors import DataError
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.evaluation.sets import Kept, Scale, keep, part
+from tactbench.core.evaluation.splits import Assignment, inner_splits
+from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.samples import FloatArray, Part
+from tactbench.core.spec.rig import EstimatorDescriptor
+
+Build = Callable[[Mapping[str, Any]], Estimator]
+"""Parameters -> a fresh estimator."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was chosen, and how well it did on the validation data."""
+
+    params: dict[str, Any]
+    k: int
+    score: float
+
+
+def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
+    """Return what the estimator may look at."""
+    if descriptor.looks_at == "time":
+        return one.row.astype(np.float64)[:, None]
+    if descriptor.looks_at == "nothing":
+        return np.zeros((len(one), 1))
+    return one.X
+
+
+def scales(protocol: ProtocolSpec, train: Kept, other: Kept) -> tuple[Scale, Scale]:
+    """Return the scales of a training set and another, as the protocol has it."""
+    first = Scale.of(train.X)
+    return first, Scale.of(other.X) if protocol.scaled_by == "each set" else first
+
+
+def select(
+    descriptor: EstimatorDescriptor,
+    given: Mapping[str, Any],
+    build: Build,
+    data: Dataset,
+    protocol: ProtocolSpec,
+    assignment: Assignment,
+    metric: Metric,
+) -> Choice | None:
+    """Choose the estimator's grid parameters and window for one fold; None if there is nothing to choose.
+
+    The test rows of `assignment` are never looked at.
+
+    Parameters
+    ----------
+    given
+        Parameters the user has fixed: they are not searched.
+
+    Raises
+    ------
+    DataError
+        If there is no data to choose on.
+    """
+    grid = {name: values for name, values in descriptor.grid.items() if name not in given}
+    if not grid and len(descriptor.window_grid) <= 1:
+        return None
+    pairs = _pairs(data, protocol, assignment)
+    n_classes = len(data.classes)
+    best: Choice | None = None
+    sign = 1.0 if metric.higher_is_better else -1.0
+    for k in descriptor.window_grid:
+        filtered = [(part(a, scale_a, k), part(b, scale_b, k)) for a, scale_a, b, scale_b in pairs]
+        for values in itertools.product(*grid.values()):
+            params = {**given, **dict(zip(grid, values, strict=True))}
+            score = _score(descriptor, build, params, filtered, metric, n_classes)
+            if best is None or sign * score > sign * best.score:
+                best = Choice(params, k, score)
+    return best
+
+
+def _pairs(data: Dataset, protocol: ProtocolSpec, assignment: Assignment) -> list[tuple[Kept, Scale, Kept, Scale]]:
+    if assignment.validation is not None:
+        masks = [(assignment.train, assignment.validation)]
+    else:
+        masks = inner_splits(data, assignment)
+    pairs = []
+    for fit, check in masks:
+        ignored: Counter[str] = Counter()
+        train = keep(data, protocol, fit, "training", ignored)
+        other = keep(data, protocol, check, "validation", ignored)
+        scale_train, scale_other = scales(protocol, train, other)
+        if train.labelled.any() and other.labelled.any():
+            pairs.append((train, scale_train, other, scale_other))
+    if not pairs:
+        raise DataError(
+            "There is nothing to choose hyper-parameters on.", hint="Fix them in the matrix: estimators: [{params: …}]."
+        )
+    return pairs
+
+
+def _score(
+    descriptor: EstimatorDescriptor,
+    build: Build,
+    params: Mapping[str, Any],
+    pairs: Sequence[tuple[Part, Part]],
+    metric: Metric,
+    n_classes: int,
+) -> float:
+    """Return the score over all validation rows together."""
+    truth, answers = [], []
+    for train, check in pairs:
+        model = build(params)
+        model.fit(features_of(train, descriptor), train.y)
+        truth.append(check.y)
+        answers.append(np.asarray(model.predict(features_of(check, descriptor))))
+    return metric.of(np.concatenate(truth), np.concatenate(answers), n_classes)

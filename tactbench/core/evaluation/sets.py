@@ -1,0 +1,147 @@
+"""From masks to X and y: what the protocol discards, scales and filters."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.errors import DataError
+from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.evaluation.windows import causal_mean
+from tactbench.core.samples import FloatArray, IntArray, Part
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Mean and deviation of each feature."""
+
+    mean: FloatArray
+    deviation: FloatArray
+
+    @classmethod
+    def of(cls, X: FloatArray) -> Scale:
+        """Measure `X` in two passes; a constant feature gets deviation 1, so that it becomes 0 and never NaN."""
+        mean = X.mean(axis=0)
+        deviation = np.sqrt(((X - mean) ** 2).mean(axis=0))
+        # A constant column's deviation is the rounding error of its mean, not exactly zero.
+        constant = deviation <= 8 * np.finfo(np.float64).eps * np.abs(mean)
+        return cls(mean, np.where(constant, 1.0, deviation))
+
+    def __call__(self, X: FloatArray) -> FloatArray:
+        """Return z-scores."""
+        return np.asarray((X - self.mean) / self.deviation)
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The rows of one set before scaling, in order of recording and time."""
+
+    X: FloatArray
+    y: npt.NDArray[np.float64]
+    labelled: Mask
+    time_s: FloatArray
+    recording: IntArray
+    row: IntArray
+    cluster: IntArray
+    segment: IntArray
+    """Windows stay within one number."""
+
+
+def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str, counts: Counter[str]) -> Kept:
+    """Collect the rows of a set and drop what the protocol drops.
+
+    Parameters
+    ----------
+    masks
+        One (n,) mask a recording.
+    what
+        Name of the set, for messages.
+    counts
+        Told how many rows were dropped, and why.
+
+    Raises
+    ------
+    DataError
+        If no row is left.
+    """
+    chosen = [mask & _after_start(table, protocol, counts) for table, mask in zip(data.tables, masks, strict=True)]
+    sizes = [int(mask.sum()) for mask in chosen]
+    if sum(sizes) == 0:
+        raise DataError(f"The {what} set has no rows.", hint="Check roles, sessions and the length of the recordings.")
+    tables = data.tables
+    X = np.concatenate([table.X[mask] for table, mask in zip(tables, chosen, strict=True)])
+    recording = np.repeat(np.arange(len(tables)), sizes)
+    row = np.concatenate([table.row[mask] for table, mask in zip(tables, chosen, strict=True)])
+    good = np.ones(len(X), dtype=bool)
+    if protocol.three_sigma:
+        forces = [np.full(len(table.row), np.nan) if table.force is None else table.force for table in tables]
+        force = np.concatenate([column[mask] for column, mask in zip(forces, chosen, strict=True)])
+        good = _within_three_sigma(X, force, data.features, what, counts)
+    sessions = {name: place for place, name in enumerate(sorted({meta.session for meta in data.metas}))}
+    cluster = np.repeat([sessions[meta.session] for meta in data.metas], sizes)
+    consecutive = protocol.window_over == "consecutive samples"
+    return Kept(
+        X=X[good],
+        y=np.concatenate([table.y[mask] for table, mask in zip(tables, chosen, strict=True)])[good],
+        labelled=np.concatenate([table.labelled[mask] for table, mask in zip(tables, chosen, strict=True)])[good],
+        time_s=np.concatenate([table.time_s[mask] for table, mask in zip(tables, chosen, strict=True)])[good],
+        recording=recording[good],
+        row=row[good],
+        cluster=cluster[good],
+        segment=_segments(recording[good], row[good], consecutive=consecutive),
+    )
+
+
+def _after_start(table: Table, protocol: ProtocolSpec, counts: Counter[str]) -> Mask:
+    started: Mask = table.row >= protocol.discard_samples
+    if protocol.discard_hold and table.meta.scene is not None:
+        started = started & (table.time_s >= table.meta.scene.profile.hold.to("s"))
+    return started
+
+
+def _within_three_sigma(
+    X: FloatArray, force: FloatArray, features: Sequence[str], what: str, counts: Counter[str]
+) -> Mask:
+    """Return which rows have every channel within three standard deviations of that channel's mean in this set."""
+    good = np.ones(len(X), dtype=bool)
+    for name, column in (*zip(features, X.T, strict=True), ("force", force)):
+        there = ~np.isnan(column)
+        if not there.any():
+            continue
+        mean = column[there].mean()
+        deviation = np.sqrt(((column[there] - mean) ** 2).mean())
+        beyond = there & (np.abs(column - mean) > 3 * deviation) & (deviation > 0)
+        if beyond.any():
+            counts[f"{what} rows with {name} beyond three sigma"] += int(beyond.sum())
+        good &= ~beyond
+    return good
+
+
+def _segments(recording: IntArray, row: IntArray, *, consecutive: bool) -> IntArray:
+    if not consecutive:
+        return recording
+    breaks = (np.diff(recording, prepend=recording[:1]) != 0) | (np.diff(row, prepend=row[:1] - 1) != 1)
+    return np.cumsum(breaks).astype(np.int64)
+
+
+def part(kept: Kept, scale: Scale, k: int) -> Part:
+    """Scale and filter a set, and leave the rows that have a label."""
+    X = causal_mean(scale(kept.X), k, kept.segment)
+    there = kept.labelled
+    return Part(
+        X=X[there], y=kept.y[there], time_s=kept.time_s[there], recording=kept.recording[there], row=kept.row[there],
+        cluster=kept.cluster[there],
+    )  # fmt: skip
+
+
+def constant_features(kept: Kept, features: Sequence[str]) -> list[str]:
+    """Return the features that never change in a set."""
+    spread = np.ptp(kept.X, axis=0)
+    return [name for name, width in zip(features, spread, strict=True) if width == 0]

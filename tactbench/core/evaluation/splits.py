@@ -1,0 +1,224 @@
+"""What is kept apart between training and test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.errors import DataError, NotApplicable, UsageError
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.spec.task import TaskSpec
+
+Mask = npt.NDArray[np.bool_]
+FOLDS = 5
+"""Folds of grouped and of shuffled splits."""
+TRAIN_SHARE = 0.8
+"""First part, in time, that an in-session split trains on."""
+SHUFFLED_STAMP = "leaks: split shuffled puts neighbouring rows of one recording or object on both sides."
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """Which rows of each recording are for what."""
+
+    name: str
+    train: tuple[Mask, ...]
+    """one (n,) mask a recording"""
+    test: tuple[Mask, ...]
+    validation: tuple[Mask, ...] | None = None
+    groups: str = "session"
+    """Name of the groups that training and test do not share; also those of an inner split."""
+
+
+def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: str | None) -> str:
+    """Return the split to use: the one asked for, or the task's first that the recordings can serve.
+
+    Raises
+    ------
+    UsageError
+        If the split asked for cannot be served; the message says which can.
+    NotApplicable
+        If the protocol or every split of the task lacks what it needs.
+    """
+    if protocol.roles_only:
+        if asked not in (None, "roles"):
+            raise UsageError(
+                f"Protocol {protocol.name!r} splits by roles only; {asked!r} was asked for.",
+                hint="Use --protocol deployable for other splits.",
+            )
+        if {meta.role for meta in data.metas} < {"train", "validation", "test"}:
+            raise NotApplicable(
+                f"Protocol {protocol.name!r} needs recordings with the roles train, validation and test; these have "
+                f"{', '.join(sorted({str(meta.role) for meta in data.metas}))}.",
+                hint="Use --protocol deployable.",
+            )
+        return "roles"
+    if asked is not None:
+        if not _can(asked, data):
+            names = {name for table in data.tables for name in table.groups} | {"roles", "in-session", "shuffled"}
+            able = sorted(name for name in names if _can(name, data))
+            raise UsageError(f"These recordings cannot be split by {asked!r}.", hint=f"They can by: {', '.join(able)}.")
+        return asked
+    for name in task.splits:
+        if name != "shuffled" and _can(name, data):
+            return name
+    raise NotApplicable(
+        f"None of the splits of task {task.name!r} ({', '.join(task.splits)}) fits these recordings.",
+        hint="Name sessions, roles or groups in the mapping.",
+    )
+
+
+def _can(name: str, data: Dataset) -> bool:
+    if name == "roles":
+        return {"train", "test"} <= {meta.role for meta in data.metas}
+    if name in ("in-session", "shuffled"):
+        return True
+    values = {value for table in _open_to_folds(data) if name in data.tables[table].groups
+              for value in np.unique(data.tables[table].groups[name])}  # fmt: skip
+    return len(values) >= 2
+
+
+def make_splits(data: Dataset, split: str, seed: int) -> list[Assignment]:
+    """Return the folds of `split`.
+
+    Notes
+    -----
+    Recordings whose role is ``test`` are an official test set: only split ``roles`` touches them.
+    """
+    if split == "roles":
+        return [_by_roles(data)]
+    if split == "in-session":
+        return list(_in_session(data))
+    if split == "shuffled":
+        return list(_shuffled(data, seed))
+    if split == "session":
+        return list(_leave_one_out(data, "session"))
+    return list(_grouped(data, split))
+
+
+def _open_to_folds(data: Dataset) -> list[int]:
+    """Return the recordings that cross-validation may use."""
+    free = [place for place, meta in enumerate(data.metas) if meta.role != "test"]
+    return free or list(range(len(data.tables)))
+
+
+def _none(data: Dataset) -> list[Mask]:
+    return [np.zeros(len(table.row), dtype=bool) for table in data.tables]
+
+
+def _by_roles(data: Dataset) -> Assignment:
+    masks = {role: tuple(np.full(len(table.row), table.meta.role == role) for table in data.tables)
+             for role in ("train", "validation", "test")}  # fmt: skip
+    validation = masks["validation"] if any(mask.any() for mask in masks["validation"]) else None
+    return Assignment("roles", masks["train"], masks["test"], validation)
+
+
+def _in_session(data: Dataset) -> Iterator[Assignment]:
+    """Within each session, the first part of every recording's labelled rows trains, the rest tests."""
+    places = _open_to_folds(data)
+    for session in sorted({data.metas[place].session for place in places}):
+        train, test = _none(data), _none(data)
+        for place in places:
+            table = data.tables[place]
+            if table.meta.session != session:
+                continue
+            labelled = np.flatnonzero(table.labelled)
+            if len(labelled) < 10:
+                continue
+            first = labelled[int(TRAIN_SHARE * len(labelled))]
+            train[place][:first] = True
+            test[place][first:] = True
+        if any(mask.any() for mask in test):
+            yield Assignment(session, tuple(train), tuple(test), groups="session")
+
+
+def _leave_one_out(data: Dataset, group: str) -> Iterator[Assignment]:
+    names = _values(data, group)
+    for name in names:
+        yield _held_out(data, group, {name}, name)
+
+
+def _grouped(data: Dataset, group: str) -> Iterator[Assignment]:
+    """Deal groups into folds of about equal size, the largest first: no randomness, no order of files."""
+    sizes: dict[str, int] = {}
+    for place in _open_to_folds(data):
+        table = data.tables[place]
+        if group in table.groups:
+            for value, count in zip(*np.unique(table.groups[group][table.labelled], return_counts=True), strict=True):
+                sizes[str(value)] = sizes.get(str(value), 0) + int(count)
+    folds: list[set[str]] = [set() for _ in range(min(FOLDS, len(sizes)))]
+    filled = [0] * len(folds)
+    for value in sorted(sizes, key=lambda name: (-sizes[name], name)):
+        smallest = filled.index(min(filled))
+        folds[smallest].add(value)
+        filled[smallest] += sizes[value]
+    for number, held_out in enumerate(folds, 1):
+        yield _held_out(data, group, held_out, f"{group} fold {number}")
+
+
+def _held_out(data: Dataset, group: str, values: set[str], name: str) -> Assignment:
+    train, test = _none(data), _none(data)
+    for place in _open_to_folds(data):
+        table = data.tables[place]
+        if group in table.groups:
+            inside = np.isin(table.groups[group], sorted(values))
+            test[place] |= inside
+            train[place] |= ~inside
+    return Assignment(name, tuple(train), tuple(test), groups=group)
+
+
+def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
+    rng = np.random.default_rng(seed)
+    places = _open_to_folds(data)
+    fold = [rng.permutation(np.arange(len(data.tables[place].row)) % FOLDS) for place in places]
+    for number in range(FOLDS):
+        train, test = _none(data), _none(data)
+        for place, dealt in zip(places, fold, strict=True):
+            test[place] = dealt == number
+            train[place] = dealt != number
+        yield Assignment(f"shuffled fold {number + 1}", tuple(train), tuple(test), groups="recording")
+
+
+def _values(data: Dataset, group: str) -> list[str]:
+    places = _open_to_folds(data)
+    return sorted({str(value) for place in places for value in np.unique(data.tables[place].groups.get(group, []))})
+
+
+def inner_splits(data: Dataset, outer: Assignment) -> list[tuple[tuple[Mask, ...], tuple[Mask, ...]]]:
+    """Return (train, validation) masks inside the training rows of `outer`, for choosing hyper-parameters.
+
+    With several training sessions, each is left out once; with one, its last fifth in time is held back.
+    """
+    trained = [place for place, mask in enumerate(outer.train) if mask.any()]
+    sessions = sorted({data.metas[place].session for place in trained})
+    inner: list[tuple[tuple[Mask, ...], tuple[Mask, ...]]] = []
+    if len(sessions) >= 2:
+        for session in sessions:
+            apart = [table.meta.session == session for table in data.tables]
+            inner.append(
+                (
+                    tuple(mask & (not out) for mask, out in zip(outer.train, apart, strict=True)),
+                    tuple(mask & out for mask, out in zip(outer.train, apart, strict=True)),
+                )
+            )
+        return inner
+    fit, check = _none(data), _none(data)
+    for place in trained:
+        rows = np.flatnonzero(outer.train[place] & data.tables[place].labelled)
+        if len(rows) >= 5:
+            first = rows[int(TRAIN_SHARE * len(rows))]
+            fit[place] = outer.train[place] & (np.arange(len(outer.train[place])) < first)
+            check[place] = outer.train[place] & (np.arange(len(outer.train[place])) >= first)
+    return [(tuple(fit), tuple(check))]
+
+
+def assert_disjoint(assignments: Sequence[Assignment]) -> None:
+    """Refuse an assignment in which a row is on both sides; raises DataError."""
+    for assignment in assignments:
+        for train, test in zip(assignment.train, assignment.test, strict=True):
+            if (train & test).any():
+                raise DataError(f"Split {assignment.name!r} leaks: rows are on both sides.", hint="Report this.")

@@ -1,0 +1,26 @@
+"""Answers that look at nothing: what any other has to beat."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def mean(*, kind: str, seed: int, threads: int) -> Any:
+    """Return a regressor that answers the mean of the training labels."""
+    from sklearn.dummy import DummyRegressor
+
+    return DummyRegressor(strategy="mean")
+
+
+def majority(*, kind: str, seed: int, threads: int) -> Any:
+    """Return a classifier that answers the most frequent class."""
+    from sklearn.dummy import DummyClassifier
+
+    return DummyClassifier(strategy="most_frequent")
+
+
+def chance(*, kind: str, seed: int, threads: int) -> Any:
+    """Return a classifier that draws each answer uniformly from the training classes, with a fixed seed."""
+    from sklearn.dummy import DummyClassifier
+
+    return DummyClassifier(strategy="uniform", random_state=seed)
