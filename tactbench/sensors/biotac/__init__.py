@@ -1,0 +1,14 @@
+"""The BioTac: 19 electrodes under a fluid film, with pressure and temperature (see ``docs/sensors.md``)."""
+
+from __future__ import annotations
+
+from tactbench.plugin import SensorDescriptor, hookimpl
+from tactbench.sensors.biotac.spec import SPEC
+
+TACTBENCH_API = 1
+
+
+@hookimpl
+def tactbench_sensors() -> list[SensorDescriptor]:
+    """Offer the sensor."""
+    return [SensorDescriptor(spec=SPEC, transducer="tactbench.sensors.biotac.transduction:build")]

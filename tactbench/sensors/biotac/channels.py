@@ -1,0 +1,124 @@
+"""The channels of the BioTac: two clocks, 22 channels at 100 Hz and one at 2200 Hz."""
+
+from __future__ import annotations
+
+import math
+
+from tactbench.plugin import ChannelSpec, PhysicalRange, Quantity, Source, StreamSpec, derived, measured, sourced
+from tactbench.sensors.biotac.electrodes import ELECTRODES, NAMES, TABLE, Electrode
+from tactbench.sensors.biotac.rest import REST_COUNTS
+
+PAPER = "Karl et al. 2016, table I"
+MANUAL = "SynTouch BioTac SP product manual (26 Oct 2015), section 5, said to hold for the BioTac's electronics"
+SHEET_2011 = "The 2011 data sheet disagrees"
+FRAME = Source(
+    tag="sourced",
+    reference="kth-ros-pkg/biotac_driver: default frame of 44 commands at 4400 samples/s, every second one PAC",
+)
+CONVERTER_TOP = 4095.0
+"""12-bit converter; source: kth-ros-pkg/biotac_driver."""
+
+ELECTRODE_REST = (
+    "computed by the conduction model of this sensor with the film at rest, so that readings at rest and under load "
+    "belong together (docs/sensors.md); measured on real recordings: 2990-3461, median 3237"
+)
+
+
+def _stated(lower: float, upper: float, unit: str, reference: str) -> PhysicalRange:
+    return PhysicalRange(lower=lower, upper=upper, unit=unit, source=Source(tag="sourced", reference=reference))
+
+
+def _unit(normal: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = normal
+    length = math.sqrt(x * x + y * y + z * z)
+    return (x / length, y / length, z / length)
+
+
+def _electrode(name: str, place: Electrode, rest: float) -> ChannelSpec:
+    return ChannelSpec(
+        name=name,
+        kind="taxel",
+        lower=0.0,
+        upper=CONVERTER_TOP,
+        rest=derived(rest, "count", ELECTRODE_REST),
+        # Falls under the contact, where the film thins; rises elsewhere, where the fluid goes.
+        sign=0,
+        position_m=(place.x_mm * 1e-3, place.y_mm * 1e-3, place.z_mm * 1e-3),
+        normal=_unit(place.normal),
+        position_source=TABLE,
+        scale=derived(3.3 / CONVERTER_TOP, "V", f"3.3 V over 4095 counts; {MANUAL}"),
+        measures=_stated(0.0, 3.3, "V", MANUAL),
+        band=_stated(0.0, 100.0, "Hz", MANUAL),
+    )
+
+
+def _converter(
+    name: str,
+    kind: str,
+    rest: Quantity,
+    *,
+    sign: int = 0,
+    scale: Quantity | None = None,
+    measures: PhysicalRange | None = None,
+    band: PhysicalRange | None = None,
+) -> ChannelSpec:
+    return ChannelSpec.model_validate(
+        {
+            "name": name, "kind": kind, "lower": 0.0, "upper": CONVERTER_TOP,
+            "rest": rest, "sign": sign, "scale": scale, "measures": measures, "band": band,
+        }
+    )  # fmt: skip
+
+
+_PDC = _converter(
+    "PDC",
+    "dc_pressure",
+    measured(2500.0, "count", "2404-2460 on one BioTac, 2583-2593 on two BioTac SP"),
+    sign=1,
+    scale=sourced(36.5, "Pa/count", MANUAL),
+    measures=_stated(0.0, 100.0, "kPa", f"{PAPER}; the same in {MANUAL} and in the 2011 data sheet"),
+    band=_stated(0.0, 1040.0, "Hz", MANUAL),
+)
+# Counts rise with temperature, not with load: 4025 / ln((155183 - 46555 x)/x) - 273.15 degC with x = TDC/4095.
+_TDC = _converter(
+    "TDC",
+    "dc_temperature",
+    measured(2576.0, "count", "2559-2592 on BioTac SP, about 57 degC: the core is heated"),
+    measures=_stated(0.0, 75.0, "degC", f"{PAPER}; the same in {MANUAL}. {SHEET_2011}: 0-80 degC"),
+    band=_stated(0.0, 22.6, "Hz", MANUAL),
+)
+# No physical range: the maker's formula gives -3 degC/s at mid-scale, outside its own 0-1 degC/s.
+_TAC = _converter(
+    "TAC",
+    "ac_temperature",
+    measured(2037.0, "count", "2032-2042 on BioTac SP"),
+    band=_stated(0.45, 22.6, "Hz", f"{PAPER}; {MANUAL} has 0.45 Hz in its table and 0.25 Hz in its text"),
+)
+_PAC = _converter(
+    "PAC",
+    "ac_pressure",
+    measured(2043.0, "count", "2040-2045 on BioTac SP"),
+    scale=sourced(0.37, "Pa/count", MANUAL),
+    measures=_stated(-0.76, 0.76, "kPa", f"{MANUAL}. {SHEET_2011}: +-2 kPa"),
+    band=_stated(10.0, 1040.0, "Hz", f"{PAPER}; the same in {MANUAL}. {SHEET_2011}: 20-2200 Hz"),
+)
+
+STREAMS: tuple[StreamSpec, ...] = (
+    StreamSpec(
+        name="electrodes",
+        rate_hz=100.0,
+        rate_source=FRAME,
+        dtype="uint16",
+        channels=(
+            *(
+                _electrode(name, place, rest)
+                for name, place, rest in zip(NAMES, ELECTRODES, REST_COUNTS, strict=True)
+            ),
+            _PDC,
+            _TDC,
+            _TAC,
+        ),
+    ),
+    StreamSpec(name="vibration", rate_hz=2200.0, rate_source=FRAME, dtype="uint16", channels=(_PAC,)),
+)
+"""One stream per clock: a frame of 10 ms holds every channel once and PAC 22 times."""

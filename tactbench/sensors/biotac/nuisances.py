@@ -1,0 +1,90 @@
+"""What comes on top of the BioTac's physics, by kind of channel.
+
+The figures are measured on public recordings of one BioTac (Alexis-Georganopoulos/Robotic-Finger, called RF), of
+another one sliding (dexrob/BioTac_slide_20_50, DX) and of three BioTac SP at rest (RuihanGao/BioTacSP_setup, RG).
+"""
+
+from __future__ import annotations
+
+from tactbench.plugin import ChannelKind, Creep, Nuisances, Quantity, assumed, derived, measured
+
+_STEP = measured(1.0, "count", "raw channels of RF, DX and RG move in steps of one count")
+_NONE_KNOWN = "no recording shows it; left at 0 rather than invented"
+
+_CREEP = (
+    Creep(
+        fraction=derived(0.05, "1", "RF: 0.11-0.12 of the response remains after release; the split is assumed"),
+        tau=measured(1.6, "s", "static holds of a BioTac SP (yayaneath/BioTacSP-DoS): 1.6 s [0.5, 6]"),
+    ),
+    Creep(
+        fraction=derived(0.06, "1", "RF: 0.11-0.12 of the response remains after release; the split is assumed"),
+        tau=measured(7.0, "s", "RF: relaxation after release, 6.5-7.9 s; the slower tail is not identifiable"),
+    ),
+)
+
+
+def _zero(unit: str) -> Quantity:
+    return assumed(0.0, unit, _NONE_KNOWN)
+
+
+_WANDER_TAU = assumed(60.0, "s", "not identifiable from twelve minutes of recordings with a trend")
+_WARM_UP_TAU = measured(500.0, "s", "RF: 450-620 s by three ways of fitting the shared drift")
+
+TAXEL = Nuisances(
+    white=measured(0.35, "count", "RF: 0.33 before rounding; 0.3-0.7 with DX. A BioTac SP shows 3.5-6, heavy-tailed"),
+    offset_shared=measured(15.0, "count", "RF: +10 to +20 between recordings 1-6 minutes apart"),
+    offset_own=measured(5.0, "count", "RF: 2-10 within a session"),
+    offset_session=measured(
+        150.0, "count", "3dperceptionlab/biotacsp-stability-set-v2: 15-250 between sessions of BioTac SP"
+    ),
+    gain_scatter=derived(0.05, "1", "RF: mirror electrodes agree to 4-5 % after a common left-right factor"),
+    warm_up=measured(90.0, "count", "RF: 70-110 counts, shared by all electrodes (94 % of the drift's variance)"),
+    warm_up_tau=_WARM_UP_TAU,
+    warm_up_scatter=measured(0.15, "1", "RF: electrodes follow the shared drift with factors of +-10-20 %"),
+    wander=measured(0.5, "count", "RF: what is left over 38 s without contact; an upper bound"),
+    wander_tau=_WANDER_TAU,
+    step=_STEP,
+    creep=_CREEP,
+)
+
+PDC = Nuisances(
+    white=measured(0.15, "count", "RF and RG: 0.12 before rounding on the quiet ones, 0.44 on one of RG"),
+    offset_shared=_zero("count"),
+    offset_own=measured(17.0, "count", "RF: +17 to +20 after a minute of presses, back only over minutes"),
+    offset_session=_zero("count"),
+    gain_scatter=_zero("1"),
+    warm_up=derived(100.0, "count", "RF: +56 where the electrodes rose by +50 on average, times their 90 counts"),
+    warm_up_tau=_WARM_UP_TAU,
+    warm_up_scatter=_zero("1"),
+    wander=_zero("count"),
+    wander_tau=_WANDER_TAU,
+    step=_STEP,
+    creep=(),
+)
+
+
+def _white_only(white: Quantity) -> Nuisances:
+    return Nuisances(
+        white=white,
+        offset_shared=_zero("count"),
+        offset_own=_zero("count"),
+        offset_session=_zero("count"),
+        gain_scatter=_zero("1"),
+        warm_up=_zero("count"),
+        warm_up_tau=_WARM_UP_TAU,
+        warm_up_scatter=_zero("1"),
+        wander=_zero("count"),
+        wander_tau=_WANDER_TAU,
+        step=_STEP,
+    )
+
+
+NUISANCES: dict[ChannelKind, Nuisances] = {
+    "taxel": TAXEL,
+    "dc_pressure": PDC,
+    "dc_temperature": _white_only(measured(0.4, "count", "RG 0.36-0.41, DX 0.45")),
+    "ac_temperature": _white_only(measured(0.8, "count", "RG 0.7, DX 1.0")),
+    "ac_pressure": _white_only(
+        measured(2.4, "count", "RG, robust; a hum of 2-3.5 counts between 30 and 200 Hz comes on top")
+    ),
+}

@@ -1,0 +1,68 @@
+"""The BioTac as a declaration: streams, skin, what its transduction needs, nuisances."""
+
+from __future__ import annotations
+
+import math
+
+from tactbench.plugin import FluidBackedShell, Quantity, SensorSpec, SkinSheet, Source, assumed, derived, sourced
+from tactbench.sensors.biotac.channels import MANUAL, STREAMS
+from tactbench.sensors.biotac.nuisances import NUISANCES
+
+_MESH = "NVlabs/biotac_sim int_ext_skin_combined_ftw.tet and top_side_core_bc.obj"
+
+SKIN = FluidBackedShell(
+    sheet=SkinSheet(
+        x_min=assumed(-14.5, "mm", "covers electrodes 1-19 with a margin; the core ends at -19.3 mm"),
+        x_max=assumed(5.5, "mm", "covers electrode 7 on the shortened arc of the dome"),
+        arc=derived(math.pi * 8.2, "mm", "half of the circumference at the outer radius"),
+        outer_radius=derived(8.2, "mm", f"{_MESH}: 8.08-8.31 mm at the pad"),
+    ),
+    young=assumed(0.8, "MPa", "silicone of the skin alone; 0.4-1.55 tried. Shore A 26 by the maker"),
+    poisson=assumed(0.48, "1", "nearly incompressible silicone"),
+    thickness=derived(1.6, "mm", f"{_MESH}: inner 6.47-6.69, outer 8.08-8.31 mm"),
+    mid_radius=derived(7.4, "mm", "outer radius less half of the thickness"),
+    tension=assumed(0.02, "N/mm", "no source"),
+    contact_stiffness=assumed(1.299, "MPa/mm", "2 E / ((1 - nu^2) t); the factor 2 has no source"),
+    core_stiffness=assumed(6.0, "MPa/mm", "penalty, stiff beside the skin"),
+    gap=derived(1.27, "mm", f"{_MESH}: inner skin minus core 1.2-1.3 mm at the pad"),
+    gap_side=derived(0.25, "mm", f"{_MESH}: 0.15-0.7 mm near 70 degrees, fitted by eye"),
+    gap_side_fraction=derived(0.85, "1", f"{_MESH}: fitted by eye"),
+    residual_film=assumed(0.06, "mm", "asperities of the inner skin keep a film open at touch-down"),
+    clamp_stiffness=assumed(0.5, "MPa/mm", "soft clamp instead of the real seam and nail"),
+    clamp_length=assumed(1.0, "mm", "soft clamp instead of the real seam and nail"),
+)
+
+_NO_EXCITATION_SOURCE = "four excitation electrodes exist; their places on the 19-electrode core are in no source"
+
+PARAMETERS: dict[str, Quantity] = {
+    "contact_x": assumed(-5.0, "mm", "middle of the pad; the paper does not state where its caps touch"),
+    "contact_s": assumed(0.0, "mm", "on the midline"),
+    "core_radius": sourced(5.08, "mm", "radius on which the electrode table lies, e.g. sqrt(3.513^2 + 3.670^2)"),
+    "film_radius": derived(5.965, "mm", f"half way between core 5.33 and inner skin 6.6 mm; {_MESH}"),
+    "dome_shortening": assumed(0.75, "1", "meridian arc of the dome, shortened to keep electrode 7 on the sheet"),
+    "conductivity": assumed(1.6, "S/m", "NaBr solution; set so that electrodes rest near 3237 counts"),
+    "reference_resistor": sourced(10e3, "ohm", f"10 kOhm; {MANUAL}"),
+    "electrode_radius": assumed(0.6, "mm", "no source"),
+    "excitation_radius": assumed(0.8, "mm", "no source"),
+    "excitation_x_front": assumed(-4.9, "mm", _NO_EXCITATION_SOURCE),
+    "excitation_x_back": assumed(-12.0, "mm", _NO_EXCITATION_SOURCE),
+    "excitation_arc": assumed(2.2, "mm", f"arc on the core either side of the midline; {_NO_EXCITATION_SOURCE}"),
+}
+
+SPEC = SensorSpec(
+    name="biotac",
+    title="SynTouch BioTac",
+    principle="resistive",
+    principle_source=Source(tag="sourced", reference="Karl et al. 2016, table I"),
+    streams=STREAMS,
+    skin=SKIN,
+    parameters=PARAMETERS,
+    nuisances=NUISANCES,
+    references=(
+        "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",
+        "Wettels, Santos, Johansson, Loeb 2008 (impedance of the electrodes)",
+        "SynTouch BioTac SP product manual, 26 Oct 2015",
+        "TAMS-Group/biotac_gazebo_plugin, clear-nus/biotac_driver (electrode table)",
+        "NVlabs/biotac_sim (meshes of core and skin)",
+    ),
+)

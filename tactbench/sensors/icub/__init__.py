@@ -1,0 +1,14 @@
+"""The iCub fingertip: 12 capacitive taxels under foam (see ``docs/sensors.md``)."""
+
+from __future__ import annotations
+
+from tactbench.plugin import SensorDescriptor, hookimpl
+from tactbench.sensors.icub.spec import SPEC
+
+TACTBENCH_API = 1
+
+
+@hookimpl
+def tactbench_sensors() -> list[SensorDescriptor]:
+    """Offer the sensor."""
+    return [SensorDescriptor(spec=SPEC, transducer="tactbench.sensors.icub.transduction:build")]

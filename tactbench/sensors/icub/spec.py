@@ -1,0 +1,96 @@
+"""The iCub fingertip as a declaration: streams, skin, what its transduction needs, nuisances."""
+
+from __future__ import annotations
+
+import math
+
+from tactbench.plugin import (
+    Creep,
+    FoamPad,
+    Nuisances,
+    Quantity,
+    SensorSpec,
+    SkinSheet,
+    Source,
+    assumed,
+    derived,
+    measured,
+    sourced,
+)
+from tactbench.sensors.icub.channels import OUTER_RADIUS_MM, STREAMS
+
+_SCHMITZ = "Schmitz et al. 2010, abstract"
+_GRASP = "clear-nus/icub_grasp_dataset, 279 loaded fingertips"
+_ARC_MM = math.pi * OUTER_RADIUS_MM
+
+SKIN = FoamPad(
+    sheet=SkinSheet(
+        x_min=derived(-9.25, "mm", f"pad of 14.5 mm ({_SCHMITZ}) and 2 mm of soft margin"),
+        x_max=derived(9.25, "mm", f"pad of 14.5 mm ({_SCHMITZ}) and 2 mm of soft margin"),
+        arc=derived(_ARC_MM, "mm", "half of the circumference"),
+        outer_radius=derived(OUTER_RADIUS_MM, "mm", f"half of the width of 13 mm; {_SCHMITZ}"),
+        cells=(44, 48),
+        pad=(
+            derived(-7.25, "mm", f"half of the length of 14.5 mm; {_SCHMITZ}"),
+            derived(7.25, "mm", f"half of the length of 14.5 mm; {_SCHMITZ}"),
+            derived(_ARC_MM, "mm", "no margin along the arc"),
+        ),
+    ),
+    young=assumed(0.12, "MPa", "oedometric modulus of the silicone foam; 0.06-0.24 tried"),
+    shear=assumed(0.05, "MPa", "no source"),
+    thickness=assumed(2.0, "mm", "working value; no source states it"),
+    densification=assumed(0.75, "1", "strain at which the foam is solid; no source"),
+    cover_tension=assumed(0.015, "N/mm", "no source"),
+    cover_bending=assumed(0.006, "N*mm", "no source"),
+    contact_stiffness=assumed(3.6, "MPa/mm", "60 E/h: a stiff penalty, not a material value"),
+)
+
+PARAMETERS: dict[str, Quantity] = {
+    "contact_x": assumed(-0.3, "mm", "middle of the pad; the paper does not state where its caps touch"),
+    "contact_s": assumed(0.0, "mm", "on the midline"),
+    "taxel_radius": assumed(1.25, "mm", "half width of the flat-topped weight of a taxel; no source"),
+    "gain": assumed(
+        60.0, "count", f"fall of the reading when the capacitance doubles; gives the size measured on {_GRASP}"
+    ),
+    "least_gap": assumed(0.05, "1", "share of the foam's thickness below which the plates cannot come"),
+    "rest_spread": measured(2.0, "count", f"standard deviation of the rest level over taxels; {_GRASP}"),
+}
+
+NUISANCES = Nuisances(
+    white=measured(0.35, "count", f"0.30-0.38 before rounding; {_GRASP}"),
+    offset_shared=assumed(0.0, "count", "the measured offsets are each taxel's own"),
+    offset_own=measured(0.2, "count", f"within a session: 0.20 [0.07, 0.48]; {_GRASP}"),
+    offset_session=measured(0.8, "count", f"between sessions: 0.78 [0.44, 2.75]; {_GRASP}"),
+    gain_scatter=assumed(0.05, "1", "as for the BioTac; not measured on this sensor"),
+    warm_up=measured(0.0, "count", f"none seen within a trial; {_GRASP}"),
+    warm_up_tau=assumed(500.0, "s", "without effect while the warm-up is 0"),
+    warm_up_scatter=assumed(0.0, "1", "without effect while the warm-up is 0"),
+    wander=measured(0.2, "count", f"an upper bound; {_GRASP}"),
+    wander_tau=assumed(60.0, "s", "not identifiable"),
+    step=sourced(1.0, "count", "8-bit values on the bus; robotology/icub-firmware"),
+    creep=(
+        Creep(
+            fraction=measured(
+                0.15, "1", "tacman-fp7/tactile-control: at most 16 % [4, 29], motor and tendon included"
+            ),
+            tau=measured(2.5, "s", "tacman-fp7/tactile-control: 2.5 s [0.8, 6.5]"),
+        ),
+    ),
+)
+
+SPEC = SensorSpec(
+    name="icub",
+    title="iCub fingertip",
+    principle="capacitive",
+    principle_source=Source(tag="sourced", reference="Karl et al. 2016, table I"),
+    streams=STREAMS,
+    skin=SKIN,
+    parameters=PARAMETERS,
+    nuisances={"taxel": NUISANCES},
+    references=(
+        "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",
+        "Schmitz et al. 2010 (fingertip, abstract)",
+        "Jamali et al. 2015 (fingertip of fabric, abstract)",
+        "robotology/icub-main, icub-firmware (frames, direction of the reading)",
+    ),
+)

@@ -1,0 +1,105 @@
+"""An ideal taxel grid: no noise, and readings that can be computed by hand (see ``docs/sensors.md``).
+
+Taxel i reads ``S * integral of p(r) exp(-|r - r_i|^2 / (2 sigma^2)) dA``: linear in the contact pressure p, and in
+closed form for a point load, for a Gaussian pressure and for a uniform one.
+"""
+
+from __future__ import annotations
+
+from tactbench.plugin import (
+    BondedLayer,
+    ChannelSpec,
+    Nuisances,
+    Quantity,
+    SensorDescriptor,
+    SensorSpec,
+    SkinSheet,
+    Source,
+    StreamSpec,
+    assumed,
+    hookimpl,
+)
+
+TACTBENCH_API = 1
+
+_WHY = "by definition: this sensor is an oracle, not a product"
+_AT_MM = (-4.5, -1.5, 1.5, 4.5)
+
+
+def _by_definition(value: float, unit: str) -> Quantity:
+    return assumed(value, unit, _WHY)
+
+
+SKIN = BondedLayer(
+    sheet=SkinSheet(
+        x_min=_by_definition(-8.0, "mm"),
+        x_max=_by_definition(8.0, "mm"),
+        arc=_by_definition(16.0, "mm"),
+        cells=(48, 48),
+    ),
+    young=_by_definition(1.0, "MPa"),
+    poisson=_by_definition(0.3, "1"),
+    thickness=_by_definition(2.0, "mm"),
+    contact_stiffness=_by_definition(30.0, "MPa/mm"),
+)
+
+PARAMETERS = {
+    "contact_x": _by_definition(0.0, "mm"),
+    "contact_s": _by_definition(0.0, "mm"),
+    "sensitivity": _by_definition(1000.0, "count/N"),
+    "influence": _by_definition(1.5, "mm"),
+}
+
+_NONE = Nuisances(
+    white=_by_definition(0.0, "count"),
+    offset_shared=_by_definition(0.0, "count"),
+    offset_own=_by_definition(0.0, "count"),
+    offset_session=_by_definition(0.0, "count"),
+    gain_scatter=_by_definition(0.0, "1"),
+    warm_up=_by_definition(0.0, "count"),
+    warm_up_tau=_by_definition(1.0, "s"),
+    warm_up_scatter=_by_definition(0.0, "1"),
+    wander=_by_definition(0.0, "count"),
+    wander_tau=_by_definition(1.0, "s"),
+    # No converter: readings are stored as float64, unrounded.
+    step=_by_definition(0.0, "count"),
+)
+
+_SOURCE = Source(tag="assumed", reference=_WHY)
+
+STREAM = StreamSpec(
+    name="taxels",
+    rate_hz=100.0,
+    rate_source=_SOURCE,
+    dtype="float64",
+    channels=tuple(
+        ChannelSpec(
+            name=f"T{row * len(_AT_MM) + column + 1}",
+            kind="taxel",
+            rest=_by_definition(0.0, "count"),
+            sign=1,
+            position_m=(x_mm * 1e-3, s_mm * 1e-3, 0.0),
+            normal=(0.0, 0.0, -1.0),
+            position_source=_SOURCE,
+        )
+        for row, x_mm in enumerate(_AT_MM)
+        for column, s_mm in enumerate(_AT_MM)
+    ),
+)
+
+SPEC = SensorSpec(
+    name="ideal",
+    title="Ideal taxel grid",
+    principle="contact pressure under a Gaussian influence",
+    principle_source=_SOURCE,
+    streams=(STREAM,),
+    skin=SKIN,
+    parameters=PARAMETERS,
+    nuisances={"taxel": _NONE},
+)
+
+
+@hookimpl
+def tactbench_sensors() -> list[SensorDescriptor]:
+    """Offer the sensor."""
+    return [SensorDescriptor(spec=SPEC, transducer="tactbench.sensors.ideal.transduction:build")]
