@@ -12,6 +12,7 @@ from tactbench.plugin import (
     Block,
     ChannelSpec,
     EffectDescriptor,
+    FloatArray,
     PlanEntry,
     RigContext,
     Scalar,
@@ -56,7 +57,8 @@ class Twin:
             If the sensor cannot be simulated, or the scene cannot be carried out on it.
         """
         chosen = plan(scene, sensor.spec, self._effects)
-        signal = Signal(sensor, scene, seed, chosen.channels, *_profile(scene))
+        t_s, force = _profile(scene)
+        signal = Signal(sensor, scene, seed, chosen.channels, t_s, force)
         for effect in chosen.effects:
             load_object(effect.where)(signal)
         yield TwinAcquisition(signal, chosen)
@@ -122,7 +124,7 @@ class TwinAcquisition:
             yield Block(REFERENCE.name, t_ns[rows], signal.label[rows, None])
 
 
-def _profile(scene: Scene) -> tuple[np.ndarray[tuple[int], np.dtype[np.float64]], ...]:
+def _profile(scene: Scene) -> tuple[FloatArray, FloatArray]:
     """Return the times [s] and true forces [N] of the scene's samples: held, then a straight ramp."""
     profile = scene.profile
     duration, hold = profile.duration.to("s"), profile.hold.to("s")

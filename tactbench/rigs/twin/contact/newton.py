@@ -119,10 +119,10 @@ class Press:
         positive semidefinite, and one system is solved instead of two.
         """
         medium, cell = self.medium, self._cell
-        b = medium.contact_stiffness * state.touching
+        b = np.asarray(medium.contact_stiffness * state.touching, dtype=np.float64)
         s = float(b.sum()) * cell
-        diagonal = medium.law.tangent(state.w) + b
-        right = -state.g_w - b * (state.g_d / s)
+        diagonal = np.asarray(medium.law.tangent(state.w) + b, dtype=np.float64)
+        right = np.asarray(-state.g_w - b * (state.g_d / s), dtype=np.float64)
         if medium.keeps_volume:
             right -= right.mean()
         inverse = np.asarray(1.0 / (medium.stiffness + diagonal.mean()), dtype=np.float64)

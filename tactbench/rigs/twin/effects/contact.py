@@ -68,7 +68,7 @@ def _medium(sensor: SensorSpec) -> Medium:
 
 
 def _touch(signal: Signal, medium: Medium) -> Touch:
-    """Return where the indenter touches: the sensor's contact point, the scene's offset, and this recording's scatter."""
+    """Return where the indenter touches: the sensor's contact point, the scene's offset, this recording's scatter."""
     scene, parameters = signal.scene, signal.sensor.spec.parameters
     x, s = (parameters[name].to("mm") if name in parameters else middle
             for name, middle in (("contact_x", float(medium.grid.x_mm.mean())), ("contact_s", 0.0)))  # fmt: skip

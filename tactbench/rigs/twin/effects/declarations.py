@@ -46,7 +46,7 @@ def _largest(scene: Scene, sensor: SensorSpec, *fields: str) -> float:
 
 
 def creep(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Called for where the skin creeps and the load changes."""
+    """Call for it where the skin creeps and the load changes."""
     terms = [term for nuisances in _observed(scene, sensor) for term in nuisances.creep]
     late = max((sum(t.fraction.to("1") for t in n.creep) for n in _observed(scene, sensor)), default=0.0)
     if not terms or late == 0:
@@ -57,24 +57,24 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def contact(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Called for where there is a load."""
+    """Call for it where there is a load."""
     largest = max(scene.profile.start.to("N"), scene.profile.end.to("N"))
     return largest > 0, f"pressed up to {largest:g} N" if largest > 0 else "the scene has no load"
 
 
 def gain_scatter(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Called for where gains differ."""
+    """Call for it where gains differ."""
     scatter = _largest(scene, sensor, "gain_scatter")
     return scatter > 0, f"gains differ by {scatter:.0%}" if scatter > 0 else "the sensor states no scatter of gains"
 
 
 def rest_level(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Always called for: a reading has a level."""
+    """Call for it always: a reading has a level."""
     return True, "every reading has one"
 
 
 def offset(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Called for where recordings differ in level."""
+    """Call for it where recordings differ in level."""
     within = scene.environment.drift_scale * _largest(scene, sensor, "offset_shared", "offset_own")
     between = scene.environment.session_offset_scale * _largest(scene, sensor, "offset_session")
     if within == 0 and between == 0:
@@ -83,7 +83,7 @@ def offset(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Called for where the sensor is not yet warm."""
+    """Call for it where the sensor is not yet warm."""
     environment = scene.environment
     amplitude = environment.drift_scale * _largest(scene, sensor, "warm_up")
     if amplitude == 0:
@@ -94,24 +94,24 @@ def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def wander(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Called for where single channels drift."""
+    """Call for it where single channels drift."""
     size = scene.environment.drift_scale * _largest(scene, sensor, "wander")
     return size > 0, f"{size:g} counts (sd)" if size > 0 else "no free drift stated, or scaled to nothing"
 
 
 def white_noise(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Called for where channels are noisy."""
+    """Call for it where channels are noisy."""
     size = scene.environment.noise_scale * _largest(scene, sensor, "white")
     return size > 0, f"{size:g} counts (sd)" if size > 0 else "no noise stated, or scaled to nothing"
 
 
 def converter(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Always called for: samples leave through it."""
+    """Call for it always: samples leave through it."""
     step = _largest(scene, sensor, "step")
     return True, f"steps of {step:g}" if step else "no steps, only the converter's range"
 
 
 def force_noise(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Called for where the reference is noisy."""
+    """Call for it where the reference is noisy."""
     noise = scene.environment.force_noise.to("N")
     return noise > 0, f"{noise:g} N (sd), unfiltered" if noise > 0 else "the reference is free of noise"

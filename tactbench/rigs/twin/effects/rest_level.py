@@ -8,7 +8,7 @@ from tactbench.rigs.twin.effects.signal import Signal
 
 
 def apply(signal: Signal) -> None:
-    """Put the response on the rest levels that the spec states, spread over the channels of this unit where it says so."""
+    """Put the response on the stated rest levels, spread over the channels of this unit where the spec says so."""
     rest = np.array([channel.rest.value if channel.rest else 0.0 for channel in signal.channels])
     spread = signal.sensor.spec.parameters.get("rest_spread")
     if spread is not None:
