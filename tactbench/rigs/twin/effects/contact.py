@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from tactbench.plugin import RigError, SensorSpec, TransducerFactory, load_object
+from tactbench.plugin import RigError, Skin, TransducerFactory, load_object
 from tactbench.rigs.twin.contact.load_table import build_table
 from tactbench.rigs.twin.contact.medium import Medium
 from tactbench.rigs.twin.contact.skins import medium_of
@@ -31,7 +31,12 @@ def apply(signal: Signal) -> None:
             f"The sensor {sensor.name!r} has no transducer, so its readings cannot be simulated.",
             hint="Name one in its SensorDescriptor, or use --rig replay.",
         )
-    medium = _medium(sensor.spec)
+    if sensor.spec.skin is None:
+        raise RigError(
+            f"The sensor {sensor.name!r} declares no skin, so it cannot be pressed in simulation.",
+            hint="Declare one of the media of tactbench.plugin, or use --rig replay.",
+        )
+    medium = _medium(sensor.spec.skin)
     touch = _touch(signal, medium)
     make: TransducerFactory = load_object(sensor.transducer)
     observe = make(sensor.spec, medium.grid, tuple(channel.name for channel in signal.channels))
@@ -63,8 +68,8 @@ def _fine(signal: Signal) -> float:
 
 
 @lru_cache(maxsize=8)
-def _medium(sensor: SensorSpec) -> Medium:
-    return medium_of(sensor)
+def _medium(skin: Skin) -> Medium:
+    return medium_of(skin)
 
 
 def _touch(signal: Signal, medium: Medium) -> Touch:
