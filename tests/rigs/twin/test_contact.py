@@ -117,7 +117,8 @@ def test_tilt_does_not_move_the_origin_of_the_approach():
 
 
 # Values of physics.md section 6 (approach in mm, fluid pressure in kPa), printed with three and two decimals. They
-# were made without subtracting the smallest gap of the grid, which is added here, and with clamps measured from cell centres.
+# were made without subtracting the smallest gap of the grid, which is added here, and with clamps measured from cell
+# centres.
 ANCHORS = {
     5.0: {0.1: (0.216, 0.54), 0.5: (0.796, 2.68), 1.0: (1.348, 5.18), 2.0: (1.515, 6.10), 5.0: (1.777, 7.72)},
     40.0: {0.1: (0.157, 0.53), 0.5: (0.487, 2.46), 1.0: (0.729, 4.49), 2.0: (1.008, 7.75), 5.0: (1.322, 13.75)},
