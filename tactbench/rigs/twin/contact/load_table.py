@@ -64,7 +64,9 @@ class LoadTable:
         return _curve(self.loads_n, self.readings, self.touch_down_n)(loads)
 
 
-def build_table(medium: Medium, gap: FloatArray, observe: Observe, largest_n: float, tolerance: float) -> LoadTable:
+def build_table(
+    medium: Medium, gap: FloatArray, observe: Observe, largest_n: float, tolerance: float, share: float = 0.0
+) -> LoadTable:
     """Solve and interpolate the readings of `observe` for loads from 0 to `largest_n`.
 
     Parameters
@@ -77,6 +79,8 @@ def build_table(medium: Medium, gap: FloatArray, observe: Observe, largest_n: fl
         Largest load [N].
     tolerance
         Wanted bound on the interpolation error, in the channels' unit; what was achieved is in the result.
+    share
+        The bound may be as large as this share of the largest change of a reading.
 
     Raises
     ------
@@ -89,6 +93,8 @@ def build_table(medium: Medium, gap: FloatArray, observe: Observe, largest_n: fl
     nodes = [largest_n * (j / FIRST_NODES) ** POWER for j in range(FIRST_NODES + 1)]
     for load in nodes:
         solver(load)
+    change = np.abs(solver(nodes[-1]) - solver(nodes[0])).max()
+    tolerance = max(tolerance, share * float(change))
     touch_down = solver.bracket()
     if touch_down is not None:
         nodes = sorted({*nodes, *solver.around(touch_down)})
@@ -186,33 +192,40 @@ class _Loads:
             residual=solution.residual,
         )
 
-    def over_core(self, load: float) -> bool:
-        """Return whether the skin meets the core under `load`."""
+    def clearance(self, load: float) -> float:
+        """Return how far the skin still is from the core under `load`, mm; negative once it is met."""
         core = self._medium.core_at_mm
-        return core is not None and bool((self._solution(load).w > core).any())
+        return np.inf if core is None else float((core - self._solution(load).w).min())
 
     def bracket(self) -> float | None:
-        """Return the load of touch-down, bisected between the nodes that enclose it; None if there is none."""
+        """Return the load of touch-down, enclosed to `BRACKET_N` between solved loads; None if there is none.
+
+        By false position with the Illinois correction: the clearance is smooth on both sides of its root, so a handful
+        of loads do what bisection needs many for.
+        """
         if self._medium.core_at_mm is None:
             return None
-        known = sorted(self._solutions)
-        over = [self.over_core(load) for load in known]
-        if not any(over) or over[0]:
+        known = sorted(load for load in self._solutions if load > 0)
+        over = [load for load in known if self.clearance(load) < 0]
+        if not over or over[0] == known[0]:
             return None
-        place = over.index(True)
-        low, high = known[place - 1], known[place]
+        high = over[0]
+        low = known[known.index(high) - 1]
+        at_low, at_high = self.clearance(low), self.clearance(high)
         while high - low > BRACKET_N:
-            middle = (low + high) / 2
-            if self.over_core(middle):
-                high = middle
+            # Kept a third of the bracket's final width away from its ends, so that both of them close in.
+            middle = (low * at_high - high * at_low) / (at_high - at_low)
+            middle = min(max(middle, low + BRACKET_N / 3), high - BRACKET_N / 3)
+            here = self.clearance(middle)
+            if here < 0:
+                high, at_high, at_low = middle, here, at_low / 2
             else:
-                low = middle
+                low, at_low, at_high = middle, here, at_high / 2
         return (low + high) / 2
 
     def around(self, load: float) -> tuple[float, float]:
         """Return the known loads on both sides of `load`."""
-        known = sorted(self._solutions)
-        return max(one for one in known if one <= load), min(one for one in known if one > load)
+        return max(one for one in self._solutions if one <= load), min(one for one in self._solutions if one > load)
 
 
 def _second_moment_radius(pressure: FloatArray, medium: Medium) -> float:
