@@ -43,7 +43,7 @@ from tactbench.core.spec.sensor import (
     SensorSpec,
     StreamSpec,
 )
-from tactbench.core.spec.skin import BondedLayer, FluidBackedShell, FoamPad, SkinSheet
+from tactbench.core.spec.skin import BondedLayer, FluidBackedShell, FoamPad, Skin, SkinSheet
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
 
 __all__ = [
@@ -85,6 +85,7 @@ __all__ = [
     "SensorDescriptor",
     "SensorSpec",
     "Shelf",
+    "Skin",
     "SkinGrid",
     "SkinSheet",
     "SkinState",

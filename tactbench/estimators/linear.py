@@ -15,12 +15,12 @@ def least_squares(*, kind: str, seed: int, threads: int) -> Any:
 def lasso(*, kind: str, seed: int, threads: int, lambda_: float) -> Any:
     """Return the Lasso: ``1/(2n) |y - Xb|² + lambda |b|_1``, scikit-learn's objective with ``alpha = lambda``.
 
-    Stops by scikit-learn's duality gap at 1e-6 of ``y``'s square: a hundred times finer than its default, so that the
-    coefficients of nearly collinear taxels do not depend on the number of sweeps.
+    Stops at a duality gap of 1e-5 of ``|y|²``, ten times finer than scikit-learn's default; on exactly collinear taxels
+    a still finer one is not reached.
     """
     from sklearn.linear_model import Lasso
 
-    return Lasso(alpha=lambda_, tol=1e-6, max_iter=20_000, precompute=True)
+    return Lasso(alpha=lambda_, tol=1e-5, max_iter=20_000)
 
 
 def ridge(*, kind: str, seed: int, threads: int, alpha: float) -> Any:

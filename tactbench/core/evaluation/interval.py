@@ -97,20 +97,17 @@ def _circular_blocks(rows: FloatArray, length: int, rng: np.random.Generator) ->
     n = len(rows)
     blocks = -(-n // length)
     last = n - (blocks - 1) * length
-    total = np.concatenate([np.zeros((1, rows.shape[1])), np.cumsum(np.concatenate([rows, rows[:length]]), axis=0)])
+    out = np.zeros((RESAMPLES, rows.shape[1]))
+    filled = np.flatnonzero(rows.any(axis=0))  # a recording of one class leaves most of the confusion matrix empty
+    mine = rows[:, filled]
+    total = np.concatenate([np.zeros((1, len(filled))), np.cumsum(np.concatenate([mine, mine[:length]]), axis=0)])
     starts = rng.integers(0, n, size=(RESAMPLES, blocks))
-    whole = (total[length:] - total[:-length])[:n]
-    # Sums of many blocks: count how often each start was drawn rather than gathering every block.
-    drawn = starts[:, :-1]
-    counts = np.zeros((RESAMPLES, n), dtype=np.float32) if drawn.shape[1] * rows.shape[1] > 4 * n else None
-    if counts is None:
-        summed = whole[drawn].sum(axis=1)
-    else:
-        for column in drawn.T:
-            counts[np.arange(RESAMPLES), column] += 1
-        summed = counts @ whole
+    whole = total[length : length + n] - total[:n]
     end = starts[:, -1]
-    return np.asarray(summed + total[end + last] - total[end])
+    for place, column in enumerate(filled):
+        sums = whole[:, place][starts[:, :-1]].sum(axis=1)
+        out[:, column] = sums + total[end + last, place] - total[end, place]
+    return out
 
 
 def block_length(loss: FloatArray) -> int:
@@ -119,13 +116,15 @@ def block_length(loss: FloatArray) -> int:
     Notes
     -----
     ``b = (2 G² / D)^(1/3) n^(1/3)`` with ``D = 4/3 g(0)²``, the flat-top lag window, and the bandwidth from the last
-    lag whose correlation is significant (Politis and White 2004, with the correction of 2009).
+    lag whose correlation is significant (Politis and White 2004, with the correction of 2009). Never shorter than
+    ``n^(1/3)``: longer blocks than needed stay valid, and a loss that looks independent may only be rare.
     """
     n = len(loss)
     centred = loss - loss.mean()
     variance = float(np.mean(centred**2))
+    shortest = int(np.ceil(n ** (1 / 3)))
     if n < 8 or variance <= 1e-30 * float(np.mean(loss**2)):
-        return 1
+        return shortest
     reach = max(5, int(np.ceil(np.sqrt(np.log10(n)))))
     longest = int(np.ceil(np.sqrt(n))) + reach
     longest = min(longest, n - 1)
@@ -145,9 +144,9 @@ def block_length(loss: FloatArray) -> int:
     g0 = float(weighted.sum())
     g = float((np.abs(lags) * weighted).sum())
     if g0 == 0.0:
-        return 1
+        return shortest
     length = (2.0 * g**2 / (4.0 / 3.0 * g0**2)) ** (1 / 3) * n ** (1 / 3)
-    return int(np.clip(np.ceil(length), 1, min(np.ceil(3 * np.sqrt(n)), max(1, n // 3))))
+    return int(np.clip(np.ceil(length), shortest, max(shortest, min(np.ceil(3 * np.sqrt(n)), n // 3))))
 
 
 def _autocovariance(centred: FloatArray, lags: int) -> FloatArray:

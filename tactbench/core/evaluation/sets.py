@@ -27,16 +27,24 @@ class Scale:
 
     @classmethod
     def of(cls, X: FloatArray) -> Scale:
-        """Measure `X` in two passes; a constant feature gets deviation 1, so that it becomes 0 and never NaN."""
-        mean = X.mean(axis=0)
-        deviation = np.sqrt(((X - mean) ** 2).mean(axis=0))
-        # A constant column's deviation is the rounding error of its mean, not exactly zero.
-        constant = deviation <= 8 * np.finfo(np.float64).eps * np.abs(mean)
-        return cls(mean, np.where(constant, 1.0, deviation))
+        """Measure `X`."""
+        return cls(*moments(X))
 
     def __call__(self, X: FloatArray) -> FloatArray:
-        """Return z-scores."""
-        return np.asarray((X - self.mean) / self.deviation)
+        """Return z-scores; a feature that was constant where the scale was measured becomes exactly 0, never NaN."""
+        useful = self.deviation > 0
+        return np.where(useful, (X - self.mean) / np.where(useful, self.deviation, 1.0), 0.0)
+
+
+def moments(X: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return mean and deviation of each column in two passes, the deviation of a constant column exactly zero.
+
+    A constant column's computed deviation is the rounding error of its mean; it would turn rounding into a signal.
+    """
+    mean = np.asarray(X.mean(axis=0))
+    deviation = np.sqrt(((X - mean) ** 2).mean(axis=0))
+    rounding = 8 * np.finfo(np.float64).eps * np.abs(mean)
+    return mean, np.where(deviation > rounding, deviation, 0.0)
 
 
 @dataclass(frozen=True)
@@ -115,8 +123,7 @@ def _within_three_sigma(
         there = ~np.isnan(column)
         if not there.any():
             continue
-        mean = column[there].mean()
-        deviation = np.sqrt(((column[there] - mean) ** 2).mean())
+        mean, deviation = moments(column[there])
         beyond = there & (np.abs(column - mean) > 3 * deviation) & (deviation > 0)
         if beyond.any():
             counts[f"{what} rows with {name} beyond three sigma"] += int(beyond.sum())

@@ -25,14 +25,14 @@ def answer(
     cell: Cell,
     registry: Registry,
     recordings: Sequence[Path],
-    dataset: Callable[[TaskSpec, tuple[Path, ...]], Dataset],
+    dataset: Callable[[str, tuple[Path, ...]], Dataset],
     working: Callable[[str], None] | None = None,
 ) -> Answer:
     """Evaluate one cell; an exception becomes a row that says ``failed`` or ``skipped``."""
     task = registry.tasks[cell.task].spec
     row = opening(cell, task)
     try:
-        material = dataset(task, tuple(recordings))
+        material = dataset(task.name, tuple(recordings))
         result = evaluate(
             task,
             registry.estimators[cell.estimator],

@@ -20,7 +20,6 @@ from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.interfaces import Rig, RigContext, Shelf
 from tactbench.core.plugins.registry import Registry, load_object, load_registry
-from tactbench.core.spec.task import TaskSpec
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -121,8 +120,8 @@ def record(order: Order) -> Path:
 
 
 @lru_cache(maxsize=2)
-def _dataset(task: TaskSpec, recordings: tuple[Path, ...]) -> Dataset:
-    return load_dataset(task, recordings)
+def _dataset(task: str, recordings: tuple[Path, ...]) -> Dataset:
+    return load_dataset(installed().tasks[task].spec, recordings)
 
 
 Job = tuple[Cell, tuple[Path, ...], "BaseException | None"]

@@ -82,4 +82,4 @@ class EffectDescriptor(Frozen):
     produces: tuple[str, ...] = ()
     consumes: tuple[str, ...] = ()
     called_for: str = Field(pattern=_WHERE)
-    """``module:callable`` -> ``callable(scene, sensor) -> Reason``; light, no numerics."""
+    """``module:callable``, called with (scene, sensor spec): whether the scene calls for it, and why; light."""

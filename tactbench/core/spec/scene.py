@@ -57,6 +57,8 @@ class Environment(Frozen):
     """Factor on white noise of the sensor."""
     drift_scale: float = Field(default=1.0, ge=0)
     """Factor on offsets, wander and warm-up."""
+    session_offset_scale: float = Field(default=0.0, ge=0)
+    """Factor on the offsets between sessions; 0: the sessions follow each other on one warm set-up, as in the paper."""
     force_noise: Quantity = sourced(
         0.6875, "N", f"{PAPER}: RMSE of the regression on the time index, read as label noise"
     )

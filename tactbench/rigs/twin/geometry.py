@@ -37,7 +37,9 @@ def grid_of(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGrid:
     nx, ns = cells or sheet.cells
     x_min, x_max, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
     dx, ds = (x_max - x_min) / nx, arc / ns
-    return SkinGrid(x_mm=x_min + (np.arange(nx) + 0.5) * dx, s_mm=-arc / 2 + (np.arange(ns) + 0.5) * ds)
+    x = x_min + (np.arange(nx, dtype=np.float64) + 0.5) * dx
+    s = -arc / 2 + (np.arange(ns, dtype=np.float64) + 0.5) * ds
+    return SkinGrid(x_mm=np.asarray(x, dtype=np.float64), s_mm=np.asarray(s, dtype=np.float64))
 
 
 def gap_mm(grid: SkinGrid, touch: Touch, outer_radius_mm: float) -> FloatArray:
@@ -77,6 +79,6 @@ def _cap(r2: FloatArray, radius: float) -> FloatArray:
 def wave_numbers(grid: SkinGrid) -> tuple[FloatArray, FloatArray]:
     """Return the wave numbers (rad/mm) of a real two-dimensional transform on `grid`: (nx, 1) and (1, ns/2+1)."""
     dx, ds = grid.cell_mm
-    kx = 2.0 * np.pi * np.fft.fftfreq(len(grid.x_mm), dx)
-    ks = 2.0 * np.pi * np.fft.rfftfreq(len(grid.s_mm), ds)
+    kx = np.asarray(2.0 * np.pi * np.fft.fftfreq(len(grid.x_mm), dx), dtype=np.float64)
+    ks = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(grid.s_mm), ds), dtype=np.float64)
     return kx[:, None], ks[None, :]

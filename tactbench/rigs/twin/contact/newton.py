@@ -119,13 +119,13 @@ class Press:
         positive semidefinite, and one system is solved instead of two.
         """
         medium, cell = self.medium, self._cell
-        b = medium.contact_stiffness * state.touching
+        b = np.asarray(medium.contact_stiffness * state.touching, dtype=np.float64)
         s = float(b.sum()) * cell
-        diagonal = medium.law.tangent(state.w) + b
-        right = -state.g_w - b * (state.g_d / s)
+        diagonal = np.asarray(medium.law.tangent(state.w) + b, dtype=np.float64)
+        right = np.asarray(-state.g_w - b * (state.g_d / s), dtype=np.float64)
         if medium.keeps_volume:
             right -= right.mean()
-        inverse = 1.0 / (medium.stiffness + diagonal.mean())
+        inverse = np.asarray(1.0 / (medium.stiffness + diagonal.mean()), dtype=np.float64)
         if medium.keeps_volume:
             inverse[0, 0] = 0.0
         dw, inner = self._conjugate_gradients(diagonal, b, s, right, inverse, tol)
@@ -166,9 +166,7 @@ class Press:
         k_dw = self.apply_stiffness(dw)
         length = 1.0
         for _ in range(MAX_HALVINGS):
-            new = _State(
-                self, state.w + length * dw, state.d + length * dd, state.force, state.k_w + length * k_dw
-            )
+            new = _State(self, state.w + length * dw, state.d + length * dd, state.force, state.k_w + length * k_dw)
             # The last term lets roundoff through once the energy cannot fall any further.
             if new.energy <= state.energy + 1e-4 * length * slope + 1e-13 * abs(state.energy):
                 return new
@@ -178,9 +176,7 @@ class Press:
     def _solution(self, state: _State, steps: int, inner: int) -> Solution:
         pressure = self.medium.contact_stiffness * state.overlap
         fluid = float((pressure - self.medium.law.pressure(state.w)).mean()) if self.medium.keeps_volume else 0.0
-        return Solution(
-            state.force, state.w, state.d, pressure, fluid, state.residual, steps, inner
-        )
+        return Solution(state.force, state.w, state.d, pressure, fluid, state.residual, steps, inner)
 
 
 class _State:
@@ -188,9 +184,7 @@ class _State:
 
     __slots__ = ("d", "energy", "force", "g_d", "g_w", "k_w", "overlap", "residual", "touching", "w")
 
-    def __init__(
-        self, press: Press, w: FloatArray, d: float, force: float, k_w: FloatArray | None = None
-    ) -> None:
+    def __init__(self, press: Press, w: FloatArray, d: float, force: float, k_w: FloatArray | None = None) -> None:
         medium, cell = press.medium, press._cell
         self.w, self.d, self.force = w, d, force
         self.k_w = press.apply_stiffness(w) if k_w is None else k_w
@@ -202,11 +196,15 @@ class _State:
             self.overlap = np.maximum(self.d - press.gap - w, 0.0)
             self.touching = self.overlap > 0
         ks = medium.contact_stiffness
-        self.energy = cell * (
-            0.5 * float(np.vdot(w, self.k_w))
-            + float(medium.law.energy(w).sum())
-            + 0.5 * ks * float(np.vdot(self.overlap, self.overlap))
-        ) - force * self.d
+        self.energy = (
+            cell
+            * (
+                0.5 * float(np.vdot(w, self.k_w))
+                + float(medium.law.energy(w).sum())
+                + 0.5 * ks * float(np.vdot(self.overlap, self.overlap))
+            )
+            - force * self.d
+        )
         g_w = self.k_w + medium.law.pressure(w) - ks * self.overlap
         if medium.keeps_volume:
             g_w -= g_w.mean()

@@ -63,9 +63,10 @@ def shell(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
 
 
 def film_at_rest_mm(skin: FluidBackedShell, grid: SkinGrid) -> FloatArray:
-    """Return the film thickness at rest, (nx, ns): ``max(gap (1 - f c²), side)``, ``c = clip((|theta| - 0.6)/1, 0, 1)``.
+    """Return the film thickness at rest, (nx, ns).
 
-    Fitted by eye to the public meshes of the BioTac's core and inner skin (assumed).
+    ``max(gap (1 - f c²), side)`` with ``c = clip(|theta| - 0.6, 0, 1)``: fitted by eye to the public meshes of the
+    BioTac's core and inner skin (assumed).
     """
     outer = skin.sheet.outer_radius.to("mm") if skin.sheet.outer_radius else np.inf
     c = np.clip(np.abs(grid.s_mm / outer) - 0.6, 0.0, 1.0)

@@ -1,0 +1,1 @@
+"""Effects of the twin, one a file; ``declarations`` says which there are without importing any."""

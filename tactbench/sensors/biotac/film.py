@@ -1,0 +1,84 @@
+"""The fluid film: its thickness at rest, and its deflection on the finer grid on which it conducts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactbench.plugin import FloatArray, FluidBackedShell, SkinGrid, UsageError
+
+REFINEMENT = 2
+"""Conduction cells per skin cell and axis: the mechanics converges at 48 x 64 cells, the conduction does not."""
+
+# Fitted by eye to the public meshes of core and skin: the film is even within 0.6 rad of the midline and has
+# narrowed to its side value one radian further out.
+_EVEN_WITHIN_RAD = 0.6
+_NARROWS_OVER_RAD = 1.0
+
+
+def film_at_rest(skin: FluidBackedShell, s_mm: FloatArray) -> FloatArray:
+    """Return the film's thickness with nothing touching.
+
+    Parameters
+    ----------
+    skin
+        The shell; its sheet must have an outer radius.
+    s_mm
+        (n,) arc length on the outer surface, 0 on the midline.
+
+    Returns
+    -------
+    (n,) millimetres: ``max(gap (1 - f c^2), gap_side)`` with ``c = clip((|s|/Ro - 0.6) / 1.0, 0, 1)``.
+
+    Raises
+    ------
+    UsageError
+        If the sheet is flat.
+    """
+    radius = skin.sheet.outer_radius
+    if radius is None:
+        raise UsageError(
+            "The film of a fluid-backed shell needs the finger's outer radius; the sheet states none.",
+            hint="Give SkinSheet.outer_radius.",
+        )
+    angle = np.abs(s_mm) / radius.to("mm")
+    narrowing = np.clip((angle - _EVEN_WITHIN_RAD) / _NARROWS_OVER_RAD, 0.0, 1.0)
+    film = skin.gap.to("mm") * (1.0 - skin.gap_side_fraction.value * narrowing**2)
+    return np.maximum(film, skin.gap_side.to("mm"))
+
+
+def refined(grid: SkinGrid, factor: int = REFINEMENT) -> SkinGrid:
+    """Return the grid with each cell cut into `factor` x `factor`; centres of cells, not nodes."""
+    return SkinGrid(x_mm=_refined_axis(grid.x_mm, factor), s_mm=_refined_axis(grid.s_mm, factor))
+
+
+def _refined_axis(centres: FloatArray, factor: int) -> FloatArray:
+    step = float(centres[1] - centres[0])
+    edge = float(centres[0]) - step / 2
+    return np.asarray(edge + (np.arange(len(centres) * factor) + 0.5) * step / factor)
+
+
+def spectral_interpolation(n: int, factor: int = REFINEMENT) -> FloatArray:
+    """Return the matrix that takes n periodic cell-centred samples to the refined cells.
+
+    It is the Dirichlet kernel, that is a zero-padded Fourier transform with the half-cell shift of cell centres
+    (which do not coincide with the finer ones), written as a matrix: two small
+    products do both axes.
+
+    Parameters
+    ----------
+    n
+        Number of samples, even.
+    factor
+        Refinement.
+
+    Returns
+    -------
+    (n * factor, n); rows sum to 1; exact for every wave below the Nyquist one.
+    """
+    fine = (np.arange(n * factor) + 0.5) / factor
+    coarse = np.arange(n) + 0.5
+    distance = fine[:, None] - coarse[None, :]  # in coarse cells; never an integer for an even factor
+    turn = np.pi * distance / n
+    at_node = np.abs(np.sin(turn)) < 1e-12
+    kernel = np.sin(n * turn) / (n * np.tan(np.where(at_node, 0.5, turn)))
+    return np.asarray(np.where(at_node, 1.0, kernel))

@@ -1,0 +1,126 @@
+"""From skin states to the iCub's counts: plate capacitors whose foam gets thinner."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tactbench.plugin import ChannelSpec, FloatArray, FoamPad, RigError, SensorSpec, SkinGrid, SkinState
+
+SUBSAMPLES = 8
+"""Points per cell and axis that average a taxel's weight; the weight's edge is a few cells wide."""
+
+
+def taxel_weight(grid: SkinGrid, centre_mm: tuple[float, float], radius_mm: float) -> FloatArray:
+    """Return the share of each cell in a taxel's reading.
+
+    Parameters
+    ----------
+    grid
+        Cell centres.
+    centre_mm
+        Axial place and arc length of the taxel.
+    radius_mm
+        Where the flat top ``exp(-(r^2/a^2)^4)`` falls.
+
+    Returns
+    -------
+    (nx, ns), sum 1.
+
+    Raises
+    ------
+    RigError
+        If the taxel lies outside the grid.
+    """
+    dx, ds = grid.cell_mm
+    within = (np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES - 0.5
+    x = (grid.x_mm[:, None] + within * dx).ravel() - centre_mm[0]
+    s = (grid.s_mm[:, None] + within * ds).ravel() - centre_mm[1]
+    flat_top = np.exp(-(((x[:, None] ** 2 + s[None, :] ** 2) / radius_mm**2) ** 4))
+    cells = flat_top.reshape(len(grid.x_mm), SUBSAMPLES, len(grid.s_mm), SUBSAMPLES).sum(axis=(1, 3))
+    total = cells.sum()
+    if total == 0.0:
+        raise RigError(
+            f"A taxel at x {centre_mm[0]:.2f}, s {centre_mm[1]:.2f} mm lies outside the skin's grid.",
+            hint="Correct the taxel's position or the SkinSheet.",
+        )
+    return np.asarray(cells / total)
+
+
+class ICubTransducer:
+    """Readings in counts: ``rest - gain (C/C0 - 1)``, before noise, rounding and clipping."""
+
+    def __init__(self, weights: FloatArray, rest: FloatArray, gain: float, foam_mm: float, least_gap: float) -> None:
+        self._weights = weights
+        self._rest = rest
+        self._gain = gain
+        self._foam_mm = foam_mm
+        self._least_mm = least_gap * foam_mm
+
+    def capacitance(self, state: SkinState) -> FloatArray:
+        """Return (n_wanted,) C/C0, ``sum W_i h / (h - u)`` with the plates never nearer than `least_gap` of h."""
+        closeness = self._foam_mm / np.maximum(state.thickness_mm, self._least_mm)
+        return np.asarray(self._weights @ closeness.ravel())
+
+    def __call__(self, state: SkinState) -> FloatArray:
+        """Return the (n_wanted,) readings under `state`; raises RigError if it is of another grid."""
+        if state.thickness_mm.size != self._weights.shape[1]:
+            raise RigError(
+                f"The skin state has {state.thickness_mm.size} cells, the transducer {self._weights.shape[1]}.",
+                hint="Give build() the grid of the states.",
+            )
+        return np.asarray(self._rest - self._gain * (self.capacitance(state) - 1.0))
+
+
+def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> ICubTransducer:
+    """Prepare the iCub fingertip's transduction.
+
+    Parameters
+    ----------
+    sensor
+        The fingertip's spec, perhaps with other parameters.
+    grid
+        The grid on which skin states will come.
+    wanted
+        Names of taxels.
+
+    Raises
+    ------
+    RigError
+        For a channel that is no taxel with a place and a rest level; for a skin that is no foam pad.
+    """
+    skin = sensor.skin
+    if not isinstance(skin, FoamPad) or skin.sheet.outer_radius is None:
+        raise RigError(
+            f"{sensor.name} has no foam pad around a finger, which this transduction needs.",
+            hint="Declare the skin as FoamPad with an outer radius, or name another transducer.",
+        )
+    taxels = {channel.name: channel for channel in sensor.channels("taxel")}
+    unknown = [name for name in wanted if name not in taxels]
+    if unknown:
+        raise RigError(f"{sensor.name} has no taxel {', '.join(unknown)}.", hint=f"Taxels: {', '.join(taxels)}.")
+    radius = sensor.parameters["taxel_radius"].to("mm")
+    outer = skin.sheet.outer_radius.to("mm")
+    weights = [taxel_weight(grid, _place_mm(taxels[name], outer), radius).ravel() for name in wanted]
+    return ICubTransducer(
+        np.stack(weights) if weights else np.empty((0, len(grid.x_mm) * len(grid.s_mm))),
+        np.array([_rest(taxels[name]) for name in wanted]),
+        sensor.parameters["gain"].to("count"),
+        skin.thickness.to("mm"),
+        sensor.parameters["least_gap"].value,
+    )
+
+
+def _place_mm(taxel: ChannelSpec, outer_radius_mm: float) -> tuple[float, float]:
+    """Axial place and arc length on the outer surface."""
+    if taxel.position_m is None:
+        raise RigError(f"{taxel.name} has no position.", hint="Give ChannelSpec.position_m.")
+    x, y, z = taxel.position_m
+    return 1e3 * x, outer_radius_mm * float(np.arctan2(y, -z))
+
+
+def _rest(taxel: ChannelSpec) -> float:
+    if taxel.rest is None:
+        raise RigError(f"{taxel.name} has no rest level.", hint="Give ChannelSpec.rest.")
+    return taxel.rest.to("count")

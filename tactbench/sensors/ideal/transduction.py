@@ -1,0 +1,67 @@
+"""From contact pressure to the ideal grid's readings: an integral done exactly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from tactbench.plugin import FloatArray, RigError, SensorSpec, SkinGrid, SkinState
+
+
+def gaussian_over_cells(centres_mm: FloatArray, at_mm: float, sigma_mm: float) -> FloatArray:
+    """Return (n,) integrals of ``exp(-(x - at)^2 / (2 sigma^2))`` over cells around `centres_mm`, millimetres."""
+    half = float(centres_mm[1] - centres_mm[0]) / 2
+    edges = np.append(centres_mm - half, centres_mm[-1] + half) - at_mm
+    primitive = np.array([math.erf(edge / (math.sqrt(2.0) * sigma_mm)) for edge in edges])
+    return np.asarray(sigma_mm * math.sqrt(math.pi / 2) * np.diff(primitive))
+
+
+class IdealTransducer:
+    """Readings in counts, exact for a pressure that is constant in each cell."""
+
+    def __init__(self, along_x: FloatArray, along_s: FloatArray, sensitivity: float) -> None:
+        self._along_x, self._along_s = along_x, along_s
+        self._sensitivity = sensitivity
+
+    def __call__(self, state: SkinState) -> FloatArray:
+        """Return the (n_wanted,) readings under `state`; raises RigError if it is of another grid."""
+        expected = (self._along_x.shape[1], self._along_s.shape[1])
+        if state.pressure_mpa.shape != expected:
+            raise RigError(
+                f"The skin state has {state.pressure_mpa.shape} cells, the transducer {expected}.",
+                hint="Give build() the grid of the states.",
+            )
+        # MPa times mm^2 is newton.
+        felt = np.einsum("ix,xs,is->i", self._along_x, state.pressure_mpa, self._along_s, optimize=True)
+        return np.asarray(self._sensitivity * felt)
+
+
+def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> IdealTransducer:
+    """Prepare the ideal grid's transduction.
+
+    Parameters
+    ----------
+    sensor
+        The ideal grid's spec, perhaps with other taxels.
+    grid
+        The grid on which skin states will come.
+    wanted
+        Names of taxels.
+
+    Raises
+    ------
+    RigError
+        For a channel that is no taxel with a place.
+    """
+    places = {channel.name: channel.position_m for channel in sensor.channels("taxel")}
+    sigma = sensor.parameters["influence"].to("mm")
+    along_x, along_s = np.empty((len(wanted), len(grid.x_mm))), np.empty((len(wanted), len(grid.s_mm)))
+    for row, name in enumerate(wanted):
+        place = places.get(name)
+        if place is None:
+            raise RigError(f"{sensor.name} has no taxel {name} with a place.", hint=f"Taxels: {', '.join(places)}.")
+        along_x[row] = gaussian_over_cells(grid.x_mm, 1e3 * place[0], sigma)
+        along_s[row] = gaussian_over_cells(grid.s_mm, 1e3 * place[1], sigma)
+    return IdealTransducer(along_x, along_s, sensor.parameters["sensitivity"].to("count/N"))

@@ -1,0 +1,178 @@
+"""The paper's protocol, step by step, on recordings whose right answer can be worked out by hand."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.metrics import METRICS
+from tactbench.core.evaluation.protocols import KARL2016
+from tactbench.core.evaluation.selection import select
+from tactbench.core.evaluation.sets import Scale, keep, part
+from tactbench.core.evaluation.splits import make_splits
+from tactbench.core.plugins.registry import load_object, load_registry
+
+from .made import force_task, label_task, record
+
+ESTIMATORS = load_registry().estimators
+ROLES = ("train", "validation", "test")
+
+
+def ticking():
+    counter = itertools.count()
+    return lambda: next(counter) * 1e-3
+
+
+def three(folder, make, **more):
+    return [record(folder / f"{role}.h5", *make(place), role=role, session=role, **more)
+            for place, role in enumerate(ROLES)]  # fmt: skip
+
+
+def ramp(seed, n=1600, gain=(50.0, -20.0, 7.0), noise=1.0, label_noise=0.0):
+    rng = np.random.default_rng(seed)
+    force = np.linspace(0.0, 5.0, n)
+    X = 1000 + force[:, None] * np.array(gain) + rng.normal(0, noise, (n, len(gain)))
+    return X, force + rng.normal(0, label_noise, n)
+
+
+def sets(paths, role, k=0):
+    from collections import Counter
+
+    data = load_dataset(force_task(), paths)
+    (assignment,) = make_splits(data, "roles", 0)
+    counts = Counter()
+    kept = keep(data, KARL2016, getattr(assignment, role), role, counts)
+    return data, kept, part(kept, Scale.of(kept.X), k), counts
+
+
+def test_the_first_600_samples_are_dropped(tmp_path):
+    _, kept, _, _ = sets(three(tmp_path, ramp), "train")
+    assert kept.row.min() == 600
+    assert len(kept.row) == 1000
+
+
+def test_a_sample_goes_if_any_channel_is_beyond_three_sigma_of_its_set(tmp_path):
+    def with_outliers(seed):
+        X, force = ramp(seed)
+        X[700, 1] += 5000.0
+        X[100, 0] += 5000.0  # among the first 600: dropped anyway
+        force[800] -= 500.0
+        return X, force
+
+    _, kept, _, counts = sets(three(tmp_path, with_outliers), "test")
+    assert set(range(600, 1600)) - set(kept.row.tolist()) >= {700, 800}
+    assert counts["test rows with t1 beyond three sigma"] >= 1
+    assert counts["test rows with force beyond three sigma"] == 1
+    by_hand = np.ones(1000, dtype=bool)
+    X, force = with_outliers(2)
+    for column in (*X[600:].T, force[600:]):
+        by_hand &= np.abs(column - column.mean()) <= 3 * column.std()
+    assert kept.row.tolist() == (np.flatnonzero(by_hand) + 600).tolist()
+
+
+def test_each_set_is_scaled_by_its_own_mean_and_deviation_all_its_recordings_pooled(tmp_path):
+    paths = three(tmp_path, ramp)
+    paths.append(record(tmp_path / "test-b.h5", *ramp(9, gain=(10.0, 5.0, 1.0)), role="test", session="test"))
+    _, kept, one, _ = sets(paths, "test")
+    assert set(kept.recording.tolist()) == {2, 3}
+    # Means of 2000 z-scores: rounding only.
+    np.testing.assert_allclose(one.X.mean(axis=0), 0.0, atol=1e-10)
+    np.testing.assert_allclose(one.X.std(axis=0), 1.0, atol=1e-10)
+    for place in (2, 3):
+        assert np.abs(one.X[one.recording == place].mean(axis=0)).max() > 0.1, "not each recording by itself"
+
+
+def test_a_channel_that_never_changes_becomes_zero_and_is_reported(tmp_path):
+    def stuck(seed):
+        X, force = ramp(seed)
+        X[:, 2] = 243.7
+        return X, force
+
+    _, _, one, _ = sets(three(tmp_path, stuck), "train")
+    assert not one.X[:, 2].any()
+    result = run(three(tmp_path, stuck))
+    assert result.counts["folds in which t2 never changes in training"] == 1
+    assert np.isfinite(result.score)
+
+
+def test_the_window_is_the_mean_over_t_minus_k_to_t_within_one_recording(tmp_path):
+    _, kept, one, _ = sets(three(tmp_path, ramp), "train", k=20)
+    z = Scale.of(kept.X)(kept.X)
+    for t in (0, 1, 19, 20, 21, 999):
+        np.testing.assert_allclose(one.X[t], z[max(0, t - 20) : t + 1].mean(axis=0), atol=1e-12)
+
+
+def run(paths, estimator="lasso", task=None, **more):
+    return evaluate(
+        task or force_task(), ESTIMATORS[estimator], more.pop("params", {}), "karl2016", more.pop("split", None), paths,
+        seed=more.pop("seed", 0), clock=ticking(), **more,
+    )  # fmt: skip
+
+
+def test_lasso_on_one_perfect_feature_is_wrong_by_exactly_lambda(tmp_path):
+    """Objective 1/2n |y - Xb|² + l |b|: b = sd(y) - l, so the error is l times a unit z-score."""
+    paths = three(tmp_path, lambda seed: ramp(seed, gain=(50.0,), noise=0.0))
+    result = run(paths, params={"lambda_": 0.2})
+    assert result.chosen["k"] == 0
+    assert result.score == pytest.approx(0.2, rel=1e-3)  # the solver stops at a duality gap of 1e-5 of y's square
+
+
+def test_the_grid_holds_what_the_paper_chose():
+    assert 0.2 in ESTIMATORS["lasso"].grid["lambda_"]
+    assert 20 in ESTIMATORS["lasso"].window_grid
+
+
+def test_hyper_parameters_are_chosen_on_validation_and_never_see_the_test_set(tmp_path):
+    paths = three(tmp_path, lambda seed: ramp(seed, label_noise=0.5))
+    chosen = []
+    for change in (0.0, 1e3):
+        X, force = ramp(2, label_noise=0.5)
+        paths[2] = record(tmp_path / f"test{change}.h5", X + change, force * 3 - change, role="test", session="test")
+        data = load_dataset(force_task(), paths)
+        (assignment,) = make_splits(data, "roles", 0)
+        descriptor = ESTIMATORS["lasso"]
+        make = load_object(descriptor.where)
+        choice = select(
+            descriptor, {}, lambda p, make=make: make(kind="regression", seed=0, threads=1, **p), data, KARL2016,
+            assignment, METRICS["rmse"],
+        )  # fmt: skip
+        chosen.append(choice)
+    assert chosen[0] == chosen[1]
+    X, force = ramp(1, label_noise=0.5)
+    paths[1] = record(tmp_path / "other.h5", X, force[::-1], role="validation", session="validation")
+    assert run(paths).scores["validation"] != chosen[0].score
+
+
+def test_the_score_is_that_of_the_test_set_and_carries_a_dagger(tmp_path):
+    result = run(three(tmp_path, lambda seed: ramp(seed, label_noise=0.5)))
+    residual = result.y_pred - result.y_true
+    assert result.score == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
+    assert result.ci_low < result.score < result.ci_high
+    assert result.dagger
+    assert result.split == "roles"
+    assert result.n_recordings == 3
+    assert "1 recording" in result.ci_method
+
+
+def test_curvature_rows_are_raw_and_classes_are_in_order(tmp_path):
+    paths = []
+    for role, radius in itertools.product(ROLES, (5.0, 7.5, 40.0)):
+        X, force = ramp(int(radius), gain=(radius, 100 / radius, 1.0))
+        paths.append(record(tmp_path / f"{role}-{radius}.h5", X, force, role=role, session=role,
+                            labels={"cap": radius}))  # fmt: skip
+    result = run(paths, "forest", label_task("cap"), params={"n_estimators": 10})
+    assert result.classes == (5.0, 7.5, 40.0)
+    assert result.confusion.shape == (3, 3)
+    assert result.confusion.sum() == result.n_test == len(result.y_true)
+    assert result.score > 0.5
+
+
+def test_it_needs_the_three_roles_and_no_other_split(tmp_path):
+    paths = three(tmp_path, ramp)
+    with pytest.raises(UsageError, match="by roles only"):
+        run(paths, split="session")
+    with pytest.raises(NotApplicable, match="deployable"):
+        run(paths[:2])

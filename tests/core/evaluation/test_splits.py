@@ -1,0 +1,224 @@
+"""Splits keep apart what they say, windows never cross, and a leak is stamped."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.core.errors import DataError, NotApplicable, UsageError
+from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.protocols import DEPLOYABLE
+from tactbench.core.evaluation.sets import Scale, keep, part
+from tactbench.core.evaluation.splits import choose_split, make_splits
+from tactbench.core.evaluation.windows import causal_mean
+
+from .made import force_task, label_task, record
+from .test_karl2016 import ESTIMATORS, ramp, ticking
+
+
+def sessions(folder, names=("a", "b", "c"), n=200, **more):
+    return [record(folder / f"{name}.h5", *ramp(place, n=n), session=name, **more)
+            for place, name in enumerate(names)]  # fmt: skip
+
+
+def grasps(folder, role=None, objects=12, each=20, seed=0):
+    rng = np.random.default_rng(seed)
+    names = np.repeat([f"thing {place}" for place in range(objects)], each)
+    y = rng.integers(0, 2, len(names))
+    X = rng.normal(size=(len(names), 3)) + y[:, None] + 3 * rng.normal(size=(objects, 3)).repeat(each, axis=0)
+    return record(
+        folder / f"grasps{role}{seed}.h5", X, t_ns=None, role=role, session=f"file {seed}",
+        annotations={"object": names, "kind": np.where(y, "slipped", "stable")},
+    )  # fmt: skip
+
+
+def run(paths, split=None, task=None, estimator="forest", **more):
+    return evaluate(task or force_task(), ESTIMATORS[estimator], more.pop("params", {"n_estimators": 10}), "deployable",
+                    split, paths, seed=0, clock=ticking(), **more)  # fmt: skip
+
+
+@pytest.mark.parametrize("split", ["session", "in-session", "shuffled", "object"])
+def test_training_and_test_rows_are_disjoint_and_every_free_row_is_tested_once(tmp_path, split):
+    paths = [grasps(tmp_path, seed=1), grasps(tmp_path, seed=2)] if split == "object" else sessions(tmp_path)
+    task = label_task() if split == "object" else force_task()
+    data = load_dataset(task, paths)
+    folds = make_splits(data, split, 0)
+    tested = [np.zeros(len(table.row), dtype=int) for table in data.tables]
+    for fold in folds:
+        for place, (train, test) in enumerate(zip(fold.train, fold.test, strict=True)):
+            assert not (train & test).any()
+            tested[place] += test
+    assert all((count <= 1).all() for count in tested)
+    if split != "in-session":
+        assert all((count == 1).all() for count in tested)
+
+
+def test_an_object_is_never_on_both_sides(tmp_path):
+    data = load_dataset(label_task(), [grasps(tmp_path, seed=1), grasps(tmp_path, seed=2)])
+    folds = make_splits(data, "object", 0)
+    assert len(folds) == 5
+    for fold in folds:
+        sides = [
+            {name for table, mask in zip(data.tables, masks, strict=True) for name in table.groups["object"][mask]}
+            for masks in (fold.train, fold.test)
+        ]
+        assert not sides[0] & sides[1]
+
+
+def test_in_session_trains_on_the_past_and_tests_on_the_future(tmp_path):
+    data = load_dataset(force_task(), sessions(tmp_path))
+    for fold in make_splits(data, "in-session", 0):
+        for table, train, test in zip(data.tables, fold.train, fold.test, strict=True):
+            if test.any():
+                assert table.time_s[train].max() < table.time_s[test].min()
+                assert train.sum() == pytest.approx(0.8 * len(train), abs=1)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 60), st.integers(0, 2**32 - 1))
+def test_a_window_never_reaches_across_a_split(tmp_path_factory, k, seed):
+    """Changing every test row must leave every training row as it was, and the other way round."""
+    folder = tmp_path_factory.mktemp("windows")
+    X, force = ramp(0, n=120)
+    rng = np.random.default_rng(seed)
+    split = str(rng.choice(["in-session", "session"]))
+    for name in ("a", "b"):
+        record(folder / f"{name}.h5", X + (name == "b"), force, session=name)
+    paths = [folder / "a.h5", folder / "b.h5"]
+    data = load_dataset(force_task(), paths)
+    from collections import Counter
+
+    for fold in make_splits(data, split, 0):
+        before = part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), Scale(np.zeros(3), np.ones(3)), k)
+        for table, test in zip(data.tables, fold.test, strict=True):
+            table.X[test] += rng.normal(size=(int(test.sum()), 3)) * 1e6
+        after = part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), Scale(np.zeros(3), np.ones(3)), k)
+        assert np.array_equal(before.X, after.X)
+
+
+@given(
+    st.integers(0, 50), st.lists(st.integers(1, 30), min_size=1, max_size=5), st.sampled_from([0.0, 1e8]),
+    st.integers(0, 2**32 - 1),
+)  # fmt: skip
+def test_the_causal_mean_is_that_of_a_naive_loop(k, lengths, offset, seed):
+    segment = np.repeat(np.arange(len(lengths)), lengths)
+    X = offset + np.random.default_rng(seed).normal(size=(len(segment), 2))
+    naive = np.array([X[max(t - k, int(np.flatnonzero(segment == segment[t])[0])) : t + 1].mean(axis=0)
+                      for t in range(len(X))])  # fmt: skip
+    # At an offset of 1e8 a double has 1.5e-8 between neighbours; sums of centred values add a few of these.
+    np.testing.assert_allclose(causal_mean(X, k, segment), naive, atol=1e-12 if offset == 0 else 1e-7)
+
+
+def test_a_shuffled_split_is_stamped_and_never_the_default(tmp_path):
+    paths = sessions(tmp_path)
+    assert run(paths).split == "session"
+    shuffled = run(paths, "shuffled")
+    assert shuffled.stamps
+    assert "leaks" in shuffled.stamps[0]
+    assert not run(paths, "in-session").stamps
+    only_shuffled = force_task(splits=("shuffled",))
+    with pytest.raises(NotApplicable):
+        choose_split(only_shuffled, DEPLOYABLE, load_dataset(only_shuffled, paths), None)
+
+
+def test_an_official_test_set_is_touched_by_split_roles_only(tmp_path):
+    paths = [grasps(tmp_path, "train", seed=1), grasps(tmp_path, "test", seed=2)]
+    by_object = run(paths, "object", label_task())
+    assert set(by_object.recording.tolist()) == {0}
+    by_roles = run(paths, "roles", label_task())
+    assert set(by_roles.recording.tolist()) == {1}
+
+
+def test_a_split_that_cannot_be_served_is_refused_with_those_that_can(tmp_path):
+    with pytest.raises(UsageError, match="in-session"):
+        run(sessions(tmp_path), "object")
+    with pytest.raises(UsageError, match="shuffled"):
+        run(sessions(tmp_path, ("a",)), "session")
+
+
+def test_deployable_scales_by_training_data_only(tmp_path):
+    paths = sessions(tmp_path, ("a", "b"))
+    data = load_dataset(force_task(), paths)
+    result = run(paths, estimator="ridge", params={})
+    for table in data.tables:
+        table.X[:] = table.X  # same data: the same score
+    assert run(paths, estimator="ridge", params={}, dataset=data).score == result.score
+    from collections import Counter
+
+    from tactbench.core.evaluation.selection import scales
+
+    fold = make_splits(data, "session", 0)[0]
+    train = keep(data, DEPLOYABLE, fold.train, "t", Counter())
+    test = keep(data, DEPLOYABLE, fold.test, "t", Counter())
+    ours, theirs = scales(DEPLOYABLE, train, test)
+    assert ours is theirs
+
+
+def test_rows_without_a_label_are_left_out_and_counted(tmp_path):
+    X, force = ramp(0, n=300)
+    force[::2] = np.nan
+    paths = [record(tmp_path / f"{name}.h5", X, force, session=name) for name in "ab"]
+    result = run(paths)
+    assert result.n_test == 300
+    assert result.counts["of 600 rows have no force sample and were left out"] == 300
+
+
+def test_a_dropped_out_taxel_never_reaches_an_estimator(tmp_path):
+    X, force = ramp(0, n=300)
+    X[10:20, 1] = np.nan
+    X[30, 0] = np.inf
+    paths = [record(tmp_path / f"{name}.h5", X, force, session=name) for name in "ab"]
+    result = run(paths)
+    assert result.counts["rows left out because t1 has no sample"] == 20
+    assert result.n_test == 2 * 289
+
+
+def test_a_recording_that_its_source_calls_unreliable_is_left_out_and_counted(tmp_path):
+    paths = sessions(tmp_path)
+    paths.append(record(tmp_path / "bad.h5", *ramp(7), session="d", excluded="declared unreliable"))
+    result = run(paths)
+    assert result.n_recordings == 3
+    assert result.counts["recordings left out (declared unreliable)"] == 1
+
+
+@pytest.mark.parametrize(
+    ("spoil", "error", "says"),
+    [
+        (lambda X, f: (X, np.full(len(f), 2.0)), DataError, "nothing to learn"),
+        (lambda X, f: (X, np.full(len(f), np.nan)), NotApplicable, "force sample"),
+        (lambda X, f: (np.column_stack([X[:, :2], np.full(len(X), np.nan)]), f), DataError, "t2 has no sample at all"),
+    ],
+)
+def test_what_cannot_be_learned_from_is_refused_with_the_reason(tmp_path, spoil, error, says):
+    X, force = ramp(0, n=200)
+    paths = [record(tmp_path / f"{name}.h5", *spoil(X, force), session=name) for name in "ab"]
+    with pytest.raises(error, match=says):
+        run(paths)
+
+
+def test_a_class_that_training_never_saw_is_scored_not_hidden(tmp_path):
+    X, _ = ramp(0, n=100)
+    paths = [record(tmp_path / f"{name}.h5", X + place, session=name, labels={"kind": label})
+             for place, (name, label) in enumerate((("a", "x"), ("b", "y"), ("c", "z")))]  # fmt: skip
+    result = run(paths, "session", label_task())
+    assert result.score == 0.0
+    assert result.classes == ("x", "y", "z")
+
+
+def test_offsets_of_a_hundred_million_do_not_lose_the_signal(tmp_path):
+    paths = [record(tmp_path / f"{name}.h5", X * 1e-2 + 1e8, f, session=name)
+             for name, (X, f) in (("a", ramp(0, n=400)), ("b", ramp(1, n=400)))]  # fmt: skip
+    assert run(paths, estimator="ridge", params={"alpha": 1.0}).score < 0.1
+
+
+def test_collinear_and_dead_taxels_have_finite_answers(tmp_path):
+    def made(seed):
+        X, f = ramp(seed, n=400)
+        return np.column_stack([X, X[:, 0] * 2, X[:, 0] - X[:, 1], np.full(len(X), 7.0)]), f
+
+    paths = [record(tmp_path / f"{name}.h5", *made(place), session=name) for place, name in enumerate("ab")]
+    for estimator in ("lasso", "ridge", "forest"):
+        result = run(paths, estimator=estimator, params={}) if estimator != "forest" else run(paths)
+        assert np.isfinite(result.y_pred).all()
+        assert result.score < 1.0
