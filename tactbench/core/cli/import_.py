@@ -68,7 +68,7 @@ def summary(report: ImportReport, folder: Path) -> list[str]:
         if finding.check not in told
     )
     for (severity, message), count in found.most_common(12):
-        where = f" (in {count} recordings)" if len(report.recordings) > 1 else ""
+        where = f" (in {count} of {len(report.recordings)} recordings)" if len(report.recordings) > 1 else ""
         lines.append(f"  {severity}: {message}{where}")
     if len(found) > 12:
         lines.append(f"  … and {len(found) - 12} more remarks; see `tactbench inspect`")

@@ -86,19 +86,19 @@ def _stream(recording: Recording, name: str) -> dict[str, Any]:
 
 def _print(about: dict[str, Any]) -> None:
     meta = about["meta"]
-    simulated = ", SIM" if meta["simulated"] else ""
     click.secho(about["file"], bold=True)
-    click.echo(f"  {about['sensor']} on {meta['rig']}{simulated}; session {meta['session']}"
-               f"{'; trial ' + meta['trial'] if meta['trial'] else ''}{'; role ' + meta['role'] if meta['role'] else ''}"
-               f"; clock {meta['clock']}")  # fmt: skip
+    said = [f"session {meta['session']}", f"clock {meta['clock']}"]
+    said += [f"{name} {meta[name]}" for name in ("trial", "role") if meta[name]]
+    click.echo(f"  {about['sensor']} on {meta['rig']}{' (SIM)' if meta['simulated'] else ''}; {'; '.join(said)}")
     if meta["labels"]:
         click.echo("  labels: " + ", ".join(f"{name} = {value}" for name, value in meta["labels"].items()))
     for stream in about["streams"]:
-        rate = (
-            f"{stream['mean_rate_hz']:.4g} Hz over {stream['seconds']:.4g} s" if stream["mean_rate_hz"] else "no rate"
+        rate = "no rate"
+        if stream["mean_rate_hz"]:
+            rate = f"{stream['mean_rate_hz']:.4g} Hz over {stream['seconds']:.4g} s"
+        channels = "; ".join(
+            f"{len(one['names'])} {one['kind']} [{one['unit']}] {_ends(one['names'])}" for one in stream["channels"]
         )
-        channels = "; ".join(f"{len(one['names'])} {one['kind']} [{one['unit']}] {_ends(one['names'])}"
-                             for one in stream["channels"])  # fmt: skip
         notes = f"; labels {', '.join(stream['annotations'])}" if stream["annotations"] else ""
         click.echo(f"  {stream['stream']} ({stream['of']}): {stream['rows']} rows, {rate}, {channels}{notes}")
     for finding in about["findings"]:

@@ -63,6 +63,7 @@ def examine(recording: Recording) -> list[Finding]:
         Empty: nothing was found.
     """
     found = list(_whole(recording))
+    clocks: dict[bytes, tuple[list[str], StreamData]] = {}
     for name in recording.stream_names:
         data = recording.read(name)
         if len(data.data) == 0:
@@ -71,8 +72,11 @@ def examine(recording: Recording) -> list[Finding]:
         columns = list(_columns(data))
         for check in _CHECKS:
             found.extend(check(name, columns))
-        found.extend(_clock(name, data))
         found.extend(_labels(name, data))
+        if data.t_ns is not None:
+            clocks.setdefault(data.t_ns.tobytes(), ([], data))[0].append(name)
+    for names, data in clocks.values():
+        found.extend(_clock(" and ".join(names), data))
     order = {"error": 0, "warning": 1, "info": 2}
     return sorted(found, key=lambda finding: order[finding.severity])
 
