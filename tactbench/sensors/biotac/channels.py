@@ -110,7 +110,10 @@ STREAMS: tuple[StreamSpec, ...] = (
         rate_source=FRAME,
         dtype="uint16",
         channels=(
-            *(_electrode(name, place, rest) for name, place, rest in zip(NAMES, ELECTRODES, REST_COUNTS, strict=True)),
+            *(
+                _electrode(name, place, rest)
+                for name, place, rest in zip(NAMES, ELECTRODES, REST_COUNTS, strict=True)
+            ),
             _PDC,
             _TDC,
             _TAC,
