@@ -110,10 +110,7 @@ STREAMS: tuple[StreamSpec, ...] = (
         rate_source=FRAME,
         dtype="uint16",
         channels=(
-            *(
-                _electrode(name, place, rest)
-                for name, place, rest in zip(NAMES, ELECTRODES, REST_COUNTS, strict=True)
-            ),
+            *(_electrode(name, place, rest) for name, place, rest in zip(NAMES, ELECTRODES, REST_COUNTS, strict=True)),
             _PDC,
             _TDC,
             _TAC,

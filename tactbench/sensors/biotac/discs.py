@@ -52,8 +52,10 @@ def disc_overlap(
     """
     dx, ds = float(x_mm[1] - x_mm[0]), float(s_mm[1] - s_mm[0])
     within = (np.arange(samples) + 0.5) / samples - 0.5
-    fine_x = (x_mm[:, None] + within * dx).ravel() - centre_mm[0]
-    fine_s = (s_mm[:, None] + within * ds).ravel() - centre_mm[1]
+    near_x = np.flatnonzero(np.abs(x_mm - centre_mm[0]) < radius_mm + dx)
+    near_s = np.flatnonzero(np.abs(s_mm - centre_mm[1]) < radius_mm + ds)
+    fine_x = (x_mm[near_x, None] + within * dx).ravel() - centre_mm[0]
+    fine_s = (s_mm[near_s, None] + within * ds).ravel() - centre_mm[1]
     inside = fine_x[:, None] ** 2 + fine_s[None, :] ** 2 <= radius_mm**2
     covered = np.count_nonzero(inside)
     if covered == 0:
@@ -62,8 +64,10 @@ def disc_overlap(
             f"sheet's cells of {dx:.2f} x {ds:.2f} mm.",
             hint="Correct the sensor's electrode positions or its SkinSheet, or ask for more cells.",
         )
-    share = inside.reshape(len(x_mm), samples, len(s_mm), samples).sum(axis=(1, 3)) / covered
-    return np.asarray(share * (np.pi * radius_mm**2))
+    overlap = np.zeros((len(x_mm), len(s_mm)))
+    share = inside.reshape(len(near_x), samples, len(near_s), samples).sum(axis=(1, 3)) / covered
+    overlap[np.ix_(near_x, near_s)] = share * (np.pi * radius_mm**2)
+    return overlap
 
 
 def discs_on(sensor: SensorSpec, grid: SkinGrid) -> tuple[Discs, tuple[float, float]]:

@@ -124,9 +124,7 @@ class FilmSheet:
         entering = self._source(film_mm)[: self.cells] * (1.0 - unknowns[: self.cells])
         return float(entering.sum()), float(self.leak * unknowns[self.cells :].sum())
 
-    def solve(
-        self, film_mm: FloatArray, neighbours: Sequence[FloatArray] = (), tolerance: float = TOLERANCE
-    ) -> Answer:
+    def solve(self, film_mm: FloatArray, neighbours: Sequence[FloatArray] = (), tolerance: float = TOLERANCE) -> Answer:
         """Return the potentials under `film_mm`.
 
         Parameters

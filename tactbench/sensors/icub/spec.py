@@ -70,9 +70,7 @@ NUISANCES = Nuisances(
     step=sourced(1.0, "count", "8-bit values on the bus; robotology/icub-firmware"),
     creep=(
         Creep(
-            fraction=measured(
-                0.15, "1", "tacman-fp7/tactile-control: at most 16 % [4, 29], motor and tendon included"
-            ),
+            fraction=measured(0.15, "1", "tacman-fp7/tactile-control: at most 16 % [4, 29], motor and tendon included"),
             tau=measured(2.5, "s", "tacman-fp7/tactile-control: 2.5 s [0.8, 6.5]"),
         ),
     ),
