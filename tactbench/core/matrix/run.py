@@ -19,8 +19,8 @@ from tactbench.core.matrix.provenance import gather
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.interfaces import Shelf
-from tactbench.core.recording.format import partial_path
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.recording.format import partial_path
 from tactbench.core.spec.matrix import MatrixSpec
 
 SEED_DECIDES = (
