@@ -122,7 +122,7 @@ def _refine(
         middles = [(a + b) / 2 for a, b in open_intervals]
         split: list[tuple[float, float]] = []
         for (a, b), middle in zip(open_intervals, middles, strict=True):
-            # The middle is solved, so it becomes a node. A kink's error halves with its interval, all else falls faster.
+            # Solved, so it becomes a node. A kink's error halves with its interval, all else falls faster.
             miss = float(np.abs(solver(middle) - curve(np.array([middle]))[0]).max()) / 2
             nodes.append(middle)
             if miss <= tolerance or b - a <= 2 * NARROWEST_N or len(nodes) >= MOST_NODES:

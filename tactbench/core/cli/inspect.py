@@ -1,0 +1,117 @@
+"""``tactbench inspect``: what is in a recording, and whether it is healthy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from tactbench.core.recording.reader import Recording
+
+COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
+
+
+@click.command(name="inspect")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
+@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
+@click.option("--salvage", is_flag=True, help="Read what a crash left behind (….partial).")
+@click.pass_context
+def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bool) -> None:
+    """Show what is in recordings: streams, channels, rates, and whether they are healthy.
+
+    Exit code 1 if a finding is an error, 2 if a file cannot be read.
+    """
+    import json
+
+    from tactbench.core.recording import reader
+
+    described = []
+    for path in files:
+        with reader.salvage(path) if salvage else reader.open_recording(path) as recording:
+            described.append(describe(recording))
+        if shape == "table":
+            _print(described[-1])
+    if shape == "json":
+        click.echo(json.dumps(described, indent=1, ensure_ascii=False, allow_nan=False))
+    ctx.exit(1 if any(one["severity"] == "error" for about in described for one in about["findings"]) else 0)
+
+
+def describe(recording: Recording) -> dict[str, Any]:
+    """Return everything there is to know about an open recording but its samples, as plain data."""
+    from dataclasses import asdict
+
+    from tactbench.core.recording.health import examine
+
+    findings = [asdict(finding) for finding in examine(recording)]
+    if recording.complete:
+        recording.verify()
+    meta = recording.meta
+    own = {stream.name for stream in meta.sensor.streams}
+    return {
+        "file": str(recording.path),
+        "complete": recording.complete,
+        "content_sha256": recording.content_digest(),
+        "meta": meta.model_dump(mode="json", exclude={"sensor", "reference"}),
+        "sensor": meta.sensor.name,
+        "streams": [
+            {"of": "sensor" if name in own else "reference", **_stream(recording, name)}
+            for name in recording.stream_names
+        ],
+        "findings": findings,
+    }
+
+
+def _stream(recording: Recording, name: str) -> dict[str, Any]:
+    data = recording.read(name)
+    seconds, rate = None, None
+    if data.t_ns is not None and len(data.t_ns) > 1:
+        seconds = float(data.t_ns[-1] - data.t_ns[0]) * 1e-9
+        rate = (len(data.t_ns) - 1) / seconds if seconds > 0 else None
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for channel in data.spec.channels:
+        kinds.setdefault((channel.kind, channel.unit), []).append(channel.name)
+    return {
+        "stream": name,
+        "rows": len(data.data),
+        "dtype": str(data.data.dtype),
+        "seconds": seconds,
+        "mean_rate_hz": rate,
+        "stated_rate_hz": data.spec.rate_hz,
+        "channels": [{"kind": kind, "unit": unit, "names": names} for (kind, unit), names in kinds.items()],
+        "annotations": sorted(data.annotations),
+    }
+
+
+def _print(about: dict[str, Any]) -> None:
+    meta = about["meta"]
+    click.secho(about["file"], bold=True)
+    said = [f"session {meta['session']}", f"clock {meta['clock']}"]
+    said += [f"{name} {meta[name]}" for name in ("trial", "role") if meta[name]]
+    click.echo(f"  {about['sensor']} on {meta['rig']}{' (SIM)' if meta['simulated'] else ''}; {'; '.join(said)}")
+    if meta["labels"]:
+        click.echo("  labels: " + ", ".join(f"{name} = {value}" for name, value in meta["labels"].items()))
+    for stream in about["streams"]:
+        rate = "no rate"
+        if stream["mean_rate_hz"]:
+            rate = f"{stream['mean_rate_hz']:.4g} Hz over {stream['seconds']:.4g} s"
+        channels = "; ".join(
+            f"{len(one['names'])} {one['kind']} [{one['unit']}] {_ends(one['names'])}" for one in stream["channels"]
+        )
+        notes = f"; labels {', '.join(stream['annotations'])}" if stream["annotations"] else ""
+        click.echo(f"  {stream['stream']} ({stream['of']}): {stream['rows']} rows, {rate}, {channels}{notes}")
+    for finding in about["findings"]:
+        click.secho(f"  {finding['severity']}: ", fg=COLOURS[finding["severity"]], nl=False)
+        click.echo(finding["message"])
+    if not about["findings"]:
+        click.echo("  healthy: nothing was found")
+    for remark in meta["remarks"]:
+        click.echo(f"  remark: {remark}")
+    if not about["complete"]:
+        click.echo("  unfinished: this is what a crash left behind")
+    click.echo(f"  content {about['content_sha256'][:16]}{' (verified)' if about['complete'] else ''}")
+
+
+def _ends(names: list[str]) -> str:
+    return ", ".join(names) if len(names) <= 4 else f"{names[0]} … {names[-1]}"

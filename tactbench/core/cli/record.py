@@ -1,0 +1,105 @@
+"""``tactbench record``: one scene into one recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from tactbench.core.plugins.interfaces import Rig
+    from tactbench.core.plugins.registry import Registry
+    from tactbench.core.spec.rig import SensorDescriptor
+    from tactbench.core.spec.scene import Scene
+
+
+@click.command(name="record")
+@click.option("--sensor", required=True, metavar="NAME", help="What is pressed on.")
+@click.option("--rig", default="twin", show_default=True, metavar="NAME", help="What presses.")
+@click.option("--cap-mm", type=click.FloatRange(min=0, min_open=True), metavar="R",
+              help="Radius of a spherical cap; without it the indenter is flat.")  # fmt: skip
+@click.option(
+    "--force-n", type=click.FloatRange(min=0, min_open=True), metavar="F", help="Force at the end; default 5."
+)
+@click.option("--seconds", type=click.FloatRange(min=0, min_open=True), metavar="T",
+              help="Duration; the ramp keeps its shape. Default 60.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")
+@click.option(
+    "--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="The recording, a .h5 file."
+)
+@click.option("--replace", is_flag=True, help="Replace the file if it is there already.")
+def command(
+    sensor: str,
+    rig: str,
+    cap_mm: float | None,
+    force_n: float | None,
+    seconds: float | None,
+    seed: int,
+    out: Path,
+    replace: bool,
+) -> None:
+    """Carry out one scene into one recording."""
+    import time
+
+    from tactbench.core.acquisition import acquire
+    from tactbench.core.errors import UsageError
+    from tactbench.core.matrix.provenance import gather
+    from tactbench.core.plugins.registry import load_registry
+
+    registry = load_registry()
+    descriptor = registry.sensors[sensor]
+    scene = _scene(out.stem, cap_mm, force_n, seconds, descriptor)
+    built = _built(registry, rig)
+    if out.exists() and not replace:
+        raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
+    meta = acquire(
+        built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
+        provenance=gather(),
+    )  # fmt: skip
+    spent = float(meta.provenance.get("sim_s", meta.provenance.get("acquisition_s", 0.0)))
+    simulated = " (SIM)" if meta.simulated else ""
+    click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{simulated}, {scene.indenter}, in {spent:.2f} s")
+    for name, value in meta.assumptions.items():
+        click.echo(f"  assumed: {name} = {value}", err=True)
+    click.echo(f"See what is in it:  tactbench inspect {out}", err=True)
+
+
+def _scene(
+    name: str, cap_mm: float | None, force_n: float | None, seconds: float | None, sensor: SensorDescriptor
+) -> Scene:
+    """Return the scene the options describe; what they leave open is that of the paper."""
+    from tactbench.core.spec.quantity import sourced
+    from tactbench.core.spec.scene import ForceRamp, Indenter, Scene
+
+    said = "the command line"
+    ramp = ForceRamp()
+    change: dict[str, Any] = {}
+    if force_n is not None:
+        change["end"] = sourced(force_n, "N", said)
+    if seconds is not None:
+        share = seconds / ramp.duration.to("s")
+        change["duration"] = sourced(seconds, "s", said)
+        change["hold"] = sourced(ramp.hold.to("s") * share, "s", f"{said}: the same share of the duration")
+        change["samples"] = max(1, round(ramp.samples * share))
+    indenter = Indenter() if cap_mm is None else Indenter(radius=sourced(cap_mm, "mm", said))
+    kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
+    labels: dict[str, str | float | int] = {} if cap_mm is None else {"cap_radius_mm": cap_mm}
+    observe = ("taxel",) if "taxel" in kinds else kinds
+    return Scene(name=name, indenter=indenter, profile=ramp.model_copy(update=change), observe=observe, labels=labels)
+
+
+def _built(registry: Registry, name: str) -> Rig:
+    from tactbench.core.errors import UsageError
+    from tactbench.core.plugins.interfaces import RigContext
+    from tactbench.core.plugins.registry import load_object
+
+    descriptor = registry.rigs[name]
+    # A folder is given so that a shelf can be built, and then be told from a rig that presses.
+    rig: Rig = load_object(descriptor.where)(RigContext(effects=tuple(registry.effects), recordings=Path()))
+    if not hasattr(rig, "open"):
+        raise UsageError(
+            f"The rig {name!r} cannot record: it hands out recordings that exist already.",
+            hint="Use --rig twin, or another rig that presses.",
+        )
+    return rig

@@ -1,0 +1,149 @@
+"""From groups of columns to channels: places and names are spelled out here, once a mapping."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from pydantic import ValidationError
+
+from tactbench.core.errors import MappingError
+from tactbench.core.recording.mapping.model import ChannelGroup, Column, StreamSource
+from tactbench.core.recording.mapping.model import Mapping as MappingFile
+from tactbench.core.spec.quantity import Quantity
+from tactbench.core.spec.recording import Scalar
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
+
+_RANGE = re.compile(r"^(?P<before>.*?)(?P<first>\d+)\.\.(?P<last>\d+)$")
+_WORD = re.compile(r"\{([^{}]*)\}")
+
+
+@dataclass(frozen=True)
+class MappedChannel:
+    """One channel, the column it comes from, and the group that says how to read it."""
+
+    spec: ChannelSpec
+    column: Column
+    group: ChannelGroup
+
+
+@dataclass(frozen=True)
+class MappedStream:
+    """One stream and where its channels come from."""
+
+    spec: StreamSpec
+    source: StreamSource
+    channels: tuple[MappedChannel, ...]
+
+
+def fill(pattern: str, words: Mapping[str, Scalar], what: str) -> str:
+    """Replace every ``{word}`` of `pattern`; MappingError for a word nobody has given."""
+
+    def word(match: re.Match[str]) -> str:
+        name = match.group(1)
+        if name not in words:
+            raise MappingError(
+                f"{what}: {pattern!r} asks for the word {name!r}; there are: {', '.join(sorted(words)) or 'none'}.",
+                hint="Words come from named groups of `path`, from `split_by`, `per_recording`, `words` and `over`.",
+            )
+        return str(words[name])
+
+    return _WORD.sub(word, pattern)
+
+
+def expand(text: Scalar) -> Iterator[Scalar]:
+    """Spell out a range: ``1..3`` is 1, 2, 3; ``e_1..3`` is e_1, e_2, e_3; anything else is itself."""
+    match = _RANGE.match(text) if isinstance(text, str) else None
+    if match is None:
+        yield text
+        return
+    before, first, last = match["before"], int(match["first"]), int(match["last"])
+    if last < first:
+        raise MappingError(f"The range {text!r} runs backwards.", hint="Write the smaller number first.")
+    for number in range(first, last + 1):
+        yield f"{before}{number}" if before else number
+
+
+def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...], dict[str, MappedStream]]:
+    """Return the sensor, the reference streams, and all streams with their columns.
+
+    Raises
+    ------
+    MappingError
+        If names collide, or columns, names and positions differ in number.
+    """
+    streams: dict[str, MappedStream] = {}
+    try:
+        for name, source in mapping.streams.items():
+            channels = tuple(channel for group in source.channels for channel in _channels(name, group))
+            spec = StreamSpec(
+                name=name, rate_hz=source.rate_hz, rate_source=source.rate_source, dtype=source.dtype,
+                channels=tuple(channel.spec for channel in channels),
+            )  # fmt: skip
+            streams[name] = MappedStream(spec, source, channels)
+        _unique([channel.spec.name for stream in streams.values() for channel in stream.channels])
+        sensor = SensorSpec(
+            **mapping.sensor.model_dump(),
+            streams=tuple(stream.spec for stream in streams.values() if stream.source.of == "sensor"),
+        )
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        given = f" (given: {first['input']!r})" if isinstance(first["input"], str | int | float) else ""
+        raise MappingError(
+            f"The mapping describes a sensor that cannot be: {where}: {first['msg']}{given}.", hint="Correct the name."
+        ) from error
+    reference = tuple(stream.spec for stream in streams.values() if stream.source.of == "reference")
+    return sensor, reference, streams
+
+
+def _channels(stream: str, group: ChannelGroup) -> Iterator[MappedChannel]:
+    given = group.columns if isinstance(group.columns, tuple) else (group.columns,)
+    columns = [_column(column) for text in given for column in expand(text)]
+    names = list(_names(stream, group, columns))
+    if group.positions_m and len(group.positions_m) != len(columns):
+        raise MappingError(
+            f"Stream {stream}: {len(columns)} columns, but {len(group.positions_m)} positions.", hint="Give one each."
+        )
+    rest = None
+    if group.rest is not None and group.rest_source is not None:
+        rest = Quantity(value=group.rest, unit=group.unit, source=group.rest_source)
+    for place, (column, name) in enumerate(zip(columns, names, strict=True)):
+        spec = ChannelSpec(
+            name=name, kind=group.kind, unit=group.unit, lower=group.lower, upper=group.upper, sign=group.sign,
+            rest=rest, position_m=group.positions_m[place] if group.positions_m else None,
+            position_source=group.position_source,
+        )  # fmt: skip
+        yield MappedChannel(spec, column, group)
+
+
+def _names(stream: str, group: ChannelGroup, columns: list[Column]) -> Iterator[str]:
+    if not group.over:
+        for column in columns:
+            yield fill(group.name, {"column": column}, f"stream {stream}")
+        return
+    ways = [[*expand(values)] if isinstance(values, str) else list(values) for values in group.over.values()]
+    combinations = list(itertools.product(*ways))
+    if len(combinations) != len(columns):
+        raise MappingError(
+            f"Stream {stream}: {len(columns)} columns, but `over` makes {len(combinations)} names.",
+            hint="Correct `columns` or `over`.",
+        )
+    for column, values in zip(columns, combinations, strict=True):
+        words = {"column": column, **dict(zip(group.over, values, strict=True))}
+        yield fill(group.name, words, f"stream {stream}")
+
+
+def _column(value: Scalar) -> Column:
+    return value if isinstance(value, int) else str(value)
+
+
+def _unique(names: list[str]) -> None:
+    doubled = sorted({name for name in names if names.count(name) > 1})
+    if doubled:
+        raise MappingError(
+            f"Two channels are called {', '.join(doubled)}.",
+            hint="Make names differ, for example with {column} or `over` in the pattern.",
+        )

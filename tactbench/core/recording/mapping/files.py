@@ -1,0 +1,148 @@
+"""Which files make which recording: patterns, words in paths, and the tables that belong together."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tactbench.core.errors import MappingError
+from tactbench.core.recording.mapping.arrays import read_npz
+from tactbench.core.recording.mapping.model import Mapping, Npz, TableSource
+from tactbench.core.recording.mapping.table import Table
+from tactbench.core.recording.mapping.text import read_text
+
+Words = dict[str, str]
+
+
+@dataclass(frozen=True)
+class FoundFile:
+    """A file, its path below the root, and the words in that path."""
+
+    path: Path
+    shown: str
+    words: Words
+
+
+@dataclass(frozen=True)
+class FileSet:
+    """The files of one or more recordings: one for each table of the mapping."""
+
+    files: dict[str, FoundFile]
+    words: Words
+
+
+@dataclass(frozen=True)
+class RawRecording:
+    """Tables of one recording, read."""
+
+    tables: dict[str, Table]
+    words: Words
+    files: tuple[str, ...]
+    """Paths below the root"""
+
+
+def find(mapping: Mapping, root: Path) -> list[FileSet]:
+    """Return what belongs together, in the order of the first table's paths.
+
+    Raises
+    ------
+    MappingError
+        If a pattern finds no file, a path lacks the words, or a file has no partner or several.
+    """
+    if not root.is_dir():
+        raise MappingError(f"There is no folder {root}.", hint="Name the folder of the data set with --root DIR.")
+    found = {name: _matching(name, source, root) for name, source in mapping.tables.items()}
+    lead, *others = found
+    sets = []
+    used: dict[str, set[str]] = {name: set() for name in others}
+    for leader in found[lead]:
+        files, words = {lead: leader}, dict(leader.words)
+        for name in others:
+            partner = _partner(leader, name, found[name])
+            used[name].add(partner.shown)
+            files[name] = partner
+            words = {**partner.words, **words}
+        sets.append(FileSet(files, words))
+    for name in others:
+        alone = [file.shown for file in found[name] if file.shown not in used[name]]
+        if alone:
+            raise MappingError(
+                f"{alone[0]} of table {name!r} belongs to no file of table {lead!r}.",
+                hint="Named groups that both `path` expressions share must be equal.",
+            )
+    return sets
+
+
+def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
+    """Read what belongs together; an archive may hold several recordings."""
+    shown = tuple(dict.fromkeys(file.shown for file in files.files.values()))
+    (first, source), *_ = mapping.tables.items()
+    if isinstance(source.read, Npz):
+        file = files.files[first]
+        for words, array in read_npz(file.path, file.shown, source.read):
+            yield RawRecording({first: array}, {**files.words, **words}, shown)
+        return
+    tables: dict[str, Table] = {}
+    for name, file in files.files.items():
+        how = mapping.tables[name].read
+        assert not isinstance(how, Npz)  # the model refuses an archive beside other tables
+        tables[name] = read_text(file.path, file.shown, how)
+    yield from _split(mapping, RawRecording(tables, files.words, shown))
+
+
+def _matching(name: str, source: TableSource, root: Path) -> list[FoundFile]:
+    paths = [path for path in root.glob(source.files) if path.is_file()]
+    if not paths:
+        raise MappingError(
+            f"No file matches {source.files!r} (table {name!r}) in {root}.",
+            hint="Check --root: the pattern starts below it.",
+        )
+    found = []
+    for path in sorted(paths, key=lambda one: one.relative_to(root).parts):
+        shown = path.relative_to(root).as_posix()
+        match = re.search(source.path, shown)
+        if match is None:
+            raise MappingError(
+                f"{shown} matches {source.files!r} but not the expression {source.path!r} (table {name!r}).",
+                hint="Make the pattern narrower, or the expression wider.",
+            )
+        words = {word: value or "" for word, value in match.groupdict().items()}
+        found.append(FoundFile(path, shown, {"file": path.stem, **words}))
+    return found
+
+
+def _partner(leader: FoundFile, name: str, candidates: list[FoundFile]) -> FoundFile:
+    shared = (set(leader.words) & set(candidates[0].words)) - {"file"}
+    fitting = [one for one in candidates if all(one.words[word] == leader.words[word] for word in shared)]
+    if len(fitting) != 1:
+        what = ", ".join(f"{word} {leader.words[word]}" for word in sorted(shared)) or "no shared words"
+        listed = ", ".join(one.shown for one in fitting[:3]) or "none"
+        raise MappingError(
+            f"{leader.shown} needs one file of table {name!r} ({what}); there are {len(fitting)}: {listed}.",
+            hint="Give both `path` expressions the same named groups.",
+        )
+    return fitting[0]
+
+
+def _split(mapping: Mapping, raw: RawRecording) -> Iterator[RawRecording]:
+    """One recording for each combination of values in the columns of `split_by`, in order of appearance."""
+    if not mapping.split_by:
+        yield raw
+        return
+    lead = next(iter(raw.tables.values()))
+    rows_of: dict[tuple[str, ...], list[int]] = {}
+    for row, values in enumerate(zip(*(lead.texts(column) for column in mapping.split_by.values()), strict=True)):
+        rows_of.setdefault(values, []).append(row)
+    for name, table in raw.tables.items():
+        if len(table) != len(lead):
+            raise MappingError(
+                f"{table.shown} (table {name!r}) has {len(table)} rows, {lead.shown} has {len(lead)}.",
+                hint="Tables joined by rows must be equally long.",
+            )
+    for values, rows in rows_of.items():
+        words = dict(zip(mapping.split_by, values, strict=True))
+        yield RawRecording(
+            {name: table.take(rows) for name, table in raw.tables.items()}, {**raw.words, **words}, raw.files
+        )

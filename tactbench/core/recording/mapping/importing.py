@@ -1,0 +1,278 @@
+"""The import itself: all recordings of a mapping, or none."""
+
+from __future__ import annotations
+
+import fnmatch
+import re
+import shutil
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import cast, get_args
+
+from tactbench.core.errors import MappingError, RecordingError
+from tactbench.core.recording.health import Finding, examine
+from tactbench.core.recording.mapping.channels import MappedStream, fill, sensor_of
+from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
+from tactbench.core.recording.mapping.model import Mapping, Word
+from tactbench.core.recording.mapping.samples import check_join, labels, samples, times
+from tactbench.core.recording.reader import content_digest, open_recording
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block
+from tactbench.core.spec.recording import RecordingMeta, Scalar
+from tactbench.core.spec.scene import Role
+from tactbench.core.spec.sensor import SensorSpec, StreamSpec
+from tactbench.core.spec.yaml_file import load_yaml
+
+RIG = "import"
+"""What an imported recording says about its rig: somebody else's, made known by a mapping."""
+
+ENDING = ".h5"
+_FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+
+Progress = Callable[[int, int, str], None]
+"""Told (files done, files in all, the last one)."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """One recording that was written."""
+
+    path: Path
+    name: str
+    rows: int
+    """Rows of its longest stream"""
+    missing: dict[str, int] = field(default_factory=dict)
+    """Samples marked as missing, by channel"""
+    excluded: str = ""
+    origin: str = ""
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """What an import did."""
+
+    title: str
+    sensor: str
+    recordings: tuple[Imported, ...]
+    files_read: int
+
+    @property
+    def rows(self) -> int:
+        """Rows of all recordings."""
+        return sum(recording.rows for recording in self.recordings)
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """Samples marked as missing in all recordings, by channel."""
+        counted: Counter[str] = Counter()
+        for recording in self.recordings:
+            counted.update(recording.missing)
+        return dict(counted)
+
+    @property
+    def excluded(self) -> dict[str, int]:
+        """Recordings that no evaluation will use, by reason."""
+        return dict(Counter(recording.excluded for recording in self.recordings if recording.excluded))
+
+
+def import_tables(
+    mapping: Path, *, root: Path | None, out: Path, progress: Progress | None = None, replace: bool = False
+) -> ImportReport:
+    """Turn the tables that a mapping file describes into recordings.
+
+    Parameters
+    ----------
+    mapping
+        The mapping file.
+    root
+        Folder of the data set; None is the folder of the mapping file.
+    out
+        Folder of the recordings. It gets all of them or, if anything is wrong, none.
+    progress
+        Told after every set of files.
+    replace
+        Replace recordings of the same name that hold something else; otherwise they are refused. One that holds the
+        same already is left as it is.
+
+    Raises
+    ------
+    ConfigError
+        If the mapping file is wrong; the message names its line.
+    MappingError
+        If a table does not fit the mapping; the message names file, line and column where there are any.
+    RecordingError
+        If `out` cannot be written.
+    """
+    wanted = load_yaml(mapping, Mapping)
+    sensor, reference, streams = sensor_of(wanted)
+    sets = find(wanted, mapping.parent if root is None else root)
+    made: list[Imported] = []
+    folder = _aside(out)
+    try:
+        for done, files in enumerate(sets, 1):
+            for raw in read(wanted, files):
+                meta = _meta(wanted, raw, sensor, reference)
+                _unique_name(meta, made)
+                made.append(_write(folder / f"{meta.name}{ENDING}", meta, wanted, raw, streams))
+            if progress is not None:
+                progress(done, len(sets), next(iter(files.files.values())).shown)
+        placed = _place(made, out, replace=replace)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return ImportReport(wanted.title, sensor.name, tuple(placed), _count_files(sets))
+
+
+def _aside(out: Path) -> Path:
+    """Make the folder in which recordings wait until all of them are good; hidden, so that no shelf shows it."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        return Path(tempfile.mkdtemp(prefix=".importing-", dir=out))
+    except OSError as error:
+        raise RecordingError(
+            f"The folder {out} cannot be written: {error.strerror}.", hint="Give another with --out DIR."
+        ) from error
+
+
+def _count_files(sets: Sequence[FileSet]) -> int:
+    return len({file.shown for files in sets for file in files.files.values()})
+
+
+def _write(
+    path: Path, meta: RecordingMeta, mapping: Mapping, raw: RawRecording, streams: dict[str, MappedStream]
+) -> Imported:
+    check_join(mapping, raw.tables)
+    counts: dict[str, int] = {}
+    missing: dict[str, int] = {}
+    clocks = {
+        name: times(table, time)
+        for name, table in raw.tables.items()
+        if (time := mapping.tables[name].time) is not None
+    }
+    with RecordingWriter(path, meta) as writer:
+        for name, stream in streams.items():
+            table = raw.tables[stream.source.table]
+            read_in = samples(stream, table)
+            writer.append(Block(name, clocks.get(stream.source.table), read_in.data, read_in.quality))
+            for label, annotation in stream.source.annotations.items():
+                writer.annotate(name, label, labels(label, annotation, table))
+            missing.update(read_in.missing)
+            counts[f"rows of {name}"] = len(table)
+        counts |= {f"{channel} without a sample": number for channel, number in missing.items()}
+        writer.revise(counts=counts)
+    with open_recording(path) as written:
+        findings = tuple(examine(written))
+    rows = max(len(table) for table in raw.tables.values())
+    return Imported(path, meta.name, rows, missing, meta.excluded, meta.origin, findings)
+
+
+def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tuple[StreamSpec, ...]) -> RecordingMeta:
+    origin = ", ".join(raw.files)
+    words: dict[str, Scalar] = dict(raw.words)
+    for name, word in mapping.words.items():
+        words[name] = _derived(name, word, words, origin)
+    names = mapping.recording
+    name = fill(names.name, words, "recording.name")
+    if not _FILE_NAME.match(name):
+        raise MappingError(
+            f"The recording made from {origin} would be called {name!r}, which is no file name.",
+            hint="Use letters, digits, dots, dashes and underscores; translate words under `words`.",
+        )
+    role = fill(names.role, words, "recording.role") or None
+    if role is not None and role not in get_args(Role):
+        raise MappingError(
+            f"The role of {origin} would be {role!r}.", hint=f"Roles: {', '.join(get_args(Role))}, or empty."
+        )
+    return RecordingMeta(
+        name=name,
+        sensor=sensor,
+        reference=reference,
+        rig=RIG,
+        simulated=False,
+        clock=mapping.clock,
+        session=fill(names.session, words, "recording.session"),
+        trial=fill(names.trial, words, "recording.trial"),
+        role=cast("Role | None", role),
+        labels={label: _label(label, value, words) for label, value in names.labels.items()},
+        excluded=_excluded(mapping, raw.files),
+        remarks=(*mapping.remarks, *_clock_remarks(mapping)),
+        origin=origin,
+    )
+
+
+def _derived(name: str, word: Word, words: dict[str, Scalar], origin: str) -> str:
+    if word.of not in words:
+        raise MappingError(
+            f"The word {name!r} is made of {word.of!r}, which nothing gives; there are: {', '.join(sorted(words))}.",
+            hint="Words may be made of words above them.",
+        )
+    given = str(words[word.of])
+    if word.divided_by is not None:
+        if not given.isdecimal():
+            raise MappingError(f"{origin}: the word {word.of!r} is {given!r}, no whole number.", hint="Use `values`.")
+        return str(int(given) // word.divided_by)
+    known = {str(key): value for key, value in (word.values or {}).items()}
+    if given not in known:
+        raise MappingError(
+            f"{origin}: {word.of} {given!r} has no translation for {name!r}; there are: {', '.join(known)}.",
+            hint="Add it to `values`.",
+        )
+    return known[given]
+
+
+def _label(label: str, value: Scalar, words: dict[str, Scalar]) -> Scalar:
+    return fill(value, words, f"recording.labels.{label}") if isinstance(value, str) else value
+
+
+def _excluded(mapping: Mapping, files: Sequence[str]) -> str:
+    reasons = [rule.reason for rule in mapping.exclude if any(fnmatch.fnmatchcase(file, rule.files) for file in files)]
+    return "; ".join(dict.fromkeys(reasons))
+
+
+def _clock_remarks(mapping: Mapping) -> tuple[str, ...]:
+    if mapping.clock == "none":
+        return ("No clock: the source gives no time and no rate; rows are ordered, that is all.",)
+    unknown = [name for name, table in mapping.tables.items() if table.time and table.time.epoch == "unknown"]
+    return tuple(f"What time zero means in table {name} is not known." for name in unknown)
+
+
+def _unique_name(meta: RecordingMeta, made: Sequence[Imported]) -> None:
+    # Folded: on some disks Press.h5 and press.h5 are one file.
+    other = next((one for one in made if one.name.casefold() == meta.name.casefold()), None)
+    if other is not None:
+        raise MappingError(
+            f"{other.origin} and {meta.origin} would both become the recording {meta.name!r}.",
+            hint="Put a word that tells them apart into `recording.name`.",
+        )
+
+
+def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Imported]:
+    """Move finished recordings to their place, after all of them have been found to fit there."""
+    to_move = []
+    for one in made:
+        target = out / one.path.name
+        if target.exists() and not replace:
+            if not _holds_the_same(target, one.path):
+                raise MappingError(
+                    f"{target} exists already and holds something else.",
+                    hint="Give another folder with --out DIR, or replace it with --replace.",
+                )
+            continue
+        to_move.append((one.path, target))
+    try:
+        for path, target in to_move:
+            path.replace(target)
+    except OSError as error:
+        raise RecordingError(f"{out} cannot be written: {error.strerror}.", hint="Give another with --out.") from error
+    return [Imported(out / one.path.name, one.name, one.rows, one.missing, one.excluded, one.origin, one.findings)
+            for one in made]  # fmt: skip
+
+
+def _holds_the_same(target: Path, path: Path) -> bool:
+    try:
+        return content_digest(target) == content_digest(path)
+    except RecordingError:
+        return False

@@ -1,0 +1,301 @@
+"""What a mapping file may say; ``docs/mappings.md`` explains it with examples."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from tactbench.core.errors import UsageError
+from tactbench.core.spec import units
+from tactbench.core.spec.quantity import Frozen, Source
+from tactbench.core.spec.recording import Scalar
+from tactbench.core.spec.sensor import ChannelKind, Vector
+
+Column = int | str
+"""A column by its place (from 0) or by its name in the header."""
+
+WORD = r"^[a-z][a-z0-9_]*$"
+MUST_NAME_SENTINELS = ("force", "torque")
+"""Kinds that are targets: a number that means "no sample" would be learnt as if it were one."""
+
+
+class Csv(Frozen):
+    """Cells between delimiters."""
+
+    format: Literal["csv"] = "csv"
+    delimiter: str = Field(default=",", min_length=1, max_length=1)
+    header: bool
+    """True: the first line names the columns. False: there is no such line, columns are numbered from 0."""
+    skip_lines: int = Field(default=0, ge=0)
+    """Lines before the header or the first row that mean nothing."""
+    no_sample: tuple[str, ...] = ()
+    """Cells with exactly one of these texts hold no sample, for example "" or "NA"."""
+
+
+class Text(Frozen):
+    """Cells between spaces or tabs."""
+
+    format: Literal["text"] = "text"
+    header: bool
+    skip_lines: int = Field(default=0, ge=0)
+    no_sample: tuple[str, ...] = ()
+
+
+class Records(Frozen):
+    """Several lines of numbers make one row; columns are numbered from 0 through all lines of it."""
+
+    format: Literal["records"] = "records"
+    numbers_per_line: tuple[Annotated[int, Field(ge=1)], ...] = Field(min_length=1)
+    first_line: str | None = None
+    """What the first line must be; it is dropped. None: the first line is data."""
+    no_sample: tuple[str, ...] = ()
+
+
+class Npz(Frozen):
+    """Arrays in one NumPy archive, never pickled ones."""
+
+    format: Literal["npz"] = "npz"
+    array: str
+    axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1, max_length=3)
+    """What each axis of the array counts; an axis that is left out has length 1."""
+    per_recording: dict[Annotated[str, Field(pattern=WORD)], str] = Field(default_factory=dict)
+    """Words taken from arrays with one value a recording: word -> array."""
+
+    @model_validator(mode="after")
+    def _axes_differ(self) -> Npz:
+        if len(set(self.axes)) != len(self.axes):
+            raise ValueError("an axis is named twice")
+        if self.per_recording and "recording" not in self.axes:
+            raise ValueError("per_recording needs an axis called recording")
+        return self
+
+
+class Time(Frozen):
+    """The clock of a table: a column, never `row / rate`."""
+
+    column: Column
+    unit: str
+    epoch: Literal["unix", "start", "unknown"]
+    """What zero is: 1970-01-01 UTC, the beginning of the recording, or nobody knows."""
+
+    @field_validator("unit")
+    @classmethod
+    def _is_time(cls, unit: str) -> str:
+        _convertible(unit, "s")
+        return unit
+
+
+class TableSource(Frozen):
+    """A family of files of one shape."""
+
+    files: str
+    """Which: a pattern below the root, with ``*`` within a folder and ``**`` across folders."""
+    path: str = ""
+    """Regular expression searched in each path; its named groups become words."""
+    read: Annotated[Csv | Text | Records | Npz, Field(discriminator="format")]
+    time: Time | None = None
+
+    @field_validator("files")
+    @classmethod
+    def _below_root(cls, files: str) -> str:
+        if files.startswith("/") or ".." in files.split("/"):
+            raise ValueError("the pattern must stay below the root folder")
+        return files
+
+    @field_validator("path")
+    @classmethod
+    def _compiles(cls, path: str) -> str:
+        try:
+            groups = re.compile(path).groupindex
+        except re.error as error:
+            raise ValueError(f"not a regular expression: {error}") from error
+        for name in groups:
+            if not re.match(WORD, name):
+                raise ValueError(f"the group {name!r} must be a word in lower case")
+        return path
+
+
+class Join(Frozen):
+    """How several tables make one recording."""
+
+    by: Literal["rows", "clock"]
+    """`rows`: row i of each belongs together. `clock`: each keeps its own rows and its own time."""
+    times_within_ms: float | None = Field(default=None, gt=0)
+    """With `rows` and two clocks: how far the times of one row may differ."""
+
+
+class Word(Frozen):
+    """A word made from another one."""
+
+    of: str = Field(pattern=WORD)
+    values: dict[Scalar, str] | None = None
+    """Translation; a value that is not in it is an error."""
+    divided_by: int | None = Field(default=None, ge=1)
+    """Whole-number division, to make blocks of consecutive numbers."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Word:
+        if (self.values is None) == (self.divided_by is None):
+            raise ValueError("give either values or divided_by")
+        return self
+
+
+class ChannelGroup(Frozen):
+    """Columns that are alike in everything but their name."""
+
+    columns: Column | tuple[Column, ...]
+    """Places, names, and ranges of either: ``1..15``, ``ff_biotac_1..24``."""
+    name: str
+    """Name of the channel; with several columns a pattern with the words of `over`, or ``{column}``."""
+    over: dict[Annotated[str, Field(pattern=WORD)], tuple[Scalar, ...] | str] = Field(default_factory=dict)
+    """Words that run through all their combinations, the last one fastest: lists, or ranges like ``1..12``."""
+    kind: ChannelKind
+    unit: str
+    """Unit of the stored numbers."""
+    given_in: str | None = None
+    """Unit of the column, if another."""
+    sentinels: tuple[float, ...] | None = None
+    """Numbers in the column that mean "no sample"; a force or torque must say, if only ``[]``."""
+    keep_repeated: bool = False
+    """A single value outside the range of all others and often repeated is a real reading."""
+    lower: float | None = None
+    upper: float | None = None
+    sign: Literal[-1, 0, 1] = 0
+    rest: float | None = None
+    rest_source: Source | None = None
+    positions_m: tuple[Vector, ...] = ()
+    position_source: Source | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ChannelGroup:
+        _convertible(self.given_in or self.unit, self.unit)
+        if self.kind in MUST_NAME_SENTINELS and self.sentinels is None:
+            raise ValueError(
+                f"a channel of kind {self.kind} must state its sentinels, the numbers that mean 'no sample': "
+                "`sentinels: [-1]`, or `sentinels: []` if there are none"
+            )
+        if (self.rest is None) != (self.rest_source is None):
+            raise ValueError("rest and rest_source belong together")
+        if bool(self.positions_m) != (self.position_source is not None):
+            raise ValueError("positions_m and position_source belong together")
+        return self
+
+
+class Annotation(Frozen):
+    """A label of every row: from a column, or numbers of equal stretches of rows."""
+
+    column: Column | None = None
+    values: dict[Scalar, str] | None = None
+    """Translation of the column; a value that is not in it is an error. An empty text is "no label"."""
+    rows_per: int | None = Field(default=None, ge=1)
+    """The label is ``row // rows_per``; the rows must come out even."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Annotation:
+        if (self.column is None) == (self.rows_per is None):
+            raise ValueError("give either column or rows_per")
+        if self.values is not None and self.column is None:
+            raise ValueError("values translate a column")
+        return self
+
+
+class StreamSource(Frozen):
+    """Channels that share one clock."""
+
+    table: str
+    of: Literal["sensor", "reference"] = "sensor"
+    rate_hz: float | None = Field(default=None, gt=0)
+    """Nominal rate, if the source states one."""
+    rate_source: Source | None = None
+    dtype: Literal["uint8", "uint16", "int16", "int32", "float32", "float64"] = "float64"
+    channels: tuple[ChannelGroup, ...] = Field(min_length=1)
+    annotations: dict[Annotated[str, Field(pattern=WORD)], Annotation] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _rate_has_a_source(self) -> StreamSource:
+        if (self.rate_hz is None) != (self.rate_source is None):
+            raise ValueError("rate_hz and rate_source belong together: a rate is never invented")
+        return self
+
+
+class SensorDeclaration(Frozen):
+    """The sensor, as far as its source describes it."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    title: str
+    principle: str
+    principle_source: Source
+    references: tuple[str, ...] = ()
+
+
+class RecordingNames(Frozen):
+    """What a recording is called and belongs to; texts with ``{word}`` in them."""
+
+    name: str
+    session: str
+    trial: str = ""
+    role: str = ""
+    """Empty, or a text that becomes train, validation or test."""
+    labels: dict[Annotated[str, Field(pattern=WORD)], Scalar] = Field(default_factory=dict)
+
+
+class Exclusion(Frozen):
+    """Files that are imported, but marked: no evaluation uses them."""
+
+    files: str
+    reason: str = Field(min_length=1)
+
+
+class Mapping(Frozen):
+    """A mapping file."""
+
+    version: Literal[1]
+    title: str
+    sensor: SensorDeclaration
+    clock: Literal["device", "host", "none"]
+    """Who made the time stamps."""
+    remarks: tuple[str, ...] = ()
+    """What a reader of a score from these recordings must know."""
+    tables: dict[Annotated[str, Field(pattern=WORD)], TableSource] = Field(min_length=1)
+    """The first one leads: the others are found by the words they share with it."""
+    join: Join | None = None
+    split_by: dict[Annotated[str, Field(pattern=WORD)], Column] = Field(default_factory=dict)
+    """One recording for each combination of values in these columns of the first table; they become words."""
+    words: dict[Annotated[str, Field(pattern=WORD)], Word] = Field(default_factory=dict)
+    recording: RecordingNames
+    streams: dict[str, StreamSource] = Field(min_length=1)
+    exclude: tuple[Exclusion, ...] = ()
+
+    @model_validator(mode="after")
+    def _hangs_together(self) -> Mapping:
+        for name, stream in self.streams.items():
+            if stream.table not in self.tables:
+                raise ValueError(f"stream {name} names the table {stream.table!r}; there are {', '.join(self.tables)}")
+        if all(stream.of == "reference" for stream in self.streams.values()):
+            raise ValueError("no stream is of the sensor")
+        if len(self.tables) > 1 and self.join is None:
+            raise ValueError("several tables need `join`: by rows, or by clock")
+        timed = [name for name, table in self.tables.items() if table.time is not None]
+        if self.clock == "none" and timed:
+            raise ValueError(f"clock is none, but table {timed[0]} has a time column")
+        if self.clock != "none" and len(timed) < len(self.tables):
+            without = next(name for name in self.tables if name not in timed)
+            raise ValueError(f"clock is {self.clock}, but table {without} has no time; write `clock: none`")
+        by_rows = self.join is not None and self.join.by == "rows"
+        if by_rows and len(timed) > 1 and self.join is not None and self.join.times_within_ms is None:
+            raise ValueError("tables with a clock each, joined by rows, need `times_within_ms`")
+        if self.join is not None and self.join.by == "clock" and (self.clock == "none" or self.split_by):
+            raise ValueError("a join by clock needs a clock, and rows that need not be split")
+        arrays = [name for name, table in self.tables.items() if isinstance(table.read, Npz)]
+        if arrays and len(self.tables) > 1:
+            raise ValueError(f"table {arrays[0]} is an archive and cannot be joined with others")
+        return self
+
+
+def _convertible(given: str, wanted: str) -> None:
+    try:
+        units.conversion(given, wanted)
+    except UsageError as error:
+        raise ValueError(str(error).rstrip(".")) from error

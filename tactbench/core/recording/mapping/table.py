@@ -1,0 +1,168 @@
+"""A foreign table in memory: where every cell came from is never forgotten."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal, InvalidOperation
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.errors import MappingError, nearest
+from tactbench.core.recording.mapping.model import Column
+from tactbench.core.samples import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """Cells as they stand in a text file."""
+
+    shown: str
+    """Name of the file for messages."""
+    header: tuple[str, ...] | None
+    cells: list[list[str]]
+    lines: list[int]
+    """Line of the file on which each row begins."""
+    no_sample: Collection[str] = field(default=())
+
+    def __len__(self) -> int:
+        return len(self.cells)
+
+    def numbers(self, column: Column) -> FloatArray:
+        """Return a column, (n,), with NaN where there is no sample; MappingError for what is no number."""
+        place = self._place(column)
+        values = np.empty(len(self.cells))
+        for row, cells in enumerate(self.cells):
+            cell = cells[place]
+            values[row] = math.nan if cell in self.no_sample else self._number(cell, row, column)
+        return values
+
+    def texts(self, column: Column) -> list[str]:
+        """Return a column as texts, (n,)."""
+        place = self._place(column)
+        return [cells[place].strip() for cells in self.cells]
+
+    def nanoseconds(self, column: Column, per_unit: int) -> IntArray:
+        """Return a column times `per_unit` as whole nanoseconds, (n,), rounded once; MappingError for a non-time."""
+        place = self._place(column)
+        times = np.empty(len(self.cells), dtype=np.int64)
+        for row, cells in enumerate(self.cells):
+            # Seconds since 1970 in float64 are exact to 0.2 µs only: the decimal text knows better.
+            try:
+                times[row] = int((Decimal(cells[place].strip()) * per_unit).to_integral_value())
+            except (InvalidOperation, ValueError, OverflowError) as error:
+                raise MappingError(
+                    f"{self.where(row)}: column {column!r}: {cells[place]!r} is not a time.",
+                    hint="A row without a time cannot be kept; check the column, or write `clock: none`.",
+                ) from error
+        return times
+
+    def take(self, rows: Sequence[int]) -> TextTable:
+        """Return some of the rows."""
+        cells = [self.cells[row] for row in rows]
+        return TextTable(self.shown, self.header, cells, [self.lines[row] for row in rows], self.no_sample)
+
+    def where(self, row: int) -> str:
+        """Return file and line of a row, for messages."""
+        return f"{self.shown}:{self.lines[row]}"
+
+    def _number(self, cell: str, row: int, column: Column) -> float:
+        try:
+            # Python's float() also reads 1_000; no table in the world means that.
+            value = float(cell) if "_" not in cell else None
+        except ValueError:
+            value = None
+        if value is None or math.isinf(value):
+            raise MappingError(
+                f"{self.where(row)}: column {column!r}: {cell!r} is not a number.",
+                hint="If such cells mean 'no sample', list the text under `no_sample` of the table.",
+            )
+        return value
+
+    def _place(self, column: Column) -> int:
+        if isinstance(column, int):
+            wide = len(self.cells[0]) if self.cells else len(self.header or ())
+            return _checked(self.shown, column, wide)
+        if self.header is None:
+            raise MappingError(
+                f"{self.shown} has no header row, so there is no column {column!r}.",
+                hint="Give its place, counted from 0, or set `header: true`.",
+            )
+        if self.header.count(column) > 1:
+            raise MappingError(
+                f"{self.shown} has {self.header.count(column)} columns called {column!r}.", hint="Give its place."
+            )
+        if column not in self.header:
+            close = nearest(column, self.header)
+            meant = f"Did you mean {' or '.join(repr(name) for name in close)}? " if close else ""
+            raise MappingError(
+                f"{self.shown} has no column {column!r}.", hint=f"{meant}It has: {_listing(self.header)}."
+            )
+        return self.header.index(column)
+
+
+@dataclass(frozen=True)
+class ArrayTable:
+    """Rows of an array."""
+
+    shown: str
+    """Name of file and array for messages."""
+    array: npt.NDArray[Any]
+    """(n, channels)"""
+
+    def __len__(self) -> int:
+        return len(self.array)
+
+    def numbers(self, column: Column) -> FloatArray:
+        """Return a column, (n,), with NaN where there is no sample; MappingError for what is no number."""
+        values = self._column(column).astype(np.float64)
+        if np.isinf(values).any():
+            row = int(np.flatnonzero(np.isinf(values))[0])
+            raise MappingError(f"{self.where(row)}: column {column}: infinite.", hint="Repair the archive.")
+        return values
+
+    def texts(self, column: Column) -> list[str]:
+        """Return a column as texts, (n,)."""
+        return [str(value) for value in self._column(column).tolist()]
+
+    def nanoseconds(self, column: Column, per_unit: int) -> IntArray:
+        """Return a column times `per_unit` as whole nanoseconds, (n,), rounded once; MappingError for a non-time."""
+        values = self._column(column)
+        if not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise MappingError(f"{self.where(row)}: column {column}: not a time.", hint="Write `clock: none`.")
+        return np.array([int((Decimal(value) * per_unit).to_integral_value()) for value in values.tolist()], np.int64)
+
+    def take(self, rows: Sequence[int]) -> ArrayTable:
+        """Return some of the rows."""
+        return ArrayTable(self.shown, self.array[list(rows)])
+
+    def where(self, row: int) -> str:
+        """Return file and line of a row, for messages."""
+        return f"{self.shown}, row {row}"
+
+    def _column(self, column: Column) -> npt.NDArray[Any]:
+        if not isinstance(column, int):
+            raise MappingError(f"{self.shown} has no column names.", hint="Give the place, counted from 0.")
+        values: npt.NDArray[Any] = self.array[:, _checked(self.shown, column, self.array.shape[1])]
+        return values
+
+
+Table = TextTable | ArrayTable
+"""Rows and columns of one recording."""
+
+
+def _checked(shown: str, place: int, wide: int) -> int:
+    if not 0 <= place < wide:
+        raise MappingError(
+            f"{shown} has no column {place}: it has {wide}, numbered from 0 to {wide - 1}.", hint="Correct the place."
+        )
+    return place
+
+
+def _listing(names: Sequence[str], most: int = 12) -> str:
+    shown = ", ".join(names[:most])
+    return f"{shown} … ({len(names)} in all)" if len(names) > most else shown
