@@ -20,6 +20,7 @@ from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.recording.format import partial_path
 from tactbench.core.spec.matrix import MatrixSpec
 
 SEED_DECIDES = (
@@ -143,12 +144,18 @@ def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progre
             material.made += 1
         told.advance(f"{order.sensor} {order.scene.name}")
 
-    for order, outcome in InProcess().each(record, missing[:1]):
-        note(order, outcome)
-    if missing[1:]:
-        with workers(min(hands, len(missing) - 1)) as crew:
-            for order, outcome in crew.each(record, missing[1:], meanwhile=lambda: _import_estimators(cells)):
-                note(order, outcome)
+    try:
+        for order, outcome in InProcess().each(record, missing[:1]):
+            note(order, outcome)
+        if missing[1:]:
+            with workers(min(hands, len(missing) - 1)) as crew:
+                for order, outcome in crew.each(record, missing[1:], meanwhile=lambda: _import_estimators(cells)):
+                    note(order, outcome)
+    except BaseException:
+        # Workers that were ended in the middle could not tidy up behind themselves.
+        for order in missing:
+            partial_path(order.path).unlink(missing_ok=True)
+        raise
     return troubles
 
 

@@ -36,7 +36,7 @@ class RecordingWriter:
     def __init__(self, path: Path, meta: RecordingMeta) -> None:
         self.path = path
         self.meta = meta
-        self._aside = path.with_name(path.name + layout.PARTIAL)
+        self._aside = layout.partial_path(path)
         self._specs = layout.specs_by_name(meta)
         self._file: Any = None
 
