@@ -64,7 +64,7 @@ def score_interval(
     rng = np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))
     rows = metric.rows(y, predicted, n_classes)
     names, number = np.unique(cluster, return_inverse=True)
-    if _enough(y, number, n_classes):
+    if enough(y, number, n_classes):
         sums = np.zeros((len(names), rows.shape[1]))
         np.add.at(sums, number, rows)
         strata = _strata(y, number, n_classes)
@@ -88,7 +88,8 @@ def score_interval(
     return _percentiles(metric.score(total, n_classes), method)
 
 
-def _enough(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> bool:
+def enough(y: npt.NDArray[Any], cluster: npt.NDArray[Any], n_classes: int) -> bool:
+    """Tell whether there are enough clusters to resample, of every class that occurs."""
     if len(np.unique(cluster)) < ENOUGH_CLUSTERS:
         return False
     return all(len(np.unique(cluster[y == one])) >= ENOUGH_CLUSTERS for one in range(n_classes) if (y == one).any())

@@ -19,6 +19,8 @@ FOLDS = 5
 """Folds of grouped and of shuffled splits."""
 TRAIN_SHARE = 0.8
 """First part, in time, that an in-session split trains on."""
+SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
+"""Splits whose unit of replication is the session."""
 SHUFFLED_STAMP = "leaks: split shuffled puts neighbouring rows of one recording or object on both sides."
 
 
