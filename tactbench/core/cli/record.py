@@ -53,7 +53,7 @@ def command(
     built = _built(registry, rig)
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
-    meta = acquire(
+    made = acquire(
         built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
         provenance=gather(),
     )  # fmt: skip
@@ -102,4 +102,5 @@ def _built(registry: Registry, name: str) -> Rig:
             f"The rig {name!r} cannot record: it hands out recordings that exist already.",
             hint="Use --rig twin, or another rig that presses.",
         )
+    meta = made.meta
     return rig

@@ -39,6 +39,8 @@ class RecordingWriter:
         self._aside = layout.partial_path(path)
         self._specs = layout.specs_by_name(meta)
         self._file: Any = None
+        self.content_digest = ""
+        """Digest of what was written, once the recording is complete."""
 
     def __enter__(self) -> RecordingWriter:
         import h5py
@@ -165,7 +167,8 @@ class RecordingWriter:
         from tactbench.core.recording.reader import digest_of
 
         self._write_meta()
-        self._file.attrs["content_sha256"] = digest_of(self._file, self.meta)
+        self.content_digest = digest_of(self._file, self.meta)
+        self._file.attrs["content_sha256"] = self.content_digest
         self._file.attrs["complete"] = True
         self._close()
         with self._aside.open("rb") as written:
