@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from tactbench.core.evaluation.interval import block_length, score_interval
 from tactbench.core.evaluation.metrics import METRICS
@@ -27,11 +28,11 @@ def test_six_sessions_cover_the_truth_as_often_as_the_interval_says():
 
 
 def test_sessions_of_one_class_stand_in_for_each_other_only():
-    """Five sessions of each of two classes, all of class 1 wrong: no resample may lose a class."""
+    """Five sessions of each of two classes, all of class 1 wrong: every resample has as many of each."""
     cluster = np.repeat(np.arange(10), 30)
     y = (cluster >= 5).astype(np.int64)
     predicted = np.zeros_like(y)
-    found = score_interval(METRICS["balanced_accuracy"], y, predicted, cluster, cluster, "session", 2, 0)
+    found = score_interval(METRICS["accuracy"], y, predicted, cluster, cluster, "session", 2, 0)
     assert "10 sessions" in found.method
     assert (found.low, found.high) == (0.5, 0.5)
 
@@ -57,14 +58,8 @@ def test_the_block_length_is_that_of_the_theory_for_a_first_order_process(memory
     """g = sum |k| R(k) = 2 R0 a / (1-a)², g0 = R0 (1+a) / (1-a): b = (6 a² / (1-a²)²)^(1/3) n^(1/3)."""
     rng = np.random.default_rng(5)
     n = 20_000
-    lengths = []
-    for _ in range(5):
-        noise = rng.normal(size=n + 500)
-        series = np.empty_like(noise)
-        series[0] = 0.0
-        for t in range(1, len(noise)):
-            series[t] = memory * series[t - 1] + noise[t]
-        lengths.append(block_length(series[500:]))
+    lengths = [block_length(lfilter([1.0], [1.0, -memory], rng.normal(size=n + 500))[500:]) for _ in range(15)]
     expected = (6 * memory**2 / (1 - memory**2) ** 2 * n) ** (1 / 3)
-    # The estimated bandwidth scatters the length by about 15 % at this n; the median of five by less.
-    assert np.median(lengths) == pytest.approx(expected, rel=0.3)
+    # The bandwidth is estimated: one length scatters by 5 to 11 %, the mean of fifteen by 3 %, and lies 2 to 5 % low. The
+    # constant of the stationary bootstrap in place of the circular one's would be 13 % lower still.
+    assert np.mean(lengths) == pytest.approx(expected, rel=0.10)
