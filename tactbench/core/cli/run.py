@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +37,7 @@ def command(ctx: click.Context, /, jobs: int, out: Path, shape: str, recordings:
 
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.
     """
+    _one_thread()
     from tactbench.core.cli.screen import progress
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
@@ -48,6 +50,15 @@ def command(ctx: click.Context, /, jobs: int, out: Path, shape: str, recordings:
     _print(outcome, shape)
     _farewell(outcome, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
+
+
+def _one_thread() -> None:
+    """Keep numerical libraries at one thread, as the table's times state; before any of them is imported.
+
+    Several threads would also sum in another order on another machine. Whoever sets these variables means it.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
 
 
 def _matrix(

@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import DataError, UnknownNameError
+from tactbench.core.errors import DataError, UnknownNameError, UsageError
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
+from tactbench.core.evaluation.fitting import answers as answers_of
+from tactbench.core.evaluation.fitting import fit
 from tactbench.core.evaluation.interval import LEVEL, score_interval
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
@@ -87,6 +89,7 @@ class _Answers:
     fold: list[IntArray]
     scores: dict[str, float]
     chosen: list[Choice]
+    names: list[str]
     search_s: float = 0.0
     fit_s: float = 0.0
     predict_s: float = 0.0
@@ -146,7 +149,7 @@ def evaluate(
     assert_disjoint(assignments)
     build = _builder(estimator, params, task, seed, threads)
     counts: Counter[str] = Counter(data.counts)
-    answers = _Answers([], [], [], [], [], {}, [])
+    answers = _Answers([], [], [], [], [], {}, [], [])
     with _thread_limit(threads):
         for number, assignment in enumerate(assignments):
             say(f"{estimator.name}: {assignment.name}")
@@ -160,6 +163,12 @@ def evaluate(
 def _builder(
     estimator: EstimatorDescriptor, params: Mapping[str, Any], task: TaskSpec, seed: int, threads: int
 ) -> Build:
+    if task.kind not in estimator.kinds:
+        raise UsageError(
+            f"The estimator {estimator.name!r} does {' and '.join(estimator.kinds)}; task {task.name!r} is "
+            f"{task.kind}.",
+            hint="See what others do with `tactbench list estimators`.",
+        )
     for name in params:
         if name not in estimator.params:
             raise UnknownNameError(f"parameter of estimator {estimator.name!r}", name, estimator.params)
@@ -192,26 +201,26 @@ def _fold(
     clock: Callable[[], float],
 ) -> None:
     began = clock()
-    choice = select(estimator, params, build, data, rules, assignment, metric)
+    choice = select(estimator, params, build, data, rules, assignment, metric, counts)
     answers.search_s += clock() - began
     fold = _prepared(assignment, data, rules, choice.k if choice else estimator.window_grid[0], counts)
     _worth_answering(fold, data)
     X_train, X_test = features_of(fold.train, estimator), features_of(fold.test, estimator)
     model = build(choice.params if choice else {})
     began = clock()
-    model.fit(X_train, fold.train.y)
+    fit(model, X_train, fold.train.y, estimator.name, counts)
     answers.fit_s += clock() - began
     began = clock()
-    predicted = np.asarray(model.predict(X_test))
+    predicted = answers_of(model, X_test, estimator.name, len(data.classes))
     answers.predict_s += clock() - began
-    _finite(predicted, estimator.name)
     n_classes = len(data.classes)
     answers.scores[f"fold {fold.name}"] = metric.of(fold.test.y, predicted, n_classes)
     if choice:
         answers.chosen.append(choice)
+        answers.names.append(fold.name)
         answers.scores["validation"] = choice.score
     elif fold.validation is not None:
-        on_validation = np.asarray(model.predict(features_of(fold.validation, estimator)))
+        on_validation = answers_of(model, features_of(fold.validation, estimator), estimator.name, n_classes)
         answers.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
     answers.y_true.append(fold.test.y)
     answers.y_pred.append(predicted)
@@ -250,14 +259,6 @@ def _worth_answering(fold: Fold, data: Dataset) -> None:
         )
 
 
-def _finite(predicted: npt.NDArray[Any], name: str) -> None:
-    if predicted.ndim != 1 or not np.isfinite(predicted.astype(np.float64)).all():
-        raise DataError(
-            f"The estimator {name!r} answered with shape {predicted.shape} or with NaN.",
-            hint="Its predict(X) must return one finite number or class index a row.",
-        )
-
-
 def _result(
     task: TaskSpec,
     rules: ProtocolSpec,
@@ -275,6 +276,12 @@ def _result(
     fold = np.concatenate(answers.fold)
     n_classes = len(data.classes)
     cluster, cluster_name = _clusters(data, split, recording, row)
+    score = metric.of(y, predicted, n_classes)
+    if not np.isfinite(score):
+        raise DataError(
+            f"The {metric.name} of {len(y)} test rows is undefined: their labels never change.",
+            hint="Choose another --split.",
+        )
     interval = score_interval(metric, y, predicted, recording, cluster, cluster_name, n_classes, seed)
     scores = dict(answers.scores)
     for other in METRICS.values():
@@ -286,9 +293,11 @@ def _result(
         table = confusion(sums, n_classes).astype(np.int64)
         for label, value in zip(data.classes, class_f1(sums, n_classes), strict=True):
             scores[f"F1 of {label}"] = float(value)
+    # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
+    scores = {name: value for name, value in scores.items() if np.isfinite(value)}
     return CellResult(
         metric=metric.name,
-        score=metric.of(y, predicted, n_classes),
+        score=score,
         ci_low=interval.low,
         ci_high=interval.high,
         ci_level=LEVEL,
@@ -303,7 +312,7 @@ def _result(
         n_train=answers.n_train,
         n_test=len(y),
         counts=dict(counts),
-        chosen=_chosen(answers.chosen),
+        chosen=_chosen(answers.chosen, answers.names),
         dagger=rules.uses_test_statistics,
         stamps=(SHUFFLED_STAMP,) if split == "shuffled" else (),
         search_s=answers.search_s,
@@ -333,12 +342,16 @@ def _clusters(data: Dataset, split: str, recording: IntArray, row: IntArray) -> 
     return cluster.astype(np.str_), name
 
 
-def _chosen(choices: Sequence[Choice]) -> dict[str, float]:
-    """Return what was chosen; over several folds, the median."""
-    if not choices:
-        return {}
-    names = choices[0].params
-    found = {name: [choice.params[name] for choice in choices] for name in names}
-    numbers = {name: values for name, values in found.items() if all(isinstance(v, int | float) for v in values)}
-    numbers["k"] = [choice.k for choice in choices]
-    return {name: float(np.median(values)) for name, values in numbers.items()}
+def _chosen(choices: Sequence[Choice], folds: Sequence[str]) -> dict[str, float]:
+    """Return what was chosen; fold by fold where folds chose differently, since a median is what nobody chose."""
+    chosen: dict[str, float] = {}
+    each = [{**choice.params, "k": choice.k} for choice in choices]
+    for name in each[0] if each else ():
+        values = [params[name] for params in each]
+        if not all(isinstance(value, int | float) for value in values):
+            continue
+        if len(set(values)) == 1:
+            chosen[name] = float(values[0])
+        else:
+            chosen |= {f"{name} of fold {fold}": float(value) for fold, value in zip(folds, values, strict=True)}
+    return chosen

@@ -12,6 +12,7 @@ import numpy as np
 
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.fitting import answers, fit
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import Kept, Scale, keep, part
@@ -56,6 +57,7 @@ def select(
     protocol: ProtocolSpec,
     assignment: Assignment,
     metric: Metric,
+    counts: Counter[str] | None = None,
 ) -> Choice | None:
     """Choose the estimator's grid parameters and window for one fold; None if there is nothing to choose.
 
@@ -65,6 +67,8 @@ def select(
     ----------
     given
         Parameters the user has fixed: they are not searched.
+    counts
+        Told which fits came with a warning.
 
     Raises
     ------
@@ -76,13 +80,14 @@ def select(
         return None
     pairs = _pairs(data, protocol, assignment)
     n_classes = len(data.classes)
+    told: Counter[str] = Counter() if counts is None else counts
     best: Choice | None = None
     sign = 1.0 if metric.higher_is_better else -1.0
     for k in descriptor.window_grid:
         filtered = [(part(a, scale_a, k), part(b, scale_b, k)) for a, scale_a, b, scale_b in pairs]
         for values in itertools.product(*grid.values()):
             params = {**given, **dict(zip(grid, values, strict=True))}
-            score = _score(descriptor, build, params, filtered, metric, n_classes)
+            score = _score(descriptor, build, params, filtered, metric, n_classes, told)
             if best is None or sign * score > sign * best.score:
                 best = Choice(params, k, score)
     return best
@@ -94,9 +99,9 @@ def _pairs(data: Dataset, protocol: ProtocolSpec, assignment: Assignment) -> lis
     else:
         masks = inner_splits(data, assignment)
     pairs = []
-    for fit, check in masks:
+    for learn, check in masks:
         ignored: Counter[str] = Counter()
-        train = keep(data, protocol, fit, "training", ignored)
+        train = keep(data, protocol, learn, "training", ignored)
         other = keep(data, protocol, check, "validation", ignored)
         scale_train, scale_other = scales(protocol, train, other)
         if train.labelled.any() and other.labelled.any():
@@ -115,12 +120,13 @@ def _score(
     pairs: Sequence[tuple[Part, Part]],
     metric: Metric,
     n_classes: int,
+    counts: Counter[str],
 ) -> float:
     """Return the score over all validation rows together."""
-    truth, answers = [], []
+    truth, given = [], []
     for train, check in pairs:
         model = build(params)
-        model.fit(features_of(train, descriptor), train.y)
+        fit(model, features_of(train, descriptor), train.y, descriptor.name, counts)
         truth.append(check.y)
-        answers.append(np.asarray(model.predict(features_of(check, descriptor))))
-    return metric.of(np.concatenate(truth), np.concatenate(answers), n_classes)
+        given.append(answers(model, features_of(check, descriptor), descriptor.name, n_classes))
+    return metric.of(np.concatenate(truth), np.concatenate(given), n_classes)

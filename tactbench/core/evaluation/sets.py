@@ -39,12 +39,12 @@ class Scale:
 def moments(X: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return mean and deviation of each column in two passes, the deviation of a constant column exactly zero.
 
-    A constant column's computed deviation is the rounding error of its mean; it would turn rounding into a signal.
+    A constant column's computed deviation is the rounding error of its mean, as large as the number of rows makes it;
+    it would turn rounding into a signal. So constancy is looked up, not inferred from the deviation.
     """
     mean = np.asarray(X.mean(axis=0))
     deviation = np.sqrt(((X - mean) ** 2).mean(axis=0))
-    rounding = 8 * np.finfo(np.float64).eps * np.abs(mean)
-    return mean, np.where(deviation > rounding, deviation, 0.0)
+    return mean, np.where(X.max(axis=0) > X.min(axis=0), deviation, 0.0)
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: s
                 f"Protocol {protocol.name!r} splits by roles only; {asked!r} was asked for.",
                 hint="Use --protocol deployable for other splits.",
             )
-        if {meta.role for meta in data.metas} < {"train", "validation", "test"}:
+        if not {"train", "validation", "test"} <= {meta.role for meta in data.metas}:
             raise NotApplicable(
                 f"Protocol {protocol.name!r} needs recordings with the roles train, validation and test; these have "
                 f"{', '.join(sorted({str(meta.role) for meta in data.metas}))}.",

@@ -6,7 +6,7 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
@@ -28,15 +28,22 @@ R = TypeVar("R")
 class Workers(Protocol):
     """Where work is done."""
 
-    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
-        """Yield every item with its result, or with the exception that stopped it, as they come."""
+    def each(
+        self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
+    ) -> Iterator[tuple[T, R | BaseException]]:
+        """Yield every item with its result, or with the exception that stopped it, as they come.
+
+        `meanwhile` is done here while workers elsewhere are busy.
+        """
 
 
 class InProcess:
     """One after the other, here."""
 
-    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
-        """Yield every item with its result or its exception."""
+    def each(
+        self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
+    ) -> Iterator[tuple[T, R | BaseException]]:
+        """Yield every item with its result or its exception; nothing can be done meanwhile."""
         for item in items:
             try:
                 yield item, work(item)
@@ -50,9 +57,13 @@ class Processes:
     def __init__(self, pool: ProcessPoolExecutor) -> None:
         self._pool = pool
 
-    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
+    def each(
+        self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
+    ) -> Iterator[tuple[T, R | BaseException]]:
         """Yield every item with its result or its exception, in the order in which they end."""
         futures: dict[Future[R], T] = {self._pool.submit(work, item): item for item in items}
+        if meanwhile is not None:
+            meanwhile()
         for future in as_completed(futures):
             error = future.exception()
             yield futures[future], error if error is not None else future.result()
@@ -60,12 +71,13 @@ class Processes:
 
 @contextmanager
 def workers(jobs: int) -> Iterator[Workers]:
-    """Open `jobs` workers: this process for one, a pool of fresh interpreters for more."""
+    """Open `jobs` workers: this process for one, a pool of processes for more."""
     if jobs == 1:
         yield InProcess()
         return
-    # Fresh interpreters: a fork would copy the parent's thread pools in an undefined state.
-    pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent)
+    pool = ProcessPoolExecutor(
+        jobs, mp_context=get_context(_start_method()), initializer=_leave_interrupts_to_the_parent
+    )
     try:
         yield Processes(pool)
     except BaseException:
@@ -74,6 +86,19 @@ def workers(jobs: int) -> Iterator[Workers]:
             process.terminate()
         raise
     pool.shutdown()
+
+
+def _start_method() -> str:
+    """Return ``fork`` where this process is its only thread, else ``spawn``.
+
+    A fork costs milliseconds and a fresh interpreter most of a second; but a fork of a process with threads copies
+    their locks in an undefined state. The command line keeps BLAS at one thread, so that there are none.
+    """
+    try:
+        threads = len(list(Path("/proc/self/task").iterdir()))
+    except OSError:
+        return "spawn"
+    return "fork" if threads == 1 else "spawn"
 
 
 def _leave_interrupts_to_the_parent() -> None:
@@ -105,18 +130,29 @@ def _rig(name: str) -> Rig:
 def record(order: Order) -> Path:
     """Make one recording. Raises whatever the rig raises."""
     registry = installed()
+    rig = registry.rigs[order.rig]
     acquire(
         _rig(order.rig),
         registry.sensors[order.sensor],
-        registry.rigs[order.rig],
+        rig,
         order.scene,
         role=order.role,
         seed=order.seed,
         path=order.path,
-        clock=time.perf_counter,
+        # Simulations run side by side: what they cost is the processor's time. A real rig is waited for.
+        clock=time.process_time if rig.simulated else time.perf_counter,
         provenance={},
     )
     return order.path
+
+
+def prepare(cell: Cell) -> None:
+    """Import what a cell's estimator needs, so that no clock and no waiting person sees it later."""
+    registry = installed()
+    descriptor = registry.estimators[cell.estimator]
+    kind = registry.tasks[cell.task].spec.kind
+    with suppress(Exception):  # what is wrong with it is the cell's to tell
+        load_object(descriptor.where)(kind=kind, seed=0, threads=1, **descriptor.params)
 
 
 @lru_cache(maxsize=2)

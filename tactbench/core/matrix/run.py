@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
 from tactbench.core.errors import NotApplicable, UsageError
-from tactbench.core.matrix.execution import Job, Workers, installed, record, rig_of, solve, workers
+from tactbench.core.matrix.execution import InProcess, Job, Workers, installed, prepare, record, rig_of, solve, workers
 from tactbench.core.matrix.keys import cell_key
 from tactbench.core.matrix.material import Order, on_the_shelf, orders_for, sensors_on, serving
 from tactbench.core.matrix.plan import Cell, plan_cells
@@ -77,8 +78,8 @@ def run_matrix(
     registry = installed()
     sources = SourceDigests(store.folder / "cache" / "sources.json")
     cells, material = _material(matrix, registry, sources, store, recordings)
+    troubles = _acquire(cells, material, jobs, told)
     with workers(jobs) as crew:
-        troubles = _acquire(material, crew, told)
         rows, computed = _evaluate(cells, material, troubles, crew, jobs, registry, sources, store, told)
     sources.save()
     _fill_baselines(rows)
@@ -119,20 +120,41 @@ def _material(
     return cells, _Material(orders_for(cells, registry, sources, store), {})
 
 
-def _acquire(material: _Material, crew: Workers, told: Progress) -> dict[Path, BaseException]:
-    """Make the recordings that are missing; return what went wrong, by path."""
+def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progress) -> dict[Path, BaseException]:
+    """Make the recordings that are missing; return what went wrong, by path.
+
+    Simulations do not disturb each other and are not timed by the wall: they use all cores, and the estimators' heavy
+    libraries are imported meanwhile. The first one is done here, so that forked workers inherit what it has loaded and
+    prepared. A real rig does one scene at a time.
+    """
     unique = {order.path: order for orders in material.orders.values() for order in orders}
     missing = [order for path, order in unique.items() if not path.exists()]
     troubles: dict[Path, BaseException] = {}
-    if missing:
-        told.begin("recording", len(missing))
-        for order, outcome in crew.each(record, missing):
-            if isinstance(outcome, BaseException):
-                troubles[order.path] = outcome
-            else:
-                material.made += 1
-            told.advance(f"{order.sensor} {order.scene.name}")
+    if not missing:
+        return troubles
+    told.begin("recording", len(missing))
+    simulated = all(installed().rigs[order.rig].simulated for order in missing)
+    hands = max(jobs, os.cpu_count() or 1) if simulated else 1
+
+    def note(order: Order, outcome: Path | BaseException) -> None:
+        if isinstance(outcome, BaseException):
+            troubles[order.path] = outcome
+        else:
+            material.made += 1
+        told.advance(f"{order.sensor} {order.scene.name}")
+
+    for order, outcome in InProcess().each(record, missing[:1]):
+        note(order, outcome)
+    if missing[1:]:
+        with workers(min(hands, len(missing) - 1)) as crew:
+            for order, outcome in crew.each(record, missing[1:], meanwhile=lambda: _import_estimators(cells)):
+                note(order, outcome)
     return troubles
+
+
+def _import_estimators(cells: Sequence[Cell]) -> None:
+    for cell in cells:
+        prepare(cell)
 
 
 def _evaluate(

@@ -2,8 +2,13 @@
 
 The potential, averaged over the film's depth h, obeys ``div(sigma h grad phi) = 0`` with insulated edges. Finite
 volumes: a face conducts with the harmonic mean of its two cells. Electrodes and excitations are equipotential discs:
-cell k under disc e is joined to it by ``3 sigma A_ke / h_k`` (A_ke the overlap; 3 is the exact depth average of a
-film fed from one face). Each electrode leaks to ground through the reference resistor; its potential is an unknown.
+cell k under disc e is joined to it by ``sigma A_ke (3/h_k + 4/(pi a))``, A_ke the overlap, a the disc's radius. Each
+electrode leaks to ground through the reference resistor; its potential is an unknown.
+
+The first term is the exact depth average of a film fed from one face, right for h << a; alone it would let a
+*thinner* film conduct *better* into a small disc (for h^2 > 1.5 a^2 ln(r/a)), which no conductor does. The second is
+the disc on a half-space, 1/(4 sigma a). Their sum agrees with the method of images for a disc on a slab,
+``R = 1/(4 sigma a) + (ln(r/(4h)) + gamma) / (2 pi sigma h)``, within 2 % of 1/(4 sigma a) for h > 1.2 a.
 
 Everything is divided by sigma, so that the only electrical number left is ``leak = 1 / (sigma R_ref)`` in mm.
 """
@@ -19,7 +24,7 @@ from tactbench.plugin import FloatArray, RigError
 from tactbench.sensors.biotac.discs import Discs
 
 DEPTH_AVERAGE = 3.0
-"""Contact conductance times h / (sigma A)."""
+"""Contact conductance of a thin film times h / (sigma A)."""
 
 # Energy norm of the error at which iterating stops, relative to the solution's own. By Cauchy and Schwarz an
 # electrode is then off by at most that times sqrt(r_e), r_e = 1/leak * R_e/(R_e + R_ref) the resistance (times sigma)
@@ -60,8 +65,8 @@ class FilmSheet:
         1 / (sigma R_ref).
     at_rest_mm
         (nx, ns) the film to factorise for, positive.
-    contact
-        Contact conductance times h / (sigma A).
+    thin_contact
+        Contact conductance of a thin film times h / (sigma A).
     """
 
     def __init__(
@@ -70,7 +75,7 @@ class FilmSheet:
         discs: Discs,
         leak_mm: float,
         at_rest_mm: FloatArray,
-        contact: float = DEPTH_AVERAGE,
+        thin_contact: float = DEPTH_AVERAGE,
     ) -> None:
         dx, ds = cell_mm
         self.shape = (at_rest_mm.shape[0], at_rest_mm.shape[1])
@@ -79,8 +84,11 @@ class FilmSheet:
         self._aspect = (ds / dx, dx / ds)
         flat = discs.electrodes.reshape(len(discs.electrodes), self.cells)
         self._owner, self._under = np.nonzero(flat)
-        self._contact = contact * flat[self._owner, self._under]
-        self._drive = contact * discs.excitation.ravel()
+        areas = flat[self._owner, self._under]
+        self._thin, self._thick = thin_contact * areas, areas * (4.0 / (np.pi * discs.electrode_radius_mm))
+        excitation = discs.excitation.ravel()
+        self._thin_drive = thin_contact * excitation
+        self._thick_drive = excitation * (4.0 / (np.pi * discs.excitation_radius_mm))
         self._n_electrodes = len(flat)
         self._at_rest = at_rest_mm.copy()
         self._factor = _factorised(self.matrix(at_rest_mm))
@@ -97,7 +105,7 @@ class FilmSheet:
 
         index = np.arange(self.cells).reshape(self.shape)
         along_x, along_s = self._faces(film_mm)
-        joints = self._contact / film_mm.ravel()[self._under]
+        joints = self._joints(film_mm)
         row = np.concatenate([index[:-1].ravel(), index[:, :-1].ravel(), self._under])
         column = np.concatenate([index[1:].ravel(), index[:, 1:].ravel(), self._owner + self.cells])
         value = np.concatenate([along_x.ravel(), along_s.ravel(), joints])
@@ -174,8 +182,13 @@ class FilmSheet:
         along_s = (2.0 * self._aspect[1]) / (thin[:, 1:] + thin[:, :-1])
         return along_x, along_s
 
+    def _joints(self, film_mm: FloatArray) -> FloatArray:
+        """Conductances over sigma between cells and the electrodes above them, one per overlap."""
+        return np.asarray(self._thin / film_mm.ravel()[self._under] + self._thick)
+
     def _source(self, film_mm: FloatArray) -> FloatArray:
-        return np.concatenate([self._drive / film_mm.ravel(), np.zeros(self._n_electrodes)])
+        driven = self._thin_drive / film_mm.ravel() + self._thick_drive
+        return np.concatenate([driven, np.zeros(self._n_electrodes)])
 
 
 class _Action:
@@ -184,8 +197,8 @@ class _Action:
     def __init__(self, sheet: FilmSheet, film_mm: FloatArray) -> None:
         self._sheet = sheet
         self._along_x, self._along_s = sheet._faces(film_mm)
-        self._joints = sheet._contact / film_mm.ravel()[sheet._under]
-        self._drive = (sheet._drive / film_mm.ravel()).reshape(sheet.shape)
+        self._joints = sheet._joints(film_mm)
+        self._drive = sheet._source(film_mm)[: sheet.cells].reshape(sheet.shape)
 
     def __call__(self, unknowns: FloatArray) -> FloatArray:
         sheet = self._sheet

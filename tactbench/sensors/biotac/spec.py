@@ -41,14 +41,14 @@ PARAMETERS: dict[str, Quantity] = {
     "film_radius": derived(5.965, "mm", f"half way between core 5.33 and inner skin 6.6 mm; {_MESH}"),
     "dome_shortening": assumed(0.75, "1", "meridian arc of the dome, shortened to keep electrode 7 on the sheet"),
     "conductivity": assumed(
-        1.46, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
+        0.84, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
     ),
     "reference_resistor": sourced(10e3, "ohm", f"10 kOhm; {MANUAL}"),
-    "electrode_radius": assumed(
-        0.3, "mm", "the value at which log R at rest scatters over electrodes by 0.23, as measured; 0.6 gives 0.34"
-    ),
+    "electrode_radius": assumed(0.6, "mm", "no source"),
     "excitation_radius": assumed(0.8, "mm", "no source"),
-    "excitation_x_front": assumed(-4.9, "mm", _NO_EXCITATION_SOURCE),
+    "excitation_x_front": assumed(
+        -1.0, "mm", f"where log R at rest scatters over electrodes by 0.23, as measured; {_NO_EXCITATION_SOURCE}"
+    ),
     "excitation_x_back": assumed(-12.0, "mm", _NO_EXCITATION_SOURCE),
     "excitation_arc": assumed(2.2, "mm", f"arc on the core either side of the midline; {_NO_EXCITATION_SOURCE}"),
 }

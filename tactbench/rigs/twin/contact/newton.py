@@ -134,30 +134,39 @@ class Press:
     def _conjugate_gradients(
         self, diagonal: FloatArray, b: FloatArray, s: float, right: FloatArray, inverse: FloatArray, tol: float
     ) -> tuple[FloatArray, int]:
+        """Solve for the deflection.
+
+        Preconditioner and stiffness are both diagonal in Fourier space, so one transform of the residual and one
+        transform back of two stacked fields give ``z = M r`` and ``K z``; ``K p`` follows by the same recurrence as p.
+        """
         x = np.zeros(self._shape)
         r = right.copy()
-        z = self._back(inverse * self._forward(r), s=self._shape)
-        p = z.copy()
-        rz = float(np.vdot(r, z))
+        p, k_p = np.zeros(self._shape), np.zeros(self._shape)
+        stacked = np.stack([inverse, inverse * self.medium.stiffness])
         stop = tol * tol * float(np.vdot(right, right))
+        last = 1.0
         for count in range(1, MAX_INNER + 1):
-            q = self.apply_stiffness(p)
-            q += diagonal * p
+            z, k_z = self._back(stacked * self._forward(r), s=self._shape)
+            rz = float(np.vdot(r, z))
+            ratio = rz / last if count > 1 else 0.0
+            p *= ratio
+            p += z
+            k_p *= ratio
+            k_p += k_z
+            q = diagonal * p
+            q += k_p
             q -= b * (float(np.vdot(b, p)) * self._cell / s)
             if self.medium.keeps_volume:
                 q -= q.mean()
             curvature = float(np.vdot(p, q))
             if curvature <= 0:
                 return x, count
-            a = rz / curvature
-            x += a * p
-            r -= a * q
+            length = rz / curvature
+            x += length * p
+            r -= length * q
             if float(np.vdot(r, r)) < stop:
                 return x, count
-            z = self._back(inverse * self._forward(r), s=self._shape)
-            rz, last = float(np.vdot(r, z)), rz
-            p *= rz / last
-            p += z
+            last = rz
         return x, MAX_INNER
 
     def _descend(self, state: _State, dw: FloatArray, dd: float) -> _State:

@@ -20,8 +20,7 @@ def apply(signal: Signal) -> None:
     """Press, and write the change of every observed reading from rest.
 
     The table's tolerance is one step of the converter, or the white noise where that is more, or half a percent of the
-    largest response: a third of what the grid itself is known to (docs/twin.md). It bounds the miss in the middle of an
-    interval before that middle joins the table, so the curve is a few times better. What was achieved is kept in the
+    largest response: a third of what the grid itself is known to (docs/twin.md). What was achieved is kept in the
     recording.
 
     Raises

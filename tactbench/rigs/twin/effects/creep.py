@@ -46,20 +46,17 @@ def lag(x: FloatArray, t_s: FloatArray, tau_s: float) -> FloatArray:
     safe = np.where(e > 0, e, 1.0)
     slope = np.where(e < 1e-4, e / 2 - e**2 / 6 + e**3 / 24, 1.0 - gain / safe)
     step = np.where(dt > 0, gain * x[:-1] + slope * np.diff(x), 0.0)
-    return _recursion(np.exp(-e), step, float(x[0]))
+    return recursion(np.exp(-e), step, float(x[0]))
 
 
-def _recursion(a: FloatArray, b: FloatArray, start: float) -> FloatArray:
-    """Return z with ``z[i+1] = a[i] z[i] + b[i]``; a compiled filter where all steps are equal."""
-    from scipy.signal import lfilter
+def recursion(a: FloatArray, b: FloatArray, start: float) -> FloatArray:
+    """Return (n+1,) z with ``z[0] = start`` and ``z[i+1] = a[i] z[i] + b[i]``, (n,) factors in 0 … 1 and addends.
 
-    if len(a) and np.ptp(a) <= 1e-12:
-        rest = lfilter([1.0], [1.0, -float(a.mean())], b, zi=np.array([float(a.mean()) * start]))[0]
-        return np.concatenate([[start], rest])
-    out = np.empty(len(a) + 1)
-    out[0] = start
-    value = start
-    for place, (factor, addend) in enumerate(zip(a.tolist(), b.tolist(), strict=True)):
-        value = factor * value + addend
-        out[place + 1] = value
-    return out
+    Solved as the bidiagonal system that it is: compiled, for any steps.
+    """
+    from scipy.linalg import solve_banded
+
+    n = len(a) + 1
+    bands = np.ones((2, n))
+    bands[1, :-1], bands[1, -1] = -a, 0.0
+    return np.asarray(solve_banded((1, 0), bands, np.concatenate([[start], b]), check_finite=False))

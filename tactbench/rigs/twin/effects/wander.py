@@ -23,9 +23,9 @@ def ornstein_uhlenbeck(t_s: FloatArray, sd: float, tau_s: float, generator: np.r
 
     A step of zero changes nothing.
     """
-    from tactbench.rigs.twin.effects.creep import _recursion
+    from tactbench.rigs.twin.effects.creep import recursion
 
     dt = np.maximum(np.diff(t_s), 0.0)
     kicks = generator.normal(size=len(t_s))
     step = sd * np.sqrt(-np.expm1(-2.0 * dt / tau_s)) * kicks[1:]
-    return _recursion(np.exp(-dt / tau_s), step, sd * float(kicks[0]))
+    return recursion(np.exp(-dt / tau_s), step, sd * float(kicks[0]))

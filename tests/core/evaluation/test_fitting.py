@@ -1,0 +1,137 @@
+"""What is done with estimators that misbehave: they may come from anybody."""
+
+import warnings
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import DataError, NotApplicable, PluginContractError, UsageError
+from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.fitting import answers, fit
+from tactbench.core.plugins.registry import load_registry
+
+from .made import force_task, label_task, record
+from .test_karl2016 import ramp, ticking
+
+ESTIMATORS = load_registry().estimators
+
+
+class Answering:
+    """Answers with what it is given, and may complain while it learns."""
+
+    def __init__(self, given, complaint=None):
+        self.given, self.complaint = given, complaint
+
+    def fit(self, X, y):
+        if isinstance(self.complaint, Exception):
+            raise self.complaint
+        if self.complaint:
+            warnings.warn(self.complaint, RuntimeWarning, stacklevel=2)
+
+    def predict(self, X):
+        return self.given
+
+
+@pytest.mark.parametrize(
+    ("given", "n_classes", "says"),
+    [
+        (np.zeros((3, 1)), 0, r"shape \(3, 1\)"),
+        (np.zeros(2), 0, r"shape \(2,\)"),
+        (np.array([0.0, np.nan, np.inf]), 0, "2 values that are NaN"),
+        (np.array(["a", "b", "c"]), 3, "type"),
+        (np.array([0, 1, 3]), 3, "do not exist"),
+        (np.array([0, 1, -1]), 3, "do not exist"),
+        (np.array([0.0, 0.5, 1.0]), 3, "do not exist"),
+    ],
+)
+def test_an_answer_that_cannot_be_scored_is_refused_naming_the_estimator(given, n_classes, says):
+    with pytest.raises(PluginContractError, match=f"'theirs' answered 3 rows with .*{says}"):
+        answers(Answering(given), np.zeros((3, 2)), "theirs", n_classes)
+
+
+def test_classes_given_as_whole_floats_are_classes():
+    given = answers(Answering(np.array([0.0, 2.0])), np.zeros((2, 1)), "theirs", 3)
+    assert given.dtype == np.int64
+    assert given.tolist() == [0, 2]
+
+
+def test_a_warning_is_counted_under_the_name_of_the_estimator():
+    counts = Counter()
+    for _ in range(2):
+        fit(Answering(None, "did not converge"), np.zeros((3, 1)), np.arange(3), "theirs", counts)
+    assert counts == {"fits of theirs with a RuntimeWarning": 2}
+
+
+def test_data_an_estimator_refuses_is_an_error_with_its_name():
+    with pytest.raises(DataError, match="'theirs' could not be fitted to 3 rows of 1 features: too small"):
+        fit(Answering(None, ValueError("too small")), np.zeros((3, 1)), np.arange(3), "theirs", Counter())
+
+
+def test_an_estimator_of_the_other_kind_is_refused(tmp_path):
+    path = record(tmp_path / "a.h5", *ramp(0, n=100))
+    with pytest.raises(UsageError, match="'majority' does classification"):
+        evaluate(force_task(), ESTIMATORS["majority"], {}, "deployable", None, [path], seed=0, clock=ticking())
+
+
+def test_recordings_without_roles_skip_the_papers_protocol(tmp_path):
+    """Foreign recordings have no roles: the cell is skipped with the reason, it does not fail."""
+    paths = [record(tmp_path / f"{name}.h5", *ramp(0), session=name) for name in "ab"]
+    with pytest.raises(NotApplicable, match="roles"):
+        evaluate(force_task(), ESTIMATORS["mean"], {}, "karl2016", None, paths, seed=0, clock=ticking())
+
+
+def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
+    X, force = ramp(0, n=200)
+    paths = [
+        record(tmp_path / "a.h5", X, force, session="a", role="train"),
+        record(tmp_path / "b.h5", X, np.full(200, 2.0), session="b", role="test"),
+    ]
+    task = force_task(protocols=("deployable",))
+    result = evaluate(task, ESTIMATORS["mean"], {}, "deployable", "roles", paths, seed=0, clock=ticking())
+    assert "r2" not in result.scores
+    assert np.isfinite(list(result.scores.values())).all()
+    with pytest.raises(DataError, match="r2 of 200 test rows is undefined"):
+        evaluate(force_task(metric="r2"), ESTIMATORS["mean"], {}, "deployable", "roles", paths, seed=0, clock=ticking())
+
+
+def test_folds_that_choose_differently_are_reported_each(tmp_path):
+    """A middle value of two folds would be a penalty that nobody chose."""
+    rng = np.random.default_rng(0)
+    paths = []
+    for place, noise in enumerate((0.1, 3.0, 0.1, 3.0)):
+        X, force = ramp(place, n=300, noise=20.0 * noise)
+        paths.append(record(tmp_path / f"{place}.h5", X, force + rng.normal(0, noise, 300), session=str(place)))
+    result = evaluate(force_task(), ESTIMATORS["ridge"], {}, "deployable", None, paths, seed=0, clock=ticking())
+    allowed = {"alpha": ESTIMATORS["ridge"].grid["alpha"], "k": ESTIMATORS["ridge"].window_grid}
+    assert any(" of fold " in name for name in result.chosen), result.chosen
+    for name, value in result.chosen.items():
+        assert value in allowed[name.split()[0]]
+
+
+def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tmp_path):
+    paths = [record(tmp_path / f"{name}.h5", *ramp(place, label_noise=0.5), session=name)
+             for place, name in enumerate("ab")]  # fmt: skip
+    results = [
+        evaluate(
+            force_task(), ESTIMATORS["forest"], {"n_estimators": 20}, "deployable", None, paths, seed=seed,
+            clock=ticking(), threads=threads,
+        )
+        for seed, threads in ((0, 1), (0, 2), (0, 2), (1, 1))
+    ]  # fmt: skip
+    first, second, third, other = results
+    assert np.array_equal(first.y_pred, second.y_pred)
+    assert np.array_equal(second.y_pred, third.y_pred)
+    assert (first.score, first.ci_low, first.ci_high) == (second.score, second.ci_low, second.ci_high)
+    assert other.score != first.score
+
+
+def test_curvature_rows_of_a_single_class_each_are_answered_by_a_class(tmp_path):
+    paths = [
+        record(tmp_path / f"{role}{cap}.h5", *ramp(seed, gain=(50.0 * cap, 3.0, 1.0)), role=role, session=role,
+               labels={"kind": float(cap)})
+        for seed, (role, cap) in enumerate((r, c) for r in ("train", "validation", "test") for c in (1, 2))
+    ]  # fmt: skip
+    result = evaluate(label_task(), ESTIMATORS["chance"], {}, "karl2016", None, paths, seed=3, clock=ticking())
+    # Uniform over two classes: 0.5, standard deviation 0.5 / sqrt(2000) = 0.011; five of them.
+    assert result.scores["accuracy"] == pytest.approx(0.5, abs=0.056)

@@ -1,0 +1,118 @@
+"""Linear models: closed forms, and what nearly collinear taxels cost."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from threadpoolctl import threadpool_limits
+
+from tactbench.plugin import load_object, load_registry
+
+ESTIMATORS = load_registry().estimators
+
+
+def build(name, **params):
+    descriptor = ESTIMATORS[name]
+    kind = descriptor.kinds[0]
+    return load_object(descriptor.where)(kind=kind, seed=0, threads=1, **{**descriptor.params, **params})
+
+
+def z(X):
+    return (X - X.mean(axis=0)) / X.std(axis=0)
+
+
+@settings(deadline=None)  # the first example imports scikit-learn
+@given(st.integers(0, 2**32 - 1), st.floats(0.01, 0.5))
+def test_lasso_on_one_perfect_z_scored_feature_is_wrong_by_exactly_lambda(seed, penalty):
+    """1/2n |y - xb|² + l|b| with y = s x: b = s - l, and the error is l times a z-score."""
+    rng = np.random.default_rng(seed)
+    x = z(rng.normal(size=(200, 1)))
+    y = 2.0 + 1.5 * x[:, 0]
+    model = build("lasso", lambda_=penalty)
+    model.fit(x, y)
+    # One coordinate is solved exactly in one sweep: rounding only.
+    assert np.sqrt(np.mean((model.predict(x) - y) ** 2)) == pytest.approx(penalty, rel=1e-9)
+
+
+def taxels(n=4400, p=19, seed=0):
+    """A ramp on taxels that all follow it: what a sensor on a flat surface gives."""
+    rng = np.random.default_rng(seed)
+    force = np.linspace(0.0, 5.0, n)
+    X = 3000.0 + force[:, None] * rng.uniform(50.0, 200.0, p) + rng.normal(0.0, 0.35, (n, p))
+    return z(X), force + rng.normal(0.0, 0.6875, n)
+
+
+@pytest.mark.parametrize("penalty", [0.01, 0.2])
+def test_lasso_on_nearly_collinear_taxels_is_at_its_optimum(penalty):
+    """The duality gap, computed here from its definition, bounds the distance from the optimum."""
+    X, y = taxels()
+    model = build("lasso", lambda_=penalty)
+    model.fit(X, y)
+    n, centred = len(y), y - y.mean()
+    rest = centred - X @ model.coef_
+    primal = 0.5 * rest @ rest / n + penalty * np.abs(model.coef_).sum()
+    dual = rest / n * min(1.0, penalty / np.abs(X.T @ rest / n).max())
+    gap = primal - (centred @ dual - 0.5 * n * dual @ dual)
+    assert 0.0 <= gap <= 1e-5 * (centred @ centred) / n
+
+
+def test_the_whole_search_of_the_lasso_takes_less_than_a_second():
+    """5 windows x 6 penalties on 4400 x 19; without the Gram matrix the sweeps took 8 s."""
+    X, y = taxels()
+    build("lasso").fit(X, y)  # imports
+    with threadpool_limits(limits=1):  # as in a cell: several BLAS threads on a 19 x 19 matrix only wait for each other
+        began = time.process_time()
+        for _ in ESTIMATORS["lasso"].window_grid:
+            for penalty in ESTIMATORS["lasso"].grid["lambda_"]:
+                build("lasso", lambda_=penalty).fit(X, y)
+        assert time.process_time() - began < 1.0
+
+
+def test_ridge_is_the_closed_form():
+    rng = np.random.default_rng(1)
+    X, y = z(rng.normal(size=(50, 4))), rng.normal(size=50)
+    model = build("ridge", alpha=3.0)
+    model.fit(X, y)
+    expected = np.linalg.solve(X.T @ X + 3.0 * np.eye(4), X.T @ (y - y.mean()))
+    np.testing.assert_allclose(model.coef_, expected, rtol=1e-9)
+
+
+def test_the_time_index_is_a_straight_line():
+    t = np.arange(100.0)[:, None]
+    model = build("time-index")
+    model.fit(t, 3.0 - 0.25 * t[:, 0])
+    assert model.predict(np.array([[200.0]]))[0] == pytest.approx(-47.0, rel=1e-12)
+
+
+def test_trivial_answers_are_trivial():
+    nothing = np.zeros((4, 1))
+    mean = build("mean")
+    mean.fit(nothing, np.array([0.0, 1.0, 2.0, 5.0]))
+    assert set(mean.predict(nothing)) == {2.0}
+    majority = build("majority")
+    majority.fit(nothing, np.array([2, 1, 2, 0]))
+    assert set(majority.predict(nothing)) == {2}
+
+
+def test_chance_draws_every_class_equally_often_whatever_training_looked_like():
+    chance = build("chance")
+    chance.fit(np.zeros((10, 1)), np.array([0] * 8 + [1, 2]))
+    counts = np.bincount(chance.predict(np.zeros((3000, 1))), minlength=3)
+    # Binomial, n = 3000, p = 1/3: standard deviation 26; five of them.
+    np.testing.assert_allclose(counts, 1000, atol=130)
+
+
+def test_every_estimator_states_parameters_its_code_accepts():
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(40, 3))
+    for descriptor in ESTIMATORS:
+        for kind in descriptor.kinds:
+            params = {**descriptor.params, **({"n_estimators": 3} if "n_estimators" in descriptor.params else {})}
+            model = load_object(descriptor.where)(kind=kind, seed=0, threads=1, **params)
+            y = (X[:, 0] > 0).astype(np.int64) if kind == "classification" else X[:, 0]
+            model.fit(X, y)
+            assert np.shape(model.predict(X)) == (40,), descriptor.name
+        assert set(descriptor.grid) <= set(descriptor.params), "what is searched can also be given"
+        assert 0 in descriptor.window_grid

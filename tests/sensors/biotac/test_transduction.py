@@ -1,0 +1,154 @@
+"""The BioTac's counts: laws first, then agreement with its own spec."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import RigError
+from tactbench.sensors.biotac.electrodes import ELECTRODES, MIRRORS, NAMES
+from tactbench.sensors.biotac.spec import SPEC
+from tactbench.sensors.biotac.transduction import build, prepared
+from tactbench.sensors.icub.spec import SPEC as ICUB
+
+REST = np.array([channel.rest.value for channel in SPEC.channels("taxel") if channel.rest is not None])
+
+
+def with_parameters(**values: float):
+    changed = {name: SPEC.parameters[name].model_copy(update={"value": value}) for name, value in values.items()}
+    return SPEC.model_copy(update={"parameters": {**SPEC.parameters, **changed}})
+
+
+def place_of(number: int) -> tuple[float, float]:
+    """Axial place and arc on the outer surface, for electrodes on the cylinder."""
+    electrode = ELECTRODES[number - 1]
+    return electrode.x_mm, 8.2 * float(np.arctan2(electrode.y_mm, -electrode.z_mm))
+
+
+@pytest.fixture
+def grid(make_grid):
+    return make_grid(SPEC)
+
+
+def test_the_stated_rest_levels_are_the_models_own(grid, make_state):
+    reading = build(SPEC, grid, NAMES)(make_state(SPEC, grid, np.zeros((48, 64))))
+    # Stated with one decimal.
+    assert reading == pytest.approx(REST, abs=0.06)
+
+
+def test_the_rest_levels_have_the_measured_median_and_spread():
+    # Public recordings: R/R_ref 0.18-0.37 with median 0.26 and a spread of 0.23 in log R; median 3237 counts. The two
+    # parameters set by these are the conductivity and the front excitation.
+    ratio = 4095.0 / REST - 1.0
+    assert np.median(REST) == pytest.approx(3237.0, abs=5.0)
+    assert np.log(ratio).std() == pytest.approx(0.23, abs=0.005)
+
+
+def test_mirrored_electrodes_agree_for_a_mirrored_state(grid, make_state, make_dent):
+    reading = dict(
+        zip(NAMES, build(SPEC, grid, NAMES)(make_state(SPEC, grid, make_dent(grid, 0.9, -5.0, 0.0))), strict=True)
+    )
+    for left, right in MIRRORS:
+        # Equal up to the iteration's tolerance.
+        assert reading[left] == pytest.approx(reading[right], abs=0.04)
+
+
+def test_a_mirrored_dent_gives_mirrored_readings(grid, make_state, make_dent):
+    one = build(SPEC, grid, NAMES)(make_state(SPEC, grid, make_dent(grid, 0.9, -6.0, 2.5)))
+    other = build(SPEC, grid, NAMES)(make_state(SPEC, grid, make_dent(grid, 0.9, -6.0, -2.5)))
+    partner = {a: b for pair in MIRRORS for a, b in (pair, pair[::-1])}
+    for row, name in enumerate(NAMES):
+        assert one[row] == pytest.approx(other[NAMES.index(partner.get(name, name))], abs=0.04)
+    assert np.abs(one - other).max() > 20.0  # and the test can tell
+
+
+@pytest.mark.parametrize("number", [2, 3, 5, 12, 15, 17, 18, 19])
+def test_an_electrode_falls_where_the_film_thins_and_rises_where_it_thickens(grid, make_state, make_dent, number):
+    x, s = place_of(number)
+    transducer = build(SPEC, grid, [f"E{number}"])
+    for depth in (0.1, 0.4, 0.9):
+        hollow = make_dent(grid, depth, x, s, 1.5, keep_volume=False)
+        assert transducer(make_state(SPEC, grid, hollow))[0] < REST[number - 1] - 1.0
+        assert transducer(make_state(SPEC, grid, -hollow))[0] > REST[number - 1] + 1.0
+
+
+@pytest.mark.parametrize("number", [4, 6, 14, 16])
+def test_side_electrodes_rise_when_the_pad_is_pressed(grid, make_state, make_dent, number):
+    # As on real recordings, where these four practically never fall.
+    reading = build(SPEC, grid, [f"E{number}"])(make_state(SPEC, grid, make_dent(grid, 0.5, -4.0, 0.0, 2.0)))
+    assert reading[0] > REST[number - 1]
+
+
+def test_only_the_product_of_conductivity_and_resistor_matters(grid, make_state, make_dent):
+    state = make_state(SPEC, grid, make_dent(grid, 0.8, -5.0, 1.0))
+    resistor, conductivity = (SPEC.parameters[name].value for name in ("reference_resistor", "conductivity"))
+    other = with_parameters(reference_resistor=resistor / 7, conductivity=conductivity * 7)
+    assert build(other, grid, NAMES)(state) == pytest.approx(build(SPEC, grid, NAMES)(state), abs=0.02)
+
+
+def test_the_conduction_grid_converges(grid, make_state, make_dent):
+    rest = make_state(SPEC, grid, np.zeros((48, 64)))
+    pressed = make_state(SPEC, grid, make_dent(grid, 1.1, -5.0, 1.0, 2.5))
+    change = {}
+    for refinement in (1, 2, 4):
+        made = prepared(SPEC, grid, refinement)
+        change[refinement] = 4095 * np.subtract(
+            *(made.sheet.solve(made.film_under(state), tolerance=1e-9).electrodes for state in (pressed, rest))
+        )
+    scale = np.sqrt(np.mean(change[4] ** 2))
+    coarse, default = (np.sqrt(np.mean((change[r] - change[4]) ** 2)) / scale for r in (1, 2))
+    # The default grid keeps 1.5 % of the signal, and halving the cell at least halves the error (order 1 or better).
+    assert default < 0.015
+    assert default < 0.5 * coarse
+
+
+def test_the_answer_does_not_depend_on_what_came_before(grid, make_state, make_dent):
+    states = [make_state(SPEC, grid, make_dent(grid, depth, -5.0, 0.5)) for depth in (0.2, 0.6, 1.0, 1.4)]
+    upwards, downwards = build(SPEC, grid, NAMES), build(SPEC, grid, NAMES)
+    rising = [upwards(state) for state in states]
+    falling = [downwards(state) for state in reversed(states)][::-1]
+    for one, other, state in zip(rising, falling, states, strict=True):
+        made = prepared(SPEC, grid)
+        direct = 4095 * made.sheet.solve_directly(made.film_under(state))[made.sheet.cells :]
+        assert np.abs(one - direct).max() < 0.02
+        assert np.abs(other - direct).max() < 0.02
+
+
+def test_the_same_calls_give_the_same_bits(grid, make_state, make_dent):
+    states = [make_state(SPEC, grid, make_dent(grid, depth, -5.0, 0.5)) for depth in (0.3, 0.9)]
+    first, second = (
+        [build_(state) for state in states] for build_ in (build(SPEC, grid, NAMES), build(SPEC, grid, NAMES))
+    )
+    assert np.array_equal(first, second)
+
+
+def test_wanted_channels_come_in_the_order_asked_for(grid, make_state, make_dent):
+    state = make_state(SPEC, grid, make_dent(grid, 0.5, -5.0, 0.0), fluid_pressure_mpa=3.65e-3)
+    every = build(SPEC, grid, NAMES)(state)
+    some = build(SPEC, grid, ["PDC", "E18", "E3"])(state)
+    # 3650 Pa at 36.5 Pa per count are 100 counts above the rest of 2500.
+    assert some == pytest.approx([2600.0, every[17], every[2]], abs=1e-9)
+
+
+def test_pressure_alone_solves_no_film(grid, make_state):
+    # A film nobody looks at is not solved: this one would be refused.
+    state = make_state(SPEC, grid, np.zeros((48, 64)), thickness_mm=np.full((48, 64), np.nan))
+    assert build(SPEC, grid, ["PDC"])(state) == pytest.approx([2500.0])
+    with pytest.raises(RigError, match="not this sensor's film"):
+        build(SPEC, grid, ["E1"])(state)
+
+
+@pytest.mark.parametrize("name", ["TDC", "TAC", "PAC", "E20"])
+def test_what_this_rung_cannot_give_is_named(grid, name):
+    with pytest.raises(RigError, match=name):
+        build(SPEC, grid, ["E1", name])
+
+
+def test_another_skin_is_refused(make_grid):
+    with pytest.raises(RigError, match="fluid-backed shell"):
+        build(SPEC.model_copy(update={"skin": ICUB.skin}), make_grid(ICUB), ["E1"])
+
+
+def test_preparing_twice_costs_once(make_grid):
+    assert prepared(SPEC, make_grid(SPEC)) is prepared(SPEC, make_grid(SPEC))
+    assert prepared(SPEC, make_grid(SPEC)) is not prepared(with_parameters(conductivity=2.0), make_grid(SPEC))
