@@ -30,7 +30,6 @@ class LazyStream:
         lengths = {int(dataset.shape[0]) for dataset in self._columns.values()}
         if strict and len(lengths) > 1:
             raise FormatError(f"In {path}, the columns of {spec.name!r} differ in length.", hint=trust.SEE)
-        # A crash may leave the last block in some columns only: what all of them have counts.
         self._rows = min(lengths)
 
     def __len__(self) -> int:
@@ -81,7 +80,7 @@ class Recording:
 
     def __init__(self, path: Path, file: Any, text: str, *, complete: bool) -> None:
         self.path = path
-        self.meta = _meta(path, text)
+        self.meta = parse_meta(path, text)
         self.complete = complete
         self._text = text
         self._file = file
@@ -163,12 +162,7 @@ def open_recording(path: Path) -> Recording:
     FormatError
         If it is not a recording, is damaged or unfinished, or was written by a newer tactbench.
     """
-    return _open(Path(path), unfinished=False)
-
-
-def salvage(path: Path) -> Recording:
-    """Open what a crash left behind (``….partial``): every block that had been flushed can be read."""
-    return _open(Path(path), unfinished=True)
+    return _open(Path(path))
 
 
 def read_meta(path: Path) -> RecordingMeta:
@@ -207,23 +201,20 @@ def _columns(path: Path, spec: StreamSpec, group: Any, *, clock: str, strict: bo
         raise FormatError(f"In {path}, stream {spec.name!r} has {has}, but its clock is {clock!r}.", hint=trust.SEE)
     if columns["quality"] is not None and columns["quality"].shape[1] != len(spec.channels):
         raise FormatError(f"In {path}, the quality of {spec.name!r} has another shape than its data.", hint=trust.SEE)
-    if not strict and columns["sequence"] is not None and len(columns["sequence"]) == 0:
-        columns["sequence"] = None  # room was made for numbers that never came
     notes = trust.subgroup(path, group, "annotations")
     for name in notes if notes is not None else ():
         columns[_NOTE + name] = trust.annotation(path, notes, name, strict=strict)
     return {name: dataset for name, dataset in columns.items() if dataset is not None}
 
 
-def _open(path: Path, *, unfinished: bool) -> Recording:
+def _open(path: Path) -> Recording:
     import h5py
 
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     try:
         # Best effort: some network disks know no locks, and a finished recording never changes.
-        swmr = {"swmr": True, "libver": "v110"} if unfinished else {}
-        file = h5py.File(path, "r", locking="best-effort", **swmr)
+        file = h5py.File(path, "r", locking="best-effort")
     except PermissionError as error:
         raise FormatError(f"{path} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
     except trust.READ_FAILURES as error:
@@ -232,8 +223,7 @@ def _open(path: Path, *, unfinished: bool) -> Recording:
             hint="Get it again from its source; `….partial` files are what a crash left behind.",
         ) from error
     try:
-        text, complete = _envelope(path, file, unfinished=unfinished)
-        return Recording(path, file, text, complete=complete)
+        return Recording(path, file, _envelope(path, file), complete=True)
     except FormatError:
         file.close()
         raise
@@ -245,8 +235,8 @@ def _open(path: Path, *, unfinished: bool) -> Recording:
         raise
 
 
-def _envelope(path: Path, file: Any, *, unfinished: bool) -> tuple[str, bool]:
-    """Return the meta text and whether the recording was finished."""
+def _envelope(path: Path, file: Any) -> str:
+    """Return the meta text."""
     if file.attrs.get("format") != layout.FORMAT:
         raise FormatError(
             f"{path} is an HDF5 file, but not a tactbench recording.",
@@ -260,20 +250,17 @@ def _envelope(path: Path, file: Any, *, unfinished: bool) -> tuple[str, bool]:
         )
     if version < 1:
         raise FormatError(f"{path} has format version {version}, which never was.", hint=trust.SEE)
-    complete = bool(file.attrs.get("complete", False))
-    if not complete and not unfinished:
-        raise FormatError(
-            f"{path} was not finished.",
-            hint="Record it again, or see what is in it with `tactbench inspect --salvage`.",
-        )
+    if not bool(file.attrs.get("complete", False)):
+        raise FormatError(f"{path} was not finished.", hint="Record it again.")
     text = file.attrs["meta"]
     text = bytes(text).decode() if isinstance(text, bytes) else str(text)
     if len(text) > layout.MAX_META_CHARACTERS:
         raise FormatError(f"{path} has a meta text of {len(text)} characters.", hint=trust.SEE)
-    return text, complete
+    return text
 
 
-def _meta(path: Path, text: str) -> RecordingMeta:
+def parse_meta(path: Path, text: str) -> RecordingMeta:
+    """Return a meta text as a model; FormatError, naming `path`, if it makes no sense."""
     try:
         return RecordingMeta.model_validate(json.loads(text))
     except (json.JSONDecodeError, RecursionError) as error:

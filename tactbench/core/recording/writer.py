@@ -12,15 +12,13 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from tactbench.core.errors import RecordingError, RigError
-from tactbench.core.recording import finished
 from tactbench.core.recording import format as layout
-from tactbench.core.recording.partial import Partial
+from tactbench.core.recording import image
+from tactbench.core.recording.partial import Columns, Partial, read_partial
+from tactbench.core.recording.reader import Recording
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
-
-# A full disk is an OSError while writing and a RuntimeError while HDF5 closes.
-_DISK_FAILURES = (OSError, RuntimeError)
 
 
 class RecordingWriter:
@@ -29,7 +27,7 @@ class RecordingWriter:
     While it is open the file is called ``<path>.partial`` and holds, after every block, all blocks so far. Leaving
     the context completes it: compressed anew, content digest, sync, rename to `path`. Leaving it by an exception
     removes it, for the caller knows that it failed and can record again; only a crash of the process leaves the
-    ``.partial`` behind, for :func:`tactbench.core.recording.reader.salvage`.
+    ``.partial`` behind, for :func:`tactbench.core.recording.salvage.salvage`.
 
     Parameters
     ----------
@@ -48,7 +46,6 @@ class RecordingWriter:
         self.path = path
         self.meta = meta
         self._aside = path.with_name(path.name + layout.PARTIAL)
-        self._completing = path.with_name(path.name + layout.COMPLETING)
         self._specs = layout.specs_by_name(meta)
         self._annotations: dict[str, dict[str, npt.NDArray[Any]]] = {}
         self._numbered: dict[str, bool] = {}
@@ -58,10 +55,9 @@ class RecordingWriter:
         text = self._text()
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            timed = self.meta.clock != "none"
-            self._partial = Partial(self._aside, text, self._specs.values(), timed=timed)
-        except _DISK_FAILURES as error:
-            raise _cannot_write(self.path, error) from error
+            self._partial = Partial(self._aside, text)
+        except OSError as error:
+            raise cannot_write(self.path, error) from error
         return self
 
     def __exit__(
@@ -69,10 +65,9 @@ class RecordingWriter:
     ) -> None:
         try:
             if kind is None:
-                finished.write(self._completing, self._open, self._text(), self._specs, self._annotations)
-                finished.place(self._completing, self.path)
-        except _DISK_FAILURES as failure:
-            raise _cannot_write(self.path, failure) from failure
+                self._complete(self._open)
+        except OSError as failure:
+            raise cannot_write(self.path, failure) from failure
         finally:
             self._clear()
 
@@ -117,8 +112,8 @@ class RecordingWriter:
             )
         try:
             self._open.append(spec.name, columns)
-        except _DISK_FAILURES as error:
-            raise _cannot_write(self.path, error) from error
+        except OSError as error:
+            raise cannot_write(self.path, error) from error
 
     def annotate(self, stream: str, name: str, values: Sequence[str] | npt.NDArray[Any]) -> None:
         """Attach a label to every row of `stream`: text or whole numbers, one a row, after its last block.
@@ -131,7 +126,7 @@ class RecordingWriter:
             If the disk refuses it.
         """
         column = np.asarray(values)
-        rows = self._open.begun.get(stream)
+        rows = self._open.rows.get(stream)
         if column.shape != (rows,):
             raise RigError(
                 f"The annotation {name!r} has shape {column.shape} for {rows or 'no'} rows of {stream!r}.",
@@ -185,33 +180,46 @@ class RecordingWriter:
             )
         return spec
 
+    def _complete(self, partial: Partial) -> None:
+        text = self._text()
+        _, blocks = read_partial(self._aside)
+        with image.build(text, self._specs, blocks, self._annotations) as file:
+            digest = self._check(Recording(self._aside, file, text, complete=True), partial)
+            image.store(file, digest, self.path)
+
+    def _check(self, recording: Recording, partial: Partial) -> str:
+        """Return the digest of the stored bytes, after making sure that every row that came is there."""
+        rows = {name: len(recording.stream(name)) for name in recording.stream_names}
+        if rows != partial.rows:
+            raise RecordingError(
+                f"The recording {self.path} lost rows while it was made: {rows} of {partial.rows} are there.",
+                hint="Did another process write to it, or did the disk fail? Record it again.",
+            )
+        return recording.content_digest()
+
     def _clear(self) -> None:
         """Remove everything but the recording."""
-        try:
-            if self._partial is not None:
-                self._partial.close()
-        except _DISK_FAILURES:
-            pass  # the disk that refused a block refuses the rest too; what matters is being raised already
-        finally:
+        if self._partial is not None:
+            self._partial.close()
             self._partial = None
-            self._aside.unlink(missing_ok=True)
-            self._completing.unlink(missing_ok=True)
+        self._aside.unlink(missing_ok=True)
 
 
-def _columns(block: Block, spec: StreamSpec) -> dict[str, npt.NDArray[Any]]:
-    """Return what is stored of `block`, by column."""
-    columns: dict[str, npt.NDArray[Any]] = {"data": _stored(block.data, spec)}
+def _columns(block: Block, spec: StreamSpec) -> Columns:
+    """Return what is stored of `block`, by column; quality only if something is not good."""
+    columns: Columns = {"data": _stored(block.data, spec)}
     if block.t_ns is not None:
         columns["t_ns"] = np.asarray(block.t_ns, dtype=np.int64)
     if block.sequence is not None:
         columns["sequence"] = np.asarray(block.sequence, dtype=np.int64)
-    quality = np.zeros(block.data.shape, dtype=np.uint8) if block.quality is None else block.quality
-    if quality.shape != block.data.shape:
-        raise RigError(
-            f"A block of stream {spec.name!r} has data {block.data.shape} and quality {quality.shape}.",
-            hint="Give one quality a sample of each channel.",
-        )
-    columns["quality"] = np.asarray(quality, dtype=np.uint8)
+    if block.quality is not None:
+        if block.quality.shape != block.data.shape:
+            raise RigError(
+                f"A block of stream {spec.name!r} has data {block.data.shape} and quality {block.quality.shape}.",
+                hint="Give one quality a sample of each channel.",
+            )
+        if block.quality.any():
+            columns["quality"] = np.asarray(block.quality, dtype=np.uint8)
     return columns
 
 
@@ -236,8 +244,9 @@ def missing_marked(data: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
     return np.where(np.isnan(data), Quality.MISSING, Quality.GOOD).astype(np.uint8)
 
 
-def _cannot_write(path: Path, error: Exception) -> RecordingError:
-    reason = getattr(error, "strerror", None) or error
+def cannot_write(path: Path, error: OSError) -> RecordingError:
+    """Return the error to raise when the disk refuses."""
+    reason = error.strerror or error
     return RecordingError(
         f"The recording {path} cannot be written: {reason}.",
         hint="Check the folder's permissions and the free space, or give another with --out.",
