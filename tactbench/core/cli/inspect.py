@@ -16,20 +16,29 @@ COLOURS = {"error": "red", "warning": "yellow", "info": "blue"}
 @click.command(name="inspect")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
 @click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
-@click.option("--salvage", is_flag=True, help="Read what a crash left behind (….partial).")
+@click.option("--salvage", is_flag=True, help="Read what a crash left behind, or what is still being made (….partial).")
+@click.option("--rescue", type=click.Path(path_type=Path), metavar="OUT",
+              help="Also turn the one FILE that a crash left behind into the recording OUT.")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bool) -> None:
+def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bool, rescue: Path | None) -> None:
     """Show what is in recordings: streams, channels, rates, and whether they are healthy.
 
     Exit code 1 if a finding is an error, 2 if a file cannot be read.
     """
     import json
 
-    from tactbench.core.recording import reader
+    from tactbench.core.recording import salvage as unfinished
+    from tactbench.core.recording.reader import open_recording
 
+    if rescue is not None:
+        if len(files) != 1:
+            raise click.UsageError("--rescue OUT takes exactly one FILE.")
+        unfinished.rescue(files[0], rescue)
+        files = (rescue,)
+    opened = unfinished.salvage if salvage and rescue is None else open_recording
     described = []
     for path in files:
-        with reader.salvage(path) if salvage else reader.open_recording(path) as recording:
+        with opened(path) as recording:
             described.append(describe(recording))
         if shape == "table":
             _print(described[-1])

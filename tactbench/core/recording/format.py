@@ -17,34 +17,49 @@ from tactbench.core.spec.sensor import StreamSpec
 FORMAT = "tactbench-recording"
 VERSION = 1
 PARTIAL = ".partial"
-"""Added to the name while a recording is being written."""
+"""Added to the name while a recording is being made."""
+COMPLETING = ".completing"
+"""Added to the name while the finished file is written, moments before it is renamed."""
 
 CHUNK_ROWS = 1024
-MAX_META_BYTES = 16 * 2**20
-"""A meta text larger than this is refused: files from strangers are data."""
+MAX_META_CHARACTERS = 16 * 2**20
+"""A longer meta text is refused: files from strangers are data."""
+MAX_LISTED_CHANNELS = 1000
+"""Streams with more channels have no channel attributes: an attribute of HDF5 holds 64 KiB. The meta has them all."""
 
-NOT_CONTENT = {"provenance"}
+NOT_CONTENT = ("provenance",)
 """Fields of the meta that are not part of the content digest: when and where it was written, at what cost."""
+
+
+def canonical(content: Any) -> str:
+    """Return plain data as canonical JSON; ValueError for NaN and infinity, which JSON does not have."""
+    return json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def meta_text(meta: RecordingMeta) -> str:
     """Return `meta` as canonical JSON."""
-    return json.dumps(meta.model_dump(mode="json"), sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return canonical(meta.model_dump(mode="json"))
 
 
 class ContentDigest:
-    """SHA-256 over what a recording says, whatever file, machine or library version holds it."""
+    """SHA-256 over what a recording says, whatever file, machine or library version holds it.
 
-    def __init__(self, meta: RecordingMeta) -> None:
-        content = meta.model_dump(mode="json", exclude=NOT_CONTENT)
-        text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-        self._sha = hashlib.sha256(f"{FORMAT} {VERSION}\n{text}\n".encode())
+    Parameters
+    ----------
+    text
+        The meta as it stands in the file: a model of a later version, with more fields, must not change the digest.
+    """
+
+    def __init__(self, text: str) -> None:
+        content = json.loads(text)
+        for name in NOT_CONTENT:
+            content.pop(name, None)
+        self._sha = hashlib.sha256(f"{FORMAT} {VERSION}\n{canonical(content)}\n".encode())
 
     def array(self, name: str, values: npt.NDArray[Any]) -> None:
-        """Add an array by name, type, shape and little-endian bytes in row order."""
-        if values.dtype.kind in "OSU":
-            flat = "\0".join(str(value) for value in values.ravel())
-            self._sha.update(f"{name} text {values.shape}\n".encode() + flat.encode())
+        """Add an array by name, type, shape and little-endian bytes in row order; texts as a JSON list."""
+        if values.dtype.kind == "U":
+            self._sha.update(f"{name} text {values.shape}\n{canonical(values.tolist())}\n".encode())
             return
         plain = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
         self._sha.update(f"{name} {plain.dtype.str} {plain.shape}\n".encode())
@@ -62,6 +77,8 @@ def specs_by_name(meta: RecordingMeta) -> dict[str, StreamSpec]:
 
 def channel_attributes(spec: StreamSpec) -> Iterable[tuple[str, Any]]:
     """Yield the attributes that let an ordinary HDF5 viewer name and scale the columns."""
+    if len(spec.channels) > MAX_LISTED_CHANNELS:
+        return
     nan = float("nan")
     yield "channel_names", [channel.name for channel in spec.channels]
     yield "channel_kinds", [channel.kind for channel in spec.channels]

@@ -1,4 +1,4 @@
-"""Reading recordings; nothing in a file from a stranger is executed."""
+"""Reading recordings; nothing in a file from a stranger is executed, and nothing outside it is opened."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from tactbench.core.errors import FormatError, MissingRecordingError
+from tactbench.core.errors import FormatError, MissingRecordingError, UsageError
 from tactbench.core.recording import format as layout
+from tactbench.core.recording import trust
 from tactbench.core.samples import StreamData
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
@@ -22,24 +23,46 @@ from tactbench.core.spec.sensor import StreamSpec
 class LazyStream:
     """A stream in an open recording: nothing is read until it is sliced."""
 
-    def __init__(self, spec: StreamSpec, group: Any) -> None:
+    def __init__(self, path: Path, spec: StreamSpec, group: Any, *, clock: str, strict: bool) -> None:
         self.spec = spec
-        self._group = group
+        self._path = path
+        self._columns = _columns(path, spec, group, clock=clock, strict=strict)
+        lengths = {int(dataset.shape[0]) for dataset in self._columns.values()}
+        if strict and len(lengths) > 1:
+            raise FormatError(f"In {path}, the columns of {spec.name!r} differ in length.", hint=trust.SEE)
+        self._rows = min(lengths)
 
     def __len__(self) -> int:
-        return int(self._group["data"].shape[0])
+        return self._rows
 
     def __getitem__(self, rows: slice) -> StreamData:
-        """Read the rows of a slice, and no others."""
-        group = self._group
-        notes = group.get("annotations", {})
+        """Read the rows of a slice, and no others; FormatError if they are damaged."""
+        rows = slice(*rows.indices(self._rows))
+        try:
+            read = {name: self._read(name, rows) for name in self._columns}
+        except trust.READ_FAILURES as error:
+            raise _damaged(self._path, error) from error
+        notes = {name[len(_NOTE) :]: column for name, column in read.items() if name.startswith(_NOTE)}
         return StreamData(
             spec=self.spec,
-            t_ns=group["t_ns"][rows] if "t_ns" in group else None,
-            data=group["data"][rows],
-            quality=group["quality"][rows] if "quality" in group else None,
-            annotations={name: _annotation(notes[name], rows) for name in notes},
+            t_ns=read.get("t_ns"),
+            data=read["data"],
+            quality=read.get("quality"),
+            annotations=notes,
         )
+
+    def columns(self) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+        """Yield every column whole, by its name below the stream, for the digest."""
+        for name in sorted(self._columns):
+            yield name, self._read(name, slice(0, self._rows))
+
+    def _read(self, name: str, rows: slice) -> npt.NDArray[Any]:
+        dataset = self._columns[name]
+        if name.startswith(_NOTE):
+            return trust.labels_of(dataset, rows)
+        values = dataset[rows]
+        native: npt.NDArray[Any] = values.astype(values.dtype.newbyteorder("="), copy=False)
+        return native
 
 
 class Recording:
@@ -47,18 +70,24 @@ class Recording:
 
     Attributes
     ----------
+    path
+        The file.
     meta
         What the recording says about itself.
     complete
         False for what a crash left behind.
     """
 
-    def __init__(self, path: Path, file: Any, meta: RecordingMeta, *, complete: bool) -> None:
+    def __init__(self, path: Path, file: Any, text: str, *, complete: bool) -> None:
         self.path = path
-        self.meta = meta
+        self.meta = parse_meta(path, text)
         self.complete = complete
+        self._text = text
         self._file = file
-        self._specs = layout.specs_by_name(meta)
+        self._specs = layout.specs_by_name(self.meta)
+        self._streams = trust.subgroup(path, file, "streams")
+        if self._streams is None:
+            raise FormatError(f"{path} has no streams.", hint=trust.SEE)
 
     def __enter__(self) -> Recording:
         return self
@@ -75,7 +104,7 @@ class Recording:
     @property
     def stream_names(self) -> tuple[str, ...]:
         """Names of the streams that hold data, the sensor's first, in the order of the specs."""
-        return tuple(name for name in self._specs if name in self._file["streams"])
+        return tuple(name for name in self._specs if name in self._streams)
 
     def stream(self, name: str) -> LazyStream:
         """Return a stream to slice.
@@ -90,31 +119,33 @@ class Recording:
                 f"{self.path} has no stream {name!r}; it has {', '.join(self.stream_names) or 'none'}.",
                 hint="See what is in it with `tactbench inspect`.",
             )
-        group, spec = self._file["streams"][name], self._specs[name]
-        _check_stream(self.path, name, group, spec)
-        return LazyStream(spec, group)
+        try:
+            group = trust.subgroup(self.path, self._streams, name)
+            return LazyStream(self.path, self._specs[name], group, clock=self.meta.clock, strict=self.complete)
+        except FormatError:
+            raise
+        except trust.READ_FAILURES as error:
+            raise _damaged(self.path, error) from error
 
     def read(self, name: str) -> StreamData:
-        """Read a whole stream."""
-        return self._guarded(name, slice(None))
-
-    def _guarded(self, name: str, rows: slice) -> StreamData:
-        try:
-            return self.stream(name)[rows]
-        except (OSError, KeyError, RuntimeError) as error:
-            raise _damaged(self.path, error) from error
+        """Read a whole stream; FormatError if there is none, or if it is damaged."""
+        return self.stream(name)[:]
 
     def content_digest(self) -> str:
         """Return the digest of what the recording says, computed from the data now."""
-        try:
-            return digest_of(self._file, self.meta)
-        except (OSError, KeyError, RuntimeError) as error:
-            raise _damaged(self.path, error) from error
+        digest = layout.ContentDigest(self._text)
+        for name in sorted(self.stream_names):
+            stream = self.stream(name)
+            try:
+                for column, values in stream.columns():
+                    digest.array(f"/{name}/{column}", values)
+            except trust.READ_FAILURES as error:
+                raise _damaged(self.path, error) from error
+        return digest.hexdigest()
 
     def verify(self) -> None:
         """Compare the data with the digest that was written with it; raises FormatError if they differ."""
-        written = self._file.attrs.get("content_sha256", "")
-        if self.content_digest() != written:
+        if self.content_digest() != self._file.attrs.get("content_sha256", ""):
             raise FormatError(
                 f"{self.path} does not hold what was written: its content digest differs.",
                 hint="The file was changed or damaged afterwards; get it again from its source.",
@@ -131,12 +162,7 @@ def open_recording(path: Path) -> Recording:
     FormatError
         If it is not a recording, is damaged or unfinished, or was written by a newer tactbench.
     """
-    return _open(Path(path), unfinished=False)
-
-
-def salvage(path: Path) -> Recording:
-    """Open what a crash left behind (``….partial``): every block that had been flushed can be read."""
-    return _open(Path(path), unfinished=True)
+    return _open(Path(path))
 
 
 def read_meta(path: Path) -> RecordingMeta:
@@ -151,110 +177,103 @@ def content_digest(path: Path) -> str:
         return recording.content_digest()
 
 
-def digest_of(file: Any, meta: RecordingMeta) -> str:
-    """Return the content digest of an open HDF5 file with this meta."""
-    digest = layout.ContentDigest(meta)
-    for name, dataset in sorted(_datasets(file["streams"], "")):
-        digest.array(name, _plain(dataset))
-    return digest.hexdigest()
+_NOTE = "annotations/"
 
 
-def _datasets(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
-    for name in group:
-        item = group[name]
-        if hasattr(item, "shape"):
-            yield f"{prefix}/{name}", item
-        else:
-            yield from _datasets(item, f"{prefix}/{name}")
-
-
-def _plain(dataset: Any) -> npt.NDArray[Any]:
-    if dataset.dtype.kind == "O":
-        return _annotation(dataset, slice(None))
-    values: npt.NDArray[Any] = dataset[:]
-    return values
-
-
-def _annotation(dataset: Any, rows: slice) -> npt.NDArray[Any]:
-    import h5py
-
-    if h5py.check_string_dtype(dataset.dtype) is not None:
-        return np.array(dataset.asstr()[rows], dtype=np.str_)
-    if dataset.dtype.kind not in "iu":
+def _columns(path: Path, spec: StreamSpec, group: Any, *, clock: str, strict: bool) -> dict[str, Any]:
+    """Return the datasets of a stream by their name below it, each looked at but not read."""
+    data = trust.numbers(path, group, "data", "iuf", 2, strict=strict)
+    wanted = np.dtype(spec.dtype)
+    if data is None or data.shape[1] != len(spec.channels) or data.dtype.newbyteorder("=") != wanted:
+        what = "no data" if data is None else f"{data.dtype} in {data.shape[1]} columns"
         raise FormatError(
-            f"The annotation {dataset.name} holds {dataset.dtype}; only text and whole numbers are read.",
-            hint="See docs/format.md.",
+            f"In {path}, stream {spec.name!r} holds {what}; its spec says {wanted} in {len(spec.channels)}.",
+            hint=trust.SEE,
         )
-    return np.asarray(dataset[rows])
+    columns: dict[str, Any] = {
+        "data": data,
+        "t_ns": trust.numbers(path, group, "t_ns", "i", 1, strict=strict),
+        "quality": trust.numbers(path, group, "quality", "u", 2, strict=strict),
+        "sequence": trust.numbers(path, group, "sequence", "i", 1, strict=strict),
+    }
+    if (columns["t_ns"] is None) != (clock == "none"):
+        has = "no time stamps" if columns["t_ns"] is None else "time stamps"
+        raise FormatError(f"In {path}, stream {spec.name!r} has {has}, but its clock is {clock!r}.", hint=trust.SEE)
+    if columns["quality"] is not None and columns["quality"].shape[1] != len(spec.channels):
+        raise FormatError(f"In {path}, the quality of {spec.name!r} has another shape than its data.", hint=trust.SEE)
+    notes = trust.subgroup(path, group, "annotations")
+    for name in notes if notes is not None else ():
+        columns[_NOTE + name] = trust.annotation(path, notes, name, strict=strict)
+    return {name: dataset for name, dataset in columns.items() if dataset is not None}
 
 
-def _open(path: Path, *, unfinished: bool) -> Recording:
+def _open(path: Path) -> Recording:
     import h5py
 
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
     try:
-        file = h5py.File(path, "r")
-    except OSError as error:
+        # Best effort: some network disks know no locks, and a finished recording never changes.
+        file = h5py.File(path, "r", locking="best-effort")
+    except PermissionError as error:
+        raise FormatError(f"{path} cannot be read: {error.strerror}.", hint="Check its permissions.") from error
+    except trust.READ_FAILURES as error:
         raise FormatError(
             f"{path} is not an HDF5 file, or it was cut short: {error}.",
             hint="Get it again from its source; `….partial` files are what a crash left behind.",
         ) from error
     try:
-        meta = _meta(path, file, unfinished=unfinished)
-        complete = bool(file.attrs.get("complete", False))
+        return Recording(path, file, _envelope(path, file), complete=True)
+    except FormatError:
+        file.close()
+        raise
+    except trust.READ_FAILURES as error:
+        file.close()
+        raise _damaged(path, error) from error
     except BaseException:
         file.close()
         raise
-    return Recording(path, file, meta, complete=complete)
 
 
-def _meta(path: Path, file: Any, *, unfinished: bool) -> RecordingMeta:
+def _envelope(path: Path, file: Any) -> str:
+    """Return the meta text."""
+    if file.attrs.get("format") != layout.FORMAT:
+        raise FormatError(
+            f"{path} is an HDF5 file, but not a tactbench recording.",
+            hint="Turn foreign files into recordings with `tactbench import MAPPING.yaml`.",
+        )
+    version = int(file.attrs["format_version"])
+    if version > layout.VERSION:
+        raise FormatError(
+            f"{path} has format version {version}; this tactbench reads up to {layout.VERSION}.",
+            hint="Install a newer tactbench.",
+        )
+    if version < 1:
+        raise FormatError(f"{path} has format version {version}, which never was.", hint=trust.SEE)
+    if not bool(file.attrs.get("complete", False)):
+        raise FormatError(f"{path} was not finished.", hint="Record it again.")
+    text = file.attrs["meta"]
+    text = bytes(text).decode() if isinstance(text, bytes) else str(text)
+    if len(text) > layout.MAX_META_CHARACTERS:
+        raise FormatError(f"{path} has a meta text of {len(text)} characters.", hint=trust.SEE)
+    return text
+
+
+def parse_meta(path: Path, text: str) -> RecordingMeta:
+    """Return a meta text as a model; FormatError, naming `path`, if it makes no sense."""
     try:
-        kind = file.attrs.get("format")
-        if kind != layout.FORMAT:
-            raise FormatError(
-                f"{path} is an HDF5 file, but not a tactbench recording.",
-                hint="Turn foreign files into recordings with `tactbench import MAPPING.yaml`.",
-            )
-        version = int(file.attrs["format_version"])
-        if version > layout.VERSION:
-            raise FormatError(
-                f"{path} has format version {version}; this tactbench reads up to {layout.VERSION}.",
-                hint="Install a newer tactbench.",
-            )
-        if not unfinished and not bool(file.attrs.get("complete", False)):
-            raise FormatError(f"{path} was not finished.", hint="Record it again; a crash cut it short.")
-        if file.attrs.get_id("meta").get_storage_size() > layout.MAX_META_BYTES:
-            raise FormatError(f"{path} has a meta text that is too large.", hint="See docs/format.md.")
-        text = file.attrs["meta"]
-        if "streams" not in file:
-            raise FormatError(f"{path} has no streams.", hint="See docs/format.md.")
-        return RecordingMeta.model_validate(json.loads(bytes(text).decode()))
-    except (KeyError, OSError, RuntimeError, TypeError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        return RecordingMeta.model_validate(json.loads(text))
+    except (json.JSONDecodeError, RecursionError) as error:
         raise _damaged(path, error) from error
+    except UsageError as error:
+        raise FormatError(f"{path} says something that cannot be: {error.message}", hint=trust.SEE) from error
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         raise FormatError(
-            f"{path} says something about itself that cannot be: {where}: {first['msg']}.", hint="See docs/format.md."
+            f"{path} says something about itself that cannot be: {where}: {first['msg']}.", hint=trust.SEE
         ) from error
 
 
-def _check_stream(path: Path, name: str, group: Any, spec: StreamSpec) -> None:
-    try:
-        data = group["data"]
-        good = data.ndim == 2 and data.shape[1] == len(spec.channels) and data.dtype.kind in "iuf"
-        for other in ("t_ns", "quality", "sequence"):
-            if other in group:
-                good = good and group[other].shape[0] == data.shape[0] and group[other].dtype.kind in "iu"
-    except (KeyError, AttributeError, OSError, RuntimeError) as error:
-        raise _damaged(path, error) from error
-    if not good:
-        raise FormatError(
-            f"In {path}, stream {name!r} does not have the shape its spec states.", hint="See docs/format.md."
-        )
-
-
-def _damaged(path: Path, error: Exception) -> FormatError:
+def _damaged(path: Path, error: BaseException) -> FormatError:
     return FormatError(f"{path} is damaged: {error}.", hint="Get it again from its source, or record it again.")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
@@ -10,9 +9,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import ValidationError
 
 from tactbench.core.errors import RecordingError, RigError
 from tactbench.core.recording import format as layout
+from tactbench.core.recording import image
+from tactbench.core.recording.partial import Columns, Partial, read_partial
+from tactbench.core.recording.reader import Recording
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
@@ -22,15 +25,21 @@ class RecordingWriter:
     """Writes one recording; use it as a context manager.
 
     While it is open the file is called ``<path>.partial`` and holds, after every block, all blocks so far. Leaving
-    the context completes it: content digest, sync, rename to `path`. Leaving it by an exception removes it; only a
-    crash of the process leaves the ``.partial`` behind, for :func:`tactbench.core.recording.reader.salvage`.
+    the context completes it: compressed anew, content digest, sync, rename to `path`. Leaving it by an exception
+    removes it, for the caller knows that it failed and can record again; only a crash of the process leaves the
+    ``.partial`` behind, for :func:`tactbench.core.recording.salvage.salvage`.
 
     Parameters
     ----------
     path
-        Where the finished recording shall lie.
+        Where the finished recording shall lie; a file that is there is replaced at the end, not before.
     meta
         What it says about itself; :meth:`revise` changes it until the end.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be written, or `meta` cannot be stored.
     """
 
     def __init__(self, path: Path, meta: RecordingMeta) -> None:
@@ -38,42 +47,51 @@ class RecordingWriter:
         self.meta = meta
         self._aside = layout.partial_path(path)
         self._specs = layout.specs_by_name(meta)
-        self._file: Any = None
         self.content_digest = ""
         """Digest of what was written, once the recording is complete."""
+        self._annotations: dict[str, dict[str, npt.NDArray[Any]]] = {}
+        self._numbered: dict[str, bool] = {}
+        self._partial: Partial | None = None
 
     def __enter__(self) -> RecordingWriter:
-        import h5py
-
+        text = self._text()
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = h5py.File(self._aside, "w")
+            self._partial = Partial(self._aside, text)
         except OSError as error:
-            raise _cannot_write(self.path, error) from error
-        self._file.attrs["format"] = layout.FORMAT
-        self._file.attrs["format_version"] = layout.VERSION
-        self._file.attrs["complete"] = False
-        self._file.attrs["NX_class"] = "NXroot"
-        self._write_meta()
-        self._file.create_group("streams").attrs["NX_class"] = "NXentry"
+            raise cannot_write(self.path, error) from error
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is not None:
-            self._close()
-            self._aside.unlink(missing_ok=True)
-            return
         try:
-            self._complete()
+            if kind is None:
+                self._complete(self._open)
         except OSError as failure:
-            self._aside.unlink(missing_ok=True)
-            raise _cannot_write(self.path, failure) from failure
+            raise cannot_write(self.path, failure) from failure
+        finally:
+            self._clear()
 
     def revise(self, **changes: Any) -> None:
-        """Change fields of the meta that are known only at the end (`drawn`, `counts`, `provenance` …)."""
-        self.meta = self.meta.model_copy(update=changes)
+        """Change fields of the meta that are known only at the end (`drawn`, `counts`, `provenance` …).
+
+        Raises
+        ------
+        RecordingError
+            If a field is unknown or a value does not fit it; streams cannot change any more.
+        """
+        fixed = sorted({"sensor", "reference", "clock"} & set(changes))
+        if fixed:
+            raise RecordingError(f"{', '.join(fixed)} cannot change once a recording is open.", hint="Open another.")
+        try:
+            self.meta = RecordingMeta.model_validate({**dict(self.meta), **changes})
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            where = ".".join(str(part) for part in first["loc"])
+            raise RecordingError(
+                f"The recording {self.meta.name!r} cannot say {where}: {first['msg']}.", hint="Correct the rig."
+            ) from error
 
     def append(self, block: Block) -> None:
         """Add `block` to its stream and flush it.
@@ -81,40 +99,62 @@ class RecordingWriter:
         Raises
         ------
         RigError
-            If the block does not fit its stream: unknown name, wrong number of channels, or times that disagree in
-            number with the rows.
+            If the block does not fit its stream: unknown name, wrong number of channels or of times, a clock where
+            there is none, readings that do not fit the stored type.
         RecordingError
             If the disk refuses it.
         """
         spec = self._checked(block)
+        columns = _columns(block, spec)
+        numbered = block.sequence is not None
+        if self._numbered.setdefault(spec.name, numbered) != numbered:
+            raise RigError(
+                f"Some blocks of stream {spec.name!r} have a sequence number and some have none.",
+                hint="Give it with all blocks of a stream, or with none.",
+            )
         try:
-            group = self._group(spec, block)
-            data = group["data"]
-            start, stop = data.shape[0], data.shape[0] + len(block.data)
-            for name, values in _columns(block, spec):
-                group[name].resize(stop, axis=0)
-                group[name][start:stop] = values
-            self._file.flush()
+            self._open.append(spec.name, columns)
         except OSError as error:
-            raise _cannot_write(self.path, error) from error
+            raise cannot_write(self.path, error) from error
 
     def annotate(self, stream: str, name: str, values: Sequence[str] | npt.NDArray[Any]) -> None:
-        """Attach a label to every row of `stream`: text or whole numbers, one a row."""
-        import h5py
+        """Attach a label to every row of `stream`: text or whole numbers, one a row, after its last block.
 
-        group = self._file[f"streams/{stream}"]
+        Raises
+        ------
+        RigError
+            If the stream has no rows yet, or another number of them, or the values are neither.
+        RecordingError
+            If the disk refuses it.
+        """
         column = np.asarray(values)
-        if len(column) != group["data"].shape[0]:
+        rows = self._open.rows.get(stream)
+        if column.shape != (rows,):
             raise RigError(
-                f"The annotation {name!r} has {len(column)} values for {group['data'].shape[0]} rows of {stream!r}.",
+                f"The annotation {name!r} has shape {column.shape} for {rows or 'no'} rows of {stream!r}.",
                 hint="Give one value a row, after the last block.",
             )
-        notes = group.require_group("annotations")
-        if column.dtype.kind in "iu":
-            notes.create_dataset(name, data=column.astype(np.int64), compression="gzip", shuffle=True)
-        else:
-            texts = [str(value) for value in column]
-            notes.create_dataset(name, data=texts, dtype=h5py.string_dtype("utf-8"), compression="gzip")
+        if column.dtype.kind not in "iuU" or any("\0" in text for text in column.tolist() if isinstance(text, str)):
+            raise RigError(
+                f"The annotation {name!r} holds {column.dtype}; labels are text without NUL, or whole numbers.",
+                hint="Turn other labels into text.",
+            )
+        self._annotations.setdefault(stream, {})[name] = column
+
+    @property
+    def _open(self) -> Partial:
+        if self._partial is None:
+            raise RecordingError(f"The recording {self.path} is not open.", hint="Use it as a context manager.")
+        return self._partial
+
+    def _text(self) -> str:
+        try:
+            return layout.meta_text(self.meta)
+        except ValueError as error:
+            raise RecordingError(
+                f"What the recording {self.meta.name!r} says about itself cannot be stored: {error}.",
+                hint="Use text and finite numbers; leave out what is not known.",
+            ) from error
 
     def _checked(self, block: Block) -> StreamSpec:
         spec = self._specs.get(block.stream)
@@ -134,67 +174,54 @@ class RecordingWriter:
                     f"A block of stream {block.stream!r} has {len(block.data)} rows but {len(values)} of {name}.",
                     hint="Give one of each a row.",
                 )
+        if (block.t_ns is None) != (self.meta.clock == "none"):
+            has = "no times" if block.t_ns is None else "times"
+            raise RigError(
+                f"A block of stream {block.stream!r} has {has}; the recording's clock is {self.meta.clock!r}.",
+                hint="Give every block its times, or say that there is no clock; never invent one.",
+            )
         return spec
 
-    def _group(self, spec: StreamSpec, block: Block) -> Any:
-        groups = self._file["streams"]
-        if spec.name in groups:
-            return groups[spec.name]
-        group = groups.create_group(spec.name)
-        group.attrs["NX_class"] = "NXdata"
-        group.attrs["signal"] = "data"
-        if spec.rate_hz is not None:
-            group.attrs["rate_hz"] = spec.rate_hz
-        for name, values in _columns(block, spec):
-            shape = (0, *values.shape[1:])
-            group.create_dataset(
-                name, shape=shape, maxshape=(None, *values.shape[1:]), dtype=values.dtype,
-                chunks=(layout.CHUNK_ROWS, *values.shape[1:]), compression="gzip", compression_opts=4, shuffle=True,
-            )  # fmt: skip
-        if "t_ns" in group:
-            group.attrs["axes"] = ["t_ns", "."]
-            group["t_ns"].attrs["units"] = "ns"
-        units = {channel.unit for channel in spec.channels}
-        group["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see channel_units"
-        for name, values in layout.channel_attributes(spec):
-            group.attrs[name] = values
-        return group
+    def _complete(self, partial: Partial) -> None:
+        text = self._text()
+        _, blocks = read_partial(self._aside)
+        with image.build(text, self._specs, blocks, self._annotations) as file:
+            self.content_digest = self._check(Recording(self._aside, file, text, complete=True), partial)
+            image.store(file, self.content_digest, self.path)
 
-    def _write_meta(self) -> None:
-        self._file.attrs["meta"] = np.bytes_(layout.meta_text(self.meta).encode())  # fixed length: no 64 KiB limit
+    def _check(self, recording: Recording, partial: Partial) -> str:
+        """Return the digest of the stored bytes, after making sure that every row that came is there."""
+        rows = {name: len(recording.stream(name)) for name in recording.stream_names}
+        if rows != partial.rows:
+            raise RecordingError(
+                f"The recording {self.path} lost rows while it was made: {rows} of {partial.rows} are there.",
+                hint="Did another process write to it, or did the disk fail? Record it again.",
+            )
+        return recording.content_digest()
 
-    def _complete(self) -> None:
-        from tactbench.core.recording.reader import digest_of
-
-        self._write_meta()
-        self.content_digest = digest_of(self._file, self.meta)
-        self._file.attrs["content_sha256"] = self.content_digest
-        self._file.attrs["complete"] = True
-        self._close()
-        with self._aside.open("rb") as written:
-            os.fsync(written.fileno())
-        self._aside.replace(self.path)
-        folder = os.open(self.path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-
-    def _close(self) -> None:
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+    def _clear(self) -> None:
+        """Remove everything but the recording."""
+        if self._partial is not None:
+            self._partial.close()
+            self._partial = None
+        self._aside.unlink(missing_ok=True)
 
 
-def _columns(block: Block, spec: StreamSpec) -> list[tuple[str, npt.NDArray[Any]]]:
-    """Return what is stored of `block`, by dataset; quality only where the first block has any."""
-    columns: list[tuple[str, npt.NDArray[Any]]] = [("data", _stored(block.data, spec))]
+def _columns(block: Block, spec: StreamSpec) -> Columns:
+    """Return what is stored of `block`, by column; quality only if something is not good."""
+    columns: Columns = {"data": _stored(block.data, spec)}
     if block.t_ns is not None:
-        columns.append(("t_ns", np.asarray(block.t_ns, dtype=np.int64)))
+        columns["t_ns"] = np.asarray(block.t_ns, dtype=np.int64)
     if block.sequence is not None:
-        columns.append(("sequence", np.asarray(block.sequence, dtype=np.int64)))
-    quality = block.quality if block.quality is not None else np.zeros(block.data.shape, dtype=np.uint8)
-    columns.append(("quality", quality.astype(np.uint8)))
+        columns["sequence"] = np.asarray(block.sequence, dtype=np.int64)
+    if block.quality is not None:
+        if block.quality.shape != block.data.shape:
+            raise RigError(
+                f"A block of stream {spec.name!r} has data {block.data.shape} and quality {block.quality.shape}.",
+                hint="Give one quality a sample of each channel.",
+            )
+        if block.quality.any():
+            columns["quality"] = np.asarray(block.quality, dtype=np.uint8)
     return columns
 
 
@@ -202,13 +229,16 @@ def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
     wanted = np.dtype(spec.dtype)
     if wanted.kind == "f" or data.dtype == wanted:
         return data.astype(wanted, copy=False)
-    stored = data.astype(wanted)
-    if not np.array_equal(stored, data):
+    limits = np.iinfo(wanted)
+    fits = data.dtype.kind in "iuf" and bool(
+        np.all((data >= limits.min) & (data <= limits.max)) and np.array_equal(np.rint(data), data)
+    )
+    if not fits:
         raise RigError(
             f"Stream {spec.name!r} stores {spec.dtype}, and a reading does not fit it without loss.",
             hint="Round and clip in the rig, or declare a wider dtype in the sensor's spec.",
         )
-    return stored
+    return data.astype(wanted)
 
 
 def missing_marked(data: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
@@ -216,8 +246,10 @@ def missing_marked(data: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
     return np.where(np.isnan(data), Quality.MISSING, Quality.GOOD).astype(np.uint8)
 
 
-def _cannot_write(path: Path, error: OSError) -> RecordingError:
+def cannot_write(path: Path, error: OSError) -> RecordingError:
+    """Return the error to raise when the disk refuses."""
+    reason = error.strerror or error
     return RecordingError(
-        f"The recording {path} cannot be written: {error.strerror or error}.",
+        f"The recording {path} cannot be written: {reason}.",
         hint="Check the folder's permissions and the free space, or give another with --out.",
     )

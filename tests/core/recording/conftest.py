@@ -1,0 +1,65 @@
+"""A small sensor, and recordings of it made through the front door."""
+
+import numpy as np
+import pytest
+
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block
+from tactbench.core.spec.quantity import Source, assumed
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
+
+
+def _sensor(channels=3, dtype="uint16"):
+    return SensorSpec(
+        name="pad",
+        title="a pad",
+        principle="capacitive",
+        principle_source=Source(tag="assumed", reference="made up for a test"),
+        streams=(
+            StreamSpec(
+                name="taxels",
+                dtype=dtype,
+                channels=tuple(
+                    ChannelSpec(name=f"t{place}", kind="taxel", lower=0, upper=4095, rest=assumed(7, "count", "test"))
+                    for place in range(channels)
+                ),
+            ),
+        ),
+    )
+
+
+def _reference():
+    return StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
+
+
+@pytest.fixture
+def make_meta():
+    """Builds a meta: ``make_meta(channels=3, dtype="uint16", **fields)``."""
+
+    def make(channels=3, dtype="uint16", **fields):
+        given = {"name": "press", "rig": "test", "reference": (_reference(),), **fields}
+        return RecordingMeta(sensor=_sensor(channels, dtype), **given)
+
+    return make
+
+
+@pytest.fixture
+def write(tmp_path, make_meta):
+    """Writes a recording: ``write(data, force=None, name="press", t_ns=…, quality=None, notes={}, **meta)``."""
+
+    def make(data, *, force=None, name="press", t_ns=None, quality=None, notes=None, dtype="uint16", **fields):
+        data = np.asarray(data)
+        times = np.arange(len(data), dtype=np.int64) * 10_000_000 if t_ns is None else np.asarray(t_ns)
+        meta = make_meta(data.shape[1], dtype, name=name, **fields)
+        timed = None if meta.clock == "none" else times
+        path = tmp_path / f"{name}.h5"
+        with RecordingWriter(path, meta) as writer:
+            writer.append(Block("taxels", timed, data, quality))
+            if force is not None:
+                writer.append(Block("force_torque", timed, np.asarray(force, dtype=float)[:, None]))
+            for label, values in (notes or {}).items():
+                writer.annotate("taxels", label, values)
+        return path
+
+    return make

@@ -1,0 +1,158 @@
+"""What is written is what is read, whatever it is and however it was cut into blocks."""
+
+import itertools
+import tempfile
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.core.recording import format as layout
+from tactbench.core.recording.reader import content_digest, open_recording, read_meta
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block
+from tactbench.core.spec.quantity import Source
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
+
+DTYPES = ("uint8", "uint16", "int16", "int32", "float32", "float64")
+text = st.text(st.characters(blacklist_characters="\0", blacklist_categories=("Cs",)), max_size=12)
+scalar = st.one_of(text, st.integers(-(2**53), 2**53), st.floats(allow_nan=False, allow_infinity=False))
+
+
+def sensor(channels, dtype):
+    return SensorSpec(
+        name="pad", title="a pad", principle="capacitive", principle_source=Source(tag="assumed", reference="test"),
+        streams=(StreamSpec(name="taxels", dtype=dtype, channels=tuple(
+            ChannelSpec(name=f"t{place}", kind="taxel") for place in range(channels))),),
+    )  # fmt: skip
+
+
+@st.composite
+def recordings(draw):
+    """A meta, the whole of its one stream, and where it is cut into blocks."""
+    rows, channels = draw(st.integers(0, 40)), draw(st.integers(1, 4))
+    dtype = np.dtype(draw(st.sampled_from(DTYPES)))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    if dtype.kind == "f":
+        data = rng.normal(0, 10.0 ** draw(st.integers(-30, 30)), (rows, channels)).astype(dtype)
+        data[rng.random(data.shape) < 0.1] = np.nan
+    else:
+        limits = np.iinfo(dtype)
+        data = rng.integers(limits.min, limits.max, (rows, channels), dtype=dtype, endpoint=True)
+    timed = draw(st.booleans())
+    flags = rng.integers(0, 8, data.shape).astype(np.uint8) if draw(st.booleans()) else None
+    meta = RecordingMeta(
+        name="x", sensor=sensor(channels, dtype.name), rig="test", clock="host" if timed else "none",
+        session=draw(text), labels=draw(st.dictionaries(text, scalar, max_size=3)),
+        remarks=tuple(draw(st.lists(text, max_size=2))), drawn=draw(st.dictionaries(text, scalar, max_size=3)),
+    )  # fmt: skip
+    times = np.cumsum(rng.integers(0, 2**40, rows)) if timed else None
+    cuts = sorted(draw(st.lists(st.integers(0, rows), max_size=3)))
+    return meta, times, data, flags, [0, *cuts, rows], draw(st.lists(text, min_size=rows, max_size=rows))
+
+
+@settings(max_examples=40, deadline=None)
+@given(recordings())
+def test_round_trip(made):
+    meta, times, data, flags, cuts, notes = made
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "x.h5"
+        with RecordingWriter(path, meta) as writer:
+            for first, last in itertools.pairwise(cuts):
+                part = slice(first, last)
+                writer.append(Block("taxels", None if times is None else times[part], data[part],
+                                    None if flags is None else flags[part]))  # fmt: skip
+            writer.annotate("taxels", "object", np.array(notes, dtype=np.str_))
+            writer.annotate("taxels", "press", np.arange(len(data)))
+        with open_recording(path) as recording:
+            recording.verify()
+            assert recording.meta == meta
+            read = recording.read("taxels")
+        # Bytes, not values: NaN and the sign of zero must survive too.
+        assert read.data.dtype == data.dtype
+        assert read.data.tobytes() == data.tobytes()
+        assert (read.t_ns is None) if times is None else np.array_equal(read.t_ns, times)
+        if flags is None or not flags.any():
+            assert read.quality is None
+        else:
+            assert np.array_equal(read.quality, flags)
+        assert read.annotations["object"].tolist() == np.array(notes, dtype=np.str_).tolist()
+        assert np.array_equal(read.annotations["press"], np.arange(len(data)))
+        assert sorted(one.name for one in Path(folder).iterdir()) == ["x.h5"]
+
+
+def test_a_slice_reads_the_same_rows_as_the_whole(write):
+    data = np.random.default_rng(0).integers(0, 4096, (3000, 5))
+    with open_recording(write(data, notes={"row": np.arange(3000)})) as recording:
+        stream = recording.stream("taxels")
+        assert len(stream) == 3000
+        for rows in (slice(100, 200), slice(-5, None), slice(0, 3000, 7), slice(2900, 9999), slice(10, 10)):
+            part = stream[rows]
+            assert np.array_equal(part.data, data[rows])
+            assert np.array_equal(part.t_ns, np.arange(3000)[rows] * 10_000_000)
+            assert np.array_equal(part.annotations["row"], np.arange(3000)[rows])
+
+
+def test_the_digest_is_of_what_is_said_not_of_the_file(tmp_path, make_meta):
+    """Blocks, compression, byte order and provenance do not matter; one bit of one reading does."""
+    data = np.arange(300, dtype=np.uint16).reshape(100, 3)
+    digests = []
+    for number, step in enumerate((100, 7)):
+        path = tmp_path / f"{number}.h5"
+        with RecordingWriter(path, make_meta(provenance={"host": number})) as writer:
+            for first in range(0, 100, step):
+                part = slice(first, first + step)
+                writer.append(Block("taxels", np.arange(100)[part] * 1000, data[part], np.zeros_like(data[part])))
+        digests.append(content_digest(path))
+    other = tmp_path / "big-endian.h5"
+    with h5py.File(tmp_path / "0.h5") as source, h5py.File(other, "w") as copy:
+        copy.attrs.update(dict(source.attrs))
+        group = copy.create_group("streams/taxels")
+        group["data"] = source["streams/taxels/data"][:].astype(">u2")
+        group["t_ns"] = source["streams/taxels/t_ns"][:].astype(">i8")
+    digests.append(content_digest(other))
+    assert len(set(digests)) == 1
+    data[50, 1] ^= 1
+    changed = tmp_path / "changed.h5"
+    with RecordingWriter(changed, make_meta()) as writer:
+        writer.append(Block("taxels", np.arange(100) * 1000, data))
+    assert content_digest(changed) not in digests
+
+
+def test_a_sensor_of_many_channels_fits(write):
+    """The meta of 600 channels is far more than the 64 KiB that an attribute of fixed length can hold."""
+    path = write(np.zeros((2, 600), dtype=int))
+    assert len(read_meta(path).sensor.streams[0].channels) == 600
+    with h5py.File(path) as file:
+        assert len(file.attrs["meta"]) > 2**16
+
+
+def test_more_channels_than_attributes_can_list(write):
+    path = write(np.ones((2, layout.MAX_LISTED_CHANNELS + 1), dtype=int))
+    with open_recording(path) as recording:
+        assert recording.read("taxels").data.all()
+
+
+def test_an_ordinary_viewer_finds_signal_axes_units_and_names(write):
+    """What h5py alone sees, without tactbench: gzip and shuffle, NeXus attributes, plain types."""
+    with h5py.File(write(np.ones((5, 3), dtype=int), force=np.arange(5), notes={"press": np.arange(5)})) as file:
+        group = file["streams/taxels"]
+        assert group.attrs["signal"] == "data"
+        assert group.attrs["axes"].tolist() == ["t_ns", "."]
+        assert group["data"].attrs["units"] == "count"
+        assert group["t_ns"].attrs["units"] == "ns"
+        assert group.attrs["channel_names"].tolist() == ["t0", "t1", "t2"]
+        assert (group["data"].compression, group["data"].shuffle) == ("gzip", True)
+        assert file["streams/force_torque/data"].attrs["units"] == "N"
+        assert file.attrs["format"] == "tactbench-recording"
+        assert file.attrs["complete"]
+
+
+@pytest.mark.parametrize("clock", ["device", "none"])
+def test_time_stamps_are_there_exactly_when_there_is_a_clock(write, clock):
+    with open_recording(write(np.ones((5, 3), dtype=int), clock=clock)) as recording:
+        assert (recording.read("taxels").t_ns is None) == (clock == "none")

@@ -1,0 +1,260 @@
+"""A recording is whole or not there; what a crash leaves can be read."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import FormatError, RecordingError, RigError
+from tactbench.core.recording.reader import open_recording
+from tactbench.core.recording.salvage import rescue, salvage
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block, Quality
+
+ROWS = 50
+
+
+def block(first=0, rows=ROWS, **change):
+    n = np.arange(first, first + rows)
+    data = (n[:, None] * 7 + np.arange(3) * 13) % 4096
+    return Block(**{"stream": "taxels", "t_ns": n * 1000, "data": data.astype(np.uint16), **change})
+
+
+def record(path, meta, *steps):
+    """Write a recording step by step."""
+    with RecordingWriter(path, meta) as writer:
+        for step in steps:
+            step(writer)
+
+
+# A child process writes blocks for ever, and says after each how many it has written.
+CHILD = """
+import sys
+import numpy as np
+from pathlib import Path
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block
+from tactbench.core.spec.recording import RecordingMeta
+meta = RecordingMeta.model_validate_json(sys.stdin.readline())
+rows = int(sys.argv[2])
+with RecordingWriter(Path(sys.argv[1]), meta) as writer:
+    for number in range(10**9):
+        n = np.arange(number * rows, (number + 1) * rows)
+        data = (n[:, None] * 7 + np.arange(3) * 13) % 4096
+        writer.append(Block("taxels", n * 1000, data.astype(np.uint16), (data % 5 == 0).astype(np.uint8)))
+        writer.append(Block("force_torque", n * 1000, np.sin(n)[:, None]))
+        print(number + 1, flush=True)
+"""
+
+
+@pytest.mark.parametrize(("rows", "after"), [(1, 40), (7, 201), (50, 21), (50, 60), (333, 9), (333, 31), (1500, 5)])
+def test_kill_9_loses_at_most_the_block_in_flight(tmp_path, make_meta, rows, after):
+    """The child is killed while it writes without pause, so that nearly every kill falls into a flush.
+
+    An ordinary HDF5 file does not survive this: one kill in five left chunks that could not be read.
+    """
+    path = tmp_path / "press.h5"
+    child = subprocess.Popen([sys.executable, "-c", CHILD, str(path), str(rows)], stdin=subprocess.PIPE,
+                             stdout=subprocess.PIPE, text=True)  # fmt: skip
+    assert child.stdin is not None
+    assert child.stdout is not None
+    with child:
+        child.stdin.write(make_meta().model_dump_json() + "\n")
+        child.stdin.flush()
+        for _ in range(after):
+            child.stdout.readline()
+        os.kill(child.pid, signal.SIGKILL)
+        said = child.stdout.read().split("\n")[:-1]
+    written = int(said[-1]) if said else after
+    assert not path.exists()
+    with pytest.raises(FormatError, match="not an HDF5 file"):
+        open_recording(path.with_name("press.h5.partial"))
+    with salvage(path.with_name("press.h5.partial")) as recording:
+        assert not recording.complete
+        taxels, force = recording.read("taxels"), recording.read("force_torque")
+    rescue(path.with_name("press.h5.partial"), path)
+    with open_recording(path) as recording:
+        recording.verify()
+        assert "broke off" in recording.meta.remarks[-1]
+        assert np.array_equal(recording.read("taxels").data, taxels.data)
+    n = np.arange(len(taxels.data))
+    assert len(n) >= written * rows
+    assert len(force.data) >= written * rows
+    assert np.array_equal(taxels.data, (n[:, None] * 7 + np.arange(3) * 13) % 4096)
+    assert np.array_equal(taxels.quality, taxels.data % 5 == 0)
+    assert np.array_equal(taxels.t_ns, n * 1000)
+    assert np.array_equal(force.data[:, 0], np.sin(np.arange(len(force.data))))
+
+
+def test_it_can_be_watched_while_it_is_made(tmp_path, make_meta):
+    path = tmp_path / "press.h5"
+    with RecordingWriter(path, make_meta()) as writer:
+        for number in range(3):
+            writer.append(block(number * ROWS))
+            with salvage(path.with_name("press.h5.partial")) as seen:
+                assert len(seen.stream("taxels")) == (number + 1) * ROWS
+    assert [one.name for one in tmp_path.iterdir()] == ["press.h5"]
+
+
+@pytest.mark.parametrize("failure", [RigError("the motor stalled"), KeyboardInterrupt()])
+def test_an_exception_leaves_nothing_and_the_old_file_alone(tmp_path, make_meta, failure):
+    path = tmp_path / "press.h5"
+    with RecordingWriter(path, make_meta()) as writer:
+        writer.append(block())
+    before = path.read_bytes()
+
+    def fail(_):
+        raise failure
+
+    with pytest.raises(type(failure)):
+        record(path, make_meta(), lambda writer: writer.append(block()), fail)
+    assert path.read_bytes() == before
+    assert [one.name for one in tmp_path.iterdir()] == ["press.h5"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"stream": "taxel"}, "'taxel'"),
+        ({"data": np.zeros((ROWS, 4))}, r"\(n, 3\)"),
+        ({"data": np.zeros(ROWS)}, r"\(n, 3\)"),
+        ({"t_ns": np.arange(3)}, "t_ns"),
+        ({"t_ns": None}, "clock is 'device'"),
+        ({"sequence": np.arange(3)}, "sequence"),
+        ({"quality": np.zeros((3, 3))}, "quality"),
+        ({"quality": np.ones((ROWS, 2))}, "quality"),
+        ({"data": np.full((ROWS, 3), 0.5)}, "without loss"),
+        ({"data": np.full((ROWS, 3), -1)}, "without loss"),
+        ({"data": np.full((ROWS, 3), 65536)}, "without loss"),
+        ({"data": np.full((ROWS, 3), np.nan)}, "without loss"),
+    ],
+)
+def test_a_block_that_does_not_fit_is_refused(tmp_path, make_meta, wrong, says):
+    with pytest.raises(RigError, match=says), RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
+        writer.append(block(**wrong))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_sequence_numbers_come_with_all_blocks_or_with_none(tmp_path, make_meta):
+    blocks = block(sequence=np.arange(ROWS)), block(ROWS)
+    with pytest.raises(RigError, match="sequence"):
+        record(tmp_path / "x.h5", make_meta(), *(lambda writer, one=one: writer.append(one) for one in blocks))
+
+
+def test_quality_that_comes_late_leaves_the_rows_before_it_good(tmp_path, make_meta):
+    bad = np.zeros((ROWS, 3), dtype=np.uint8)
+    bad[3, 1] = Quality.MISSING
+    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
+        writer.append(block())
+        writer.append(block(ROWS, quality=bad))
+    with open_recording(tmp_path / "x.h5") as recording:
+        quality = recording.read("taxels").quality
+    assert np.argwhere(quality).tolist() == [[ROWS + 3, 1]]
+
+
+@pytest.mark.parametrize("labels", [["a"], ["a"] * (ROWS + 1), [0.5] * ROWS, ["a\0b"] * ROWS, [None] * ROWS])
+def test_labels_that_do_not_fit_are_refused(tmp_path, make_meta, labels):
+    annotate = partial(RecordingWriter.annotate, stream="taxels", name="object", values=labels)
+    with pytest.raises(RigError, match="object"):
+        record(tmp_path / "x.h5", make_meta(), lambda writer: writer.append(block()), annotate)
+
+
+def test_what_is_known_only_at_the_end(tmp_path, make_meta):
+    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
+        writer.append(block())
+        writer.revise(drawn={"offset_mm": 0.25}, counts={"rows": ROWS}, provenance={"sim_s": 1.5})
+    with open_recording(tmp_path / "x.h5") as recording:
+        assert recording.meta.drawn == {"offset_mm": 0.25}
+        assert recording.meta.provenance == {"sim_s": 1.5}
+
+
+@pytest.mark.parametrize(
+    "change", [{"plan": "none"}, {"colour": "red"}, {"sensor": None}, {"drawn": {"x": float("nan")}}]
+)
+def test_what_cannot_be_said_is_refused(tmp_path, make_meta, change):
+    with pytest.raises(RecordingError):
+        record(tmp_path / "x.h5", make_meta(), partial(RecordingWriter.revise, **change))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_made(tmp_path, make_meta):
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(RecordingError, match="--out"), RecordingWriter(tmp_path / "taken" / "x.h5", make_meta()):
+        pass
+
+
+def test_a_disk_that_is_full(tmp_path, make_meta):
+    """The size limit of a process stands for the disk: the write fails with an error, not with a signal."""
+    script = """
+import resource, signal, sys
+import numpy as np
+from pathlib import Path
+from tactbench.core.errors import RecordingError
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block
+from tactbench.core.spec.recording import RecordingMeta
+meta = RecordingMeta.model_validate_json(sys.stdin.readline())
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (2**18, resource.RLIM_INFINITY))
+rng = np.random.default_rng(0)
+try:
+    with RecordingWriter(Path("x.h5"), meta) as writer:
+        for number in range(1000):
+            writer.append(Block("force_torque", np.arange(1000), rng.normal(size=(1000, 1))))
+except RecordingError as error:
+    print(error)
+print(list(Path().iterdir()))
+"""
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, input=make_meta().model_dump_json() + "\n",
+                          capture_output=True, text=True, timeout=60)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "x.h5 cannot be written" in done.stdout
+    assert "free space" in done.stdout
+    assert done.stdout.rstrip().endswith("[]")
+
+
+def test_a_second_writer_of_the_same_file_is_turned_away(tmp_path, make_meta):
+    with RecordingWriter(tmp_path / "x.h5", make_meta()) as first:
+        first.append(block())
+        with pytest.raises(RecordingError, match="another process"), RecordingWriter(tmp_path / "x.h5", make_meta()):
+            pass
+        first.append(block(ROWS))
+    with open_recording(tmp_path / "x.h5") as recording:
+        assert len(recording.stream("taxels")) == 2 * ROWS
+
+
+def test_rows_that_vanish_are_noticed(tmp_path, make_meta):
+    """A journal that somebody else cut short must not become a recording with fewer rows."""
+    journal = tmp_path / "x.h5.partial"
+    with pytest.raises(RecordingError, match="lost rows"):
+        record(
+            tmp_path / "x.h5",
+            make_meta(),
+            lambda writer: writer.append(block()),
+            lambda writer: writer.append(block(ROWS)),
+            lambda _: os.truncate(journal, journal.stat().st_size - 10),
+        )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_recordings_at_once_in_two_threads(tmp_path, make_meta):
+    def make(name):
+        with RecordingWriter(tmp_path / f"{name}.h5", make_meta(name=name)) as writer:
+            for number in range(5):
+                writer.append(block(number * ROWS))
+
+    threads = [threading.Thread(target=make, args=(name,)) for name in ("a", "b")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for name in ("a", "b"):
+        with open_recording(Path(tmp_path / f"{name}.h5")) as recording:
+            recording.verify()
+            assert len(recording.stream("taxels")) == 5 * ROWS
