@@ -60,6 +60,6 @@ def test_the_block_length_is_that_of_the_theory_for_a_first_order_process(memory
     n = 20_000
     lengths = [block_length(lfilter([1.0], [1.0, -memory], rng.normal(size=n + 500))[500:]) for _ in range(15)]
     expected = (6 * memory**2 / (1 - memory**2) ** 2 * n) ** (1 / 3)
-    # The bandwidth is estimated: one length scatters by 5 to 11 %, the mean of fifteen by 3 %, and lies 2 to 5 % low. The
-    # constant of the stationary bootstrap in place of the circular one's would be 13 % lower still.
+    # The bandwidth is estimated: one length scatters by 5 to 11 %, the mean of fifteen by 3 %, and lies 2 to 5 % low.
+    # The constant of the stationary bootstrap in place of the circular one's would be 13 % lower still.
     assert np.mean(lengths) == pytest.approx(expected, rel=0.10)
