@@ -57,6 +57,7 @@ def command(
         built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
         provenance=gather(),
     )  # fmt: skip
+    meta = made.meta
     spent = float(meta.provenance.get("sim_s", meta.provenance.get("acquisition_s", 0.0)))
     simulated = " (SIM)" if meta.simulated else ""
     click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{simulated}, {scene.indenter}, in {spent:.2f} s")
@@ -102,5 +103,4 @@ def _built(registry: Registry, name: str) -> Rig:
             f"The rig {name!r} cannot record: it hands out recordings that exist already.",
             hint="Use --rig twin, or another rig that presses.",
         )
-    meta = made.meta
     return rig
