@@ -156,8 +156,13 @@ def _notes(rows: Sequence[Row]) -> list[str]:
     )
     for row in rows:
         if row["chosen"]:
-            picked = ", ".join(f"{key} = {value:g}" for key, value in sorted(row["chosen"].items()))
+            picked = ", ".join(f"{key.rstrip('_')} = {value:g}" for key, value in sorted(row["chosen"].items()))
             notes.append(f"{_who(row)}: chosen on validation data: {picked}.")
+    notes += [
+        f"{_who(row)} is no better than the trivial baseline: see how the recordings differ before blaming the sensor."
+        for row in rows
+        if _no_better(row)
+    ]
     notes += _distinct(
         f"{row['sensor']}/{row['task']}: {what}: {count}."
         for row in rows
@@ -168,6 +173,13 @@ def _notes(rows: Sequence[Row]) -> list[str]:
     notes += _distinct(f"{row['task']}: interval by {row['ci_method']}." for row in rows if row["ci_method"])
     notes += [f"{_who(row)} {row['status']}: {row['reason']}" for row in rows if row["status"] != "done"]
     return notes
+
+
+def _no_better(row: Row) -> bool:
+    if row["status"] != "done" or row["is_baseline"] or row["baseline"] is None:
+        return False
+    lower = row["metric"] in LOWER_IS_BETTER
+    return bool(row["ci_high"] >= row["baseline"] if lower else row["ci_low"] <= row["baseline"])
 
 
 def _who(row: Row) -> str:

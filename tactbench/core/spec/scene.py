@@ -51,7 +51,7 @@ class ForceRamp(Frozen):
 class Environment(Frozen):
     """What surrounds the contact, and how far the assumed nuisances are scaled."""
 
-    since_power_on: Quantity = assumed(600.0, "s", "a warm sensor: the paper does not say how long it ran")
+    since_power_on: Quantity = assumed(600.0, "s", "ten minutes: not yet quite warm; the paper does not say")
     """Time from switching the sensor on to the first sample of the session [time]."""
     noise_scale: float = Field(default=1.0, ge=0)
     """Factor on white noise of the sensor."""
