@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tactbench.core.plugins.interfaces import Acquisition, Rig
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Role, Scene
+
+
+class Acquired(NamedTuple):
+    """A finished recording."""
+
+    meta: RecordingMeta
+    content_digest: str
 
 
 def acquire(
@@ -24,7 +31,7 @@ def acquire(
     path: Path,
     clock: Callable[[], float],
     provenance: Mapping[str, Any],
-) -> RecordingMeta:
+) -> Acquired:
     """Carry out `scene` and write what the rig yields to `path`.
 
     Parameters
@@ -64,7 +71,7 @@ def acquire(
                 drawn=dict(acquisition.drawn),
                 provenance={**provenance, key: spent},
             )
-        return writer.meta
+    return Acquired(writer.meta, writer.content_digest)
 
 
 def _meta(

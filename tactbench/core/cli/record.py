@@ -53,10 +53,11 @@ def command(
     built = _built(registry, rig)
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
-    meta = acquire(
+    made = acquire(
         built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
         provenance=gather(),
     )  # fmt: skip
+    meta = made.meta
     spent = float(meta.provenance.get("sim_s", meta.provenance.get("acquisition_s", 0.0)))
     simulated = " (SIM)" if meta.simulated else ""
     click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{simulated}, {scene.indenter}, in {spent:.2f} s")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -135,8 +136,26 @@ def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:
     for row in outcome.failures:
         remark(f"Failed: {row['cell']}: {row['reason']}")
     if shape == "table":
-        sensor, task = outcome.rows[0]["sensor"], outcome.rows[0]["task"]
-        remark("Try next:")
-        remark("  tactbench run                                 the paper's whole matrix")
-        remark(f"  tactbench run --task {task} --protocol deployable   without looking at test-set statistics")
-        remark(f"  tactbench show {sensor:<30}  what the sensor is, and who says so")
+        _suggest(outcome.rows[0])
+
+
+def _suggest(row: Mapping[str, Any]) -> None:
+    """Say what to try next, fitting to what was just run."""
+    from tactbench.core.cli.screen import remark
+
+    if row["simulated"]:
+        tries = {
+            "tactbench run": "the paper's whole matrix",
+            f"tactbench run --task {row['task']} --protocol deployable": "without looking at test-set statistics",
+            f"tactbench show {row['sensor']}": "what the sensor is, and who says so",
+        }
+    else:
+        tries = {
+            "tactbench run … --split shuffled": "what a leaking split would have claimed",
+            "tactbench run … --estimator forest": "another answer (see tactbench list estimators)",
+            "tactbench inspect FILE": "what is in a recording, and whether it is healthy",
+        }
+    width = max(len(command) for command in tries)
+    remark("Try next:")
+    for command_text, why in tries.items():
+        remark(f"  {command_text:<{width}}  {why}")

@@ -20,6 +20,7 @@ from tactbench.core.evaluation.fitting import fit
 from tactbench.core.evaluation.interval import LEVEL, score_interval
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
+from tactbench.core.evaluation.replication import replicates
 from tactbench.core.evaluation.selection import Build, Choice, features_of, scales, select
 from tactbench.core.evaluation.sets import constant_features, keep, part
 from tactbench.core.evaluation.splits import (
@@ -145,7 +146,7 @@ def evaluate(
     rules = protocol_called(protocol)
     metric = metric_called(task.metric)
     chosen_split = choose_split(task, rules, data, split)
-    assignments = make_splits(data, chosen_split, seed)
+    assignments = make_splits(data, chosen_split, seed, gap=max(estimator.window_grid))
     assert_disjoint(assignments)
     build = _builder(estimator, params, task, seed, threads)
     counts: Counter[str] = Counter(data.counts)
@@ -275,7 +276,7 @@ def _result(
     recording, row = np.concatenate(answers.recording), np.concatenate(answers.row)
     fold = np.concatenate(answers.fold)
     n_classes = len(data.classes)
-    cluster, cluster_name = _clusters(data, split, recording, row)
+    cluster, cluster_name = replicates(data, task, split, y, recording, row)
     score = metric.of(y, predicted, n_classes)
     if not np.isfinite(score):
         raise DataError(
@@ -330,16 +331,6 @@ def _result(
         row=row,
         fold=fold,
     )
-
-
-def _clusters(data: Dataset, split: str, recording: IntArray, row: IntArray) -> tuple[npt.NDArray[Any], str]:
-    """Return the unit of replication of every test row: the group the split keeps apart, else the session."""
-    name = split if all(split in table.groups for table in data.tables) else "session"
-    cluster = np.empty(len(recording), dtype=object)
-    for place, table in enumerate(data.tables):
-        mine = recording == place
-        cluster[mine] = table.groups[name][np.searchsorted(table.row, row[mine])]
-    return cluster.astype(np.str_), name
 
 
 def _chosen(choices: Sequence[Choice], folds: Sequence[str]) -> dict[str, float]:

@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable
-from tactbench.core.evaluation.alignment import nearest_rows
+from tactbench.core.evaluation.channels import channel_on, channels_for, feature_streams, features_on, on_clock
 from tactbench.core.recording.reader import Recording, open_recording
-from tactbench.core.samples import FloatArray, IntArray, Quality, StreamData
-from tactbench.core.spec import units
+from tactbench.core.samples import FloatArray, IntArray, StreamData
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec
 
@@ -108,11 +107,11 @@ class _Raw:
 
 def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> _Raw:
     meta = recording.meta
-    stream = _feature_stream(recording, task)
-    data = recording.read(stream)
-    picked = [place for place, channel in enumerate(data.spec.channels) if channel.kind in task.features]
-    X = _numbers(data)[:, picked]
-    names = tuple(data.spec.channels[place].name for place in picked)
+    streams = [recording.read(name) for name in feature_streams(recording, task)]
+    data = streams[0]
+    columns = [features_on(meta, data, stream, task, counts) for stream in streams]
+    names = tuple(name for some, _ in columns for name in some)
+    X = np.hstack([block for _, block in columns])
     if len(X) == 0:
         raise DataError(f"The recording {meta.name!r} has no samples.", hint="Record it again.")
     empty = [name for name, column in zip(names, X.T, strict=True) if np.isnan(column).all()]
@@ -122,9 +121,9 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> _Raw:
             hint="Leave the channel out of the mapping, or record it again.",
         )
     y, labelled = _target(recording, task, data)
-    force = _force(recording, data)
+    force = _force(recording, task, data, y)
     time_s = (data.t_ns - data.t_ns[0]) * 1e-9 if data.t_ns is not None else np.arange(len(X), dtype=np.float64)
-    raw = _Raw(names, X, y, labelled, force, time_s, np.arange(len(X), dtype=np.int64), _groups(meta, data))
+    raw = _Raw(names, X, y, labelled, force, time_s, np.arange(len(X), dtype=np.int64), _groups(meta, data, task))
     whole = np.asarray(~np.isnan(X).any(axis=1))
     if not whole.all():
         for name, column in zip(names, X.T, strict=True):
@@ -141,30 +140,6 @@ def _rows(raw: _Raw, keep: npt.NDArray[np.bool_]) -> _Raw:
     )  # fmt: skip
 
 
-def _feature_stream(recording: Recording, task: TaskSpec) -> str:
-    """Return the one stream that carries the features."""
-    own = {stream.name for stream in recording.meta.sensor.streams}
-    for name in recording.stream_names:
-        spec = recording.stream(name).spec
-        if name in own and any(channel.kind in task.features for channel in spec.channels):
-            return name
-    wanted = " or ".join(kind.replace("_", " ") for kind in task.features)
-    meta = recording.meta
-    raise NotApplicable(
-        f"Task {task.name!r} needs a {wanted} channel; {meta.sensor.name} has none in {meta.name!r}.",
-        hint="See what the sensor has with `tactbench show`.",
-    )
-
-
-def _numbers(data: StreamData) -> FloatArray:
-    """Return the samples as float64, with NaN where there is none."""
-    numbers = data.data.astype(np.float64)
-    if data.quality is not None:
-        numbers[(data.quality & Quality.MISSING) != 0] = np.nan
-    numbers[~np.isfinite(numbers)] = np.nan
-    return numbers
-
-
 Labels = tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]
 """Targets, and which of them are there."""
 
@@ -172,7 +147,7 @@ Labels = tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]
 def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Labels:
     if isinstance(task.target, LabelTarget):
         return _label(recording.meta, task.target.name, features)
-    column = _channel(recording, task.target, features)
+    column = channel_on(recording, task.target, features)
     if column is None:
         n = len(features.data)
         return np.full(n, np.nan), np.zeros(n, dtype=bool)
@@ -189,38 +164,16 @@ def _label(meta: RecordingMeta, name: str, features: StreamData) -> Labels:
     return np.full(n, ""), np.zeros(n, dtype=bool)
 
 
-def _force(recording: Recording, features: StreamData) -> FloatArray | None:
-    return _channel(recording, ChannelTarget(kind="force"), features)
+def _force(recording: Recording, task: TaskSpec, features: StreamData, y: npt.NDArray[Any]) -> FloatArray | None:
+    """Return the reference force, in whatever unit: the target itself, or else the only force channel there is."""
+    if isinstance(task.target, ChannelTarget) and task.target.kind == "force":
+        return y
+    found = channels_for(recording, ChannelTarget(kind="force"))
+    return on_clock(recording, features, *found[0]) if len(found) == 1 else None
 
 
-def _channel(recording: Recording, target: ChannelTarget, features: StreamData) -> FloatArray | None:
-    """Return a channel on the clock of the features, in the unit of `target`; None if there is none."""
-    found = []
-    for name in recording.stream_names:
-        spec = recording.stream(name).spec
-        for place, channel in enumerate(spec.channels):
-            if channel.kind == target.kind and target.name in (None, channel.name):
-                found.append((name, place, channel))
-    if not found:
-        return None
-    if len(found) > 1:
-        found = [one for one in found if one[2].name in ("normal", "fz")] or found
-    if len(found) > 1:
-        names = ", ".join(channel.name for _, _, channel in found)
-        raise DataError(
-            f"The recording {recording.meta.name!r} has several {target.kind} channels: {names}.",
-            hint="Name one in the task's target.",
-        )
-    name, place, channel = found[0]
-    data = features if name == features.spec.name else recording.read(name)
-    column = _numbers(data)[:, place] * units.conversion(channel.unit, target.unit)
-    picked = nearest_rows(features, data, recording.meta.name)
-    aligned = np.full(len(features.data), np.nan)
-    aligned[picked >= 0] = column[picked[picked >= 0]]
-    return aligned
-
-
-def _groups(meta: RecordingMeta, data: StreamData) -> dict[str, npt.NDArray[np.str_]]:
+def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, npt.NDArray[np.str_]]:
+    """Return labels by which rows can be kept together; the answer asked for is none of them."""
     n = len(data.data)
     constant = {
         "session": meta.session,
@@ -234,6 +187,7 @@ def _groups(meta: RecordingMeta, data: StreamData) -> dict[str, npt.NDArray[np.s
     for name, column in data.annotations.items():
         own = column.dtype.kind in "iu"
         groups[name] = np.array([f"{meta.session}/{value}" if own else str(value) for value in column], dtype=np.str_)
+    groups.pop(task.target.name or "", None)
     return groups
 
 

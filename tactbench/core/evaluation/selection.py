@@ -78,7 +78,7 @@ def select(
     grid = {name: values for name, values in descriptor.grid.items() if name not in given}
     if not grid and len(descriptor.window_grid) <= 1:
         return None
-    pairs = _pairs(data, protocol, assignment)
+    pairs = _pairs(data, protocol, assignment, max(descriptor.window_grid))
     n_classes = len(data.classes)
     told: Counter[str] = Counter() if counts is None else counts
     best: Choice | None = None
@@ -93,11 +93,13 @@ def select(
     return best
 
 
-def _pairs(data: Dataset, protocol: ProtocolSpec, assignment: Assignment) -> list[tuple[Kept, Scale, Kept, Scale]]:
+def _pairs(
+    data: Dataset, protocol: ProtocolSpec, assignment: Assignment, gap: int
+) -> list[tuple[Kept, Scale, Kept, Scale]]:
     if assignment.validation is not None:
         masks = [(assignment.train, assignment.validation)]
     else:
-        masks = inner_splits(data, assignment)
+        masks = inner_splits(data, assignment, gap)
     pairs = []
     for learn, check in masks:
         ignored: Counter[str] = Counter()

@@ -81,12 +81,16 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     """
     chosen = [mask & _after_start(table, protocol, counts) for table, mask in zip(data.tables, masks, strict=True)]
     sizes = [int(mask.sum()) for mask in chosen]
+    early = sum(int(mask.sum()) for mask in masks) - sum(sizes)
+    if early:
+        counts[f"{what} rows before the press begins"] += early
     if sum(sizes) == 0:
         raise DataError(f"The {what} set has no rows.", hint="Check roles, sessions and the length of the recordings.")
     tables = data.tables
     X = np.concatenate([table.X[mask] for table, mask in zip(tables, chosen, strict=True)])
     recording = np.repeat(np.arange(len(tables)), sizes)
     row = np.concatenate([table.row[mask] for table, mask in zip(tables, chosen, strict=True)])
+    place = np.concatenate([np.flatnonzero(mask) for mask in chosen])
     good = np.ones(len(X), dtype=bool)
     if protocol.three_sigma:
         forces = [np.full(len(table.row), np.nan) if table.force is None else table.force for table in tables]
@@ -103,7 +107,7 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
         recording=recording[good],
         row=row[good],
         cluster=cluster[good],
-        segment=_segments(recording[good], row[good], consecutive=consecutive),
+        segment=_segments(recording[good], place[good], consecutive=consecutive),
     )
 
 
@@ -131,10 +135,15 @@ def _within_three_sigma(
     return good
 
 
-def _segments(recording: IntArray, row: IntArray, *, consecutive: bool) -> IntArray:
+def _segments(recording: IntArray, place: IntArray, *, consecutive: bool) -> IntArray:
+    """Return (n,) numbers of the stretches that windows stay in.
+
+    `place` counts the rows of a table, in which rows with a dropped-out channel are not: a filter in use skips such a
+    row and goes on, it does not start anew. A jump in `place` is a row that belongs to another set.
+    """
     if not consecutive:
         return recording
-    breaks = (np.diff(recording, prepend=recording[:1]) != 0) | (np.diff(row, prepend=row[:1] - 1) != 1)
+    breaks = (np.diff(recording, prepend=recording[:1]) != 0) | (np.diff(place, prepend=place[:1] - 1) != 1)
     return np.cumsum(breaks).astype(np.int64)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,8 @@ FOLDS = 5
 """Folds of grouped and of shuffled splits."""
 TRAIN_SHARE = 0.8
 """First part, in time, that an in-session split trains on."""
+SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
+"""Splits whose unit of replication is the session."""
 SHUFFLED_STAMP = "leaks: split shuffled puts neighbouring rows of one recording or object on both sides."
 
 
@@ -77,13 +80,19 @@ def _can(name: str, data: Dataset) -> bool:
         return {"train", "test"} <= {meta.role for meta in data.metas}
     if name in ("in-session", "shuffled"):
         return True
-    values = {value for table in _open_to_folds(data) if name in data.tables[table].groups
-              for value in np.unique(data.tables[table].groups[name])}  # fmt: skip
-    return len(values) >= 2
+    tables = [data.tables[place] for place in _open_to_folds(data)]
+    if any(name not in table.groups for table in tables):
+        return False  # rows of no known group could be related to either side
+    return len({value for table in tables for value in np.unique(table.groups[name][table.labelled])}) >= 2
 
 
-def make_splits(data: Dataset, split: str, seed: int) -> list[Assignment]:
+def make_splits(data: Dataset, split: str, seed: int, gap: int = 0) -> list[Assignment]:
     """Return the folds of `split`.
+
+    Parameters
+    ----------
+    gap
+        Rows left out between training and test where a recording is cut in time: the longest window that may be chosen.
 
     Notes
     -----
@@ -92,7 +101,7 @@ def make_splits(data: Dataset, split: str, seed: int) -> list[Assignment]:
     if split == "roles":
         return [_by_roles(data)]
     if split == "in-session":
-        return list(_in_session(data))
+        return list(_in_session(data, gap))
     if split == "shuffled":
         return list(_shuffled(data, seed))
     if split == "session":
@@ -117,7 +126,7 @@ def _by_roles(data: Dataset) -> Assignment:
     return Assignment("roles", masks["train"], masks["test"], validation)
 
 
-def _in_session(data: Dataset) -> Iterator[Assignment]:
+def _in_session(data: Dataset, gap: int) -> Iterator[Assignment]:
     """Within each session, the first part of every recording's labelled rows trains, the rest tests."""
     places = _open_to_folds(data)
     for session in sorted({data.metas[place].session for place in places}):
@@ -130,7 +139,7 @@ def _in_session(data: Dataset) -> Iterator[Assignment]:
             if len(labelled) < 10:
                 continue
             first = labelled[int(TRAIN_SHARE * len(labelled))]
-            train[place][:first] = True
+            train[place][: max(first - gap, 0)] = True
             test[place][first:] = True
         if any(mask.any() for mask in test):
             yield Assignment(session, tuple(train), tuple(test), groups="session")
@@ -150,14 +159,19 @@ def _grouped(data: Dataset, group: str) -> Iterator[Assignment]:
         if group in table.groups:
             for value, count in zip(*np.unique(table.groups[group][table.labelled], return_counts=True), strict=True):
                 sizes[str(value)] = sizes.get(str(value), 0) + int(count)
+    for number, held_out in enumerate(_dealt(sizes), 1):
+        yield _held_out(data, group, held_out, f"{group} fold {number}")
+
+
+def _dealt(sizes: Mapping[str, int]) -> list[set[str]]:
+    """Deal groups into folds, the largest first into the emptiest."""
     folds: list[set[str]] = [set() for _ in range(min(FOLDS, len(sizes)))]
     filled = [0] * len(folds)
     for value in sorted(sizes, key=lambda name: (-sizes[name], name)):
         smallest = filled.index(min(filled))
         folds[smallest].add(value)
         filled[smallest] += sizes[value]
-    for number, held_out in enumerate(folds, 1):
-        yield _held_out(data, group, held_out, f"{group} fold {number}")
+    return folds
 
 
 def _held_out(data: Dataset, group: str, values: set[str], name: str) -> Assignment:
@@ -188,32 +202,34 @@ def _values(data: Dataset, group: str) -> list[str]:
     return sorted({str(value) for place in places for value in np.unique(data.tables[place].groups.get(group, []))})
 
 
-def inner_splits(data: Dataset, outer: Assignment) -> list[tuple[tuple[Mask, ...], tuple[Mask, ...]]]:
+def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[tuple[Mask, ...], tuple[Mask, ...]]]:
     """Return (train, validation) masks inside the training rows of `outer`, for choosing hyper-parameters.
 
-    With several training sessions, each is left out once; with one, its last fifth in time is held back.
+    What the outer split keeps apart is kept apart here too: each session (or group) is left out once, in five folds
+    where there are more than five. With a single one, the last fifth in time of each recording is held back.
     """
-    trained = [place for place, mask in enumerate(outer.train) if mask.any()]
-    sessions = sorted({data.metas[place].session for place in trained})
-    inner: list[tuple[tuple[Mask, ...], tuple[Mask, ...]]] = []
-    if len(sessions) >= 2:
-        for session in sessions:
-            apart = [table.meta.session == session for table in data.tables]
-            inner.append(
-                (
-                    tuple(mask & (not out) for mask, out in zip(outer.train, apart, strict=True)),
-                    tuple(mask & out for mask, out in zip(outer.train, apart, strict=True)),
-                )
-            )
+    sizes: Counter[str] = Counter()
+    for table, mask in zip(data.tables, outer.train, strict=True):
+        if mask.any():
+            values, counts = np.unique(table.groups[outer.groups][mask & table.labelled], return_counts=True)
+            sizes.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
+    if len(sizes) >= 2:
+        inner = []
+        for held_out in _dealt(sizes):
+            apart = [np.isin(table.groups.get(outer.groups, ""), sorted(held_out)) for table in data.tables]
+            fit = tuple(mask & ~out for mask, out in zip(outer.train, apart, strict=True))
+            check = tuple(mask & out for mask, out in zip(outer.train, apart, strict=True))
+            inner.append((fit, check))
         return inner
-    fit, check = _none(data), _none(data)
-    for place in trained:
-        rows = np.flatnonzero(outer.train[place] & data.tables[place].labelled)
+    learn, last = _none(data), _none(data)
+    for place, table in enumerate(data.tables):
+        rows = np.flatnonzero(outer.train[place] & table.labelled)
         if len(rows) >= 5:
             first = rows[int(TRAIN_SHARE * len(rows))]
-            fit[place] = outer.train[place] & (np.arange(len(outer.train[place])) < first)
-            check[place] = outer.train[place] & (np.arange(len(outer.train[place])) >= first)
-    return [(tuple(fit), tuple(check))]
+            number = np.arange(len(table.row))
+            learn[place] = outer.train[place] & (number < first - gap)
+            last[place] = outer.train[place] & (number >= first)
+    return [(tuple(learn), tuple(last))]
 
 
 def assert_disjoint(assignments: Sequence[Assignment]) -> None:

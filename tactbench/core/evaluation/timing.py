@@ -10,15 +10,15 @@ import numpy as np
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray
 
-WARM_UP = 3
+WARM_UP = 1
 AT_LEAST, AT_MOST = 20, 200
-BUDGET_S = 0.4
+BUDGET_S = 0.3
 
 
 def single_row_latency_s(model: Estimator, X: FloatArray, clock: Callable[[], float]) -> FloatArray:
     """Return (calls,) seconds of ``predict`` on one row whose features are ready.
 
-    At least 20 calls and at most 200, within 0.4 s where 20 take less; the first three are not counted. Rows are spread
+    At least 20 calls and at most 200, within 0.3 s where 20 take less; the first is not counted. Rows are spread
     over `X`, so that a model that answers some rows faster is not flattered.
     """
     wanted = np.linspace(0, len(X) - 1, AT_MOST).astype(int)

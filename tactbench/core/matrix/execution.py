@@ -127,11 +127,11 @@ def _rig(name: str) -> Rig:
     return rig_of(name, installed())  # type: ignore[return-value]
 
 
-def record(order: Order) -> Path:
-    """Make one recording. Raises whatever the rig raises."""
+def record(order: Order) -> str:
+    """Make one recording and return its content digest. Raises whatever the rig raises."""
     registry = installed()
     rig = registry.rigs[order.rig]
-    acquire(
+    made = acquire(
         _rig(order.rig),
         registry.sensors[order.sensor],
         rig,
@@ -143,7 +143,7 @@ def record(order: Order) -> Path:
         clock=time.process_time if rig.simulated else time.perf_counter,
         provenance={},
     )
-    return order.path
+    return made.content_digest
 
 
 def prepare(cell: Cell) -> None:

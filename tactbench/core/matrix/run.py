@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,6 +20,7 @@ from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.recording.format import partial_path
 from tactbench.core.spec.matrix import MatrixSpec
 
 SEED_DECIDES = (
@@ -87,14 +88,15 @@ def run_matrix(
     provenance["jobs"] = jobs
     store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
     store.write("scores.json", scores_text(rows))
-    return Outcome(tuple(rows), provenance, computed, material.made)
+    return Outcome(tuple(rows), provenance, computed, len(material.made))
 
 
 @dataclass
 class _Material:
     orders: dict[tuple[str, str, int], list[Order]]
     shelf: dict[tuple[str, str, int], list[Path]]
-    made: int = 0
+    made: dict[Path, str] = field(default_factory=dict)
+    """Content digests of the recordings made now."""
 
     def paths(self, cell: Cell) -> list[Path]:
         wanted = (cell.sensor, cell.task, cell.seed)
@@ -136,19 +138,25 @@ def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progre
     simulated = all(installed().rigs[order.rig].simulated for order in missing)
     hands = max(jobs, os.cpu_count() or 1) if simulated else 1
 
-    def note(order: Order, outcome: Path | BaseException) -> None:
+    def note(order: Order, outcome: str | BaseException) -> None:
         if isinstance(outcome, BaseException):
             troubles[order.path] = outcome
         else:
-            material.made += 1
+            material.made[order.path] = outcome
         told.advance(f"{order.sensor} {order.scene.name}")
 
-    for order, outcome in InProcess().each(record, missing[:1]):
-        note(order, outcome)
-    if missing[1:]:
-        with workers(min(hands, len(missing) - 1)) as crew:
-            for order, outcome in crew.each(record, missing[1:], meanwhile=lambda: _import_estimators(cells)):
-                note(order, outcome)
+    try:
+        for order, outcome in InProcess().each(record, missing[:1]):
+            note(order, outcome)
+        if missing[1:]:
+            with workers(min(hands, len(missing) - 1)) as crew:
+                for order, outcome in crew.each(record, missing[1:], meanwhile=lambda: _import_estimators(cells)):
+                    note(order, outcome)
+    except BaseException:
+        # Workers that were ended in the middle could not tidy up behind themselves.
+        for order in missing:
+            partial_path(order.path).unlink(missing_ok=True)
+        raise
     return troubles
 
 
@@ -168,7 +176,7 @@ def _evaluate(
     store: Store,
     told: Progress,
 ) -> tuple[list[Row], int]:
-    digests = _Digests()
+    digests = _Digests(material.made)
     rows: dict[str, Row] = {}
     keys: dict[str, str] = {}
     waiting: list[Job] = []

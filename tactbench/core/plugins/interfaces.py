@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy.typing as npt
 
@@ -69,6 +69,13 @@ class TransducerFactory(Protocol):
 
     def __call__(self, sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> Transducer:
         """Prepare for `grid` and the channels named in `wanted`; raises RigError for a channel it cannot give."""
+
+
+class Reason(NamedTuple):
+    """What ``EffectDescriptor.called_for`` answers: whether a scene calls for the effect, and why or why not."""
+
+    called_for: bool
+    text: str
 
 
 class Estimator(Protocol):

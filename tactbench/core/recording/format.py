@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -87,3 +88,8 @@ def channel_attributes(spec: StreamSpec) -> Iterable[tuple[str, Any]]:
     yield "channel_scale", np.array([nan if c.scale is None else c.scale.value for c in spec.channels])
     yield "channel_signs", np.array([channel.sign for channel in spec.channels], dtype=np.int8)
     yield "channel_position_m", np.array([channel.position_m or (nan, nan, nan) for channel in spec.channels])
+
+
+def partial_path(path: Path) -> Path:
+    """Return where a recording lies while it is being written."""
+    return path.with_name(path.name + PARTIAL)

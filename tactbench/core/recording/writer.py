@@ -45,8 +45,10 @@ class RecordingWriter:
     def __init__(self, path: Path, meta: RecordingMeta) -> None:
         self.path = path
         self.meta = meta
-        self._aside = path.with_name(path.name + layout.PARTIAL)
+        self._aside = layout.partial_path(path)
         self._specs = layout.specs_by_name(meta)
+        self.content_digest = ""
+        """Digest of what was written, once the recording is complete."""
         self._annotations: dict[str, dict[str, npt.NDArray[Any]]] = {}
         self._numbered: dict[str, bool] = {}
         self._partial: Partial | None = None
@@ -184,8 +186,8 @@ class RecordingWriter:
         text = self._text()
         _, blocks = read_partial(self._aside)
         with image.build(text, self._specs, blocks, self._annotations) as file:
-            digest = self._check(Recording(self._aside, file, text, complete=True), partial)
-            image.store(file, digest, self.path)
+            self.content_digest = self._check(Recording(self._aside, file, text, complete=True), partial)
+            image.store(file, self.content_digest, self.path)
 
     def _check(self, recording: Recording, partial: Partial) -> str:
         """Return the digest of the stored bytes, after making sure that every row that came is there."""

@@ -82,4 +82,4 @@ class EffectDescriptor(Frozen):
     produces: tuple[str, ...] = ()
     consumes: tuple[str, ...] = ()
     called_for: str = Field(pattern=_WHERE)
-    """``module:callable``, called with (scene, sensor spec): whether the scene calls for it, and why; light."""
+    """``module:callable``, called with (Scene, SensorSpec): a Reason; light, no numerics."""

@@ -1,4 +1,4 @@
-"""The twin: a simulated rig, the embedded default (see ``docs/twin.md``)."""
+"""The twin: a simulated rig that needs nothing but this package (see ``docs/twin.md``)."""
 
 from __future__ import annotations
 
@@ -6,20 +6,43 @@ from tactbench.plugin import EffectDescriptor, RigDescriptor, hookimpl
 
 TACTBENCH_API = 1
 
+_HERE = "tactbench.rigs.twin"
+
 
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
     """Offer the rig."""
-    return [
-        RigDescriptor(
-            name="twin", title="Simulated parallel manipulator", where="tactbench.rigs.twin.rig:build", simulated=True
-        )
-    ]
+    return [RigDescriptor(name="twin", title="Simulated twin", where=f"{_HERE}.rig:build", simulated=True)]
 
 
 @hookimpl
 def tactbench_effects() -> list[EffectDescriptor]:
-    """Offer the effects."""
-    from tactbench.rigs.twin.effects.declarations import EFFECTS
+    """Offer the twin's own effects."""
+    return [
+        _effect("creep", "Creep of the skin", "effects.creep:apply", (), ("effective-force",)),
+        _effect("contact", "Normal contact", "contact.stages:press_skin", ("effective-force", "core"), ("skin",)),
+        _effect("core", "Touch-down on the core", "contact.core:with_core", (), ("core",)),
+        _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure",)),
+        _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
+        _effect("transduction", "Transduction", "contact.stages:read_skin", ("skin", "gain"), ("taxel", "reading")),
+        _effect("rest-spread", "Scatter of rest levels", "effects.rest_spread:apply", (), ("disturbance",)),
+        _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",)),
+        _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",)),
+        _effect("wander", "Free drift", "effects.wander:apply", (), ("disturbance",)),
+        _effect("white-noise", "White noise", "effects.white_noise:apply", (), ("disturbance",)),
+        _effect("converter", "Converter", "effects.converter:apply", ("reading", "disturbance"), ("stored",)),
+        _effect("force-noise", "Noise of the force sensor", "effects.force_noise:apply", (), ("reference-force",)),
+    ]
 
-    return list(EFFECTS)
+
+def _effect(
+    name: str, title: str, where: str, consumes: tuple[str, ...], produces: tuple[str, ...]
+) -> EffectDescriptor:
+    return EffectDescriptor(
+        name=name,
+        title=title,
+        where=f"{_HERE}.{where}",
+        consumes=consumes,
+        produces=produces,
+        called_for=f"{_HERE}.effects.called_for:{name.replace('-', '_')}",
+    )

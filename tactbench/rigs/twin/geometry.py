@@ -1,4 +1,7 @@
-"""The unrolled skin, and the gap between it and an indenter. Lengths in mm, angles in rad."""
+"""The unrolled skin: its grid, the gap to an indenter, the film at rest. Millimetres.
+
+``x`` runs along the finger, ``s`` along the arc of its outer surface; ``theta = s / outer radius``.
+"""
 
 from __future__ import annotations
 
@@ -7,78 +10,117 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, SkinGrid, SkinSheet
+from tactbench.plugin import FloatArray, Indenter, RigError, SkinGrid, SkinSheet
 
-FAR_MM = 50.0
-"""Gap where the cap does not exist any more (beyond its own radius)."""
+BEYOND_THE_CAP_MM = 50.0
+"""How far above its radius a cap is put where it does not exist: large, finite, and never touched."""
 
 
 @dataclass(frozen=True)
-class Touch:
-    """An indenter at a place: a cap of `radius_mm` (infinite: flat) with its apex at (x, s), slightly tilted."""
+class Contact:
+    """Where and with what the skin is pressed."""
 
     radius_mm: float
+    """Radius of the cap; infinite for a flat surface."""
     x_mm: float
+    """Apex along the finger, in the sheet's coordinates."""
     s_mm: float
+    """Apex along the arc."""
     tilt_x: float = 0.0
+    """Slope of the indenter along the finger [1]."""
     tilt_s: float = 0.0
+    """Slope of the indenter across the finger [1]."""
 
 
-def grid_of(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGrid:
-    """Return the cell centres of `sheet`.
+def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGrid:
+    """Return the cell centres of `sheet`, ``x_min + (i + 1/2) dx`` and ``-arc/2 + (j + 1/2) ds``.
 
     Parameters
     ----------
     sheet
-        The unrolled skin.
+        The rectangle.
     cells
-        Axial x arc; None takes the sheet's own.
+        Cells along x and s instead of the sheet's own.
     """
-    nx, ns = cells or sheet.cells
+    along, across = cells or sheet.cells
     x_min, x_max, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
-    dx, ds = (x_max - x_min) / nx, arc / ns
-    x = x_min + (np.arange(nx, dtype=np.float64) + 0.5) * dx
-    s = -arc / 2 + (np.arange(ns, dtype=np.float64) + 0.5) * ds
-    return SkinGrid(x_mm=np.asarray(x, dtype=np.float64), s_mm=np.asarray(s, dtype=np.float64))
+    dx, ds = (x_max - x_min) / along, arc / across
+    x: FloatArray = np.asarray(x_min + (np.arange(along) + 0.5) * dx, dtype=np.float64)
+    s: FloatArray = np.asarray(-arc / 2 + (np.arange(across) + 0.5) * ds, dtype=np.float64)
+    return SkinGrid(x_mm=x, s_mm=s)
 
 
-def gap_mm(grid: SkinGrid, touch: Touch, outer_radius_mm: float) -> FloatArray:
-    """Return the gap at zero approach, (nx, ns), measured along the press axis, its minimum zero.
+def radius_mm(indenter: Indenter) -> float:
+    """Return the cap's radius; infinite for a flat surface."""
+    return math.inf if indenter.radius is None else indenter.radius.to("mm")
 
-    The finger falls away from the tangent plane by ``2 Ro sin²(theta/2)`` and the cap by ``r² / (R + sqrt(R² - r²))``:
-    the textbook forms ``Ro (1 - cos theta)`` and ``R - sqrt(R² - r²)`` lose all digits for small angles and large R.
 
-    Parameters
-    ----------
-    grid, touch
-        Skin and indenter.
-    outer_radius_mm
-        Radius of the finger; infinite for a flat pad.
+def gap_mm(grid: SkinGrid, contact: Contact, outer_radius_mm: float = math.inf) -> FloatArray:
+    """Return the (nx, ns) gap between the unloaded skin and the indenter at zero approach.
+
+    The fall-away of the finger ``2 Ro sin²(theta/2)`` and the sag of the cap ``r² / (R + sqrt(R² - r²))`` are written
+    so that nothing cancels: R = 1e9 mm and a flat surface agree to rounding. Measured along the press axis. With a
+    tilt the smallest gap is subtracted, so that the approach keeps its origin.
     """
-    along = grid.x_mm[:, None] - touch.x_mm
-    arc = grid.s_mm[None, :] - touch.s_mm
+    x = grid.x_mm[:, None] - contact.x_mm
     if math.isinf(outer_radius_mm):
-        across, fall = arc, np.zeros_like(arc)
+        y = grid.s_mm[None, :] - contact.s_mm
+        fall = np.zeros_like(y)
     else:
-        angle = arc / outer_radius_mm
-        across = outer_radius_mm * np.sin(angle)
-        fall = 2.0 * outer_radius_mm * np.sin(angle / 2.0) ** 2
-    gap = fall + _cap(along**2 + across**2, touch.radius_mm) + touch.tilt_x * along + touch.tilt_s * across
-    # With a tilt the first point of touch is not the apex: without this the origin of the approach would move.
-    return np.asarray(gap - gap.min())
+        theta = (grid.s_mm[None, :] - contact.s_mm) / outer_radius_mm
+        y = outer_radius_mm * np.sin(theta)
+        fall = 2.0 * outer_radius_mm * np.sin(theta / 2.0) ** 2
+    gap: FloatArray = fall + _sag(x**2 + y**2, contact.radius_mm)
+    if contact.tilt_x or contact.tilt_s:
+        gap = gap + contact.tilt_x * x + contact.tilt_s * y
+        gap = gap - gap.min()
+    return gap
 
 
-def _cap(r2: FloatArray, radius: float) -> FloatArray:
+def _sag(r2: FloatArray, radius: float) -> FloatArray:
     if math.isinf(radius):
         return np.zeros_like(r2)
-    inside = r2 < (0.999 * radius) ** 2
-    root = np.sqrt(np.where(inside, radius**2 - r2, 0.0))
-    return np.where(inside, r2 / (radius + root), radius + FAR_MM)
+    # 0.999 R: the cap's flank is vertical at r = R, and no solver on a height field can touch it.
+    exists = r2 < (0.999 * radius) ** 2
+    inside = np.where(exists, r2, 0.0)
+    return np.where(exists, inside / (radius + np.sqrt(radius**2 - inside)), radius + BEYOND_THE_CAP_MM)
 
 
-def wave_numbers(grid: SkinGrid) -> tuple[FloatArray, FloatArray]:
-    """Return the wave numbers (rad/mm) of a real two-dimensional transform on `grid`: (nx, 1) and (1, ns/2+1)."""
+def film_at_rest_mm(
+    grid: SkinGrid, outer_radius_mm: float, *, gap: float, gap_side: float, side_fraction: float
+) -> FloatArray:
+    """Return the (nx, ns) film thickness with nothing touching.
+
+    ``max(gap (1 - f c²), gap_side)`` with ``c = clip((|theta| - 0.6) / 1.0, 0, 1)``: fitted by eye to the public
+    meshes of skin and core.
+    """
+    theta = np.abs(grid.s_mm) / outer_radius_mm
+    side = np.clip(theta - 0.6, 0.0, 1.0)
+    film = np.maximum(gap * (1.0 - side_fraction * side**2), gap_side)
+    return np.broadcast_to(film, (grid.x_mm.size, grid.s_mm.size)).copy()
+
+
+def check_contact(grid: SkinGrid, contact: Contact) -> None:
+    """Refuse a contact the grid cannot resolve or that misses the skin.
+
+    Raises
+    ------
+    RigError
+        If the cap's radius is below a cell, where a contact would live in one cell and follow the mesh and not the
+        physics; or if its apex is off the sheet, where the periodic sheet would answer for the wrong side.
+    """
     dx, ds = grid.cell_mm
-    kx = np.asarray(2.0 * np.pi * np.fft.fftfreq(len(grid.x_mm), dx), dtype=np.float64)
-    ks = np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(grid.s_mm), ds), dtype=np.float64)
-    return kx[:, None], ks[None, :]
+    if contact.radius_mm < max(dx, ds):
+        raise RigError(
+            f"A cap of radius {contact.radius_mm:g} mm is smaller than a cell of the skin ({dx:.2f} x {ds:.2f} mm): "
+            "the contact would be one cell wide whatever the load.",
+            hint=f"Use a radius of at least {3 * max(dx, ds):.1f} mm, or a sensor spec with more cells.",
+        )
+    x_low, x_high = grid.x_mm[0] - dx / 2, grid.x_mm[-1] + dx / 2
+    s_high = grid.s_mm[-1] + ds / 2
+    if not (x_low <= contact.x_mm <= x_high and abs(contact.s_mm) <= s_high):
+        raise RigError(
+            f"The contact point x = {contact.x_mm:.2f} mm, s = {contact.s_mm:.2f} mm lies outside the skin "
+            f"(x from {x_low:.2f} to {x_high:.2f} mm, |s| up to {s_high:.2f} mm).",
+            hint="Correct the scene's placement, or contact_x and contact_s among the sensor's parameters.",
+        )

@@ -222,3 +222,16 @@ def test_collinear_and_dead_taxels_have_finite_answers(tmp_path):
         result = run(paths, estimator=estimator, params={}) if estimator != "forest" else run(paths)
         assert np.isfinite(result.y_pred).all()
         assert result.score < 1.0
+
+
+def test_a_dropped_out_row_is_skipped_by_the_window_which_does_not_start_anew(tmp_path):
+    from collections import Counter
+
+    X, force = ramp(0, n=100)
+    X[50, 1] = np.nan
+    paths = [record(tmp_path / f"{name}.h5", X, force, session=name) for name in "ab"]
+    data = load_dataset(force_task(), paths)
+    one = part(keep(data, DEPLOYABLE, make_splits(data, "session", 0)[0].train, "t", Counter()),
+               Scale(np.zeros(3), np.ones(3)), 5)  # fmt: skip
+    after = int(np.flatnonzero(one.row == 52)[0])
+    np.testing.assert_allclose(one.X[after], X[[46, 47, 48, 49, 51, 52]].mean(axis=0), rtol=1e-12)

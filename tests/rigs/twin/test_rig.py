@@ -1,182 +1,257 @@
-"""Scenes on the twin: what is planned, what comes out, and that a seed decides it."""
+"""The twin through its seam: what a user of a rig sees."""
 
-import math
+from __future__ import annotations
+
+import hashlib
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-from tactbench.core.plugins.registry import load_registry
 from tactbench.plugin import (
+    EffectDescriptor,
     Environment,
     ForceRamp,
     Indenter,
     NotApplicable,
     Placement,
     Quality,
+    Reason,
     RigContext,
     RigError,
     Scene,
     assumed,
 )
+from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.rig import build
 
-REGISTRY = load_registry()
-TWIN = build(RigContext(effects=tuple(REGISTRY.effects)))
+
+def _q(value, unit):
+    return assumed(value, unit, "test")
 
 
-def q(value, unit):
-    return assumed(value, unit, "for a test")
+QUIET = Environment(noise_scale=0.0, drift_scale=0.0, force_noise=_q(0.0, "N"))
+CAP = Indenter(radius=_q(10.0, "mm"))
 
 
-def scene(radius=10.0, end=5.0, samples=400, **more):
-    indenter = Indenter() if math.isinf(radius) else Indenter(radius=q(radius, "mm"))
-    profile = ForceRamp(end=q(end, "N"), samples=samples)
-    return Scene(name="press", indenter=indenter, profile=profile, **more)
+def _scene(name="cap", **more):
+    return Scene(name=name, indenter=CAP, profile=more.pop("profile", ForceRamp(samples=500)), **more)
 
 
-def carried_out(sensor, one, seed=1):
-    with TWIN.open(REGISTRY.sensors[sensor], one, seed=seed) as acquisition:
+@pytest.fixture(scope="module")
+def rig():
+    return build(RigContext(effects=tuple(tactbench_effects())))
+
+
+def _record(rig, sensor, scene, seed=1):
+    with rig.open(sensor, scene, seed=seed) as acquisition:
         blocks = list(acquisition)
-        by_stream = {}
-        for block in blocks:
-            by_stream.setdefault(block.stream, []).append(block)
-        data = {name: np.concatenate([block.data for block in some]) for name, some in by_stream.items()}
-        quality = {
-            name: np.concatenate([block.quality for block in some])
-            for name, some in by_stream.items()
-            if some[0].quality is not None
-        }
-        times = {name: np.concatenate([block.t_ns for block in some]) for name, some in by_stream.items()}
-        return acquisition, data, quality, times
+    streams = {}
+    for block in blocks:
+        streams.setdefault(block.stream, []).append(block)
+    joined = {
+        name: (
+            np.concatenate([block.t_ns for block in parts]),
+            np.concatenate([block.data for block in parts]),
+            None if parts[0].quality is None else np.concatenate([block.quality for block in parts]),
+        )
+        for name, parts in streams.items()
+    }
+    return acquisition, joined
 
 
-def test_a_scene_has_its_samples_its_clock_and_its_force():
-    _, data, _, times = carried_out("icub", scene(samples=5000))
-    assert data["taxels"].shape == (5000, 12)
-    assert data["taxels"].dtype == np.uint8
-    assert data["force_torque"].shape == (5000, 1)
-    assert np.array_equal(times["taxels"], times["force_torque"])
-    assert np.unique(np.diff(times["taxels"])).tolist() == [12_000_000]  # 60 s / 5000
-    held = data["force_torque"][:600, 0]
-    # Four standard errors of 600 samples of 0.6875 N.
-    assert abs(held.mean()) < 4 * 0.6875 / math.sqrt(600)
-    assert held.std() == pytest.approx(0.6875, rel=4 / math.sqrt(2 * 600))
-    assert data["force_torque"][-200:, 0].mean() == pytest.approx(4.89, abs=4 * 0.6875 / math.sqrt(200))
+def test_a_recording_has_the_shape_it_promises(rig, sensors):
+    acquisition, streams = _record(rig, sensors["icub"], _scene(profile=ForceRamp(samples=2300)))
+    (stream,) = acquisition.streams
+    t_ns, data, quality = streams[stream.name]
+    assert data.shape == (2300, 12) == quality.shape
+    assert data.dtype == np.dtype(stream.dtype) == np.uint8
+    assert t_ns.dtype == np.int64
+    assert t_ns[0] == 0
+    assert np.all(np.diff(t_ns) > 0)
+    assert stream.rate_hz == pytest.approx(2300 / 60)
+    (reference,) = acquisition.reference
+    assert [channel.name for channel in reference.channels] == ["fz"]
+    assert reference.channels[0].kind == "force"
+    np.testing.assert_array_equal(streams["force_torque"][0], t_ns)
+    assert streams["force_torque"][1].dtype == np.float64
+    assert dict(acquisition.assumptions) == {
+        "placement_scatter_mm": 0.1, "drift_scale": 1.0, "noise_scale": 1.0, "force_noise_n": 0.6875,
+        "session_offset_scale": 0.0, "since_power_on_s": 600.0,
+    }  # fmt: skip
+    assert acquisition.drawn["solver_residual"] < 1e-6
+    assert acquisition.drawn["table_error_count"] < 1.0
 
 
-@pytest.mark.parametrize("sensor", ["biotac", "icub", "ideal"])
-def test_the_same_seed_gives_the_same_samples_and_another_does_not(sensor):
-    first, again, other = (carried_out(sensor, scene(), seed)[1] for seed in (1, 1, 2))
-    for name in first:
-        assert np.array_equal(first[name], again[name])
-        assert not np.array_equal(first[name], other[name])
+def test_the_force_is_held_and_then_rises_straight(rig, sensors):
+    _, streams = _record(rig, sensors["icub"], _scene(environment=QUIET))
+    t_s, force = streams["force_torque"][0] * 1e-9, streams["force_torque"][1][:, 0]
+    assert np.all(force[t_s < 7.2 - 1e-6] == 0)
+    ramp = t_s >= 7.2
+    # Time stamps are rounded to nanoseconds.
+    np.testing.assert_allclose(force[ramp], 5.0 * (t_s[ramp] - 7.2) / 52.8, atol=1e-8)
 
 
-def test_units_are_the_same_in_all_recordings_and_placements_are_not():
-    quiet = Environment(noise_scale=0, drift_scale=0, force_noise=q(0, "N"))
-    fixed = Placement(scatter=q(0, "mm"))
-    one = scene(environment=quiet, placement=fixed)
-    other = one.model_copy(update={"name": "another", "session": "2"})
-    assert np.array_equal(carried_out("icub", one)[1]["taxels"], carried_out("icub", other)[1]["taxels"])
-    scattered = one.model_copy(update={"placement": Placement(scatter=q(0.5, "mm"))})
-    drawn = carried_out("icub", scattered)[0].drawn
-    assert drawn["contact_x_mm"] != -0.3
+@pytest.mark.parametrize("name", ["icub", "biotac"])
+def test_the_same_seed_gives_the_same_bits_and_another_does_not(rig, sensors, name):
+    first, second, other = (_record(rig, sensors[name], _scene(), seed=seed)[1] for seed in (4, 4, 5))
+    for stream, (_, data, _quality) in first.items():
+        np.testing.assert_array_equal(data, second[stream][1])
+        assert not np.array_equal(data, other[stream][1])
 
 
-def test_pressing_lowers_the_icubs_readings_and_the_biotacs_rise_and_fall():
-    icub = carried_out("icub", scene())[1]["taxels"].astype(float)
-    fall = icub[:30].mean(axis=0) - icub[-30:].mean(axis=0)
-    assert fall.max() > 10
-    assert fall.min() > -2
-    biotac = carried_out("biotac", scene())[1]["electrodes"].astype(float)
-    change = biotac[-30:].mean(axis=0) - biotac[:30].mean(axis=0)
-    assert change.min() < -100
-    assert change.max() > 10
-
-
-def test_the_plan_says_what_is_left_out_and_why():
-    acquisition, *_ = carried_out("biotac", scene())
-    plan = {entry.effect: entry for entry in acquisition.plan}
-    assert plan["contact"].included
-    assert "5 N" in plan["contact"].reason
-    assert not plan["channels of kind ac_pressure"].included
-    assert all(entry.reason for entry in acquisition.plan)
-    assert [stream.name for stream in acquisition.streams] == ["electrodes"]
-    assert {channel.kind for channel in acquisition.streams[0].channels} == {"taxel"}
-    still = carried_out("biotac", scene(environment=Environment(drift_scale=0, noise_scale=0)))[0]
-    out = {entry.effect for entry in still.plan if not entry.included}
-    assert {"offset", "warm-up", "wander", "white-noise"} <= out
-
-
-def test_what_is_left_out_is_not_imported():
-    script = (
-        "import sys\n"
-        "from tests.rigs.twin.test_rig import carried_out, scene, Environment, q\n"
-        "quiet = Environment(drift_scale=0, noise_scale=0, force_noise=q(0, 'N'))\n"
-        "carried_out('ideal', scene(environment=quiet))\n"
-        "left_out = ['offset', 'warm_up', 'white_noise', 'force_noise', 'gain_scatter', 'creep']\n"
-        "print([n for n in left_out if 'tactbench.rigs.twin.effects.' + n in sys.modules])\n"
+def test_another_process_draws_the_same(sensors, rig):
+    code = (
+        "import numpy as np, hashlib;"
+        "from tactbench.rigs.twin.draws import generator;"
+        "print(hashlib.sha256(generator(4, 'icub', 'unit').standard_normal(9).tobytes()).hexdigest())"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=120)
-    assert done.stdout.strip() == "[]"
+    from tactbench.rigs.twin.draws import generator
+
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    assert answer == hashlib.sha256(generator(4, "icub", "unit").standard_normal(9).tobytes()).hexdigest()
 
 
-def test_leaving_one_effect_out_does_not_change_what_another_draws():
-    with_noise = scene(environment=Environment(drift_scale=0, force_noise=q(0.5, "N")))
-    without = scene(environment=Environment(drift_scale=0, noise_scale=0, force_noise=q(0.5, "N")))
-    first, second = carried_out("icub", with_noise)[1], carried_out("icub", without)[1]
-    assert np.array_equal(first["force_torque"], second["force_torque"])
-    assert not np.array_equal(first["taxels"], second["taxels"])
+def test_a_quiet_unloaded_sensor_reads_its_rest_exactly(rig, sensors):
+    scene = _scene(environment=QUIET, profile=ForceRamp(end=_q(0.0, "N"), samples=50))
+    acquisition, streams = _record(rig, sensors["biotac"], scene)
+    data = streams[acquisition.streams[0].name][1]
+    rest = [round(channel.rest.value) for channel in sensors["biotac"].spec.channels("taxel")]
+    np.testing.assert_array_equal(data, np.tile(rest, (50, 1)))
+    assert acquisition.plan
 
 
-def test_saturation_is_clipped_and_flagged():
-    loud = scene(environment=Environment(drift_scale=200.0))
-    _, data, quality, _ = carried_out("biotac", loud)
-    at_end = (data["electrodes"] == 4095) | (data["electrodes"] == 0)
-    flagged = (quality["electrodes"] & Quality.SATURATED) != 0
-    assert flagged.any()
-    assert (at_end | ~flagged).all()
+def test_gains_belong_to_the_unit_and_offsets_to_the_recording(rig, sensors):
+    still = Placement(scatter=_q(0.0, "mm"))
+    same = [_record(rig, sensors["icub"], _scene(name, environment=QUIET, placement=still))[1] for name in ("a", "b")]
+    # Nothing but the unit's own draws is left: two recordings of one unit agree to the bit.
+    np.testing.assert_array_equal(same[0]["taxels"][1], same[1]["taxels"][1])
+    drifting = Environment(noise_scale=0.0, drift_scale=10.0, force_noise=_q(0.0, "N"))
+    apart = [
+        _record(rig, sensors["icub"], _scene(name, environment=drifting, placement=still))[1] for name in ("a", "b")
+    ]
+    assert not np.array_equal(apart[0]["taxels"][1][:40], apart[1]["taxels"][1][:40])
 
 
-def test_the_table_is_as_good_as_it_says_at_loads_it_has_not_seen():
-    from tactbench.rigs.twin.contact.load_table import _Loads, build_table
-    from tactbench.rigs.twin.contact.skins import medium_of
-    from tactbench.rigs.twin.geometry import Touch, gap_mm
+def test_the_warm_up_rises_towards_rest(rig, sensors):
+    def level(since):
+        environment = QUIET.model_copy(update={"drift_scale": 1.0, "since_power_on": _q(since, "s")})
+        scene = _scene(environment=environment, profile=ForceRamp(end=_q(0.0, "N"), samples=20))
+        _, streams = _record(rig, sensors["biotac"], scene)
+        return streams["electrodes"][1].mean()
 
-    for name, radius, x in (("biotac", 5.0, -5.0), ("biotac", 40.0, -4.9), ("icub", 10.0, -0.3)):
-        descriptor = REGISTRY.sensors[name]
-        medium = medium_of(descriptor.spec.skin)
-        gap = gap_mm(medium.grid, Touch(radius, x, 0.1), medium.outer_radius_mm)
-        taxels = tuple(channel.name for channel in descriptor.spec.channels("taxel"))
-        from tactbench.plugin import load_object
-
-        observe = load_object(descriptor.transducer)(descriptor.spec, medium.grid, taxels)
-        table = build_table(medium, gap, observe, 5.0, 0.45)
-        loads = np.sort(np.random.default_rng(3).uniform(0.0, 5.0, 20))
-        direct = _Loads(medium, gap, load_object(descriptor.transducer)(descriptor.spec, medium.grid, taxels))
-        truth = np.array([direct(load) for load in loads])
-        assert np.abs(table(loads) - truth).max() < max(table.error, 0.45)
-        assert table.residual < 1e-6
+    cold, warm, hot = level(0.0), level(500.0), level(5e5)
+    # 90 counts in all, of which exp(-1) are to come after one time constant; factors scatter by 15 % over 19
+    # channels (mean +-3 counts, but the same ones in every recording), rounding by half a count, wander by .1.
+    rise = hot - cold
+    assert 75 < rise < 105
+    assert (hot - warm) / rise == pytest.approx(np.exp(-1), abs=0.03)
 
 
-@pytest.mark.parametrize(("radius", "load"), [(5.0, 0.96), (10.0, 1.15), (40.0, 3.44)])
-def test_the_skin_meets_the_core_where_it_did_elsewhere(radius, load):
-    fixed = Placement(scatter=q(0, "mm"))
-    drawn = carried_out("biotac", scene(radius, placement=fixed))[0].drawn
-    # Clamps are measured from the edge here and from cell centres there: up to 7 % softer (see test_contact).
-    assert drawn["touch_down_n"] == pytest.approx(load, rel=0.08)
+def test_saturated_samples_are_clipped_and_flagged(rig, sensors):
+    spec = sensors["icub"].spec
+    stream = spec.streams[0]
+    channels = tuple(channel.model_copy(update={"upper": 240.0}) for channel in stream.channels)
+    narrow = spec.model_copy(update={"streams": (stream.model_copy(update={"channels": channels}),)})
+    descriptor = sensors["icub"].model_copy(update={"spec": narrow})
+    _, streams = _record(rig, descriptor, _scene())
+    _, data, quality = streams["taxels"]
+    assert data.max() == 240
+    np.testing.assert_array_equal(quality == Quality.SATURATED, data == 240)
 
 
-def test_flat_never_reaches_the_core_below_five_newtons():
-    assert carried_out("biotac", scene(math.inf))[0].drawn["touch_down_n"] == "not reached"
+def test_only_observed_kinds_are_recorded_and_planned(rig, sensors):
+    acquisition, streams = _record(rig, sensors["biotac"], _scene())
+    assert {channel.kind for stream in acquisition.streams for channel in stream.channels} == {"taxel"}
+    plan = {entry.effect: entry for entry in acquisition.plan}
+    assert not plan["fluid-pressure"].included
+    assert "no observed channel depends on it" in plan["fluid-pressure"].reason
+    both, wider = _record(rig, sensors["biotac"], _scene(observe=("taxel", "dc_pressure")))
+    (stream,) = both.streams
+    assert [channel.name for channel in stream.channels][-1] == "PDC"
+    assert {entry.effect for entry in both.plan if entry.included} >= {"fluid-pressure", "core", "creep"}
+    pdc = wider["electrodes"][1][:, -1].astype(float)
+    # The fluid's pressure rises under load: hundreds of counts at 5 N, far above noise and offset.
+    assert pdc[-20:].mean() - pdc[:20].mean() > 100
+    assert len(streams["electrodes"][1][0]) == 19
 
 
-def test_scenes_that_cannot_be_are_refused_with_the_next_step():
-    with pytest.raises(NotApplicable, match="icub has none"):
-        carried_out("icub", scene(observe=("ac_pressure",)))
+def test_a_flat_surface_leaves_the_core_out_with_a_number(rig, sensors):
+    scene = Scene(name="flat", profile=ForceRamp(samples=100))
+    acquisition, _ = _record(rig, sensors["biotac"], scene)
+    (core,) = [entry for entry in acquisition.plan if entry.effect == "core"]
+    assert not core.included
+    assert "never touches the core below 5 N: depth 0." in core.reason
+    assert "mm < 1.21 mm" in core.reason
+
+
+def test_what_the_twin_does_not_model_is_not_applicable(rig, sensors):
+    with pytest.raises(NotApplicable, match="ac_pressure"):
+        _record(rig, sensors["biotac"], _scene(observe=("taxel", "ac_pressure")))
+    with pytest.raises(NotApplicable, match="icub has taxel"):
+        _record(rig, sensors["icub"], _scene(observe=("dc_temperature",)))
+    bare = sensors["icub"].model_copy(update={"spec": sensors["icub"].spec.model_copy(update={"skin": None})})
+    with pytest.raises(NotApplicable, match="no skin"):
+        _record(rig, bare, _scene())
+
+
+def test_a_cap_below_a_cell_is_refused(rig, sensors):
+    scene = Scene(name="needle", indenter=Indenter(radius=_q(0.3, "mm")))
     with pytest.raises(RigError, match="smaller than a cell"):
-        carried_out("icub", scene(0.1))
-    with pytest.raises(RigError, match="outside its skin"):
-        carried_out("icub", scene(placement=Placement(x=q(50, "mm"))))
+        _record(rig, sensors["icub"], scene)
+
+
+def test_a_strangers_effect_takes_part(sensors, tmp_path, monkeypatch):
+    (tmp_path / "dew.py").write_text(
+        "from tactbench.plugin import Reason\n"
+        "def called_for(scene, sensor):\n    return Reason(True, 'it is raining')\n"
+        "def apply(run):\n    run.readings -= 7\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    dew = EffectDescriptor(
+        name="dew", title="Dew", where="dew:apply", called_for="dew:called_for", produces=("disturbance",)
+    )
+    dry = build(RigContext(effects=tuple(tactbench_effects())))
+    wet = build(RigContext(effects=(*tactbench_effects(), dew)))
+    scene = _scene(environment=QUIET)
+    acquisition, after = _record(wet, sensors["icub"], scene)
+    _, before = _record(dry, sensors["icub"], scene)
+    np.testing.assert_array_equal(before["taxels"][1].astype(int) - after["taxels"][1], 7)
+    assert ("dew", True, "it is raining") in [(e.effect, e.included, e.reason) for e in acquisition.plan]
+    assert isinstance(Reason(True, ""), tuple)
+
+
+def test_what_a_plan_leaves_out_is_never_imported():
+    code = """
+import sys
+from tactbench.plugin import *
+from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.rig import build
+from tactbench.sensors.icub import tactbench_sensors
+q = lambda v, u: assumed(v, u, "test")
+rig = build(RigContext(effects=tuple(tactbench_effects())))
+quiet = Environment(noise_scale=0.0, drift_scale=0.0, force_noise=q(0.0, "N"))
+scene = Scene(name="flat", environment=quiet, profile=ForceRamp(samples=50))
+with rig.open(tactbench_sensors()[0], scene, seed=1) as acquisition:
+    list(acquisition)
+mine = sorted(m.removeprefix("tactbench.rigs.twin.") for m in sys.modules if m.startswith("tactbench.rigs.twin."))
+print(" ".join(mine))
+"""
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "contact.foam" in answer
+    assert "effects.creep" in answer
+    assert "effects.converter" in answer
+    for left_out in ("core", "shell", "layer"):
+        assert f"contact.{left_out}" not in answer
+    for left_out in ("offset", "warm_up", "wander", "white_noise", "force_noise"):
+        assert f"effects.{left_out}" not in answer
+
+
+def test_listing_the_twin_imports_no_numerics():
+    code = (
+        "import sys, tactbench.rigs.twin as twin; twin.tactbench_rigs(); twin.tactbench_effects();"
+        "print(' '.join(m for m in sys.modules if m.startswith(('scipy', 'tactbench.rigs.twin.'))))"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert answer.strip() == ""

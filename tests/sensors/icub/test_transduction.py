@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -78,6 +80,18 @@ def test_a_taxel_weight_adds_to_one_wherever_it_falls(make_grid):
         centre = (weight.sum(axis=1) @ grid.x_mm, weight.sum(axis=0) @ grid.s_mm)
         # Sub-sampling is symmetric to a sixteenth of a cell.
         assert centre == pytest.approx((1.0 + shift, -2.0 + shift), abs=0.42 / 16)
+
+
+def test_the_weight_is_flat_over_the_taxel(make_grid):
+    grid = make_grid(SPEC, 4)
+    density = taxel_weight(grid, (0.0, 0.0), 1.25) / np.prod(grid.cell_mm)
+    # The integral of exp(-(r^2/a^2)^4) over the plane is pi a^2 Gamma(5/4); at r = a the weight has fallen to 1/e.
+    top = 1.0 / (np.pi * 1.25**2 * math.gamma(1.25))
+    assert density.max() == pytest.approx(top, rel=1e-4)
+    r = np.hypot(grid.x_mm[:, None], grid.s_mm[None, :])
+    rim = np.abs(r - 1.25) < 0.02
+    # Within 0.02 mm of the rim the weight changes by 8 * 0.02 / 1.25 of itself.
+    assert density[rim] == pytest.approx(top / math.e, rel=0.15)
 
 
 def test_what_cannot_be_given_is_refused_by_name(make_grid):

@@ -1,1 +1,1 @@
-"""Normal contact: what the skin is made of, one load, and many loads. Units mm, N, MPa."""
+"""How the skin answers a load: media, the Newton solver, load tables."""

@@ -1,77 +1,71 @@
-"""A linear elastic layer bonded to a rigid base, of any Poisson ratio, 1/2 included."""
+"""A linear elastic layer bonded to a rigid base, frictionless on top."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from tactbench.plugin import BondedLayer, FloatArray, RigError, SkinGrid
-from tactbench.rigs.twin.contact.medium import Medium
-from tactbench.rigs.twin.geometry import wave_numbers
+from tactbench.rigs.twin.contact.media import Medium, no_local_law, require_positive
+from tactbench.rigs.twin.contact.spectrum import Spectrum
 
-SERIES_BELOW = 0.35
-"""k h below which the kernel is summed as a series: the closed form cancels there."""
-
-
-@dataclass(frozen=True)
-class Nothing:
-    """No local law: all is in the kernel."""
-
-    def energy(self, w: FloatArray) -> FloatArray:
-        """Return zero."""
-        return np.zeros_like(w)
-
-    pressure = energy
-    tangent = energy
+_SERIES_BELOW = 0.35
+"""Below this q the numerator is summed as a series: sinh y - y would cancel."""
+_TERMS = 8
 
 
-def layer_kernel(q: FloatArray, nu: float) -> FloatArray:
-    """Return M(q), q = k h, of ``u^ = 2/(E* k) M p^`` for a frictionless top on a bonded base.
+def compliance_shape(q: FloatArray, poisson: float) -> FloatArray:
+    """Return ``M(q)``, the compliance of the layer relative to a half-space, for ``q = k h``.
 
-    ``M = [(3-4nu) sinh 2q - 2q] / [(3-4nu) cosh 2q + 2q² + 5 - 12nu + 8nu²]``, evaluated so that nothing cancels for
-    small q (a series for ``sinh y - y``) and nothing overflows for large q (multiplied through by ``exp(-2q)``).
-
-    Raises
-    ------
-    RigError
-        If `nu` is not in 0 … 0.5.
+    ``M = [(3-4nu) sinh 2q - 2q] / [(3-4nu) cosh 2q + 2q² + 5 - 12nu + 8nu²]``: 1 for short waves,
+    ``q (1-2nu) / (2 (1-nu)²)`` for long ones (Winkler), ``2 q³ / 3`` for an incompressible layer. Valid for every
+    q >= 0 and 0 <= nu <= 1/2.
     """
-    if not 0.0 <= nu <= 0.5:
-        raise RigError(f"A Poisson ratio of {nu} cannot be.", hint="It lies between 0 and 0.5.")
-    a, c = 3.0 - 4.0 * nu, 5.0 - 12.0 * nu + 8.0 * nu**2
-    y = 2.0 * np.minimum(q, SERIES_BELOW)
-    term = y**3 / 6.0
+    q = np.asarray(q, dtype=np.float64)
+    a, c = 3 - 4 * poisson, 5 - 12 * poisson + 8 * poisson**2
+    small = q < _SERIES_BELOW
+    y = 2 * np.where(small, q, 0.0)
+    term = y**3 / 6
     series = term.copy()
-    for n in range(2, 9):
+    for n in range(2, _TERMS + 1):
         term = term * y**2 / ((2 * n) * (2 * n + 1))
         series += term
-    small = (a * series + (2.0 - 4.0 * nu) * y) / (a * np.cosh(y) + y**2 / 2.0 + c)
-    large_q = np.maximum(q, SERIES_BELOW)
-    decay = np.exp(-2.0 * large_q)
-    large = (a * (1.0 - decay**2) / 2.0 - 2.0 * large_q * decay) / (
-        a * (1.0 + decay**2) / 2.0 + (2.0 * large_q**2 + c) * decay
-    )
-    return np.where(q < SERIES_BELOW, small, large)
+    # (3-4nu) sinh y - y = (3-4nu) (sinh y - y) + (2-4nu) y, whose last factor is exactly 0 at nu = 1/2.
+    low = (a * series + (2 - 4 * poisson) * y) / (a * np.cosh(y) + y**2 / 2 + c)
+    big = np.where(small, 1.0, q)
+    decay, decay2 = np.exp(-2 * big), np.exp(-4 * big)
+    high = (a * (1 - decay2) / 2 - 2 * big * decay) / (a * (1 + decay2) / 2 + (2 * big**2 + c) * decay)
+    shape: FloatArray = np.where(small, low, high)
+    return shape
 
 
-def layer(skin: BondedLayer, grid: SkinGrid) -> Medium:
-    """Return `skin` on `grid`: ``K(k) = E* k / (2 M(k h))``, at k = 0 the oedometric ``E_oed / h``."""
-    young, nu, h = skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm")
-    kx, ks = wave_numbers(grid)
-    k = np.sqrt(kx**2 + ks**2)
-    plane = young / (1.0 - nu**2)
-    incompressible = nu == 0.5
-    at_zero = 0.0 if incompressible else young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / h
-    safe = np.where(k > 0, k, 1.0)
-    stiffness = np.where(k > 0, plane * safe / (2.0 * layer_kernel(safe * h, nu)), at_zero)
+def medium(skin: BondedLayer, grid: SkinGrid) -> Medium:
+    """Return the layer on `grid`: ``K = E* k / (2 M(k h))``, and ``E_oed / h`` for a uniform pressure.
+
+    An incompressible layer does not yield to a uniform pressure: its mean deflection is held at zero.
+    """
+    young, poisson, thickness = skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm")
+    contact_stiffness = skin.contact_stiffness.to("MPa/mm")
+    require_positive(young=young, thickness=thickness, contact_stiffness=contact_stiffness)
+    if not 0 <= poisson <= 0.5:
+        raise RigError(
+            f"Poisson's ratio of the layer is {poisson:g}; it must lie between 0 and 0.5.",
+            hint="Correct the skin in the sensor's spec.",
+        )
+    spectrum = Spectrum(grid)
+    k = np.sqrt(spectrum.k2)
+    k[0, 0] = 1.0
+    stiffness = young / (1 - poisson**2) * k / (2 * compliance_shape(k * thickness, poisson))
+    incompressible = poisson == 0.5
+    oedometric = 0.0 if incompressible else young * (1 - poisson) / ((1 + poisson) * (1 - 2 * poisson))
+    stiffness[0, 0] = oedometric / thickness
     return Medium(
         grid=grid,
+        spectrum=spectrum,
         stiffness=stiffness,
-        law=Nothing(),
-        contact_stiffness=skin.contact_stiffness.to("MPa/mm"),
-        keeps_volume=incompressible,
-        outer_radius_mm=skin.sheet.outer_radius.to("mm") if skin.sheet.outer_radius else np.inf,
-        rest_thickness_mm=np.full((len(grid.x_mm), len(grid.s_mm)), h),
+        respond=no_local_law,
+        contact_stiffness=contact_stiffness,
+        zero_mean=incompressible,
+        rest_thickness_mm=np.full(spectrum.shape, thickness),
         least_thickness_mm=0.0,
+        low_modes=150,
     )

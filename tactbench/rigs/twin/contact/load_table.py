@@ -1,265 +1,191 @@
-"""Readings as a function of load: solved at a few loads, interpolated between them, with an error estimate.
+"""Readings against load, solved at a few loads only.
 
-Quasi-static contact depends on time only through the load, so nothing is solved per sample. Nodes are added where the
-interpolant is worst; the load at which the skin meets the core is bracketed, and no cubic crosses it.
+Quasi-static contact depends on time through the force alone. So the skin is solved at adaptively chosen loads, all
+wanted readings are kept, and a shape-preserving cubic between the nodes answers for every sample. Midpoints that
+were solved to test an interval become nodes themselves; twice the largest difference they showed is the reported
+bound.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, RigError, SkinState
-from tactbench.rigs.twin.contact.medium import Medium
-from tactbench.rigs.twin.contact.newton import Press, Solution
+from tactbench.plugin import FloatArray, SkinState
+from tactbench.rigs.twin.contact.interpolant import Interpolant
+from tactbench.rigs.twin.contact.press import Press
 
-Observe = Callable[[SkinState], FloatArray]
-"""A skin state -> (channels,) readings."""
+_FIRST_NODES = 6
+_POWER = 1.7
+"""First nodes at ``j^1.7``: dense where a cap's contact grows fastest."""
+_NARROWEST_N = 0.02
+"""No interval narrower than this is split."""
+_UNSEEN = 2.0
+"""Safety of the reported bound: one midpoint per interval sees at least half of what a single bend in it can hide
+at a quarter of its width."""
+_TOUCH_DOWN_N = 0.01
+"""How closely the load is bracketed at which the film closes."""
 
-FIRST_NODES = 6
-POWER = 1.7
-"""First nodes at ``F_max (j/n)^1.7``: readings change fastest at small loads."""
-NARROWEST_N = 0.02
-"""Intervals are not split below this."""
-BRACKET_N = 0.01
-"""Width to which the load of touch-down is known."""
-MOST_NODES = 40
+
+MOST_NODES = 16
+"""Nodes after which refining ends. Past touch-down the readings step by a count or two as single cells meet the
+core, whatever the interpolant: more nodes would follow the mesh, not the physics."""
 
 
 @dataclass(frozen=True)
 class LoadTable:
-    """Readings at loads, and the curve through them.
-
-    Attributes
-    ----------
-    loads_n
-        (n,) nodes, the first one 0.
-    readings
-        (n, channels)
-    error
-        Estimate of the largest difference between curve and solution, in the channels' unit: half of what was seen at
-        the middles of the accepted intervals before these middles became nodes too.
-    touch_down_n
-        Load at which the skin meets the core, or None if it does not.
-    residual
-        Largest residual of a solution.
-    solves
-        How many loads were solved.
-    """
+    """Readings of one contact for any load from zero to the largest."""
 
     loads_n: FloatArray
+    """(n,) nodes, the first at zero."""
     readings: FloatArray
-    error: float
-    touch_down_n: float | None
-    residual: float
+    """(n, channels)"""
+    states: tuple[SkinState, ...]
+    """(n,) the skin at the nodes, without its fields."""
+    touch_down_n: tuple[float, float] | None
+    """Bracket of the load at which the core is touched; None when it never is."""
+    error: FloatArray
+    """(channels,) twice the largest difference between a solved reading and an interpolant it was no part of."""
+    interpolant: Interpolant
     solves: int
-    deepest: SkinState
+
+    @property
+    def residual(self) -> float:
+        """Largest residual of all nodes."""
+        return max(state.residual for state in self.states)
 
     def __call__(self, force_n: FloatArray) -> FloatArray:
-        """Return (samples, channels) readings at `force_n`; loads beyond the table are clamped, never extrapolated."""
-        loads = np.clip(force_n, 0.0, self.loads_n[-1])
-        return _curve(self.loads_n, self.readings, self.touch_down_n)(loads)
+        """Return the (m, channels) readings at (m,) forces; forces beyond the table are held at its ends."""
+        return self.interpolant(np.clip(force_n, 0.0, self.loads_n[-1]))
+
+
+class _Builder:
+    def __init__(self, press: Press, read: Callable[[SkinState], FloatArray]) -> None:
+        self._press = press
+        self._read = read
+        self.nodes: dict[float, tuple[SkinState, FloatArray]] = {}
+        self.closed: dict[float, bool] = {}
+
+    def node(self, force: float) -> FloatArray:
+        if force not in self.nodes:
+            state = self._press(force)
+            self.nodes[force] = (self._press.scalars(state), self._read(state))
+            self.closed[force] = force > 0 and self._press.closing_mm(state) > 0
+        return self.nodes[force][1]
+
+    def interpolant(self, touch_down: tuple[float, float] | None) -> Interpolant:
+        loads = sorted(self.nodes)
+        values = np.stack([self.nodes[load][1] for load in loads])
+        breaks = [] if touch_down is None else [loads.index(load) for load in touch_down]
+        return Interpolant(np.array(loads), values, breaks)
 
 
 def build_table(
-    medium: Medium, gap: FloatArray, observe: Observe, largest_n: float, tolerance: float, share: float = 0.0
+    press: Press,
+    read: Callable[[SkinState], FloatArray],
+    *,
+    largest_n: float,
+    tolerance: FloatArray,
+    most_nodes: int = MOST_NODES,
 ) -> LoadTable:
-    """Solve and interpolate the readings of `observe` for loads from 0 to `largest_n`.
+    """Solve and tabulate one contact.
 
     Parameters
     ----------
-    medium, gap
-        The skin and the gap to the indenter.
-    observe
-        What is read from a skin state.
+    press
+        Solves the skin for one force.
+    read
+        The sensor's noise-free readings of a state: (channels,).
     largest_n
-        Largest load [N].
+        Upper end of the table; a table of a scene without load has the rest state twice.
     tolerance
-        Wanted bound on the interpolation error, in the channels' unit; what was achieved is in the result.
-    share
-        The bound may be as large as this share of the largest change of a reading.
-
-    Raises
-    ------
-    RigError
-        If `largest_n` is not positive, or contact does not settle.
+        (channels,) wanted bound on the interpolation error.
+    most_nodes
+        Nodes after which refining ends even if the bound is missed: the achieved one is reported.
     """
+    builder = _Builder(press, read)
     if not largest_n > 0:
-        raise RigError(f"A load table up to {largest_n} N is empty.", hint="Press with a positive force.")
-    solver = _Loads(medium, gap, observe)
-    nodes = [largest_n * (j / FIRST_NODES) ** POWER for j in range(FIRST_NODES + 1)]
-    for load in nodes:
-        solver(load)
-    change = np.abs(solver(nodes[-1]) - solver(nodes[0])).max()
-    tolerance = max(tolerance, share * float(change))
-    touch_down = solver.bracket()
-    if touch_down is not None:
-        nodes = sorted({*nodes, *solver.around(touch_down)})
-    nodes, error = _refine(solver, nodes, touch_down, tolerance)
-    loads = np.array(nodes)
+        rest = builder.node(0.0)
+        flat = Interpolant(np.array([0.0, 1.0]), np.stack([rest, rest]))
+        state = builder.nodes[0.0][0]
+        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, 0)
+    for j in range(_FIRST_NODES):
+        builder.node(largest_n * (j / (_FIRST_NODES - 1)) ** _POWER)
+    touch_down = _bracket(builder, press)
+    error = _refine(builder, press, touch_down, tolerance, most_nodes)
+    loads = sorted(builder.nodes)
     return LoadTable(
-        loads_n=loads,
-        readings=np.array([solver(load) for load in nodes]),
-        error=error,
+        loads_n=np.array(loads),
+        readings=np.stack([builder.nodes[load][1] for load in loads]),
+        states=tuple(builder.nodes[load][0] for load in loads),
         touch_down_n=touch_down,
-        residual=max(solver.residuals),
-        solves=len(solver.residuals) - 1,
-        deepest=solver.state(largest_n),
+        error=error,
+        interpolant=builder.interpolant(touch_down),
+        solves=press.solves,
     )
 
 
+def _bracket(builder: _Builder, press: Press) -> tuple[float, float] | None:
+    """Bracket touch-down and put a node on either side."""
+    closed = [load for load in sorted(builder.nodes) if builder.closed[load]]
+    if not closed:
+        return None
+    high = closed[0]
+    below = [(load, press.closing_at(load)) for load in sorted(builder.nodes) if load < high][-2:]
+    margin = 0.4 * _TOUCH_DOWN_N
+    for step in itertools.count(1):
+        low, at_low = below[-1]
+        if high - low <= _TOUCH_DOWN_N:
+            break
+        middle = 0.5 * (low + high)
+        if step % 3 and len(below) > 1 and at_low > below[-2][1]:
+            # Straight on from below, where the closing is smooth: above, the core already holds the skin back.
+            root = low - at_low * (low - below[-2][0]) / (at_low - below[-2][1])
+            middle = root + margin if high > root + 2 * margin else root - margin
+            middle = min(max(middle, low + margin), high - margin)
+        closing = press.closing_at(middle)
+        if closing > 0:
+            high = middle
+        else:
+            below = [below[-1], (middle, closing)]
+    builder.node(low)
+    builder.node(high)
+    return low, high
+
+
 def _refine(
-    solver: _Loads, nodes: list[float], touch_down: float | None, tolerance: float
-) -> tuple[list[float], float]:
-    """Split intervals whose middle is not where the curve says; return the nodes and the largest accepted miss."""
-    accepted = 0.0
-    open_intervals = [(a, b) for a, b in pairwise(nodes) if not _around(a, b, touch_down)]
-    while open_intervals:
-        curve = _curve(np.array(nodes), np.array([solver(load) for load in nodes]), touch_down)
-        middles = [(a + b) / 2 for a, b in open_intervals]
-        split: list[tuple[float, float]] = []
-        for (a, b), middle in zip(open_intervals, middles, strict=True):
-            # Solved, so it becomes a node. A kink's error halves with its interval, all else falls faster.
-            miss = float(np.abs(solver(middle) - curve(np.array([middle]))[0]).max()) / 2
-            nodes.append(middle)
-            if miss <= tolerance or b - a <= 2 * NARROWEST_N or len(nodes) >= MOST_NODES:
-                accepted = max(accepted, miss)
-            else:
-                split += [(a, middle), (middle, b)]
-        nodes.sort()
-        open_intervals = split
-    return nodes, accepted
+    builder: _Builder,
+    press: Press,
+    touch_down: tuple[float, float] | None,
+    tolerance: FloatArray,
+    most_nodes: int,
+) -> FloatArray:
+    """Test every interval at its midpoint, split the worst first; return the bound achieved.
 
+    The bound of an interval is what its parent's midpoint showed before it became a node: the final interpolant,
+    which has that node, does better wherever the readings are smooth.
+    """
+    loads = sorted(builder.nodes)
+    untested = [pair for pair in itertools.pairwise(loads) if pair != touch_down]
+    shown: dict[tuple[float, float], FloatArray] = {}
 
-def _around(a: float, b: float, touch_down: float | None) -> bool:
-    return touch_down is not None and a < touch_down < b
+    def test(low: float, high: float, interpolant: Interpolant) -> None:
+        middle = 0.5 * (low + high)
+        difference = np.abs(builder.node(middle) - interpolant(np.array([middle]))[0])
+        shown[low, middle] = shown[middle, high] = difference
 
-
-class _Loads:
-    """Solves loads, each once, starting from the nearest one that is known."""
-
-    def __init__(self, medium: Medium, gap: FloatArray, observe: Observe) -> None:
-        self._medium, self._observe = medium, observe
-        self._press = Press(medium, gap)
-        dx, ds = medium.grid.cell_mm
-        self._cell = dx * ds
-        self._solutions: dict[float, Solution] = {}
-        self._readings: dict[float, FloatArray] = {}
-        self.residuals: list[float] = []
-
-    def __call__(self, load: float) -> FloatArray:
-        if load not in self._readings:
-            self._readings[load] = np.asarray(self._observe(self.state(load)), dtype=np.float64)
-        return self._readings[load]
-
-    def _solution(self, load: float) -> Solution:
-        if load not in self._solutions:
-            solution = self._press.solve(load, self._start(load))
-            self._solutions[load] = solution
-            self.residuals.append(solution.residual)
-        return self._solutions[load]
-
-    def _start(self, load: float) -> tuple[FloatArray, float] | None:
-        """Return a guess: on the line through the two nearest known loads, or the nearest."""
-        known = sorted((one for one in self._solutions if one > 0), key=lambda one: abs(one - load))
-        if not known:
-            return None
-        first = self._solutions[known[0]]
-        if len(known) == 1:
-            return first.w, first.approach_mm
-        second = self._solutions[known[1]]
-        share = float(np.clip((load - known[0]) / (known[1] - known[0]), -1.0, 1.0))
-        return (
-            first.w + share * (second.w - first.w),
-            first.approach_mm + share * (second.approach_mm - first.approach_mm),
-        )
-
-    def state(self, load: float) -> SkinState:
-        """Return the skin under `load`, as a transducer sees it."""
-        solution, medium = self._solution(load), self._medium
-        thickness = np.maximum(medium.rest_thickness_mm - solution.w, medium.least_thickness_mm)
-        return SkinState(
-            grid=medium.grid,
-            force_n=load,
-            deflection_mm=solution.w,
-            pressure_mpa=solution.pressure,
-            thickness_mm=thickness,
-            depth_mm=solution.approach_mm,
-            fluid_pressure_mpa=solution.fluid_pressure,
-            contact_radius_mm=_second_moment_radius(solution.pressure, medium),
-            residual=solution.residual,
-        )
-
-    def clearance(self, load: float) -> float:
-        """Return how far the skin still is from the core under `load`, mm; negative once it is met."""
-        core = self._medium.core_at_mm
-        return np.inf if core is None else float((core - self._solution(load).w).min())
-
-    def bracket(self) -> float | None:
-        """Return the load of touch-down, enclosed to `BRACKET_N` between solved loads; None if there is none.
-
-        By false position with the Illinois correction: the clearance is smooth on both sides of its root, so a handful
-        of loads do what bisection needs many for.
-        """
-        if self._medium.core_at_mm is None:
-            return None
-        known = sorted(load for load in self._solutions if load > 0)
-        over = [load for load in known if self.clearance(load) < 0]
-        if not over or over[0] == known[0]:
-            return None
-        high = over[0]
-        low = known[known.index(high) - 1]
-        at_low, at_high = self.clearance(low), self.clearance(high)
-        while high - low > BRACKET_N:
-            # Kept a third of the bracket's final width away from its ends, so that both of them close in.
-            middle = (low * at_high - high * at_low) / (at_high - at_low)
-            middle = min(max(middle, low + BRACKET_N / 3), high - BRACKET_N / 3)
-            here = self.clearance(middle)
-            if here < 0:
-                high, at_high, at_low = middle, here, at_low / 2
-            else:
-                low, at_low, at_high = middle, here, at_high / 2
-        return (low + high) / 2
-
-    def around(self, load: float) -> tuple[float, float]:
-        """Return the known loads on both sides of `load`."""
-        return max(one for one in self._solutions if one <= load), min(one for one in self._solutions if one > load)
-
-
-def _second_moment_radius(pressure: FloatArray, medium: Medium) -> float:
-    """Return ``sqrt(5/2 <r²>)`` weighted with pressure: exact for Hertz, and no counting of cells."""
-    total = float(pressure.sum())
-    if total <= 0:
-        return 0.0
-    x, s = medium.grid.x_mm[:, None], medium.grid.s_mm[None, :]
-    mean_x, mean_s = float((pressure * x).sum()) / total, float((pressure * s).sum()) / total
-    moment = float((pressure * ((x - mean_x) ** 2 + (s - mean_s) ** 2)).sum()) / total
-    return float(np.sqrt(2.5 * moment))
-
-
-def _curve(loads: FloatArray, readings: FloatArray, touch_down: float | None) -> Callable[[FloatArray], FloatArray]:
-    """Return the shape-preserving cubic through the nodes, in two pieces that do not look across touch-down."""
-    from scipy.interpolate import PchipInterpolator
-
-    if touch_down is None:
-        whole = PchipInterpolator(loads, readings, axis=0)
-        return lambda force: np.asarray(whole(force))
-    below, above = loads <= touch_down, loads > touch_down
-    # Between the two nodes of the bracket, 0.01 N apart, the curve is the straight line that joins the pieces.
-    pieces = [(loads[side], PchipInterpolator(loads[side], readings[side], axis=0) if side.sum() > 1 else None)
-              for side in (below, above)]  # fmt: skip
-    last, first = loads[below][-1], loads[above][0]
-    ends = readings[below][-1], readings[above][0]
-
-    def curve(force: FloatArray) -> FloatArray:
-        share = np.clip((force - last) / (first - last), 0.0, 1.0)[:, None]
-        out = ends[0] + share * (ends[1] - ends[0])
-        for (nodes, piece), inside in zip(pieces, (force <= last, force >= first), strict=True):
-            if piece is not None and inside.any():
-                out[inside] = piece(np.clip(force[inside], nodes[0], nodes[-1]))
-        return np.asarray(out)
-
-    return curve
+    first = builder.interpolant(touch_down)
+    for low, high in untested:
+        test(low, high, first)
+    while len(builder.nodes) < most_nodes:
+        wide = {pair: d for pair, d in shown.items() if pair[1] - pair[0] > 2 * _NARROWEST_N}
+        worst = max(wide, key=lambda pair: float(np.max(wide[pair] / tolerance)), default=None)
+        if worst is None or np.all(wide[worst] <= tolerance):
+            break
+        del shown[worst]
+        test(*worst, builder.interpolant(touch_down))
+    bound: FloatArray = _UNSEEN * np.max(np.stack(list(shown.values())), axis=0)
+    return bound

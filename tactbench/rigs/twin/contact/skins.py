@@ -1,20 +1,32 @@
-"""From a declared skin to a medium on a grid."""
+"""Which module presses which declared skin."""
 
 from __future__ import annotations
 
-from tactbench.plugin import FluidBackedShell, FoamPad, Skin
-from tactbench.rigs.twin.contact.foam import foam
-from tactbench.rigs.twin.contact.layer import layer
-from tactbench.rigs.twin.contact.medium import Medium
-from tactbench.rigs.twin.contact.shell import shell
-from tactbench.rigs.twin.geometry import grid_of
+from tactbench.plugin import BondedLayer, FluidBackedShell, FoamPad, RigError, SkinGrid
+from tactbench.rigs.twin.contact.media import Medium
 
 
-def medium_of(skin: Skin, cells: tuple[int, int] | None = None) -> Medium:
-    """Return `skin` on its own grid, or on one of `cells` (axial x arc)."""
-    grid = grid_of(skin.sheet, cells)
+def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) -> Medium:
+    """Return the medium a spec declares, on `grid`; only its own module is imported.
+
+    Raises
+    ------
+    RigError
+        If the parameters are not physical, or the medium is none the twin can press.
+    """
     if isinstance(skin, FluidBackedShell):
-        return shell(skin, grid)
+        from tactbench.rigs.twin.contact import shell
+
+        return shell.medium(skin, grid)
     if isinstance(skin, FoamPad):
-        return foam(skin, grid)
-    return layer(skin, grid)
+        from tactbench.rigs.twin.contact import foam
+
+        return foam.medium(skin, grid)
+    if isinstance(skin, BondedLayer):
+        from tactbench.rigs.twin.contact import layer
+
+        return layer.medium(skin, grid)
+    raise RigError(
+        f"The twin cannot press a skin of type {type(skin).__name__}.",
+        hint="Declare one of FluidBackedShell, FoamPad and BondedLayer.",
+    )

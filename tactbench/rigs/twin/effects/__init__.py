@@ -1,1 +1,1 @@
-"""Effects of the twin, one a file; ``declarations`` says which there are without importing any."""
+"""What comes between the scene and the skin, and between the skin and the stored number: one effect per file."""

@@ -1,20 +1,25 @@
-"""The converter: rounds, then clips, then says where it stood at its end. Always the last stage."""
+"""The converter: rounds to its step, clips to its range, flags what stood at the end."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from tactbench.plugin import Quality
-from tactbench.rigs.twin.effects.signal import Signal
+from tactbench.rigs.twin.synthesis import Synthesis
 
 
-def apply(signal: Signal) -> None:
-    """Turn readings into samples."""
-    step = signal.each(lambda nuisances: nuisances.step.value)
-    fine = np.where(step > 0, step, 1.0)
-    rounded = np.where(step > 0, np.round(signal.readings / fine) * fine, signal.readings)
-    lower = np.array([-np.inf if channel.lower is None else channel.lower for channel in signal.channels])
-    upper = np.array([np.inf if channel.upper is None else channel.upper for channel in signal.channels])
-    signal.samples = np.clip(rounded, lower, upper)
-    saturated = (rounded < lower) | (rounded > upper)
-    signal.quality = np.where(saturated, Quality.SATURATED, Quality.GOOD).astype(np.uint8)
+def apply(run: Synthesis) -> None:
+    """Turn readings into what the converter would store; the last stage.
+
+    A sample is flagged SATURATED when the converter stands at its end, as the reader of a real one would see it.
+    """
+    for column, channel in enumerate(run.channels):
+        nuisances = run.nuisances(channel.kind)
+        reading = run.readings[:, column]
+        if nuisances is not None and nuisances.step.value > 0:
+            reading = np.round(reading / nuisances.step.value) * nuisances.step.value
+        lower = -np.inf if channel.lower is None else channel.lower
+        upper = np.inf if channel.upper is None else channel.upper
+        reading = np.clip(reading, lower, upper)
+        run.quality[(reading <= lower) | (reading >= upper), column] |= np.uint8(Quality.SATURATED)
+        run.readings[:, column] = reading

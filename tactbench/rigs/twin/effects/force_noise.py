@@ -1,12 +1,11 @@
-"""Noise of the force-torque sensor: the recorded force is the unfiltered one."""
+"""The reference force-torque sensor's own noise."""
 
 from __future__ import annotations
 
-from tactbench.rigs.twin.effects.signal import Signal
+from tactbench.rigs.twin.synthesis import Synthesis
 
 
-def apply(signal: Signal) -> None:
-    """Add white noise to the label."""
-    sd = signal.scene.environment.force_noise.to("N")
-    generator = signal.generator("force-noise", "recording")
-    signal.label = signal.force + sd * generator.normal(size=len(signal.force))
+def apply(run: Synthesis) -> None:
+    """Add white noise to the reference force, unfiltered as in the paper; the load itself stays the true one."""
+    spread = run.scene.environment.force_noise.to("N")
+    run.reference_n += spread * run.of_recording("force").standard_normal(run.t_s.size)

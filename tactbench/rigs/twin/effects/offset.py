@@ -1,19 +1,19 @@
-"""Offsets: levels that differ from recording to recording, and from session to session."""
+"""Offsets between recordings and sessions."""
 
 from __future__ import annotations
 
-from tactbench.rigs.twin.effects.signal import Signal
+from tactbench.rigs.twin.synthesis import Synthesis
 
 
-def apply(signal: Signal) -> None:
-    """Add this recording's shared and own offsets, and this session's."""
-    environment = signal.scene.environment
-    n = len(signal.channels)
-    here = signal.generator("offset", "recording")
-    shared = signal.each(lambda nuisances: nuisances.offset_shared.value) * here.normal()
-    own = signal.each(lambda nuisances: nuisances.offset_own.value) * here.normal(size=n)
-    session = signal.each(lambda nuisances: nuisances.offset_session.value)
-    between = session * signal.generator("offset", "session").normal(size=n)
-    signal.readings = (
-        signal.readings + environment.drift_scale * (shared + own) + environment.session_offset_scale * between
-    )
+def apply(run: Synthesis) -> None:
+    """Add what all channels of a recording share, what is each one's own, and what a new session changes."""
+    environment = run.scene.environment
+    for kind, columns in run.by_kind().items():
+        nuisances = run.nuisances(kind)
+        if nuisances is None:
+            continue
+        shared = nuisances.offset_shared.value * float(run.of_recording("offset", "shared", kind).standard_normal())
+        own = nuisances.offset_own.value * run.of_every_channel(kind, run.of_recording("offset", "own", kind))
+        session = nuisances.offset_session.value * run.of_every_channel(kind, run.of_session("offset", kind))
+        run.readings[:, columns] += environment.drift_scale * (shared + own)
+        run.readings[:, columns] += environment.session_offset_scale * session

@@ -1,19 +1,24 @@
-"""Warm-up: all channels drift together towards the level of the warm sensor."""
+"""The shared warm-up of a heated sensor."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tactbench.rigs.twin.effects.signal import Signal
+from tactbench.rigs.twin.synthesis import Synthesis
 
 
-def apply(signal: Signal) -> None:
-    """Subtract what is still to come of ``A (1 - exp(-t/tau))``, so that the stated rest is that of the warm sensor."""
-    environment = signal.scene.environment
-    since = environment.since_power_on.to("s") + signal.scene.starts_after_s + signal.t_s
-    tau = signal.each(lambda nuisances: nuisances.warm_up_tau.to("s"))
-    amplitude = environment.drift_scale * signal.each(lambda nuisances: nuisances.warm_up.value)
-    scatter = signal.each(lambda nuisances: nuisances.warm_up_scatter.to("1"))
-    factor = 1.0 + scatter * signal.generator("warm-up", "unit").normal(size=len(signal.channels))
-    to_come = np.exp(-since[:, None] / np.where(tau > 0, tau, 1.0))
-    signal.readings = signal.readings - amplitude * factor * to_come
+def apply(run: Synthesis) -> None:
+    """Add ``-W f_i exp(-t / tau)``: the spec's rest is the warm level, less what is still to come.
+
+    ``t`` counts from power-on; the factors ``f_i = 1 + scatter n_i`` belong to the unit.
+    """
+    environment, scene = run.scene.environment, run.scene
+    t = environment.since_power_on.to("s") + scene.starts_after_s + run.t_s
+    for kind, columns in run.by_kind().items():
+        nuisances = run.nuisances(kind)
+        if nuisances is None or not nuisances.warm_up.value:
+            continue
+        numbers = run.of_every_channel(kind, run.of_unit("warm-up", kind))
+        factors = 1.0 + nuisances.warm_up_scatter.to("1") * numbers
+        still_to_come = nuisances.warm_up.value * np.exp(-t / nuisances.warm_up_tau.to("s"))
+        run.readings[:, columns] -= environment.drift_scale * still_to_come[:, None] * factors

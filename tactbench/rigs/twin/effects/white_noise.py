@@ -1,13 +1,17 @@
-"""White noise of each channel, before rounding."""
+"""White noise of every sample, before the converter rounds."""
 
 from __future__ import annotations
 
-from tactbench.rigs.twin.effects.signal import Signal
+from tactbench.rigs.twin.synthesis import Synthesis
 
 
-def apply(signal: Signal) -> None:
-    """Add it."""
-    sd = signal.scene.environment.noise_scale * signal.each(lambda nuisances: nuisances.white.value)
-    signal.readings = signal.readings + sd * signal.generator("white-noise", "recording").normal(
-        size=signal.readings.shape
-    )
+def apply(run: Synthesis) -> None:
+    """Add independent normal numbers."""
+    scale = run.scene.environment.noise_scale
+    for kind, columns in run.by_kind().items():
+        nuisances = run.nuisances(kind)
+        if nuisances is None or not nuisances.white.value:
+            continue
+        noise = run.of_recording("white", kind).standard_normal((run.t_s.size, len(columns)))
+        noise *= scale * nuisances.white.value
+        run.readings[:, columns] += noise

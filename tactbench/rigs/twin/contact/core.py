@@ -1,0 +1,43 @@
+"""The rigid core under a fluid-backed skin: it carries what the closed film no longer can.
+
+Imported only when a load closes the film. Below that load the solution without the core is the solution with it, so
+leaving it out changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tactbench.plugin import FloatArray, FluidBackedShell
+from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_positive
+
+
+class CoreReaction:
+    """A one-sided spring under the film, on top of another local law."""
+
+    def __init__(self, below: LocalLaw, stiffness: float, film_mm: FloatArray) -> None:
+        self._below = below
+        self._stiffness = stiffness
+        self._film_mm = film_mm
+
+    def __call__(self, deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
+        """Return restoring pressure and summed energy density; fill the tangent."""
+        pressure, energy = self._below(deflection_mm, tangent)
+        pressed = deflection_mm - self._film_mm
+        np.maximum(pressed, 0.0, out=pressed)
+        tangent += self._stiffness * (pressed > 0)
+        flat = pressed.reshape(-1)
+        energy += 0.5 * self._stiffness * float(flat @ flat)
+        pressed *= self._stiffness
+        pressure += pressed
+        return pressure, energy
+
+
+def with_core(medium: Medium, skin: FluidBackedShell) -> Medium:
+    """Return `medium` with a core that answers once less than the residual film is left."""
+    stiffness = skin.core_stiffness.to("MPa/mm")
+    require_positive(core_stiffness=stiffness)
+    film = medium.rest_thickness_mm - medium.least_thickness_mm
+    return replace(medium, respond=CoreReaction(medium.respond, stiffness, film))

@@ -1,0 +1,75 @@
+"""What every skin medium offers the solver: a stiffness per Fourier mode and a local law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from tactbench.plugin import FloatArray, RigError, SkinGrid
+from tactbench.rigs.twin.contact.spectrum import Spectrum
+
+
+class LocalLaw(Protocol):
+    """A force law that looks at one cell at a time."""
+
+    def __call__(self, deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
+        """Return the (nx, ns) restoring pressure [MPa] (a new array) and the summed energy density [N/mm].
+
+        Fills `tangent` with the (nx, ns) derivative of the pressure [MPa/mm].
+        """
+
+
+@dataclass(frozen=True)
+class Medium:
+    """A skin on a grid. Units mm, N, MPa."""
+
+    grid: SkinGrid
+    spectrum: Spectrum
+    stiffness: FloatArray
+    """(nx, ns//2+1) pressure per deflection of each mode [MPa/mm]."""
+    respond: LocalLaw
+    contact_stiffness: float
+    """Of the indenter against the skin [MPa/mm]."""
+    zero_mean: bool
+    """The volume under the skin is constant: the mean deflection stays zero."""
+    rest_thickness_mm: FloatArray
+    """(nx, ns) film or layer with nothing touching."""
+    least_thickness_mm: float
+    """What stays open when pressed flat; 0 where there is no such limit."""
+    low_modes: int
+    """Pairs of soft modes that the preconditioner solves exactly: chosen for speed, without effect on the result."""
+    has_core: bool = False
+    """There is a core to touch down on when less than `least_thickness_mm` would be left."""
+
+    def closing_mm(self, deflection_mm: FloatArray) -> float:
+        """Return how far the skin passes the least film; above zero the core is touched."""
+        return float(np.max(deflection_mm - self.rest_thickness_mm)) + self.least_thickness_mm
+
+    def thickness_mm(self, deflection_mm: FloatArray) -> FloatArray:
+        """Return the (nx, ns) film or layer left."""
+        left = self.rest_thickness_mm - deflection_mm
+        return np.maximum(left, self.least_thickness_mm) if self.has_core else left
+
+
+def no_local_law(deflection_mm: FloatArray, tangent: FloatArray) -> tuple[FloatArray, float]:
+    """Answer for media whose whole stiffness is in the Fourier modes."""
+    tangent.fill(0.0)
+    return np.zeros_like(deflection_mm), 0.0
+
+
+def require_positive(**values: float) -> None:
+    """Refuse parameters that would make the energy non-convex.
+
+    Raises
+    ------
+    RigError
+        Naming the first parameter that is not a positive finite number.
+    """
+    for name, value in values.items():
+        if not (value > 0 and np.isfinite(value)):
+            raise RigError(
+                f"The skin's {name} is {value:g}; it must be positive and finite.",
+                hint="Correct the skin in the sensor's spec.",
+            )

@@ -1,0 +1,149 @@
+"""Presses one skin with one indenter at any force, starting each solve from its neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from tactbench.plugin import FloatArray, SkinState
+from tactbench.rigs.twin.contact.media import Medium
+from tactbench.rigs.twin.contact.newton import TOLERANCE, NewtonSolver, Solution
+from tactbench.rigs.twin.geometry import Contact
+
+_NOTHING = np.zeros((0, 0))
+
+
+class Press:
+    """Solves forces in any order.
+
+    Parameters
+    ----------
+    medium
+        The skin without a core.
+    gap_mm
+        (nx, ns) gap at zero approach.
+    contact
+        Where the apex is.
+    core
+        Gives the skin with its core; asked for only when a load closes the film. None: there is no core.
+    fluid_pressure
+        Whether states carry the pressure of the fluid.
+    """
+
+    def __init__(
+        self,
+        medium: Medium,
+        gap_mm: FloatArray,
+        contact: Contact,
+        *,
+        core: Callable[[Medium], Medium] | None = None,
+        fluid_pressure: bool = True,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        self.medium = medium
+        self.gap_mm = gap_mm
+        self.contact = contact
+        self.touched_core = False
+        self.solves = 0
+        self.products = 0
+        self._solver = NewtonSolver(medium, gap_mm)
+        self._core = core
+        self._wants_fluid_pressure = fluid_pressure
+        self._tolerance = tolerance
+        self._solutions: dict[float, Solution] = {}
+        self._least_gap = float(gap_mm.min())
+
+    def __call__(self, force_n: float) -> SkinState:
+        """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
+        if force_n <= 0:
+            zero = np.zeros(self.gap_mm.shape)
+            return SkinState(
+                grid=self.medium.grid,
+                force_n=0.0,
+                deflection_mm=zero,
+                pressure_mpa=zero,
+                thickness_mm=self.medium.rest_thickness_mm,
+                depth_mm=0.0,
+                fluid_pressure_mpa=0.0,
+                contact_radius_mm=0.0,
+                residual=0.0,
+            )
+        solution = self._solve(force_n)
+        pressure = solution.pressure_mpa
+        return SkinState(
+            grid=self.medium.grid,
+            force_n=force_n,
+            deflection_mm=solution.deflection_mm,
+            pressure_mpa=pressure,
+            thickness_mm=self.medium.thickness_mm(solution.deflection_mm),
+            # Counted from first touch: between cells the gap's smallest value on the grid is not zero.
+            depth_mm=solution.depth_mm - self._least_gap,
+            fluid_pressure_mpa=self._fluid_pressure(solution),
+            contact_radius_mm=self._contact_radius(pressure),
+            residual=solution.residual,
+        )
+
+    def closing_at(self, force_n: float) -> float:
+        """Return how far the film is past closing under `force_n` [mm]; negative while it is open."""
+        if force_n <= 0:
+            return self.medium.closing_mm(np.zeros(self.gap_mm.shape))
+        return self.medium.closing_mm(self._solve(force_n).deflection_mm)
+
+    def closing_mm(self, state: SkinState) -> float:
+        """Return how far the film of `state` is past closing [mm]; minus infinity without a core."""
+        return self.medium.closing_mm(state.deflection_mm) if self.medium.has_core else -np.inf
+
+    def scalars(self, state: SkinState) -> SkinState:
+        """Return `state` without its fields: what a table keeps."""
+        return replace(state, deflection_mm=_NOTHING, pressure_mpa=_NOTHING, thickness_mm=_NOTHING)
+
+    def _solve(self, force: float) -> Solution:
+        if force in self._solutions:
+            return self._solutions[force]
+        solution = self._count(self._solver.solve(force, self._guess(force), tolerance=self._tolerance))
+        if self.medium.has_core and not self.touched_core and self.medium.closing_mm(solution.deflection_mm) > 0:
+            self.touched_core = True
+            if self._core is not None:
+                self.medium = self._core(self.medium)
+                self._solver = NewtonSolver(self.medium, self.gap_mm)
+                solution = self._count(self._solver.solve(force, solution.vector, tolerance=self._tolerance))
+        self._solutions[force] = solution
+        return solution
+
+    def _count(self, solution: Solution) -> Solution:
+        self.solves += 1
+        self.products += solution.products
+        return solution
+
+    def _guess(self, force: float) -> FloatArray | None:
+        """Return a state near `force` from the solved loads around it (Lagrange in the square root of the load)."""
+        if not self._solutions:
+            return None
+        # In sqrt(F) the approach of a cap is nearly straight.
+        near = sorted(self._solutions, key=lambda load: abs(load**0.5 - force**0.5))[:3]
+        if len(near) > 1 and (max(near) < force or min(near) > force):
+            near = near[:2]
+        u = [load**0.5 for load in near]
+        guess = np.zeros_like(self._solutions[near[0]].vector)
+        for i, load in enumerate(near):
+            weight = 1.0
+            for j, other in enumerate(u):
+                if j != i:
+                    weight *= (force**0.5 - other) / (u[i] - other)
+            guess += weight * self._solutions[load].vector
+        return guess
+
+    def _fluid_pressure(self, solution: Solution) -> float:
+        """Return the multiplier of the constant volume: what the contact brings in and the skin does not carry."""
+        if not (self.medium.zero_mean and self._wants_fluid_pressure):
+            return 0.0
+        local, _ = self.medium.respond(solution.deflection_mm, np.empty(self.gap_mm.shape))
+        return float(np.mean(solution.pressure_mpa - local))
+
+    def _contact_radius(self, pressure: FloatArray) -> float:
+        """Return ``sqrt(5/2 <r²>)`` weighted with the pressure: exact for Hertz, where counting cells is not."""
+        grid, contact = self.medium.grid, self.contact
+        r2 = (grid.x_mm[:, None] - contact.x_mm) ** 2 + (grid.s_mm[None, :] - contact.s_mm) ** 2
+        return float(np.sqrt(2.5 * np.sum(pressure * r2) / np.sum(pressure)))

@@ -1,0 +1,153 @@
+"""Fields of the skin as Fourier coefficients in one flat real vector.
+
+The coefficients are scaled so that the dot product of two vectors is the sum over cells of the product of the fields:
+energy, gradient and conjugate directions live in Fourier space, where the skin's own stiffness is a diagonal.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.plugin import FloatArray, SkinGrid
+
+
+class Spectrum:
+    """Transforms of one grid.
+
+    Parameters
+    ----------
+    grid
+        Cell centres; the sheet is taken as periodic.
+    """
+
+    def __init__(self, grid: SkinGrid) -> None:
+        from scipy import fft
+
+        self._fft: Any = fft
+        self.shape = (grid.x_mm.size, grid.s_mm.size)
+        nx, ns = self.shape
+        self.half = (nx, ns // 2 + 1)
+        self.size = 2 * self.half[0] * self.half[1]
+        """Length of a flat vector."""
+        dx, ds = grid.cell_mm
+        self.area_mm2 = dx * ds
+        """Of one cell."""
+        kx = 2 * np.pi * np.fft.fftfreq(nx, dx)
+        ks = 2 * np.pi * np.fft.rfftfreq(ns, ds)
+        self.kx = np.broadcast_to(kx[:, None], self.half).copy()
+        """(nx, ns//2+1) axial wave number, 1/mm."""
+        self.k2 = kx[:, None] ** 2 + ks[None, :] ** 2
+        """(nx, ns//2+1) squared wave number, 1/mm²."""
+        # Columns between the first and the last stand for themselves and their conjugates.
+        weight = np.full((1, self.half[1]), math.sqrt(2.0))
+        weight[0, 0] = 1.0
+        if ns % 2 == 0:
+            weight[0, -1] = 1.0
+        root = math.sqrt(nx * ns)
+        self._forward = weight / root
+        self._backward = root / weight
+        self._buffer = np.empty(self.half, dtype=np.complex128)
+
+    def of(self, field: FloatArray) -> FloatArray:
+        """Return the (size,) vector of a (nx, ns) field."""
+        coefficients = self._fft.rfft2(field)
+        coefficients *= self._forward
+        flat: FloatArray = coefficients.view(np.float64).reshape(-1)
+        return flat
+
+    def field(self, vector: FloatArray) -> FloatArray:
+        """Return the (nx, ns) field of a (size,) vector."""
+        np.multiply(vector.view(np.complex128).reshape(self.half), self._backward, out=self._buffer)
+        real: FloatArray = self._fft.irfft2(self._buffer, s=self.shape, overwrite_x=True)
+        return real
+
+    def diagonal(self, multiplier: FloatArray) -> FloatArray:
+        """Return the (size,) diagonal that multiplies vectors like the (nx, ns//2+1) `multiplier`."""
+        return np.repeat(multiplier.reshape(-1), 2)
+
+
+class LowModes:
+    """The softest Fourier modes as an orthonormal real basis, in which a varying stiffness is a small matrix.
+
+    A local stiffness D(x) couples modes k and k' by its own Fourier coefficients at ``k - k'`` and ``k + k'``; so
+    the matrix is gathered from one transform of D instead of being integrated.
+    """
+
+    def __init__(self, spectrum: Spectrum, stiffness: FloatArray, *, count: int, zero_mean: bool) -> None:
+        nx, ns = spectrum.shape
+        nh = spectrum.half[1]
+        rows, columns = np.meshgrid(np.arange(nx), np.arange(nh), indexing="ij")
+        signed = np.where(rows > nx // 2, rows - nx, rows)
+        # One of each pair of conjugates, and no mode at the Nyquist rim, where cosine and sine coincide.
+        free = (columns > 0) | (signed > 0)
+        free &= (2 * np.abs(signed) < nx) & (2 * columns < ns)
+        chosen = np.flatnonzero(free)
+        order = np.argsort(stiffness.reshape(-1)[chosen], kind="stable")
+        chosen = np.sort(chosen[order[:count]])
+        m, n = signed.reshape(-1)[chosen], columns.reshape(-1)[chosen]
+        self._modes = chosen.size
+        self._mean = not zero_mean
+        self.size = 2 * self._modes + int(self._mean)
+        """Number of basis functions: cosines, sines and, unless the mean is held at zero, the constant."""
+        own = m[:, None], n[:, None]
+        other = m[None, :], n[None, :]
+        self._difference = ((own[0] - other[0]) % nx) * ns + (own[1] - other[1]) % ns
+        self._sum = ((own[0] + other[0]) % nx) * ns + (own[1] + other[1]) % ns
+        self._own = (m % nx) * ns + n
+        # Modes of the first column are stored twice, as k and -k, each with half of the weight.
+        doubled = np.where(n == 0, math.sqrt(2.0), 1.0)
+        places = [2 * chosen, 2 * chosen + 1]
+        scales = [doubled, doubled]
+        if self._mean:
+            places.append(np.array([0]))
+            scales.append(np.ones(1))
+        self._places = np.concatenate(places)
+        self._scales = np.concatenate(scales)
+        pairs = np.flatnonzero(n == 0)
+        mirror = ((-m[pairs]) % nx) * nh
+        self._mirror_places = np.concatenate([2 * mirror, 2 * mirror + 1])
+        self._mirror_from = np.concatenate([pairs, self._modes + pairs])
+        root = math.sqrt(0.5)
+        self._mirror_scales = np.concatenate([np.full(pairs.size, root), np.full(pairs.size, -root)])
+        self._cells = nx * ns
+        self._root = math.sqrt(2.0 / self._cells)
+        own_stiffness = stiffness.reshape(-1)[chosen]
+        parts = [own_stiffness, own_stiffness]
+        if self._mean:
+            parts.append(stiffness.reshape(-1)[:1])
+        self._stiffness = np.concatenate(parts)
+        self._fft = spectrum._fft
+
+    def take(self, vector: FloatArray) -> FloatArray:
+        """Return the (size,) coefficients of a flat vector."""
+        taken: FloatArray = vector[self._places] * self._scales
+        return taken
+
+    def put(self, coefficients: FloatArray, vector: FloatArray) -> None:
+        """Overwrite the low modes of a flat vector."""
+        vector[self._places] = coefficients / self._scales
+        vector[self._mirror_places] = coefficients[self._mirror_from] * self._mirror_scales
+
+    def matrix(self, local: FloatArray, out: FloatArray) -> None:
+        """Fill ``out[:size, :size]`` with the matrix of ``K + local`` for a (nx, ns) local stiffness."""
+        spectrum: npt.NDArray[np.complex128] = self._fft.fft2(local).reshape(-1)
+        spectrum /= self._cells
+        difference, total = spectrum[self._difference], spectrum[self._sum]
+        n = self._modes
+        # Coefficient at q: sum D cos(qx) - i sum D sin(qx), over the number of cells.
+        np.add(difference.real, total.real, out=out[:n, :n])
+        np.subtract(difference.real, total.real, out=out[n : 2 * n, n : 2 * n])
+        # The stored sine coefficient is minus the sine's own: out[n+i, j] = -<sin_i, D cos_j>.
+        np.add(total.imag, difference.imag, out=out[n : 2 * n, :n])
+        out[:n, n : 2 * n] = out[n : 2 * n, :n].T
+        if self._mean:
+            own = spectrum[self._own] * math.sqrt(2.0)
+            out[2 * n, :n], out[2 * n, n : 2 * n] = own.real, own.imag
+            out[:n, 2 * n], out[n : 2 * n, 2 * n] = own.real, own.imag
+            out[2 * n, 2 * n] = spectrum[0].real
+        diagonal = np.einsum("ii->i", out[: self.size, : self.size])
+        diagonal += self._stiffness

@@ -1,0 +1,163 @@
+"""The effects of contact as stages of a synthesis: press, look at the fluid, read the skin."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactbench.plugin import (
+    FloatArray,
+    FluidBackedShell,
+    NotApplicable,
+    PluginContractError,
+    RigError,
+    SkinState,
+    load_object,
+)
+from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
+from tactbench.rigs.twin.contact.media import Medium
+from tactbench.rigs.twin.contact.press import Press
+from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.geometry import check_contact, gap_mm, skin_grid
+from tactbench.rigs.twin.synthesis import Synthesis
+
+READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
+"""Kinds of channels a sensor's transducer answers for."""
+_MOST_TABLES = 64
+
+
+@dataclass(frozen=True)
+class _Tabulated:
+    table: LoadTable
+    touched_core: bool
+    closing_mm: float
+    film_mm: float
+
+
+_TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
+
+
+def press_skin(run: Synthesis) -> None:
+    """Refuse a contact that cannot be resolved; the solving itself follows the sensor's wish for readings."""
+    skin = run.sensor.spec.skin
+    if skin is None:
+        raise NotApplicable(f"{run.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
+    check_contact(skin_grid(skin.sheet), run.contact)
+
+
+def watch_fluid(run: Synthesis) -> None:
+    """Ask for the pressure of the fluid with every solved load."""
+    run.fluid_pressure = True
+
+
+def read_skin(run: Synthesis) -> None:
+    """Add each channel's response: gain times its reading under the effective force, less its reading at rest."""
+    columns = [i for i, channel in enumerate(run.channels) if channel.kind in READ_FROM_THE_SKIN]
+    tabulated = _tabulated(run, columns)
+    table = tabulated.table
+    for kind, own in run.by_kind().items():
+        if kind not in READ_FROM_THE_SKIN:
+            continue
+        among = [columns.index(column) for column in own]
+        response = table(run.effective_n.get(kind, run.force_n))[:, among] - table.readings[0, among]
+        if run.gain is not None:
+            response *= run.gain[own]
+        run.readings[:, own] += response
+    _report(run, tabulated)
+
+
+def _tabulated(run: Synthesis, columns: list[int]) -> _Tabulated:
+    profile = run.scene.profile
+    largest = max(profile.start.to("N"), profile.end.to("N"))
+    text = f"{run.sensor.model_dump_json()}|{run.contact}|{largest!r}|{columns}|{run.fluid_pressure}|{run.lent}"
+    key = hashlib.blake2b(text.encode(), digest_size=16).digest()
+    if key in _TABLES:
+        _TABLES.move_to_end(key)
+        return _TABLES[key]
+    made = _tabulate(run, columns, largest)
+    _TABLES[key] = made
+    if len(_TABLES) > _MOST_TABLES:
+        _TABLES.popitem(last=False)
+    return made
+
+
+def _tabulate(run: Synthesis, columns: list[int], largest: float) -> _Tabulated:
+    spec, skin = run.sensor.spec, run.sensor.spec.skin
+    if skin is None or run.sensor.transducer is None:
+        raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
+    grid = skin_grid(skin.sheet)
+    outer = skin.sheet.outer_radius
+    gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"))
+    names = [run.channels[column].name for column in columns]
+    try:
+        transducer = load_object(run.sensor.transducer)(spec, grid, names)
+    except RigError as error:
+        raise NotApplicable(f"The transducer of {spec.name} cannot answer: {error}", hint=error.hint) from error
+
+    def read(state: SkinState) -> FloatArray:
+        readings = np.asarray(transducer(state), dtype=np.float64)
+        if readings.shape != (len(names),) or not np.all(np.isfinite(readings)):
+            raise PluginContractError(
+                f"The transducer of {spec.name} returned shape {readings.shape} at {state.force_n:g} N; "
+                f"expected ({len(names)},) finite readings.",
+                hint="Return one finite number for each wanted channel.",
+            )
+        return readings
+
+    core: Callable[[Medium], Medium] | None = None
+    if "core" in run.lent and isinstance(skin, FluidBackedShell):
+        where = run.lent["core"]
+
+        def core(medium: Medium) -> Medium:
+            made: Medium = load_object(where)(medium, skin)
+            return made
+
+    press = Press(medium_of(skin, grid), gap, run.contact, core=core, fluid_pressure=run.fluid_pressure)
+    table = build_table(press, read, largest_n=largest, tolerance=_tolerance(run, columns))
+    closing = press.closing_at(largest) if press.medium.has_core else 0.0
+    film = float(press.medium.rest_thickness_mm.max()) - press.medium.least_thickness_mm
+    return _Tabulated(table, press.touched_core, closing, film)
+
+
+def _tolerance(run: Synthesis, columns: list[int]) -> FloatArray:
+    """Return the interpolation error to aim at: one standard deviation of what noise and rounding hide anyway."""
+    wanted = []
+    for column in columns:
+        nuisances = run.nuisances(run.channels[column].kind)
+        hidden = 0.0 if nuisances is None else float(np.hypot(nuisances.white.value, nuisances.step.value / 12**0.5))
+        # Without any stated noise: a ten-thousandth of the range, or of one.
+        upper, lower = run.channels[column].upper, run.channels[column].lower
+        span = upper - lower if upper is not None and lower is not None else 1.0
+        wanted.append(hidden if hidden > 0 else 1e-4 * span)
+    return np.array(wanted)
+
+
+def _report(run: Synthesis, tabulated: _Tabulated) -> None:
+    table = tabulated.table
+    deepest = table.states[-1]
+    run.drawn.update(
+        table_nodes=table.loads_n.size,
+        table_solves=table.solves,
+        table_error_count=float(table.error.max(initial=0.0)),
+        solver_residual=table.residual,
+        depth_mm=deepest.depth_mm,
+    )
+    if "core" not in run.lent:
+        return
+    force = deepest.force_n
+    if table.touch_down_n is not None:
+        low, high = table.touch_down_n
+        run.drawn["touch_down_n"] = (low + high) / 2
+        run.settled["core"] = (True, f"the film closes at {(low + high) / 2:.2f} N, within 0.01 N")
+    elif not tabulated.touched_core:
+        sure = deepest.depth_mm < tabulated.film_mm
+        number = (
+            f"depth {deepest.depth_mm:.2f} mm < {tabulated.film_mm:.2f} mm"
+            if sure
+            else f"{-tabulated.closing_mm:.2f} mm of film are left above the asperities"
+        )
+        run.settled["core"] = (False, f"never touches the core below {force:g} N: {number}")

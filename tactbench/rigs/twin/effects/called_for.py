@@ -1,0 +1,147 @@
+"""Which effects a scene calls for: predicates without numerics, so that a plan costs nothing.
+
+Each takes the scene and the sensor's spec and answers with a Reason that carries a number where there is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tactbench.plugin import FluidBackedShell, Nuisances, Quantity, Reason, Scene, SensorSpec
+
+
+def _largest_n(scene: Scene) -> float:
+    return max(scene.profile.start.to("N"), scene.profile.end.to("N"))
+
+
+def _observed(scene: Scene, sensor: SensorSpec) -> list[Nuisances]:
+    return [sensor.nuisances[kind] for kind in scene.observe if kind in sensor.nuisances]
+
+
+def _largest(scene: Scene, sensor: SensorSpec, pick: Callable[[Nuisances], Quantity]) -> Quantity | None:
+    found = [pick(nuisances) for nuisances in _observed(scene, sensor)]
+    return max(found, key=lambda quantity: quantity.value, default=None)
+
+
+def contact(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether the skin is pressed."""
+    largest = _largest_n(scene)
+    if sensor.skin is None:
+        return Reason(False, f"{sensor.name} declares no skin")
+    if not largest > 0:
+        return Reason(False, "the scene has no load: 0 N throughout")
+    return Reason(True, f"{scene.indenter} pressed with up to {largest:g} N")
+
+
+def core(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether the skin may touch down on a core."""
+    if not isinstance(sensor.skin, FluidBackedShell):
+        return Reason(False, "the skin has no core under a fluid film")
+    if not _largest_n(scene) > 0:
+        return Reason(False, "the scene has no load: 0 N throughout")
+    left = sensor.skin.gap.to("mm") - sensor.skin.residual_film.to("mm")
+    return Reason(True, f"taken into the solve from the load that leaves no more than the film's {left:g} mm")
+
+
+def fluid_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether there is a fluid whose pressure can be looked at."""
+    if not isinstance(sensor.skin, FluidBackedShell):
+        return Reason(False, "the skin holds no fluid")
+    return Reason(True, "an observed channel reads the pressure of the fluid")
+
+
+def transduction(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether the sensor has a skin to read."""
+    if sensor.skin is None:
+        return Reason(False, f"{sensor.name} declares no skin")
+    return Reason(True, f"{sensor.principle} channels read the skin")
+
+
+def creep(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether the response lags behind a load that changes."""
+    terms = [term for nuisances in _observed(scene, sensor) for term in nuisances.creep]
+    share = sum(term.fraction.to("1") for term in terms)
+    if not terms or not share:
+        return Reason(False, "the spec states no creep for the observed channels")
+    if scene.profile.start.to("N") == scene.profile.end.to("N"):
+        return Reason(False, f"the load is constant: {scene.profile.end.to('N'):g} N throughout")
+    slowest = max(term.tau.to("s") for term in terms)
+    return Reason(True, f"{100 * share:.0f} % of the response comes late, by up to {slowest:g} s")
+
+
+def gain(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether channels of one unit have different gains."""
+    scatter = _largest(scene, sensor, lambda nuisances: nuisances.gain_scatter)
+    if scatter is None or not scatter.value:
+        return Reason(False, "the spec states no scatter of gain for the observed channels")
+    return Reason(True, f"gains scatter by {100 * scatter.to('1'):g} % within a unit")
+
+
+def offset(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether recordings start from different levels."""
+    environment = scene.environment
+    shared = _largest(scene, sensor, lambda nuisances: nuisances.offset_shared)
+    own = _largest(scene, sensor, lambda nuisances: nuisances.offset_own)
+    session = _largest(scene, sensor, lambda nuisances: nuisances.offset_session)
+    if session is not None and session.value and environment.session_offset_scale:
+        scale = environment.session_offset_scale
+        return Reason(True, f"levels move by {session} (sd) between sessions, scaled by {scale:g}")
+    found = [quantity for quantity in (shared, own) if quantity is not None]
+    largest = max(found, key=lambda quantity: quantity.value, default=None)
+    return _scaled(
+        scene, largest, "offset", "levels move by {} (sd) between recordings; between sessions by nothing more"
+    )
+
+
+def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether rest levels rise to a warm value."""
+    rise = _largest(scene, sensor, lambda nuisances: nuisances.warm_up)
+    return _scaled(scene, rise, "warm-up", "rest levels rise by {} from power-on")
+
+
+def wander(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether channels drift freely."""
+    spread = _largest(scene, sensor, lambda nuisances: nuisances.wander)
+    return _scaled(scene, spread, "free drift", "channels wander by {} (sd)")
+
+
+def rest_spread(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether channels of one unit rest at different levels."""
+    spread = sensor.parameters.get("rest_spread")
+    if spread is None or not spread.value:
+        return Reason(False, "the spec states rest levels channel by channel")
+    return Reason(True, f"rest levels scatter by {spread} within a unit")
+
+
+def white_noise(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether every sample has its own error."""
+    noise = _largest(scene, sensor, lambda nuisances: nuisances.white)
+    if noise is None or not noise.value:
+        return Reason(False, "the spec states no white noise for the observed channels")
+    if not scene.environment.noise_scale:
+        return Reason(False, "the scene scales noise by 0")
+    return Reason(True, f"noise of {noise} (sd), scaled by {scene.environment.noise_scale:g}")
+
+
+def converter(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer that readings are always stored through the converter."""
+    step = _largest(scene, sensor, lambda nuisances: nuisances.step)
+    stated = f"steps of {step}, " if step is not None and step.value else ""
+    return Reason(True, f"{stated}clipped to each channel's range")
+
+
+def force_noise(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether the reference force differs from the true one."""
+    noise = scene.environment.force_noise
+    if not noise.value:
+        return Reason(False, "the scene's force sensor is free of noise")
+    return Reason(True, f"the unfiltered force sensor errs by {noise} (sd)")
+
+
+def _scaled(scene: Scene, size: Quantity | None, what: str, text: str) -> Reason:
+    scale = scene.environment.drift_scale
+    if size is None or not size.value:
+        return Reason(False, f"the spec states no {what} for the observed channels")
+    if not scale:
+        return Reason(False, "the scene scales drift by 0")
+    return Reason(True, f"{text.format(size)}, scaled by {scale:g}")

@@ -1,0 +1,13 @@
+"""Rest levels that differ from channel to channel within one unit."""
+
+from __future__ import annotations
+
+from tactbench.rigs.twin.synthesis import Synthesis
+
+
+def apply(run: Synthesis) -> None:
+    """Move each taxel's rest level by the sensor parameter ``rest_spread`` (sd), the same in every recording."""
+    columns = run.by_kind().get("taxel")
+    if columns:
+        spread = run.sensor.spec.parameters["rest_spread"].value
+        run.readings[:, columns] += spread * run.of_every_channel("taxel", run.of_unit("rest", "taxel"))

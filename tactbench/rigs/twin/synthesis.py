@@ -1,0 +1,81 @@
+"""The recording in the making: what the effects of a plan read and write, in the plan's order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Nuisances, Scalar, Scene, SensorDescriptor
+from tactbench.rigs.twin import draws
+from tactbench.rigs.twin.geometry import Contact
+
+
+@dataclass
+class Synthesis:
+    """State of one recording while its effects are applied.
+
+    An effect is a callable that takes this object and changes it: ``where`` of its descriptor names it.
+    """
+
+    sensor: SensorDescriptor
+    scene: Scene
+    seed: int
+    channels: tuple[ChannelSpec, ...]
+    """The channels that will be recorded, in order of the sensor's streams."""
+    t_s: FloatArray
+    """(n,) seconds since the recording's first sample."""
+    force_n: FloatArray
+    """(n,) true normal force."""
+    contact: Contact
+    readings: FloatArray
+    """(n, channels) what the channels would say; starts at rest."""
+    quality: npt.NDArray[np.uint8]
+    """(n, channels)"""
+    reference_n: FloatArray
+    """(n,) what the force sensor says; starts at the true force."""
+    effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
+    """(n,) force the response of a kind of channel follows, where it is not the true one."""
+    gain: FloatArray | None = None
+    """(channels,) factors on the response; None: all one."""
+    fluid_pressure: bool = False
+    """Somebody looks at the pressure of the fluid."""
+    lent: dict[str, str] = field(default_factory=dict)
+    """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
+    settled: dict[str, tuple[bool, str]] = field(default_factory=dict)
+    """Plan entries that only the solve could decide: name -> (included, reason)."""
+    drawn: dict[str, Scalar] = field(default_factory=dict)
+    """What was drawn or achieved."""
+
+    def nuisances(self, kind: ChannelKind) -> Nuisances | None:
+        """Return the nuisances of a kind of channel; None when the spec states none."""
+        return self.sensor.spec.nuisances.get(kind)
+
+    def by_kind(self) -> dict[ChannelKind, list[int]]:
+        """Return the columns of each kind of channel."""
+        columns: dict[ChannelKind, list[int]] = {}
+        for column, channel in enumerate(self.channels):
+            columns.setdefault(channel.kind, []).append(column)
+        return columns
+
+    def of_unit(self, *what: str) -> np.random.Generator:
+        """Return the generator of what belongs to this sensor unit: the same in every recording of a seed."""
+        return draws.generator(self.seed, self.sensor.name, "unit", *what)
+
+    def of_session(self, *what: str) -> np.random.Generator:
+        """Return the generator of what the recordings of a session share."""
+        return draws.generator(self.seed, self.sensor.name, "session", self.scene.session, *what)
+
+    def of_recording(self, *what: str) -> np.random.Generator:
+        """Return the generator of what is this recording's own."""
+        return draws.generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
+
+    def of_every_channel(self, kind: ChannelKind, generator: np.random.Generator) -> FloatArray:
+        """Return one standard normal number for each recorded channel of `kind`.
+
+        Drawn for all the sensor's channels of that kind, so that recording fewer of them changes none.
+        """
+        every = [channel.name for channel in self.sensor.spec.channels(kind)]
+        numbers = dict(zip(every, generator.standard_normal(len(every)), strict=True))
+        return np.array([numbers[channel.name] for channel in self.channels if channel.kind == kind])

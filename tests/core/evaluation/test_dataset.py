@@ -1,0 +1,140 @@
+"""A recording on one clock: what belongs together, what is missing, what it is called."""
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import DataError, NotApplicable
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Quality
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.plugin import Block, ChannelSpec, ChannelTarget, SensorSpec, Source, StreamSpec
+
+from .made import force_task, label_task, record
+from .test_karl2016 import ramp
+
+MS = 1_000_000
+
+
+def two_streams(path, taxels, vibration, force, *, unit="N"):
+    """A sensor with taxels at 100 Hz and vibration at its own times; the force on its own clock too."""
+    sensor = SensorSpec(
+        name="two", title="Two clocks", principle="none", principle_source=Source(tag="assumed", reference="a test"),
+        streams=(
+            StreamSpec(name="slow", channels=(ChannelSpec(name="t0", kind="taxel"),)),
+            StreamSpec(name="fast", channels=(ChannelSpec(name="v0", kind="ac_pressure"),)),
+        ),
+    )  # fmt: skip
+    reference = StreamSpec(name="ft", channels=(ChannelSpec(name="fz", kind="force", unit=unit),))
+    meta = RecordingMeta(name=path.stem, sensor=sensor, reference=(reference,), rig="made")
+    with RecordingWriter(path, meta) as writer:
+        for name, (t_ms, values) in (("slow", taxels), ("fast", vibration), ("ft", force)):
+            times = (np.asarray(t_ms) * MS).astype(np.int64)
+            writer.append(Block(name, times, np.asarray(values, dtype=np.float64)[:, None]))
+    return path
+
+
+def test_features_of_several_streams_stand_on_the_clock_of_the_first(tmp_path):
+    slow = np.arange(0.0, 100.0, 10.0)
+    fast = np.arange(0.0, 100.0, 0.5)
+    path = two_streams(tmp_path / "a.h5", (slow, slow), (fast, fast), (slow, slow))
+    data = load_dataset(force_task(features=("taxel", "ac_pressure")), [path])
+    assert data.features == ("t0", "v0")
+    np.testing.assert_array_equal(data.tables[0].X, np.column_stack([slow, slow]))
+
+
+def test_a_row_without_a_sample_of_the_other_stream_is_left_out_and_counted(tmp_path):
+    slow = np.arange(0.0, 100.0, 10.0)
+    path = two_streams(tmp_path / "a.h5", (slow, slow), (slow[:6], slow[:6]), (slow, slow))
+    data = load_dataset(force_task(features=("taxel", "ac_pressure")), [path])
+    assert data.counts["rows left out because v0 has no sample"] == 4
+    assert data.tables[0].row.tolist() == list(range(6))
+
+
+def test_a_stream_the_sensor_lacks_is_a_reason_and_never_ignored(tmp_path):
+    path = record(tmp_path / "a.h5", *ramp(0, n=50))
+    with pytest.raises(NotApplicable, match="needs a vibration stream; made has none"):
+        load_dataset(force_task(features=("taxel", "ac_pressure")), [path])
+
+
+def test_the_force_is_the_nearest_sample_in_the_unit_of_the_task(tmp_path):
+    slow = np.arange(0.0, 100.0, 10.0)
+    late = slow + 3.0
+    path = two_streams(tmp_path / "a.h5", (slow, slow), (slow, slow), (late, 1000.0 * late), unit="mN")
+    (table,) = load_dataset(force_task(), [path]).tables
+    np.testing.assert_allclose(table.y, late, rtol=1e-12)
+    assert table.labelled.all()
+
+
+def test_a_force_in_counts_is_refused_and_not_called_newtons(tmp_path):
+    slow = np.arange(0.0, 100.0, 10.0)
+    path = two_streams(tmp_path / "a.h5", (slow, slow), (slow, slow), (slow, slow), unit="count")
+    with pytest.raises(DataError, match="'fz' is recorded in 'count', which is no 'N'"):
+        load_dataset(force_task(), [path])
+
+
+def test_without_a_clock_rows_belong_together_only_if_they_are_equally_many(tmp_path):
+    X, force = ramp(0, n=50)
+    (table,) = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, t_ns=None)]).tables
+    np.testing.assert_array_equal(table.y, force)
+    np.testing.assert_array_equal(table.time_s, np.arange(50))
+
+
+def test_flagged_samples_are_kept_and_counted(tmp_path):
+    X, force = ramp(0, n=50)
+    quality = np.zeros(X.shape, dtype=np.uint8)
+    quality[3:10, 0] = Quality.SATURATED
+    quality[20, 1] = Quality.SUSPECT
+    data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, quality=quality)])
+    assert data.counts["saturated samples kept"] == 7
+    assert data.counts["suspect samples kept"] == 1
+    assert len(data.tables[0].row) == 50
+
+
+def test_samples_marked_missing_are_no_labels_whatever_number_stands_there(tmp_path):
+    """-1 for "no sample" must not become a force of -1 N."""
+    X, _ = ramp(0, n=50)
+    sensor = SensorSpec(
+        name="made", title="t", principle="none", principle_source=Source(tag="assumed", reference="a test"),
+        streams=(StreamSpec(name="taxels", channels=(ChannelSpec(name="t0", kind="taxel"),)),),
+    )  # fmt: skip
+    reference = StreamSpec(name="ft", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
+    missing = np.tile([0, int(Quality.MISSING)], 25).astype(np.uint8)[:, None]
+    with RecordingWriter(
+        tmp_path / "a.h5", RecordingMeta(name="a", sensor=sensor, reference=(reference,), rig="made")
+    ) as writer:
+        times = np.arange(50, dtype=np.int64) * 10 * MS
+        writer.append(Block("taxels", times, X[:, :1]))
+        writer.append(Block("ft", times, np.where(missing, -1.0, 2.0), missing))
+    data = load_dataset(force_task(), [tmp_path / "a.h5"])
+    assert data.counts["of 50 rows have no force sample and were left out"] == 25
+    assert set(data.tables[0].y[data.tables[0].labelled]) == {2.0}
+
+
+def test_the_answer_is_not_a_group(tmp_path):
+    X, _ = ramp(0, n=20)
+    notes = {"kind": np.tile(["a", "b"], 10), "object": np.repeat(["x", "y"], 10)}
+    data = load_dataset(label_task(), [record(tmp_path / "a.h5", X, annotations=notes)])
+    assert "kind" not in data.tables[0].groups
+    assert "object" in data.tables[0].groups
+
+
+def test_several_force_channels_need_a_name(tmp_path):
+    sensor = SensorSpec(
+        name="made", title="t", principle="none", principle_source=Source(tag="assumed", reference="a test"),
+        streams=(StreamSpec(name="taxels", channels=(ChannelSpec(name="t0", kind="taxel"),)),),
+    )  # fmt: skip
+    channels = tuple(ChannelSpec(name=name, kind="force", unit="N") for name in ("fa", "fb"))
+    meta = RecordingMeta(name="a", sensor=sensor, reference=(StreamSpec(name="ft", channels=channels),), rig="made")
+    with RecordingWriter(tmp_path / "a.h5", meta) as writer:
+        times = np.arange(20, dtype=np.int64) * 10 * MS
+        writer.append(Block("taxels", times, np.zeros((20, 1))))
+        writer.append(Block("ft", times, np.tile([1.0, 2.0], (20, 1))))
+    with pytest.raises(DataError, match="fa, fb"):
+        load_dataset(force_task(), [tmp_path / "a.h5"])
+    by_label = label_task("cap")
+    X = np.zeros((20, 1))
+    (table,) = load_dataset(by_label, [record(tmp_path / "b.h5", X, X[:, 0], labels={"cap": 5.0})]).tables
+    assert table.force is not None, "the paper's rule looks at the force in the curvature task too"
+    named = force_task(target=ChannelTarget(kind="force", name="fb"))
+    assert set(load_dataset(named, [tmp_path / "a.h5"]).tables[0].y) == {2.0}

@@ -1,0 +1,55 @@
+"""An interval resamples what was repeated, the coarsest of which there is enough."""
+
+import numpy as np
+
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.replication import replicates
+
+from .made import force_task, label_task, record
+from .test_karl2016 import ramp
+from .test_splits import grasps, run, sessions
+
+
+def test_objects_of_the_official_test_stand_in_for_each_other(tmp_path):
+    """One test file is one session; the task names objects, and there are twelve."""
+    paths = [grasps(tmp_path, "train", seed=1), grasps(tmp_path, "test", seed=2)]
+    assert run(paths, "roles", label_task()).ci_method == "bootstrap over 12 objects"
+
+
+def test_trials_of_one_session_stand_in_for_each_other(tmp_path):
+    paths = [
+        record(tmp_path / f"{place}.h5", *ramp(place, n=40), session="one", role="train" if place < 2 else "test")
+        for place in range(9)
+    ]
+    task = force_task(protocols=("deployable",))
+    assert run(paths, "roles", task, "mean", params={}).ci_method == "bootstrap over 7 recordings"
+
+
+def test_sessions_come_before_recordings(tmp_path):
+    paths = sessions(tmp_path, tuple("abcdef"), n=40)
+    assert run(paths, "session", estimator="mean", params={}).ci_method == "bootstrap over 6 sessions"
+
+
+def test_five_caps_of_one_session_each_recorded_once_are_not_replicates(tmp_path):
+    """Resampling the caps would lose classes: time is resampled instead, and the row says so."""
+    X, _ = ramp(0, n=60)
+    paths = [
+        record(tmp_path / f"{role}{cap}.h5", X + cap, role=role, session=role, labels={"kind": cap})
+        for role in ("train", "validation", "test") for cap in range(5)
+    ]  # fmt: skip
+    result = run(paths, "roles", label_task(), "chance", params={})
+    assert "within 5 recordings" in result.ci_method
+
+
+def test_a_unit_is_found_for_each_row_by_its_number(tmp_path):
+    """Rows that were left out must not shift the groups of those that follow."""
+    X, force = ramp(0, n=60)
+    X[5:15, 0] = np.nan
+    notes = {"press": np.repeat(np.arange(6), 10)}
+    data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, annotations=notes)])
+    table = data.tables[0]
+    codes, name = replicates(
+        data, force_task(splits=("press",)), "press", table.y, np.zeros(50, dtype=np.int64), table.row
+    )
+    assert name == "press"
+    assert codes.tolist() == (table.row // 10).tolist()

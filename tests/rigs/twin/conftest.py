@@ -1,0 +1,84 @@
+"""Real skins and real sensors for the twin's tests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from tactbench.plugin import BondedLayer, SensorDescriptor, SensorSpec, SkinSheet, assumed
+from tactbench.rigs.twin.contact.core import with_core
+from tactbench.rigs.twin.contact.media import Medium
+from tactbench.rigs.twin.contact.newton import NewtonSolver
+from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
+from tactbench.sensors.biotac.spec import SPEC as BIOTAC
+from tactbench.sensors.icub.spec import SPEC as ICUB
+
+SPECS = {"biotac": BIOTAC, "icub": ICUB}
+
+SolverOf = Callable[..., NewtonSolver]
+
+
+@pytest.fixture(scope="session")
+def specs() -> dict[str, SensorSpec]:
+    return SPECS
+
+
+@pytest.fixture(scope="session")
+def sensors() -> dict[str, SensorDescriptor]:
+    return {
+        name: SensorDescriptor(spec=spec, transducer=f"tactbench.sensors.{name}.transduction:build")
+        for name, spec in SPECS.items()
+    }
+
+
+@pytest.fixture(scope="session")
+def medium() -> Callable[..., Medium]:
+    """The whole skin of a sensor, the core included."""
+
+    def make(name: str, *, skin: object = None, core: bool = True) -> Medium:
+        declared = skin if skin is not None else SPECS[name].skin
+        made = medium_of(declared, skin_grid(declared.sheet))
+        return with_core(made, declared) if made.has_core and core else made
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def solver(medium: Callable[..., Medium]) -> SolverOf:
+    def make(name: str, radius: float, x: float, s: float = 0.0, **more: object) -> NewtonSolver:
+        made = medium(name, **more)
+        outer = SPECS[name].skin.sheet.outer_radius.to("mm")
+        return NewtonSolver(made, gap_mm(made.grid, Contact(radius, x, s), outer))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def layer() -> Callable[..., tuple[BondedLayer, NewtonSolver]]:
+    """A flat bonded layer on 24 mm, pressed by a sphere of radius 10 mm in the middle."""
+
+    def make(
+        poisson: float, *, young: float = 1.0, thickness: float = 2.0, cells: int = 96, penalty: float = 300.0
+    ) -> tuple[BondedLayer, NewtonSolver]:
+        skin = BondedLayer(
+            sheet=SkinSheet(
+                x_min=assumed(-12, "mm", "test"),
+                x_max=assumed(12, "mm", "test"),
+                arc=assumed(24, "mm", "test"),
+                cells=(cells, cells),
+            ),
+            young=assumed(young, "MPa", "test"),
+            poisson=assumed(poisson, "1", "test"),
+            thickness=assumed(thickness, "mm", "test"),
+            contact_stiffness=assumed(penalty, "MPa/mm", "test"),
+        )
+        grid = skin_grid(skin.sheet)
+        return skin, NewtonSolver(medium_of(skin, grid), gap_mm(grid, Contact(10.0, 0.0, 0.0)))
+
+    return make
+
+
+FLAT = math.inf
