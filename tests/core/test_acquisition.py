@@ -71,10 +71,11 @@ def run(path, rig, *, simulated=True, clock=None):
 
 def test_everything_the_rig_says_is_kept(tmp_path):
     rig = Weights()
-    meta = run(tmp_path / "r.h5", rig)
+    meta, digest = run(tmp_path / "r.h5", rig)
     with open_recording(tmp_path / "r.h5") as recording:
         recording.verify()
         assert recording.meta == meta
+        assert recording.content_digest() == digest
         assert recording.stream_names == ("taxels", "force_torque")
         assert recording.read("force_torque").data[:, 0].tolist() == [0.0] * 10 + [0.5] * 10 + [1.0] * 10
         assert np.array_equal(
@@ -103,9 +104,9 @@ def test_the_cost_is_the_rigs_alone(tmp_path):
                 now[0] += 10
                 yield block
 
-    assert run(tmp_path / "a.h5", Slow(), clock=lambda: now[0]).provenance == {"tactbench": "1", "sim_s": 61.0}
-    meta = run(tmp_path / "b.h5", Slow(), clock=lambda: now[0], simulated=False)
-    assert meta.provenance["acquisition_s"] == 61.0
+    assert run(tmp_path / "a.h5", Slow(), clock=lambda: now[0]).meta.provenance == {"tactbench": "1", "sim_s": 61.0}
+    made = run(tmp_path / "b.h5", Slow(), clock=lambda: now[0], simulated=False)
+    assert made.meta.provenance["acquisition_s"] == 61.0
 
 
 @pytest.mark.parametrize("fails_at", [0, 2])
