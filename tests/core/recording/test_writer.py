@@ -147,15 +147,18 @@ def test_sequence_numbers_come_with_all_blocks_or_with_none(tmp_path, make_meta)
         record(tmp_path / "x.h5", make_meta(), *(lambda writer, one=one: writer.append(one) for one in blocks))
 
 
-def test_quality_that_comes_late_leaves_the_rows_before_it_good(tmp_path, make_meta):
+@pytest.mark.parametrize("rows", [ROWS, 20_000])  # fewer, and more, than are compressed at once
+def test_quality_that_comes_late_leaves_the_rows_before_and_after_it_good(tmp_path, make_meta, rows):
     bad = np.zeros((ROWS, 3), dtype=np.uint8)
     bad[3, 1] = Quality.MISSING
     with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
-        writer.append(block())
-        writer.append(block(ROWS, quality=bad))
+        writer.append(block(0, rows))
+        writer.append(block(rows, quality=bad))
+        writer.append(block(rows + ROWS, rows))
     with open_recording(tmp_path / "x.h5") as recording:
         quality = recording.read("taxels").quality
-    assert np.argwhere(quality).tolist() == [[ROWS + 3, 1]]
+    assert quality.shape == (2 * rows + ROWS, 3)
+    assert np.argwhere(quality).tolist() == [[rows + 3, 1]]
 
 
 @pytest.mark.parametrize("labels", [["a"], ["a"] * (ROWS + 1), [0.5] * ROWS, ["a\0b"] * ROWS, [None] * ROWS])

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import MappingError, nearest
 from tactbench.core.recording.mapping.model import Npz
-from tactbench.core.recording.mapping.table import ArrayTable
+from tactbench.core.recording.mapping.table import ArrayTable, plain
 
 MAX_BYTES = 4 * 2**30
 """An archive that unpacks to more is refused: a small file can claim any size."""
@@ -52,7 +52,7 @@ def read_npz(path: Path, shown: str, how: Npz) -> Iterator[tuple[Words, ArrayTab
             )
     wide = len(str(len(ordered) - 1))
     for index, rows in enumerate(ordered):
-        words = {word: str(arrays[name][index].item()) for word, name in how.per_recording.items()}
+        words = {word: plain(arrays[name][index].item()) for word, name in how.per_recording.items()}
         yield {"index": f"{index:0{wide}d}", **words}, ArrayTable(f"{shown}[{how.array}, {index}]", rows)
 
 

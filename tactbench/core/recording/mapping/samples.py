@@ -160,8 +160,9 @@ def _no_hidden_sentinel(channel: MappedChannel, table: Table, given: FloatArray)
     if channel.group.kind not in MUST_NAME_SENTINELS or channel.group.keep_repeated:
         return
     for value in (given.min(), given.max()):
-        share = float((given == value).mean())
-        if REPEATED_SHARE < share < 1:
+        count = int((given == value).sum())
+        share = count / len(given)
+        if count > 1 and REPEATED_SHARE < share < 1:
             raise MappingError(
                 f"{table.shown}: column {channel.column!r} (channel {channel.spec.name}) is {value:g} in "
                 f"{100 * share:.1f} % of the rows and on one side of it in all others: that looks like 'no sample'.",

@@ -53,7 +53,12 @@ class TextTable:
             # Seconds since 1970 in float64 are exact to 0.2 µs only: the decimal text knows better.
             try:
                 times[row] = int((Decimal(cells[place].strip()) * per_unit).to_integral_value())
-            except (InvalidOperation, ValueError, OverflowError) as error:
+            except OverflowError as error:
+                raise MappingError(
+                    f"{self.where(row)}: column {column!r}: {cells[place]!r} is too far away for a time.",
+                    hint="Correct the unit.",
+                ) from error
+            except (InvalidOperation, ValueError) as error:
                 raise MappingError(
                     f"{self.where(row)}: column {column!r}: {cells[place]!r} is not a time.",
                     hint="A row without a time cannot be kept; check the column, or write `clock: none`.",
@@ -126,7 +131,7 @@ class ArrayTable:
 
     def texts(self, column: Column) -> list[str]:
         """Return a column as texts, (n,)."""
-        return [str(value) for value in self._column(column).tolist()]
+        return [plain(value) for value in self._column(column).tolist()]
 
     def nanoseconds(self, column: Column, per_unit: int) -> IntArray:
         """Return a column times `per_unit` as whole nanoseconds, (n,), rounded once; MappingError for a non-time."""
@@ -149,6 +154,11 @@ class ArrayTable:
             raise MappingError(f"{self.shown} has no column names.", hint="Give the place, counted from 0.")
         values: npt.NDArray[Any] = self.array[:, _checked(self.shown, column, self.array.shape[1])]
         return values
+
+
+def plain(value: Any) -> str:
+    """Return a number as people write it in a mapping: 1, not 1.0."""
+    return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
 
 
 Table = TextTable | ArrayTable

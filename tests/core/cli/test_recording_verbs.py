@@ -1,0 +1,110 @@
+"""import, inspect and record, as a person calls them."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+MAPPING = """
+version: 1
+title: a scale
+sensor: {name: pad, title: a pad, principle: capacitive, principle_source: {tag: assumed, reference: test}}
+clock: host
+tables:
+  scale:
+    files: "*.csv"
+    read: {format: csv, header: true}
+    time: {column: t, unit: s, epoch: start}
+recording: {name: "{file}", session: "{file}"}
+streams:
+  taxels: {table: scale, channels: [{columns: [a, b], name: "{column}", kind: taxel, unit: count}]}
+  scale:
+    table: scale
+    of: reference
+    channels: [{columns: f, name: fz, kind: force, unit: N, given_in: gf, sentinels: [-1]}]
+"""
+
+
+@pytest.fixture
+def tables(shell):
+    (shell.folder / "mapping.yaml").write_text(MAPPING)
+    for name in ("one", "two"):
+        rows = "".join(f"{n / 100},{n},{7},{-1 if n % 2 else n}\n" for n in range(50))
+        (shell.folder / f"{name}.csv").write_text("t,a,b,f\n" + rows)
+    return shell
+
+
+def test_import_then_inspect(tables):
+    done = tables("import", "mapping.yaml", "--out", "recordings")
+    assert "2 recordings of pad, 100 rows, from 2 files" in done.stdout
+    assert "one: fz has no sample in 25 of 50 rows" in done.stdout
+    assert "warning: taxel b constant (in 2 of 2 recordings)" in done.stdout
+    assert "importing" in done.stderr
+    shown = tables("inspect", "recordings/one.h5").stdout
+    assert "pad on import; session one; clock host" in shown
+    assert "taxels (sensor): 50 rows, 100 Hz" in shown
+    assert "(verified)" in shown
+    about = json.loads(tables("inspect", "recordings/one.h5", "recordings/two.h5", "--format", "json").stdout)
+    assert [one["meta"]["name"] for one in about] == ["one", "two"]
+    assert {finding["check"] for finding in about[0]["findings"]} == {"stuck", "missing"}
+    assert about[0]["content_sha256"] != about[1]["content_sha256"]
+
+
+def test_a_wrong_table_is_one_clear_screen(tables):
+    with (tables.folder / "two.csv").open("a") as file:
+        file.write("0.6,x,1,2\n")
+    done = tables("import", "mapping.yaml", code=2)
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+    assert "two.csv:52: column 'a': 'x' is not a number" in done.stderr
+    assert not list((tables.folder / "recordings").rglob("*"))[1:]
+
+
+def test_a_damaged_recording(tables):
+    tables("import", "mapping.yaml", "--out", "recordings")
+    path = tables.folder / "recordings" / "one.h5"
+    path.write_bytes(path.read_bytes()[:5000])
+    done = tables("inspect", "recordings/one.h5", code=2)
+    assert done.stdout == ""
+    assert done.stderr.startswith("Error: ")
+    assert "cut short" in done.stderr
+
+
+def test_record_then_inspect(shell):
+    done = shell(
+        "record", "--sensor", "icub", "--cap-mm", "10", "--force-n", "2", "--seconds", "3", "--out", "press.h5"
+    )
+    assert "icub on twin (SIM), cap R 10 mm" in done.stdout
+    (about,) = json.loads(shell("inspect", "press.h5", "--format", "json").stdout)
+    assert about["meta"]["simulated"]
+    assert about["meta"]["labels"] == {"cap_radius_mm": 10.0}
+    assert about["meta"]["scene"]["profile"]["end"]["value"] == 2.0
+    assert {stream["of"] for stream in about["streams"]} == {"sensor", "reference"}
+    assert "exists already" in shell("record", "--sensor", "icub", "--out", "press.h5", code=2).stderr
+
+
+def test_a_rig_that_cannot_record(shell):
+    done = shell("record", "--sensor", "icub", "--rig", "replay", "--out", "press.h5", code=2)
+    assert "cannot record" in done.stderr
+    assert not (shell.folder / "press.h5").exists()
+
+
+def test_what_a_crash_left_behind(tables):
+    tables("import", "mapping.yaml", "--out", "recordings")
+    done = tables("inspect", "recordings/one.h5", "--salvage", code=2)
+    assert "without `--salvage`" in done.stderr
+    script = (
+        "import os, sys, numpy as np\n"
+        "from pathlib import Path\n"
+        "from tactbench.core.recording.reader import read_meta\n"
+        "from tactbench.core.recording.writer import RecordingWriter\n"
+        "from tactbench.core.samples import Block\n"
+        "with RecordingWriter(Path('new.h5'), read_meta(Path('recordings/one.h5'))) as writer:\n"
+        "    writer.append(Block('taxels', np.arange(9), np.ones((9, 2))))\n"
+        "    os.kill(os.getpid(), 9)\n"
+    )
+    subprocess.run([sys.executable, "-c", script], cwd=tables.folder, check=False)
+    assert "9 rows" in tables("inspect", "new.h5.partial", "--salvage").stdout
+    assert "broke off" in tables("inspect", "new.h5.partial", "--rescue", "new.h5").stdout
+    assert (tables.folder / "new.h5").exists()

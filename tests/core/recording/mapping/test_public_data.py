@@ -1,0 +1,157 @@
+"""The ready mappings, on the whole of the three public data sets they are made for.
+
+Expected figures are those of the data sets' own description, counted on the files independently of tactbench.
+"""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactbench.core.recording.mapping import import_tables
+from tactbench.core.recording.reader import open_recording
+from tactbench.core.samples import Quality
+
+MAPPINGS = Path(__file__).resolve().parents[4] / "examples" / "mappings"
+FOLDERS = {"eflesh": "eflesh", "biotacsp": "biotacsp-stability-v2", "icub": "icub-grasp"}
+
+
+@pytest.fixture(scope="module")
+def imported(shared_data, tmp_path_factory):
+    """Imports by name of the mapping, each only once."""
+    done = {}
+
+    def go(name):
+        if name not in done:
+            root = shared_data / FOLDERS[name.split("-")[0]]
+            done[name] = import_tables(MAPPINGS / f"{name}.yaml", root=root, out=tmp_path_factory.mktemp(name))
+        return done[name]
+
+    return go
+
+
+def opened(report):
+    for one in report.recordings:
+        with open_recording(one.path) as recording:
+            yield recording
+
+
+@pytest.mark.parametrize("name", ["eflesh-normal", "eflesh-normal-raw"])
+def test_eflesh_normal(imported, name):
+    report = imported(name)
+    assert [one.missing for one in report.recordings] == [{"fz": 1740}, {"fz": 1740}]
+    largest = []
+    for recording in opened(report):
+        taxels, force = recording.read("magnetometers"), recording.read("load_cell")
+        assert taxels.data.shape == (3600, 15)
+        assert np.array_equal(np.bincount(taxels.annotations["press"]), np.full(10, 360))
+        there = (force.quality[:, 0] & Quality.MISSING) == 0
+        assert np.array_equal(there, ~np.isnan(force.data[:, 0]))
+        assert force.data[there].min() == 0
+        largest.append(force.data[there].max())
+        steps = np.diff(taxels.t_ns) * 1e-9
+        assert (steps > 0).all()
+        assert np.median(steps) == pytest.approx(0.073, abs=0.0005)  # the description gives three decimals
+        assert len(steps) / steps.sum() == pytest.approx(9.5, abs=0.05)  # and here one
+        # A row's two clocks differ by less than 5 ms.
+        assert np.abs(taxels.t_ns - force.t_ns).max() < 5e6
+        assert recording.meta.clock == "host"
+    assert largest[0] == pytest.approx(34.154, abs=0.0005)
+    assert [one.name for one in report.recordings] == ["normal-20250401_014340", "normal-20250401_015037"]
+    with open_recording(report.recordings[0].path) as recording:
+        remarks = "\n".join(recording.meta.remarks)
+    assert ("knowledge of where each press begins" in remarks) == (name == "eflesh-normal")
+    findings = {finding.check: finding.message for finding in report.recordings[0].findings}
+    assert "median step 0.073" in findings["irregular"]
+    assert "mean rate 9.47 Hz" in findings["irregular"]
+
+
+def test_eflesh_raw_and_baselined_differ_by_a_constant_in_each_press(imported):
+    """The authors' baseline changes at press boundaries and nowhere else: rows and presses are where they belong."""
+    with open_recording(imported("eflesh-normal-raw").recordings[0].path) as recording:
+        raw = recording.read("magnetometers")
+    with open_recording(imported("eflesh-normal").recordings[0].path) as recording:
+        less = recording.read("magnetometers")
+    baseline = raw.data - less.data
+    for press in range(10):
+        inside = baseline[less.annotations["press"] == press]
+        # The tables hold float32 texts of some 1e4: their rounding is a few 1e-3.
+        assert np.ptp(inside, axis=0).max() < 0.01
+    assert np.abs(np.diff(baseline[::360], axis=0)).max() > 1
+
+
+def test_eflesh_shear(imported):
+    report = imported("eflesh-shear")
+    (one,) = report.recordings
+    assert (one.rows, one.missing) == (7200, {"fz": 3475})
+    with open_recording(one.path) as recording:
+        assert recording.read("magnetometers").data.shape == (7200, 30)
+        assert np.nanmax(recording.read("load_cell").data) == pytest.approx(17.9, abs=0.05)
+        probe = recording.read("probe").data
+    assert np.ptp(probe, axis=0)[:2].max() < 1e-6  # metres: x and y stand still
+    assert probe[:, 2].max() == pytest.approx(0.494, abs=1e-4)
+
+
+def test_eflesh_slip(imported, shared_data):
+    report = imported("eflesh-slip")
+    with np.load(shared_data / "eflesh" / "slip_detection" / "slip_sequences.npz", allow_pickle=False) as archive:
+        X, y = archive["X"], archive["y"]
+    labels = []
+    for index, recording in enumerate(opened(report)):
+        labels.append(recording.meta.labels["slip"])
+        if index % 20 == 0:
+            assert np.array_equal(recording.read("magnetometers").data, X[index])
+        assert recording.meta.clock == "none"
+    assert labels == ["slipped" if one else "stable" for one in y]
+    assert Counter(labels) == {"slipped": 103, "stable": 34}
+
+
+def test_biotacsp_stability(imported):
+    report = imported("biotacsp-stability")
+    assert report.rows == 5193
+    rows, objects = {}, {}
+    for recording in opened(report):
+        data, meta = recording.read("electrodes"), recording.meta
+        slipped = Counter(data.annotations["slipped"].tolist())
+        rows[meta.session] = (meta.role, slipped["stable"], slipped["slipped"])
+        objects[meta.session] = set(data.annotations["object"].tolist())
+        assert data.t_ns is None
+        assert data.data.shape[1] == 72
+    assert rows == {
+        "palm_down": ("train", 667, 609),
+        "palm_side": ("train", 603, 670),
+        "palm_45": ("train", 1058, 1075),
+        "palm_45_test": ("test", 250, 261),
+    }
+    assert len(objects["palm_down"]) == 41
+    assert objects["palm_down"] == objects["palm_side"] == objects["palm_45"]
+    assert len(objects["palm_45_test"]) == 10
+    assert not objects["palm_45_test"] & objects["palm_45"]
+
+
+def test_icub_grasp(imported):
+    report = imported("icub-grasp")
+    assert report.files_read == 230
+    assert list(report.excluded.values()) == [27]
+    trials, slices, lowest, highest, peaks, stated = Counter(), 0, 255, 0, [], []
+    for recording in opened(report):
+        taxels = recording.read("taxels")
+        trials[recording.meta.labels["object"]] += 1
+        assert bool(recording.meta.excluded) == (recording.meta.labels["object"] == "full_coke")
+        slices += len(taxels.data)
+        lowest, highest = min(lowest, taxels.data.min()), max(highest, taxels.data.max())
+        assert taxels.data.shape[1] == 60
+        peaks.append((255 - taxels.data.astype(int)).reshape(-1, 5, 12).max(axis=2))
+        stated.append(recording.read("finger_peaks").data)
+    assert slices == 2883
+    assert (lowest, highest) == (142, 255)
+    assert trials == Counter(dict.fromkeys(trials, 20) | {"full_coke": 27, "empty_coke": 21, "none": 22})
+    assert sum(trials.values()) - trials["full_coke"] == 203
+    # The files' own summary of a finger is the largest of 255 minus its readings, read a moment apart: it agrees within
+    # 1 count in more than 90 % of the slices with its own finger, and in at most 55 % with another. So the columns are
+    # where they belong.
+    near = np.abs(np.concatenate(stated)[:, :, None] - np.concatenate(peaks)[:, None, :]) <= 1
+    agree = near.mean(axis=0)
+    assert (np.diag(agree) > 0.9).all()
+    assert agree[~np.eye(5, dtype=bool)].max() < 0.55
