@@ -48,7 +48,7 @@ class BioTacTransducer:
     """Readings in counts, before noise, rounding and clipping.
 
     Each call begins with the potentials of the calls before, which saves a third of the steps if loads come in order.
-    Its answer depends on them by no more than the solver's tolerance, 0.02 counts; the same calls in the same order
+    Its answer depends on them by no more than the solver's tolerance, 0.12 counts; the same calls in the same order
     give the same bits.
     """
 

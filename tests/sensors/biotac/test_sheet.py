@@ -111,8 +111,8 @@ def test_the_iteration_agrees_with_a_direct_solution(seed):
     direct = sheet.solve_directly(film)
     cold, warm = sheet.solve(film), sheet.solve(film, [sheet.solve(1.1 * film).unknowns])
     for answer in (cold, warm):
-        # The promise of TOLERANCE: 0.02 of 4095 counts.
-        assert 4095 * np.abs(answer.electrodes - direct[sheet.cells :]).max() < 0.02
+        # The promise of TOLERANCE: 0.12 of 4095 counts.
+        assert 4095 * np.abs(answer.electrodes - direct[sheet.cells :]).max() < 0.12
 
 
 @given(seed=st.integers(0, 10_000))
