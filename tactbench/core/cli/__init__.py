@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import sys
 from typing import Any
@@ -65,6 +66,9 @@ def cli() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 every cell done, 1 some cell failed, 2 usage, 130 interrupted."""
+    # A short-lived process that imports thousands of objects to keep: looking through them for garbage every 700 new
+    # ones takes a sixth of the time of an import.
+    gc.set_threshold(100_000, 50, 100)
     sys.exit(_exit_code(arguments))
 
 
