@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.numbers import duration, interval, score, whole
 
 Row = Mapping[str, Any]
@@ -100,7 +101,7 @@ def _lines(members: Sequence[Row]) -> Iterable[Line]:
     for row in results:
         yield Line(_cells(row, str(ranked[row["cell"]])), "result")
     for row in baselines:
-        yield Line(_cells(row, ""), "baseline")
+        yield Line(_cells(row, "base"), "baseline")
     for row in members:
         if row["status"] != "done":
             yield Line(_empty(row), "failed")
@@ -135,8 +136,7 @@ def _empty(row: Row) -> tuple[str, ...]:
 
 def _estimator(row: Row) -> str:
     options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
-    name = f"{row['estimator']} ({options})" if options else row["estimator"]
-    return f"{name} (baseline)" if row["is_baseline"] else str(name)
+    return f"{row['estimator']} ({options})" if options else str(row["estimator"])
 
 
 def _seconds(milliseconds: float | None) -> float | None:
@@ -163,14 +163,11 @@ def _notes(rows: Sequence[Row]) -> list[str]:
         for row in rows
         if _no_better(row)
     ]
-    notes += _distinct(
-        f"{row['sensor']}/{row['task']}: {what}: {count}."
-        for row in rows
-        for what, count in sorted(row["counts"].items())
-        if count
-    )
+    notes += _distinct(f"{row['sensor']}/{row['task']}: {told}." for row in rows for told in told_counts(row["counts"]))
     notes += _distinct(f"{row['sensor']}: {remark}" for row in rows for remark in row["remarks"])
-    notes += _distinct(f"{row['task']}: interval by {row['ci_method']}." for row in rows if row["ci_method"])
+    notes += _distinct(
+        f"{row['task']}: interval by {row['ci_method']}." for row in rows if row["ci_method"] and not row["is_baseline"]
+    )
     notes += [f"{_who(row)} {row['status']}: {row['reason']}" for row in rows if row["status"] != "done"]
     return notes
 

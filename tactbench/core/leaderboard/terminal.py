@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.leaderboard.table import NUMERIC, build_table
+from tactbench.core.leaderboard.table import NUMERIC, Block, build_table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 _STYLE = {"result": "bold", "baseline": "dim", "failed": "red"}
+_FIRST_TO_GO = ("batch/row", "p95", "sessions", "n test", "sim", "baseline", "fit", "published", "latency p50")
+"""Columns that a narrow terminal does without, in this order; the files have them all."""
+_AROUND_A_CELL = 3
 
 
 def show(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
@@ -21,17 +24,37 @@ def show(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
     from rich.text import Text
 
     table = build_table(rows)
+    left_out: set[str] = set()
     for block in table.blocks:
         grid = RichTable(title=Text(block.title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
-        # A column nobody fills only takes room from the others.
-        filled = [
-            place for place in range(len(table.columns)) if any(line.cells[place].strip("–") for line in block.lines)
-        ]
-        for place in filled:
+        places, gone = _fitting(table.columns, block, console.width)
+        left_out |= gone
+        for place in places:
             name = table.columns[place]
-            grid.add_column(Text(name), justify="right" if name in NUMERIC else "left", overflow="fold")
+            grid.add_column(Text(name), justify="right" if name in NUMERIC else "left", no_wrap=True)
         for line in block.lines:
-            grid.add_row(*(Text(line.cells[place]) for place in filled), style=_STYLE[line.kind])
+            grid.add_row(*(Text(line.cells[place]) for place in places), style=_STYLE[line.kind])
         console.print(grid)
-    for note in table.notes:
+    notes = list(table.notes)
+    if left_out:
+        names = ", ".join(name for name in table.columns if name in left_out)
+        notes.append(f"This terminal is too narrow for: {names}. They are in the files.")
+    for note in notes:
         console.print(Padding(Text(note, style="dim"), (0, 0, 0, 1)))
+
+
+def _fitting(columns: Sequence[str], block: Block, width: int) -> tuple[list[int], set[str]]:
+    """Return the columns to show, and the names of those that there is no room for; empty columns are never shown."""
+    widths = {
+        place: max(len(columns[place]), *(len(line.cells[place]) for line in block.lines)) + _AROUND_A_CELL
+        for place in range(len(columns))
+        if any(line.cells[place].strip("–") for line in block.lines)
+    }
+    gone: set[str] = set()
+    for name in _FIRST_TO_GO:
+        if sum(widths.values()) + _AROUND_A_CELL <= width:
+            break
+        place = columns.index(name)
+        if widths.pop(place, None) is not None:
+            gone.add(name)
+    return list(widths), gone

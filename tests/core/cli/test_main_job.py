@@ -63,7 +63,7 @@ def test_the_files_of_a_run(ran):
     assert json.loads((out / "leaderboard.json").read_text()) == rows
     with (out / "leaderboard.csv").open() as file:
         assert len(list(csv.DictReader(file))) == len(rows)
-    assert "time-index (baseline)" in (out / "leaderboard.md").read_text()
+    assert "| base | icub SIM | time-index |" in (out / "leaderboard.md").read_text()
     assert json.loads((out / "run.json").read_text())["distributions"]["numpy"]
     assert not list(out.rglob("*.partial"))
 

@@ -5,6 +5,7 @@ import json
 import pytest
 from rich.console import Console
 
+from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.formats import JSON_KEYS, to_csv, to_json, to_latex, to_markdown
 from tactbench.core.leaderboard.numbers import duration, score
 from tactbench.core.leaderboard.table import build_table
@@ -17,7 +18,7 @@ def test_lower_is_better_is_ranked_upwards_and_baselines_have_no_rank():
     table = build_table([row("a", score=0.7), row("b", score=0.5), row("a", "mean", score=1.4)])
     (block,) = table.blocks
     assert [(line.cells[0], line.cells[1], line.kind) for line in block.lines] == [
-        ("1", "b SIM", "result"), ("2", "a SIM", "result"), ("", "a SIM", "baseline"),
+        ("1", "b SIM", "result"), ("2", "a SIM", "result"), ("base", "a SIM", "baseline"),
     ]  # fmt: skip
 
 
@@ -90,3 +91,27 @@ def test_durations_have_three_digits_and_a_unit(seconds, text):
 
 def test_scores_with_a_unit_have_four_decimals():
     assert (score(0.68754, "N"), score(0.60488, "1"), score(None, "1")) == ("0.6875", "0.605", "–")
+
+
+def test_a_narrow_terminal_drops_columns_and_says_so_and_never_breaks_a_word():
+    out = io.StringIO()
+    show([row("a-sensor-of-some-name", sim_s=1.0)], Console(file=out, width=80))
+    lines = out.getvalue().splitlines()
+    (line,) = [line for line in lines if "a-sensor-of-some-name SIM" in line]
+    assert "0.5000" in line
+    assert any("too narrow for" in line and "batch/row" in line for line in lines)
+    assert max(len(line.rstrip()) for line in lines) <= 80
+    wide = io.StringIO()
+    show([row("a-sensor-of-some-name", sim_s=1.0)], Console(file=wide, width=200))
+    assert "too narrow" not in wide.getvalue()
+
+
+def test_counts_are_summed_over_sets_and_the_busiest_channels_come_first():
+    counts = {
+        f"{one} rows with T{place} beyond three sigma": place for one in ("training", "test") for place in range(7)
+    }
+    counts |= {f"{one} rows before the press begins": 600 for one in ("training", "test")}
+    assert told_counts(counts) == [
+        "rows before the press begins: 1200",
+        "rows beyond three sigma in T6 12, T5 10, T4 8, T3 6 and 3 more channels",
+    ]
