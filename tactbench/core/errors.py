@@ -12,6 +12,7 @@
     ├── RecordingError                a recording cannot be read or written
     │   ├── FormatError               (also ValueError) not a recording, or a damaged one
     │   ├── MissingRecordingError     (also FileNotFoundError)
+    │   ├── UnwritableError           the place for it refuses: exit code 2
     │   └── MappingError              (also ValueError) a foreign table does not fit its mapping: exit code 2
     ├── RigError                      a rig cannot carry out a scene
     └── DataError                     (also ValueError) recordings cannot become X and y
@@ -124,6 +125,12 @@ class FormatError(RecordingError, ValueError):
 
 class MissingRecordingError(RecordingError, FileNotFoundError):
     """There is no such recording."""
+
+    exit_code = 2
+
+
+class UnwritableError(RecordingError):
+    """The folder or disk that a recording shall go to refuses it."""
 
     exit_code = 2
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from tactbench.core.errors import RecordingError, RigError
+from tactbench.core.errors import RecordingError, RigError, UnwritableError
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.partial import Columns, Partial, read_partial
@@ -246,10 +246,10 @@ def missing_marked(data: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
     return np.where(np.isnan(data), Quality.MISSING, Quality.GOOD).astype(np.uint8)
 
 
-def cannot_write(path: Path, error: OSError) -> RecordingError:
+def cannot_write(path: Path, error: OSError) -> UnwritableError:
     """Return the error to raise when the disk refuses."""
     reason = error.strerror or error
-    return RecordingError(
+    return UnwritableError(
         f"The recording {path} cannot be written: {reason}.",
         hint="Check the folder's permissions and the free space, or give another with --out.",
     )

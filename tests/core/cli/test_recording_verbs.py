@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -108,3 +109,11 @@ def test_what_a_crash_left_behind(tables):
     assert "9 rows" in tables("inspect", "new.h5.partial", "--salvage").stdout
     assert "broke off" in tables("inspect", "new.h5.partial", "--rescue", "new.h5").stdout
     assert (tables.folder / "new.h5").exists()
+
+
+def test_a_folder_that_refuses_recordings_is_a_usage_error(shell, shared_data):
+    (shell.folder / "taken").write_text("a file, not a folder")
+    mapping = Path(__file__).parents[3] / "examples" / "mappings" / "eflesh-normal.yaml"
+    done = shell("import", str(mapping), "--root", str(shared_data / "eflesh"), "--out", "taken/there", code=2)
+    assert "--out" in done.stderr
+    assert "Traceback" not in done.stderr

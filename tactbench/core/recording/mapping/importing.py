@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast, get_args
 
-from tactbench.core.errors import MappingError, RecordingError
+from tactbench.core.errors import MappingError, RecordingError, UnwritableError
 from tactbench.core.recording.health import Finding, examine
 from tactbench.core.recording.mapping.channels import MappedStream, fill, sensor_of
 from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
@@ -104,7 +104,7 @@ def import_tables(
         If the mapping file is wrong; the message names its line.
     MappingError
         If a table does not fit the mapping; the message names file, line and column where there are any.
-    RecordingError
+    UnwritableError
         If `out` cannot be written.
     """
     wanted = load_yaml(mapping, Mapping)
@@ -132,7 +132,7 @@ def _aside(out: Path) -> Path:
         out.mkdir(parents=True, exist_ok=True)
         return Path(tempfile.mkdtemp(prefix=".importing-", dir=out))
     except OSError as error:
-        raise RecordingError(
+        raise UnwritableError(
             f"The folder {out} cannot be written: {error.strerror}.", hint="Give another with --out DIR."
         ) from error
 
@@ -266,7 +266,7 @@ def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Import
         for path, target in to_move:
             path.replace(target)
     except OSError as error:
-        raise RecordingError(f"{out} cannot be written: {error.strerror}.", hint="Give another with --out.") from error
+        raise UnwritableError(f"{out} cannot be written: {error.strerror}.", hint="Give another with --out.") from error
     return [Imported(out / one.path.name, one.name, one.rows, one.missing, one.excluded, one.origin, one.findings)
             for one in made]  # fmt: skip
 
