@@ -15,7 +15,8 @@ from tactbench.core.matrix.progress import Progress
 if TYPE_CHECKING:
     from rich.console import Console
 
-WIDTH_WITHOUT_TERMINAL = 160
+WIDTH_WITHOUT_TERMINAL = 240
+"""Wide enough for every column: a file or a pipe has no edge."""
 
 
 def console() -> Console:
