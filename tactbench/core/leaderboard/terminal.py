@@ -40,7 +40,7 @@ def show(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
         names = ", ".join(name for name in table.columns if name in left_out)
         notes.append(f"This terminal is too narrow for: {names}. They are in the files.")
     for note in notes:
-        console.print(Padding(Text(note, style="dim"), (0, 0, 0, 1)))
+        console.print(Padding(Text(note, style="dim"), (0, 0, 0, 1), expand=False))
 
 
 def _fitting(columns: Sequence[str], block: Block, width: int) -> tuple[list[int], set[str]]:
