@@ -86,7 +86,7 @@ def _md(text: str) -> str:
 _TEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
     "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "†": r"$\dagger$", "‡": r"$\ddagger$", "–": "--",
-    "…": r"\ldots{}", "·": r"$\cdot$", "µ": r"$\mu$", "²": r"$^2$", "\n": " ", " ": r"\,",
+    "…": r"\ldots{}", "·": r"$\cdot$", "µ": r"$\mu$", "²": r"$^2$", "\n": " ", "\u202f": r"\,",
 }  # fmt: skip
 
 

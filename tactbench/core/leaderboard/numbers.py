@@ -27,7 +27,7 @@ def duration(seconds: float | None) -> str:
 
 def whole(value: int | None) -> str:
     """Return a count with thin groups of three."""
-    return "–" if value is None else f"{value:,}".replace(",", " ")
+    return "–" if value is None else f"{value:,}".replace(",", "\u202f")
 
 
 def _three(value: float) -> str:

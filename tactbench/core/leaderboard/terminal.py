@@ -26,7 +26,8 @@ def show(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
     table = build_table(rows)
     left_out: set[str] = set()
     for block in table.blocks:
-        grid = RichTable(title=Text(block.title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+        console.print(Text(block.title, style="bold"))  # not the grid's own title: that is folded to the grid's width
+        grid = RichTable(box=box.SIMPLE_HEAD)
         places, gone = _fitting(table.columns, block, console.width)
         left_out |= gone
         for place in places:

@@ -116,3 +116,9 @@ def test_counts_are_summed_over_sets_and_the_busiest_channels_come_first():
         "rows before the press begins: 1200",
         "rows beyond three sigma in T6 12, T5 10, T4 8, T3 6 and 3 more channels",
     ]
+
+
+def test_latex_keeps_ordinary_spaces_and_sets_thin_ones_in_numbers():
+    text = to_latex([row(n_test=4400)])
+    assert r"4\,400" in text
+    assert "lower is better" in text
