@@ -50,7 +50,7 @@ class _Lines:
     def __init__(self) -> None:
         self._stage, self._total, self._done = "", 0, 0
 
-    def begin(self, stage: str, total: int) -> None:
+    def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
         self._stage, self._total, self._done = stage, total, 0
         remark(f"{stage}: {total} to do")
 
@@ -63,35 +63,47 @@ class _Lines:
         pass
 
 
+class _Bar:
+    """A bar a stage; its clock ticks by a thread where a thread is allowed, else with each step."""
+
+    def __init__(self) -> None:
+        self._shown: Any = None
+        self._task: Any = None
+
+    def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import Progress as RichProgress
+
+        self.end()
+        columns = (
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[now]}", markup=False),
+        )
+        self._shown = RichProgress(*columns, console=Console(stderr=True), auto_refresh=alone)
+        self._task = self._shown.add_task(f"{stage:<10}", total=total, now="")
+        self._shown.start()
+
+    def advance(self, what: str) -> None:
+        self._shown.update(self._task, advance=1, now=what, refresh=True)
+
+    def working(self, what: str) -> None:
+        self._shown.update(self._task, now=what, refresh=True)
+
+    def end(self) -> None:
+        if self._shown is not None:
+            self._shown.stop()
+            self._shown = None
+
+
 @contextmanager
 def _bar() -> Iterator[Progress]:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-    from rich.progress import Progress as RichProgress
-    from rich.text import Text
-
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[now]}", markup=False),
-    )
-    with RichProgress(*columns, console=Console(stderr=True), transient=False) as shown:
-
-        class Bar:
-            """A bar a stage."""
-
-            task: Any = None
-
-            def begin(self, stage: str, total: int) -> None:
-                self.task = shown.add_task(f"{stage:<10}", total=total, now="")
-
-            def advance(self, what: str) -> None:
-                shown.update(self.task, advance=1, now=Text(what).plain)
-
-            def working(self, what: str) -> None:
-                shown.update(self.task, now=Text(what).plain)
-
-        yield Bar()
+    bar = _Bar()
+    try:
+        yield bar
+    finally:
+        bar.end()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
@@ -61,7 +62,8 @@ class Processes:
         self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
     ) -> Iterator[tuple[T, R | BaseException]]:
         """Yield every item with its result or its exception, in the order in which they end."""
-        futures: dict[Future[R], T] = {self._pool.submit(work, item): item for item in items}
+        with _interrupts_held_back():
+            futures: dict[Future[R], T] = {self._pool.submit(work, item): item for item in items}
         if meanwhile is not None:
             meanwhile()
         for future in as_completed(futures):
@@ -75,9 +77,7 @@ def workers(jobs: int) -> Iterator[Workers]:
     if jobs == 1:
         yield InProcess()
         return
-    pool = ProcessPoolExecutor(
-        jobs, mp_context=get_context(_start_method()), initializer=_leave_interrupts_to_the_parent
-    )
+    pool = ProcessPoolExecutor(jobs, mp_context=get_context(_start_method()))
     try:
         yield Processes(pool)
     except BaseException:
@@ -101,8 +101,20 @@ def _start_method() -> str:
     return "fork" if threads == 1 else "spawn"
 
 
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Start processes that ignore Ctrl-C from their first instruction on: it is the parent that ends them.
+
+    A terminal sends the interrupt to all of them at once; one that is still starting would print where it was.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @lru_cache(maxsize=1)

@@ -134,9 +134,9 @@ def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progre
     troubles: dict[Path, BaseException] = {}
     if not missing:
         return troubles
-    told.begin("recording", len(missing))
     simulated = all(installed().rigs[order.rig].simulated for order in missing)
     hands = max(jobs, os.cpu_count() or 1) if simulated else 1
+    told.begin("recording", len(missing), alone=hands == 1)
 
     def note(order: Order, outcome: str | BaseException) -> None:
         if isinstance(outcome, BaseException):
@@ -199,7 +199,7 @@ def _evaluate(
         else:
             waiting.append((cell, tuple(paths), trouble))
     if waiting:
-        told.begin("evaluating", len(waiting))
+        told.begin("evaluating", len(waiting), alone=jobs == 1)
         work: Callable[[Job], Any] = solve if jobs > 1 else (lambda job: solve(job, told.working))
         for (cell, _, trouble), outcome in crew.each(work, waiting):
             row, arrays = outcome if not isinstance(outcome, BaseException) else solve((cell, (), outcome))

@@ -1,0 +1,74 @@
+"""A real terminal: the bar moves, Ctrl-C reaches every process at once, and nobody prints where it was."""
+
+import fcntl
+import os
+import pty
+import select
+import subprocess
+import sys
+import termios
+import time
+
+import pytest
+
+COMMAND = [
+    *(sys.executable, "-m", "tactbench", "run", "--sensor", "icub", "--task", "curvature"),
+    *("--estimator", "logistic", "--estimator", "forest"),
+]
+
+
+def started(folder):
+    """Start the command as the foreground job of a new terminal; return the process and our end of the terminal."""
+    ours, theirs = pty.openpty()
+
+    def own_terminal():
+        os.setsid()
+        fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+    env = {**os.environ, "COLUMNS": "140", "LINES": "40", "TERM": "xterm-256color", "PYTHONPATH": ""}
+    process = subprocess.Popen(COMMAND, cwd=folder, env=env, stdin=theirs, stdout=theirs, stderr=theirs,
+                               preexec_fn=own_terminal)  # fmt: skip
+    os.close(theirs)
+    return process, ours
+
+
+def read_until(ours, text, seconds):
+    """Return what came up to `text`, or all if it does not come in time."""
+    seen, until = "", time.monotonic() + seconds
+    while text not in seen and time.monotonic() < until:
+        if not select.select([ours], [], [], 0.5)[0]:
+            continue
+        try:
+            piece = os.read(ours, 65536)
+        except OSError:  # the other side has closed
+            break
+        if not piece:
+            break
+        seen += piece.decode(errors="replace")
+    return seen
+
+
+@pytest.mark.parametrize("at", [" 0/15", " 1/15", " 4/15", "evaluating"])
+def test_ctrl_c_ends_it_with_one_sentence(tmp_path, at):
+    process, ours = started(tmp_path)
+    seen = read_until(ours, at, 60)
+    assert at in seen
+    os.write(ours, b"\x03")
+    seen += read_until(ours, "goes on from there", 60)
+    assert process.wait(60) == 130
+    seen += read_until(ours, "\0", 1)
+    os.close(ours)
+    assert "goes on from there" in seen
+    assert "Traceback" not in seen
+    assert "KeyboardInterrupt" not in seen
+    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".partial", ".completing")]
+
+
+def test_the_bar_shows_both_stages_and_the_table_comes_last(tmp_path):
+    process, ours = started(tmp_path)
+    seen = read_until(ours, "Try next:", 120)
+    seen += read_until(ours, "\0", 2)
+    assert process.wait(60) == 0
+    os.close(ours)
+    assert "15/15" in seen
+    assert seen.index("recording") < seen.index("evaluating") < seen.index("macro F1")
