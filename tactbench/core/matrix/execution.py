@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
@@ -103,18 +102,19 @@ def _start_method() -> str:
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Start processes that ignore Ctrl-C from their first instruction on: it is the parent that ends them.
+    """Start processes that are deaf to Ctrl-C from their first instruction on: it is the parent that ends them.
 
-    A terminal sends the interrupt to all of them at once; one that is still starting would print where it was.
+    A terminal sends the interrupt to all of them at once, and one that is still starting would print where it was. The
+    signal is blocked, which children inherit; one that comes meanwhile waits here and is delivered afterwards.
     """
-    if threading.current_thread() is not threading.main_thread():
+    if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @lru_cache(maxsize=1)
