@@ -116,32 +116,44 @@ def test_a_strangers_sensor_runs(shell):
     assert lasso["score"] < lasso["baseline"]
 
 
-@pytest.mark.parametrize("stage", ["recording", "evaluating"])
-def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path, stage):
-    command = [sys.executable, "-m", "tactbench", "run", "--sensor", "icub", "--task", "curvature", "--estimator",
-               "logistic", "--estimator", "forest"]  # fmt: skip
+CURVATURE = [
+    *(sys.executable, "-m", "tactbench", "run", "--sensor", "icub", "--task", "curvature"),
+    *("--estimator", "logistic", "--estimator", "forest"),
+]
+
+
+def interrupted(folder, stage):
+    """Interrupt a run once one step of `stage` is done and the next is under way; return its code and its streams."""
+    folder.mkdir()
     env = {**os.environ, "PYTHONPATH": ""}
-    running = subprocess.Popen(
-        command, cwd=tmp_path, env=env, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    seen = ""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    running = subprocess.Popen(CURVATURE, cwd=folder, env=env, **pipes)
     for line in running.stderr:
-        seen += line
         if line.startswith(f"{stage}: ") and "/" in line.partition(": ")[2].split()[0]:
-            break  # one step of the stage is done, the next is under way
+            break
     running.send_signal(signal.SIGINT)
     out, err = running.communicate(timeout=60)
-    assert running.returncode == 130, seen + err
+    return running.returncode, out, err
+
+
+@pytest.mark.parametrize("stage", ["recording", "evaluating"])
+def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path, stage):
+    for attempt in range(3):  # Python drops an interrupt that comes while it is inside a destructor: rare
+        folder = tmp_path / str(attempt)
+        code, out, err = interrupted(folder, stage)
+        if code == 130:
+            break
+    assert code == 130, err
     assert "goes on from there" in err
     assert "Traceback" not in err
     assert out == ""
-    results = tmp_path / "tactbench-results"
+    results = folder / "tactbench-results"
     assert not list(results.rglob("*.partial"))
     finished = {path.name: path.read_bytes() for path in results.rglob("*.h5")}
     assert finished
     began = time.monotonic()
-    done = subprocess.run([*command[:-2], "--format", "json"], cwd=tmp_path, env=env, capture_output=True, text=True,
-                          timeout=120, check=False)  # fmt: skip
+    done = subprocess.run([*CURVATURE[:-2], "--format", "json"], cwd=folder, env={**os.environ, "PYTHONPATH": ""},
+                          capture_output=True, text=True, timeout=120, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert time.monotonic() - began < 100
     for name, content in finished.items():
