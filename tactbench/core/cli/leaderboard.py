@@ -7,17 +7,15 @@ from pathlib import Path
 
 import click
 
-FORMATS = ("table", "json", "md", "latex", "csv")
+from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
 
 
 @click.command(name="leaderboard")
 @click.argument("folder", type=click.Path(path_type=Path), default=Path("tactbench-results"), required=False)
-@click.option("--format", "shape", type=click.Choice(FORMATS), default="table", show_default=True)
+@click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True)
 def command(folder: Path, shape: str) -> None:
     """Show the last run's table again, in any format. FOLDER is what `run --out` wrote."""
-    from tactbench.core.cli.screen import console
     from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.formats import FORMATS as TEXTS
     from tactbench.core.leaderboard.formats import JSON_KEYS
 
     path = folder / "leaderboard.json"
@@ -27,9 +25,4 @@ def command(folder: Path, shape: str) -> None:
         raise UsageError(f"{path} cannot be read: {error}.", hint="Make one with `tactbench run --out DIR`.") from error
     if not isinstance(rows, list) or not all(isinstance(row, dict) and set(JSON_KEYS) <= set(row) for row in rows):
         raise UsageError(f"{path} is not a leaderboard of this version.", hint="Run `tactbench run` again.")
-    if shape == "table":
-        from tactbench.core.leaderboard.terminal import show
-
-        show(rows, console())
-    else:
-        click.echo(TEXTS[shape](rows), nl=False)
+    print_rows(rows, shape)

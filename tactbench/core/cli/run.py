@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
+
 if TYPE_CHECKING:
     from tactbench.core.matrix.run import Outcome
     from tactbench.core.spec.matrix import MatrixSpec
-
-FORMATS = ("table", "json", "md", "latex", "csv")
 
 
 @click.command(name="run")
@@ -30,7 +30,7 @@ FORMATS = ("table", "json", "md", "latex", "csv")
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
-@click.option("--format", "shape", type=click.Choice(FORMATS), default="table", show_default=True,
+@click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
 @click.pass_context
 def command(ctx: click.Context, /, jobs: int, out: Path, shape: str, recordings: Path | None, **asked: Any) -> None:
@@ -48,7 +48,7 @@ def command(ctx: click.Context, /, jobs: int, out: Path, shape: str, recordings:
     store = Store(out)
     with progress() as told:
         outcome = run_matrix(matrix, store, jobs=jobs, recordings=folder, progress=told)
-    _print(outcome, shape)
+    print_rows(outcome.rows, shape)
     _farewell(outcome, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
 
@@ -107,18 +107,6 @@ def _matrix(
         over["estimators"] = tuple(EstimatorChoice(name=name) for name in dict.fromkeys(estimators))
     change["tasks"] = tuple(choice.model_copy(update=over) for choice in chosen)
     return matrix.model_copy(update=change)
-
-
-def _print(outcome: Outcome, shape: str) -> None:
-    from tactbench.core.cli.screen import console
-    from tactbench.core.leaderboard.formats import FORMATS as TEXTS
-
-    if shape == "table":
-        from tactbench.core.leaderboard.terminal import show
-
-        show(outcome.rows, console())
-    else:
-        click.echo(TEXTS[shape](outcome.rows), nl=False)
 
 
 def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:

@@ -16,7 +16,7 @@ from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
 from tactbench.core.recording.partial import Columns, Partial, read_partial
 from tactbench.core.recording.reader import Recording
-from tactbench.core.samples import Block, Quality
+from tactbench.core.samples import Block
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -239,11 +239,6 @@ def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
             hint="Round and clip in the rig, or declare a wider dtype in the sensor's spec.",
         )
     return data.astype(wanted)
-
-
-def missing_marked(data: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
-    """Return the quality of `data` in which NaN stands for a sample that is not there."""
-    return np.where(np.isnan(data), Quality.MISSING, Quality.GOOD).astype(np.uint8)
 
 
 def cannot_write(path: Path, error: OSError) -> UnwritableError:

@@ -148,10 +148,3 @@ class SensorSpec(Frozen):
         """Return the channels of the given kinds (all of them without arguments), in order of the streams."""
         every = (channel for stream in self.streams for channel in stream.channels)
         return tuple(channel for channel in every if not kinds or channel.kind in kinds)
-
-    def stream_of(self, channel: str) -> StreamSpec:
-        """Return the stream that carries `channel`; KeyError if there is none."""
-        for stream in self.streams:
-            if any(candidate.name == channel for candidate in stream.channels):
-                return stream
-        raise KeyError(channel)
