@@ -13,6 +13,7 @@ from tactbench.core.errors import (
     TactbenchError,
     UsageError,
 )
+from tactbench.core.plugins.checks import Check, Verdict
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import (
     Acquisition,
@@ -56,6 +57,7 @@ __all__ = [
     "ChannelKind",
     "ChannelSpec",
     "ChannelTarget",
+    "Check",
     "Creep",
     "DataError",
     "EffectDescriptor",
@@ -101,6 +103,7 @@ __all__ = [
     "Transducer",
     "TransducerFactory",
     "UsageError",
+    "Verdict",
     "assumed",
     "derived",
     "hookimpl",

@@ -49,6 +49,11 @@ class RigDescriptor(Frozen):
     """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a Shelf."""
     simulated: bool = False
     """Rows from this rig are marked SIM and never ranked against hardware."""
+    verification: str | None = Field(default=None, pattern=_WHERE)
+    """``module:callable``, called without arguments: the simulation against its oracles, a sequence of Check."""
+    likeness: str | None = Field(default=None, pattern=_WHERE)
+    """``module:callable``, called with (SensorDescriptor, folder of recordings or None): Checks of the simulated
+    sensor against what was measured on real ones, or of recordings against the same ranges."""
 
 
 class EstimatorDescriptor(Frozen):

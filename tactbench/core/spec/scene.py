@@ -33,6 +33,10 @@ class Placement(Frozen):
     """Offset along the arc [length]."""
     scatter: Quantity = assumed(0.1, "mm", "repeatability of exchanging a cap; no source states it")
     """Standard deviation of both offsets from recording to recording [length]."""
+    tilt_x: Quantity = assumed(0.0, "rad", "the indenter's axis is the press axis")
+    """Slope of the indenter along the finger [angle]; positive: it stands further off towards the tip."""
+    tilt_s: Quantity = assumed(0.0, "rad", "the indenter's axis is the press axis")
+    """Slope of the indenter across the finger [angle]."""
 
 
 class ForceRamp(Frozen):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -170,7 +171,8 @@ def _place(run: Synthesis) -> Contact:
     off_x, off_s = scatter * run.of_recording("placement").standard_normal(2)
     x, s = nominal_x + placement.x.to("mm") + off_x, nominal_s + placement.s.to("mm") + off_s
     run.drawn.update(placement_x_mm=float(x), placement_s_mm=float(s))
-    return Contact(run.contact.radius_mm, float(x), float(s))
+    tilt_x, tilt_s = (math.tan(tilt.to("rad")) for tilt in (placement.tilt_x, placement.tilt_s))
+    return Contact(run.contact.radius_mm, float(x), float(s), tilt_x, tilt_s)
 
 
 def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:

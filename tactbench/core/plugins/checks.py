@@ -1,0 +1,44 @@
+"""What a simulated rig lets people check: named checks that yield verdicts, each a number held against a range."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One number held against the range it must lie in."""
+
+    name: str
+    """Short, lower case, unique within its check: ``depth at 64 x 64``."""
+    found: float
+    low: float
+    """Lower end of the range, included; minus infinity where only the upper end counts."""
+    high: float
+    """Upper end of the range, included; infinity where only the lower end counts."""
+    unit: str = "1"
+    source: str = ""
+    """Where the range comes from: a formula, a measurement, a reason for the bound."""
+    note: str = ""
+    """For a miss: its cause, as far as it is known."""
+
+    @property
+    def met(self) -> bool:
+        """Whether the number lies in its range; not a number never does."""
+        return math.isfinite(self.found) and self.low <= self.found <= self.high
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that can be checked, not yet carried out."""
+
+    name: str
+    """Short and unique: ``hertz``."""
+    group: str
+    """What it belongs to: ``contact``, ``memory``, ``channels`` …"""
+    title: str
+    """One line: what is compared with what."""
+    run: Callable[[], Sequence[Verdict]]
+    """Carries it out; may take seconds."""
