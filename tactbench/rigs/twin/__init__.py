@@ -36,7 +36,12 @@ def tactbench_effects() -> list[EffectDescriptor]:
 
 
 def _effect(
-    name: str, title: str, where: str, consumes: tuple[str, ...], produces: tuple[str, ...]
+    name: str,
+    title: str,
+    where: str,
+    consumes: tuple[str, ...],
+    produces: tuple[str, ...],
+    predicates: str = "effects.called_for",
 ) -> EffectDescriptor:
     return EffectDescriptor(
         name=name,
@@ -44,5 +49,5 @@ def _effect(
         where=f"{_HERE}.{where}",
         consumes=consumes,
         produces=produces,
-        called_for=f"{_HERE}.effects.called_for:{name.replace('-', '_')}",
+        called_for=f"{_HERE}.{predicates}:{name.replace('-', '_')}",
     )
