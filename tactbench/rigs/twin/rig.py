@@ -26,6 +26,7 @@ from tactbench.plugin import (
     StreamSpec,
     load_object,
 )
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.synthesis import Synthesis
@@ -74,10 +75,13 @@ class Twin:
     ----------
     effects
         All installed effects; a plan takes from them what a scene calls for.
+    fidelity
+        How finely contacts are resolved.
     """
 
-    def __init__(self, effects: Sequence[EffectDescriptor]) -> None:
+    def __init__(self, effects: Sequence[EffectDescriptor], fidelity: Fidelity = DEFAULT) -> None:
         self.effects = tuple(effects)
+        self.fidelity = fidelity
 
     def explain(self, sensor: SensorDescriptor, scene: Scene) -> Plan:
         """Return the plan of a scene without carrying it out.
@@ -104,7 +108,7 @@ class Twin:
             If the contact cannot be resolved or solved.
         """
         plan = self.explain(sensor, scene)
-        run = _prepare(sensor, scene, seed, plan)
+        run = _prepare(sensor, scene, seed, plan, self.fidelity)
         for effect in plan.stages:
             load_object(effect.where)(run)
         yield _acquisition(run, plan)
@@ -115,7 +119,7 @@ def build(context: RigContext) -> Twin:
     return Twin(context.effects)
 
 
-def _prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan) -> Synthesis:
+def _prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidelity: Fidelity) -> Synthesis:
     channels = tuple(channel for channel in sensor.spec.channels() if channel.kind in plan.kinds)
     t_s, force = _load(scene)
     rest = np.array([_rest(channel) for channel in channels])
@@ -131,6 +135,7 @@ def _prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan) -> S
         quality=np.zeros((t_s.size, len(channels)), dtype=np.uint8),
         reference_n=force.copy(),
         lent=dict(plan.lent),
+        fidelity=fidelity,
     )
     run.contact = _place(run)
     return run

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Nuisances, Scalar, Scene, SensorDescriptor
 from tactbench.rigs.twin import draws
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
 
 
@@ -45,6 +46,8 @@ class Synthesis:
     """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
     settled: dict[str, tuple[bool, str]] = field(default_factory=dict)
     """Plan entries that only the solve could decide: name -> (included, reason)."""
+    fidelity: Fidelity = DEFAULT
+    """How finely the contact is resolved."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """What was drawn or achieved."""
 

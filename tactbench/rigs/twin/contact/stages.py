@@ -46,7 +46,7 @@ def press_skin(run: Synthesis) -> None:
     skin = run.sensor.spec.skin
     if skin is None:
         raise NotApplicable(f"{run.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
-    check_contact(skin_grid(skin.sheet), run.contact)
+    check_contact(skin_grid(skin.sheet, run.fidelity.cells(skin.sheet)), run.contact)
 
 
 def watch_fluid(run: Synthesis) -> None:
@@ -73,7 +73,8 @@ def read_skin(run: Synthesis) -> None:
 def _tabulated(run: Synthesis, columns: list[int]) -> _Tabulated:
     profile = run.scene.profile
     largest = max(profile.start.to("N"), profile.end.to("N"))
-    text = f"{run.sensor.model_dump_json()}|{run.contact}|{largest!r}|{columns}|{run.fluid_pressure}|{run.lent}"
+    spec = run.sensor.model_dump_json()
+    text = f"{spec}|{run.contact}|{largest!r}|{columns}|{run.fluid_pressure}|{run.lent}|{run.fidelity}"
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
         _TABLES.move_to_end(key)
@@ -89,12 +90,14 @@ def _tabulate(run: Synthesis, columns: list[int], largest: float) -> _Tabulated:
     spec, skin = run.sensor.spec, run.sensor.spec.skin
     if skin is None or run.sensor.transducer is None:
         raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
-    grid = skin_grid(skin.sheet)
+    fidelity = run.fidelity
+    grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     outer = skin.sheet.outer_radius
     gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"))
     names = [run.channels[column].name for column in columns]
     try:
-        transducer = load_object(run.sensor.transducer)(spec, grid, names)
+        factory = load_object(run.sensor.transducer)
+        transducer = factory(spec, grid, names, **fidelity.options(factory))
     except RigError as error:
         raise NotApplicable(f"The transducer of {spec.name} cannot answer: {error}", hint=error.hint) from error
 
@@ -116,8 +119,21 @@ def _tabulate(run: Synthesis, columns: list[int], largest: float) -> _Tabulated:
             made: Medium = load_object(where)(medium, skin)
             return made
 
-    press = Press(medium_of(skin, grid), gap, run.contact, core=core, fluid_pressure=run.fluid_pressure)
-    table = build_table(press, read, largest_n=largest, tolerance=_tolerance(run, columns))
+    press = Press(
+        medium_of(skin, grid),
+        gap,
+        run.contact,
+        core=core,
+        fluid_pressure=run.fluid_pressure,
+        tolerance=fidelity.newton_tolerance,
+    )
+    table = build_table(
+        press,
+        read,
+        largest_n=largest,
+        tolerance=fidelity.table_tolerance_factor * _tolerance(run, columns),
+        most_nodes=fidelity.most_nodes,
+    )
     closing = press.closing_at(largest) if press.medium.has_core else 0.0
     film = float(press.medium.rest_thickness_mm.max()) - press.medium.least_thickness_mm
     return _Tabulated(table, press.touched_core, closing, film)
