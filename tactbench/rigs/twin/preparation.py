@@ -16,6 +16,7 @@ from tactbench.plugin import (
     SensorDescriptor,
     SensorSpec,
 )
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan
 from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
@@ -24,7 +25,7 @@ _OWN_CLOCK_FROM = 2.0
 """A stream this many times faster than the sensor's slowest keeps its own clock: it is there to see fast things."""
 
 
-def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan) -> Synthesis:
+def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidelity: Fidelity = DEFAULT) -> Synthesis:
     """Return the recording of `scene` before any effect is applied.
 
     Raises
@@ -45,6 +46,7 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan) -> Sy
         contact=Contact(radius_mm(scene.indenter), 0.0, 0.0),
         reference_n=load.at(t_s),
         lent=dict(plan.lent),
+        fidelity=fidelity,
     )
     run.contact = _place(run)
     return run

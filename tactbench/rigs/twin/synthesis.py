@@ -21,6 +21,7 @@ from tactbench.plugin import (
     load_object,
 )
 from tactbench.rigs.twin import draws
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
 
 
@@ -102,6 +103,8 @@ class Synthesis:
     """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
     settled: dict[str, tuple[bool, str]] = field(default_factory=dict)
     """Plan entries that only the solve could decide: name -> (included, reason)."""
+    fidelity: Fidelity = DEFAULT
+    """How finely the contact is resolved."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """What was drawn or achieved."""
     clock: Callable[[], float] = time.perf_counter
