@@ -43,17 +43,18 @@ class Press:
         tolerance: float = TOLERANCE,
     ) -> None:
         self.medium = medium
-        self.gap_mm = gap_mm
+        # From first touch: between cells the gap's smallest value on the grid is not zero, and in its rounding the
+        # depth of a piconewton would drown.
+        self.gap_mm = gap_mm - gap_mm.min()
         self.contact = contact
         self.touched_core = False
         self.solves = 0
         self.products = 0
-        self._solver = NewtonSolver(medium, gap_mm)
+        self._solver = NewtonSolver(medium, self.gap_mm)
         self._core = core
         self._wants_fluid_pressure = fluid_pressure
         self._tolerance = tolerance
         self._solutions: dict[float, Solution] = {}
-        self._least_gap = float(gap_mm.min())
 
     def __call__(self, force_n: float) -> SkinState:
         """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
@@ -78,8 +79,7 @@ class Press:
             deflection_mm=solution.deflection_mm,
             pressure_mpa=pressure,
             thickness_mm=self.medium.thickness_mm(solution.deflection_mm),
-            # Counted from first touch: between cells the gap's smallest value on the grid is not zero.
-            depth_mm=solution.depth_mm - self._least_gap,
+            depth_mm=solution.depth_mm,
             fluid_pressure_mpa=self._fluid_pressure(solution),
             contact_radius_mm=self._contact_radius(pressure),
             residual=solution.residual,
@@ -90,6 +90,14 @@ class Press:
         if force_n <= 0:
             return self.medium.closing_mm(np.zeros(self.gap_mm.shape))
         return self.medium.closing_mm(self._solve(force_n).deflection_mm)
+
+    def pressure_at(self, force_n: float) -> FloatArray:
+        """Return the (nx, ns) contact pressure under `force_n` [MPa]."""
+        return self._solve(force_n).pressure_mpa if force_n > 0 else np.zeros(self.gap_mm.shape)
+
+    def deflection_at(self, force_n: float) -> FloatArray:
+        """Return the (nx, ns) deflection under `force_n` [mm]."""
+        return self._solve(force_n).deflection_mm if force_n > 0 else np.zeros(self.gap_mm.shape)
 
     def closing_mm(self, state: SkinState) -> float:
         """Return how far the film of `state` is past closing [mm]; minus infinity without a core."""
