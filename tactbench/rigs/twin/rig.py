@@ -141,11 +141,12 @@ def _load(scene: Scene) -> tuple[FloatArray, FloatArray]:
     profile = scene.profile
     duration, hold = profile.duration.to("s"), profile.hold.to("s")
     start, end = profile.start.to("N"), profile.end.to("N")
-    if not duration > 0 or hold < 0 or min(start, end) < 0:
+    stated = (duration, hold, start, end)
+    if not all(map(math.isfinite, stated)) or not duration > 0 or hold < 0 or min(start, end) < 0:
         raise RigError(
             f"The scene {scene.name!r} asks for a ramp from {start:g} to {end:g} N within {duration:g} s after "
             f"{hold:g} s of rest.",
-            hint="Duration must be positive, hold and forces at least zero.",
+            hint="Duration must be positive, hold and forces at least zero, all of them finite.",
         )
     t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (duration / profile.samples)
     if hold >= duration:

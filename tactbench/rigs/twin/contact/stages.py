@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from tactbench.plugin import (
     NotApplicable,
     PluginContractError,
     RigError,
+    Scalar,
     SkinState,
     load_object,
 )
@@ -22,7 +23,8 @@ from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.skins import medium_of
-from tactbench.rigs.twin.geometry import check_contact, gap_mm, skin_grid
+from tactbench.rigs.twin.contact.validity import check_reach, remarks
+from tactbench.rigs.twin.geometry import check_contact, gap_mm, pad_of, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
@@ -36,6 +38,7 @@ class _Tabulated:
     touched_core: bool
     closing_mm: float
     film_mm: float
+    remarks: Mapping[str, Scalar]
 
 
 _TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
@@ -120,7 +123,10 @@ def _tabulate(run: Synthesis, columns: list[int], largest: float) -> _Tabulated:
     table = build_table(press, read, largest_n=largest, tolerance=_tolerance(run, columns))
     closing = press.closing_at(largest) if press.medium.has_core else 0.0
     film = float(press.medium.rest_thickness_mm.max()) - press.medium.least_thickness_mm
-    return _Tabulated(table, press.touched_core, closing, film)
+    outer_mm = np.inf if outer is None else outer.to("mm")
+    check_reach(press, largest, outer_mm)
+    found = remarks(press, table.loads_n.tolist(), outer_mm, pad_of(skin.sheet, grid))
+    return _Tabulated(table, press.touched_core, closing, film, found)
 
 
 def _tolerance(run: Synthesis, columns: list[int]) -> FloatArray:
@@ -145,6 +151,7 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
         table_error_count=float(table.error.max(initial=0.0)),
         solver_residual=table.residual,
         depth_mm=deepest.depth_mm,
+        **tabulated.remarks,
     )
     if "core" not in run.lent:
         return
