@@ -30,6 +30,7 @@ from tactbench.plugin import (
 )
 from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan, plan_scene
+from tactbench.rigs.twin.stated_numbers import MOST_SAMPLES, check_numbers
 from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
 
 ROWS_PER_BLOCK = 1000
@@ -134,6 +135,7 @@ def build(context: RigContext) -> Twin:
 
 
 def _prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan) -> Synthesis:
+    check_numbers(scene)
     t_s, load = _load(scene)
     run = Synthesis(
         sensor=sensor,
@@ -155,12 +157,11 @@ def _load(scene: Scene) -> tuple[FloatArray, Load]:
     profile = scene.profile
     duration, hold = profile.duration.to("s"), profile.hold.to("s")
     start, end = profile.start.to("N"), profile.end.to("N")
-    stated = (duration, hold, start, end)
-    if not all(map(math.isfinite, stated)) or not duration > 0 or hold < 0 or min(start, end) < 0:
+    if not duration > 0 or hold < 0 or min(start, end) < 0:
         raise RigError(
             f"The scene {scene.name!r} asks for a ramp from {start:g} to {end:g} N within {duration:g} s after "
             f"{hold:g} s of rest.",
-            hint="Duration must be positive, hold and forces at least zero, all of them finite.",
+            hint="Duration must be positive, hold and forces at least zero.",
         )
     t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (duration / profile.samples)
     if hold >= duration:
@@ -175,17 +176,23 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
     slow = tuple(stream for stream in spec.streams if (stream.rate_hz or 0.0) < _OWN_CLOCK_FROM * slowest)
     for clock, streams in (("", slow), *((stream.name, (stream,)) for stream in spec.streams if stream not in slow)):
         channels = tuple(channel for stream in streams for channel in stream.channels if channel.kind in plan.kinds)
+        if not channels:
+            continue
         rate = streams[0].rate_hz if clock else None
-        own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
-        if channels:
-            yield Track(
-                clock=clock,
-                channels=channels,
-                t_s=own,
-                force_n=load.at(own),
-                readings=np.tile([_rest(channel) for channel in channels], (own.size, 1)),
-                quality=np.zeros((own.size, len(channels)), dtype=np.uint8),
+        if rate is not None and not duration * rate <= MOST_SAMPLES:
+            raise RigError(
+                f"The stream {clock} would have {duration * rate:.2g} samples: {duration:g} s at {rate:g} Hz.",
+                hint=f"Up to {MOST_SAMPLES} fit into memory: shorten the scene, or observe slower channels.",
             )
+        own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
+        yield Track(
+            clock=clock,
+            channels=channels,
+            t_s=own,
+            force_n=load.at(own),
+            readings=np.tile([_rest(channel) for channel in channels], (own.size, 1)),
+            quality=np.zeros((own.size, len(channels)), dtype=np.uint8),
+        )
 
 
 def _rest(channel: ChannelSpec) -> float:
