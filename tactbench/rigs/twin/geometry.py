@@ -18,6 +18,7 @@ STEEPEST = 1.0
 normal, which agree for gentle slopes only."""
 RIM = 0.999
 """Share of its radius up to which a cap exists: at its rim the flank is vertical, and no height field can touch it."""
+_FEWEST_CELLS = 8
 BEYOND_THE_CAP_MM = 50.0
 """How far above its radius a cap is put where it does not exist: large, finite, and never touched."""
 
@@ -47,9 +48,21 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
         The rectangle.
     cells
         Cells along x and s instead of the sheet's own.
+
+    Raises
+    ------
+    RigError
+        If the sheet has no area, its radius is none, or it has fewer than eight cells either way: a contact is wider.
     """
     along, across = cells or sheet.cells
     x_min, x_max, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
+    outer = math.inf if sheet.outer_radius is None else sheet.outer_radius.to("mm")
+    if not (0 < x_max - x_min < math.inf and 0 < arc < math.inf and outer > 0 and min(along, across) >= _FEWEST_CELLS):
+        raise RigError(
+            f"The skin's sheet runs from x = {x_min:g} to {x_max:g} mm and {arc:g} mm across, on a radius of {outer:g} "
+            f"mm, in {along} x {across} cells.",
+            hint=f"Its sides and radius must be positive and finite, its cells at least {_FEWEST_CELLS} either way.",
+        )
     dx, ds = (x_max - x_min) / along, arc / across
     x: FloatArray = np.asarray(x_min + (np.arange(along) + 0.5) * dx, dtype=np.float64)
     s: FloatArray = np.asarray(-arc / 2 + (np.arange(across) + 0.5) * ds, dtype=np.float64)

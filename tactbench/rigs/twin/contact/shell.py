@@ -38,6 +38,7 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
         mid_radius=skin.mid_radius.to("mm"),
         contact_stiffness=contact_stiffness,
         gap=skin.gap.to("mm"),
+        clamp_length=skin.clamp_length.to("mm"),
     )
     require_poisson(poisson)
     spectrum = Spectrum(grid)

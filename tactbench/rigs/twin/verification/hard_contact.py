@@ -75,12 +75,13 @@ def lawful(case: Case, press: Press, loads: Sequence[float]) -> list[SkinState]:
     """Solve ascending loads; hold each against its laws and each pair against monotony."""
     case.says(loads_n=", ".join(f"{load:.4g}" for load in loads))
     dx, ds = press.medium.grid.cell_mm
-    states = []
+    states: list[SkinState] = []
     for load in loads:
         state = press(load)
         for what, values in (
             ("deflection", state.deflection_mm), ("pressure", state.pressure_mpa), ("thickness", state.thickness_mm),
-            ("depth", state.depth_mm), ("fluid pressure", state.fluid_pressure_mpa), ("radius", state.contact_radius_mm),
+            ("depth", state.depth_mm), ("fluid pressure", state.fluid_pressure_mpa),
+            ("radius", state.contact_radius_mm),
         ):  # fmt: skip
             case.holds(np.isfinite(values).all(), f"{what} at {load:g} N is not finite")
         case.holds(np.all(state.pressure_mpa >= 0), f"the indenter pulls at {load:g} N")
@@ -102,7 +103,7 @@ def _loads(case: Case, low: float, high: float) -> list[float]:
 
 
 def any_radius(case: Case) -> None:
-    """Caps of 1e-4 mm to infinity: refused below a cell and past their rim, otherwise solved.
+    """Solve caps of 1e-4 mm to infinity; refuse them below a cell and past their rim.
 
     A cap of 3 mm or more under up to 5 N has an answer on every skin of ours.
     """
@@ -116,17 +117,22 @@ def any_radius(case: Case) -> None:
     check_reach(press, loads[-1], outer_mm(skin))
     told = remarks(press, loads, outer_mm(skin), pad_of(skin.sheet, press.medium.grid))
     few = np.count_nonzero(states[-1].pressure_mpa) < 28  # pi 3²
-    case.holds(("remark contact" in told) == few, "a contact below three cells in radius must be remarked on, and only it")
+    case.holds(
+        ("remark contact" in told) == few, "a contact below three cells in radius must be remarked on, and only it"
+    )
 
 
 def a_cap_that_is_none(case: Case) -> None:
-    """Radii of zero, below zero and not a number: refused."""
+    """Refuse radii of zero, below zero and not a number."""
     case.right = "refusal"
-    press_of(skin := draw_skin(case), draw_contact(case, skin, (0.0, -case.decades(1e-3, 1e3), math.nan)[case.rng.integers(3)]))
+    press_of(
+        skin := draw_skin(case),
+        draw_contact(case, skin, (0.0, -case.decades(1e-3, 1e3), math.nan)[case.rng.integers(3)]),
+    )
 
 
 def unresolved_contact(case: Case) -> None:
-    """A contact of which nothing is remarked agrees with the same contact on cells half as wide, to 5 %.
+    """Agree with the same contact on cells half as wide to 5 %, or remark on it.
 
     Measured on the ideal grid: up to 2 % at three cells, and rising quickly below.
     """
@@ -142,7 +148,7 @@ def unresolved_contact(case: Case) -> None:
 
 
 def flat_is_a_huge_cap(case: Case) -> None:
-    """R of 1e9 mm or more equals a flat surface.
+    """Take R of 1e9 mm or more for a flat surface.
 
     The depth moves by no more than the gap does: the energy's minimiser is monotone in the gap and moves with it as a
     whole, so that depth is a contraction of the gap in the maximum norm. The least gap counts twice.
@@ -158,7 +164,7 @@ def flat_is_a_huge_cap(case: Case) -> None:
 
 
 def any_load(case: Case) -> None:
-    """Zero is rest exactly; 1e-12 to 500 N are finite, balanced and monotone, and remarked on beyond 5 N."""
+    """Be at rest exactly at 0 N; finite, balanced and monotone from 1e-12 to 500 N, with a remark beyond 5 N."""
     skin = draw_skin(case)
     press = press_of(skin, draw_contact(case, skin, case.decades(5.0, 1e3)))
     rest = press(0.0)
@@ -172,7 +178,7 @@ def any_load(case: Case) -> None:
 
 
 def loads_that_are_none(case: Case) -> None:
-    """Loads below zero are rest; not a number and infinity are refused by the solver."""
+    """Be at rest below 0 N; refuse a load that is infinite or no number."""
     skin = draw_skin(case)
     press = press_of(skin, draw_contact(case, skin, 10.0))
     case.holds(press(-case.decades(1e-9, 1e3)).depth_mm == 0.0, "a pull presses")
@@ -181,7 +187,7 @@ def loads_that_are_none(case: Case) -> None:
 
 
 def edge_and_tilt(case: Case) -> None:
-    """Grazing, edge and tilted contacts: refused outside the skin and beyond 45 degrees, otherwise solved.
+    """Solve grazing, edge and tilted contacts; refuse them outside the skin and beyond 45 degrees.
 
     All skins are mirror images of themselves across s = 0, so that a mirrored contact is as deep.
     """
@@ -199,10 +205,13 @@ def edge_and_tilt(case: Case) -> None:
     mirrored = Contact(contact.radius_mm, contact.x_mm, -contact.s_mm, contact.tilt_x, -contact.tilt_s)
     twin = press_of(skin, mirrored)(state.force_n)
     # Rounding decides which of two mirrored cells is met first; the depth feels it as far as the residual lets it.
-    case.holds(abs(twin.depth_mm / state.depth_mm - 1) <= 2 * SOLVED, f"mirrored {twin.depth_mm!r}, not {state.depth_mm!r}")
+    case.holds(
+        abs(twin.depth_mm / state.depth_mm - 1) <= 2 * SOLVED, f"mirrored {twin.depth_mm!r}, not {state.depth_mm!r}"
+    )
     case.holds(not press.gap_mm.min(), "the approach has lost its origin")
 
 
 FAMILIES: tuple[Family, ...] = (
-    any_radius, a_cap_that_is_none, unresolved_contact, flat_is_a_huge_cap, any_load, loads_that_are_none, edge_and_tilt,
+    any_radius, a_cap_that_is_none, unresolved_contact, flat_is_a_huge_cap, any_load, loads_that_are_none,
+    edge_and_tilt,
 )  # fmt: skip
