@@ -18,7 +18,7 @@ STEEPEST = 1.0
 normal, which agree for gentle slopes only."""
 RIM = 0.999
 """Share of its radius up to which a cap exists: at its rim the flank is vertical, and no height field can touch it."""
-_FEWEST_CELLS = 8
+_FEWEST_CELLS = 4
 BEYOND_THE_CAP_MM = 50.0
 """How far above its radius a cap is put where it does not exist: large, finite, and never touched."""
 
@@ -52,7 +52,7 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
     Raises
     ------
     RigError
-        If the sheet has no area, its radius is none, or it has fewer than eight cells either way: a contact is wider.
+        If the sheet has no area, its radius is none, or it has fewer than four cells either way.
     """
     along, across = cells or sheet.cells
     x_min, x_max, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")

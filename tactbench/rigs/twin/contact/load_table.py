@@ -9,6 +9,7 @@ bound.
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,7 +18,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray, SkinState
 from tactbench.rigs.twin.contact.interpolant import Interpolant
-from tactbench.rigs.twin.contact.press import Press
+from tactbench.rigs.twin.contact.press import AnyPress, scalars
 
 _FIRST_NODES = 6
 _POWER = 1.7
@@ -62,6 +63,8 @@ class LoadTable:
     curves: Interpolant
     """Depth, contact radius and fluid pressure against load."""
     solves: int
+    solved_s: float
+    """Seconds spent on the skin; what reading it took is not among them."""
 
     @property
     def residual(self) -> float:
@@ -79,8 +82,10 @@ class LoadTable:
 
 
 class _Builder:
-    def __init__(self, press: Press, read: Callable[[SkinState], FloatArray]) -> None:
+    def __init__(self, press: AnyPress, read: Callable[[SkinState], FloatArray], clock: Callable[[], float]) -> None:
         self._press = press
+        self._clock = clock
+        self.read_s = 0.0
         self._read = read
         self.nodes: dict[float, tuple[SkinState, FloatArray]] = {}
         self.closed: dict[float, bool] = {}
@@ -88,7 +93,9 @@ class _Builder:
     def node(self, force: float) -> FloatArray:
         if force not in self.nodes:
             state = self._press(force)
-            self.nodes[force] = (self._press.scalars(state), self._read(state))
+            began = self._clock()
+            self.nodes[force] = (scalars(state), self._read(state))
+            self.read_s += self._clock() - began
             self.closed[force] = force > 0 and self._press.closing_mm(state) > 0
         return self.nodes[force][1]
 
@@ -109,12 +116,13 @@ def _scalars(state: SkinState) -> FloatArray:
 
 
 def build_table(
-    press: Press,
+    press: AnyPress,
     read: Callable[[SkinState], FloatArray],
     *,
     largest_n: float,
     tolerance: FloatArray,
     most_nodes: int = MOST_NODES,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> LoadTable:
     """Solve and tabulate one contact.
 
@@ -130,14 +138,17 @@ def build_table(
         (channels,) wanted bound on the interpolation error.
     most_nodes
         Nodes after which refining ends even if the bound is missed: the achieved one is reported.
+    clock
+        Seconds, monotonic.
     """
-    builder = _Builder(press, read)
+    began = clock()
+    builder = _Builder(press, read, clock)
     if not largest_n > 0:
         rest = builder.node(0.0)
         flat = Interpolant(np.array([0.0, 1.0]), np.stack([rest, rest]))
         still = Interpolant(np.array([0.0, 1.0]), np.zeros((2, 3)))
         state = builder.nodes[0.0][0]
-        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, still, 0)
+        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, still, 0, 0.0)
     for j in range(_FIRST_NODES):
         builder.node(largest_n * (j / (_FIRST_NODES - 1)) ** _POWER)
     touch_down = _bracket(builder, press)
@@ -152,10 +163,11 @@ def build_table(
         interpolant=builder.interpolant(touch_down),
         curves=builder.curves(touch_down),
         solves=press.solves,
+        solved_s=clock() - began - builder.read_s,
     )
 
 
-def _bracket(builder: _Builder, press: Press) -> tuple[float, float] | None:
+def _bracket(builder: _Builder, press: AnyPress) -> tuple[float, float] | None:
     """Bracket touch-down and put a node on either side."""
     closed = [load for load in sorted(builder.nodes) if builder.closed[load]]
     if not closed:
@@ -185,7 +197,7 @@ def _bracket(builder: _Builder, press: Press) -> tuple[float, float] | None:
 
 def _refine(
     builder: _Builder,
-    press: Press,
+    press: AnyPress,
     touch_down: tuple[float, float] | None,
     tolerance: FloatArray,
     most_nodes: int,

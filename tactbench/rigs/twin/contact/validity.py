@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, RigError, Scalar
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import Press
+from tactbench.rigs.twin.contact.press import AnyPress
 from tactbench.rigs.twin.geometry import RIM, STEEPEST
 
 RESOLVED_CELLS = 3.0
@@ -28,7 +28,7 @@ AT_THE_EDGE = 0.01
 """Share of the load outside the active skin that is still no remark. Assumed."""
 
 
-def check_reach(press: Press, force_n: float, outer_radius_mm: float) -> None:
+def check_reach(press: AnyPress, force_n: float, outer_radius_mm: float) -> None:
     """Refuse a load under which the skin is touched where the cap no longer exists.
 
     Raises
@@ -39,7 +39,7 @@ def check_reach(press: Press, force_n: float, outer_radius_mm: float) -> None:
     if not force_n > 0 or math.isinf(press.contact.radius_mm):
         return
     beyond = _from_apex_mm(press, outer_radius_mm) >= RIM * press.contact.radius_mm
-    if np.any(press.pressure_at(force_n)[beyond] > 0):
+    if np.any(press(force_n).pressure_mpa[beyond] > 0):
         raise RigError(
             f"Under {force_n:g} N the cap of radius {press.contact.radius_mm:g} mm sinks in past its rim: what would "
             "touch there is not part of it.",
@@ -48,7 +48,7 @@ def check_reach(press: Press, force_n: float, outer_radius_mm: float) -> None:
 
 
 def remarks(
-    press: Press, loads_n: Iterable[float], outer_radius_mm: float, pad: npt.NDArray[np.bool_] | None = None
+    press: AnyPress, loads_n: Iterable[float], outer_radius_mm: float, pad: npt.NDArray[np.bool_] | None = None
 ) -> dict[str, Scalar]:
     """Return what a reader of this contact must know, at the largest of `loads_n`.
 
@@ -71,10 +71,10 @@ def remarks(
     if not loads:
         return {}
     force = loads[-1]
-    pressure = press.pressure_at(force)
+    pressure = press(force).pressure_mpa
     found: dict[str, Scalar] = {"contact_radius_cells": _radius_cells(pressure)}
     for load in loads:
-        if _radius_cells(press.pressure_at(load)) >= RESOLVED_CELLS:
+        if _radius_cells(press(load).pressure_mpa) >= RESOLVED_CELLS:
             found["resolved_above_n"] = load
             break
     else:
@@ -84,7 +84,7 @@ def remarks(
         )
     if force > HELD_AGAINST_N:
         found["remark load"] = f"{force:g} N is beyond the {HELD_AGAINST_N:g} N the model has been held against"
-    found |= _too_deep(press.medium, press.deflection_at(force))
+    found |= _too_deep(press.medium, press(force).deflection_mm)
     radius, reach = press.contact.radius_mm, float(_from_apex_mm(press, outer_radius_mm)[pressure > 0].max())
     if reach >= radius * math.sin(math.atan(STEEPEST)):
         found["remark flank"] = (
@@ -101,7 +101,7 @@ def _radius_cells(pressure: FloatArray) -> float:
     return math.sqrt(np.count_nonzero(pressure) / math.pi)
 
 
-def _from_apex_mm(press: Press, outer_radius_mm: float) -> FloatArray:
+def _from_apex_mm(press: AnyPress, outer_radius_mm: float) -> FloatArray:
     """Return the (nx, ns) distance from the cap's axis."""
     grid, contact = press.medium.grid, press.contact
     across = grid.s_mm - contact.s_mm

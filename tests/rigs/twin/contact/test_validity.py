@@ -33,7 +33,7 @@ def test_an_ordinary_contact_needs_no_remark(press):
     made, outer, pad = press("icub", 10.0)
     found = remarks(made, [0.0, 0.01, 0.5, 5.0], outer, pad)
     assert _texts(found) == set()
-    assert found["contact_radius_cells"] == pytest.approx(math.sqrt(np.count_nonzero(made.pressure_at(5.0)) / math.pi))
+    assert found["contact_radius_cells"] == pytest.approx(math.sqrt(np.count_nonzero(made(5.0).pressure_mpa) / math.pi))
     assert found["resolved_above_n"] == 0.5
 
 
