@@ -48,7 +48,7 @@ from tactbench.core.spec.sensor import (
     SensorSpec,
     StreamSpec,
 )
-from tactbench.core.spec.skin import BondedLayer, FluidBackedShell, FoamPad, Skin, SkinSheet
+from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPad, Skin, SkinSheet
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
 
 __all__ = [
@@ -65,6 +65,7 @@ __all__ = [
     "CostStudy",
     "Creep",
     "DataError",
+    "Dome",
     "EffectDescriptor",
     "Environment",
     "Estimator",

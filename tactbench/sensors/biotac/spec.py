@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tactbench.plugin import FluidBackedShell, Quantity, SensorSpec, SkinSheet, Source, assumed, derived, sourced
+from tactbench.plugin import Dome, FluidBackedShell, Quantity, SensorSpec, SkinSheet, Source, assumed, derived, sourced
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.nuisances import NUISANCES
 
@@ -15,6 +15,12 @@ SKIN = FluidBackedShell(
         x_min=assumed(-14.5, "mm", "covers electrodes 1-19 with a margin; the core ends at -19.3 mm"),
         x_max=assumed(5.5, "mm", "covers electrode 7 on the shortened arc of the dome"),
         arc=derived(math.pi * 8.2, "mm", "half of the circumference at the outer radius"),
+        dome=Dome(
+            start=sourced(0.0, "mm", f"the core is a cylinder from -12 to 0 mm; {_MESH}"),
+            arc_per_radian=derived(
+                0.75 * 5.08, "mm", "the core's meridian, shortened as the places of its electrodes are"
+            ),
+        ),
         outer_radius=derived(8.2, "mm", f"{_MESH}: 8.08-8.31 mm at the pad"),
     ),
     young=assumed(0.8, "MPa", "silicone of the skin alone; 0.4-1.55 tried. Shore A 26 by the maker"),
