@@ -36,7 +36,7 @@ from tactbench.core.spec.rig import (
     SensorDescriptor,
     TaskDescriptor,
 )
-from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene
+from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Simulation
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
@@ -91,6 +91,7 @@ __all__ = [
     "SensorDescriptor",
     "SensorSpec",
     "Shelf",
+    "Simulation",
     "Skin",
     "SkinGrid",
     "SkinSheet",

@@ -76,6 +76,11 @@ class Reason(NamedTuple):
 
     called_for: bool
     text: str
+    change: float | None = None
+    """What leaving the effect out changes in an observed channel: at most, if it is not called for (0: exactly
+    nothing); about, if it is. None: unknown without computing it."""
+    unit: str = "count"
+    """Unit of `change`."""
 
 
 class Estimator(Protocol):

@@ -88,3 +88,5 @@ class EffectDescriptor(Frozen):
     consumes: tuple[str, ...] = ()
     called_for: str = Field(pattern=_WHERE)
     """``module:callable``, called with (Scene, SensorSpec): a Reason; light, no numerics."""
+    groups: tuple[str, ...] = ()
+    """Words that stand for several effects at once in a scene's ``simulation.effects``: ``drift``, ``noise``."""

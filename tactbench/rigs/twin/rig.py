@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -22,13 +23,14 @@ from tactbench.plugin import (
     Scalar,
     Scene,
     SensorDescriptor,
+    SensorSpec,
     Source,
     StreamSpec,
     load_object,
 )
 from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan, plan_scene
-from tactbench.rigs.twin.synthesis import Synthesis
+from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
 
 ROWS_PER_BLOCK = 1000
 REFERENCE_STREAM = "force_torque"
@@ -37,6 +39,21 @@ _ONE_CLOCK = Source(
     reference="the twin samples the sensor and the force sensor at once, on the scene's reference clock, as the "
     "embedded system of Karl et al. 2016 does (5000 samples in 60 s)",
 )
+
+
+_OWN_CLOCK_FROM = 2.0
+"""A stream this many times faster than the sensor's slowest keeps its own clock: it is there to see fast things."""
+
+
+class Samples(NamedTuple):
+    """What one stream of a recording holds."""
+
+    t_ns: npt.NDArray[np.int64]
+    """(n,) nanoseconds since the first sample."""
+    data: npt.NDArray[np.generic]
+    """(n, channels)"""
+    quality: npt.NDArray[np.uint8] | None
+    """(n, channels); None: all good."""
 
 
 @dataclass(frozen=True)
@@ -48,23 +65,24 @@ class TwinAcquisition:
     plan: tuple[PlanEntry, ...]
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
-    t_ns: npt.NDArray[np.int64]
-    """(n,) nanoseconds since the first sample."""
-    samples: Mapping[str, tuple[npt.NDArray[np.generic], npt.NDArray[np.uint8] | None]] = field(repr=False)
-    """Stream -> (n, channels) data and quality."""
+    samples: Mapping[str, Samples] = field(repr=False)
+    """By name of the stream."""
 
     def __iter__(self) -> Iterator[Block]:
-        """Yield blocks of up to 1000 rows, the streams in turn, as samples taken at once would arrive."""
-        for start in range(0, self.t_ns.size, ROWS_PER_BLOCK):
-            rows = slice(start, start + ROWS_PER_BLOCK)
+        """Yield blocks, the streams in turn, each up to the same moment, as samples taken at once would arrive."""
+        reference = self.samples[REFERENCE_STREAM].t_ns
+        given = dict.fromkeys(self.samples, 0)
+        for start in range(0, reference.size, ROWS_PER_BLOCK):
+            last = start + ROWS_PER_BLOCK >= reference.size
+            until = None if last else reference[start + ROWS_PER_BLOCK]
             for stream in (*self.streams, *self.reference):
-                data, quality = self.samples[stream.name]
-                yield Block(
-                    stream=stream.name,
-                    t_ns=self.t_ns[rows],
-                    data=data[rows],
-                    quality=None if quality is None else quality[rows],
-                )
+                own, first = self.samples[stream.name], given[stream.name]
+                end = own.t_ns.size if until is None else int(np.searchsorted(own.t_ns, until))
+                rows = slice(first, end)
+                given[stream.name] = end
+                if end > first:
+                    quality = None if own.quality is None else own.quality[rows]
+                    yield Block(stream=stream.name, t_ns=own.t_ns[rows], data=own.data[rows], quality=quality)
 
 
 class Twin:
@@ -116,28 +134,24 @@ def build(context: RigContext) -> Twin:
 
 
 def _prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan) -> Synthesis:
-    channels = tuple(channel for channel in sensor.spec.channels() if channel.kind in plan.kinds)
-    t_s, force = _load(scene)
-    rest = np.array([_rest(channel) for channel in channels])
+    t_s, load = _load(scene)
     run = Synthesis(
         sensor=sensor,
         scene=scene,
         seed=seed,
-        channels=channels,
         t_s=t_s,
-        force_n=force,
+        load=load,
+        tracks=tuple(_tracks(sensor.spec, scene, plan, t_s, load)),
         contact=Contact(radius_mm(scene.indenter), 0.0, 0.0),
-        readings=np.tile(rest, (t_s.size, 1)),
-        quality=np.zeros((t_s.size, len(channels)), dtype=np.uint8),
-        reference_n=force.copy(),
+        reference_n=load.at(t_s),
         lent=dict(plan.lent),
     )
     run.contact = _place(run)
     return run
 
 
-def _load(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    """Return times and true force: held at the start, then straight to the end."""
+def _load(scene: Scene) -> tuple[FloatArray, Load]:
+    """Return the reference clock and the true force: held at the start, then straight to the end."""
     profile = scene.profile
     duration, hold = profile.duration.to("s"), profile.hold.to("s")
     start, end = profile.start.to("N"), profile.end.to("N")
@@ -149,9 +163,28 @@ def _load(scene: Scene) -> tuple[FloatArray, FloatArray]:
         )
     t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (duration / profile.samples)
     if hold >= duration:
-        return t_s, np.full(t_s.size, start)
-    force: FloatArray = start + (end - start) * np.clip((t_s - hold) / (duration - hold), 0.0, 1.0)
-    return t_s, force
+        return t_s, Load(np.array([0.0, duration]), np.array([start, start]))
+    return t_s, Load(np.array([0.0, hold, duration]), np.array([start, start, end]))
+
+
+def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: Load) -> Iterator[Track]:
+    """Yield the channels on the reference clock, then those of every stream that keeps its own."""
+    duration = scene.profile.duration.to("s")
+    slowest = min((stream.rate_hz for stream in spec.streams if stream.rate_hz is not None), default=math.inf)
+    slow = tuple(stream for stream in spec.streams if (stream.rate_hz or 0.0) < _OWN_CLOCK_FROM * slowest)
+    for clock, streams in (("", slow), *((stream.name, (stream,)) for stream in spec.streams if stream not in slow)):
+        channels = tuple(channel for stream in streams for channel in stream.channels if channel.kind in plan.kinds)
+        rate = streams[0].rate_hz if clock else None
+        own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
+        if channels:
+            yield Track(
+                clock=clock,
+                channels=channels,
+                t_s=own,
+                force_n=load.at(own),
+                readings=np.tile([_rest(channel) for channel in channels], (own.size, 1)),
+                quality=np.zeros((own.size, len(channels)), dtype=np.uint8),
+            )
 
 
 def _rest(channel: ChannelSpec) -> float:
@@ -178,23 +211,26 @@ def _place(run: Synthesis) -> Contact:
 def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     profile = run.scene.profile
     rate = profile.samples / profile.duration.to("s")
-    columns = {channel.name: column for column, channel in enumerate(run.channels)}
     streams: list[StreamSpec] = []
-    samples: dict[str, tuple[npt.NDArray[np.generic], npt.NDArray[np.uint8] | None]] = {}
-    for stream in run.sensor.spec.streams:
-        kept = tuple(channel for channel in stream.channels if channel.name in columns)
-        if not kept:
-            continue
-        own = [columns[channel.name] for channel in kept]
-        streams.append(stream.model_copy(update={"channels": kept, "rate_hz": rate, "rate_source": _ONE_CLOCK}))
-        samples[stream.name] = (_stored(run.readings[:, own], stream, kept), run.quality[:, own])
+    samples: dict[str, Samples] = {}
+    for track in run.tracks:
+        columns = {channel.name: column for column, channel in enumerate(track.channels)}
+        for stream in run.sensor.spec.streams:
+            kept = tuple(channel for channel in stream.channels if channel.name in columns)
+            if not kept:
+                continue
+            own = [columns[channel.name] for channel in kept]
+            clock = {} if track.clock else {"rate_hz": rate, "rate_source": _ONE_CLOCK}
+            streams.append(stream.model_copy(update={"channels": kept, **clock}))
+            stored = _stored(track.readings[:, own], stream, kept)
+            samples[stream.name] = Samples(_ns(track.t_s), stored, track.quality[:, own])
     reference = StreamSpec(
         name=REFERENCE_STREAM,
         rate_hz=rate,
         rate_source=_ONE_CLOCK,
         channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),),
     )
-    samples[REFERENCE_STREAM] = (run.reference_n[:, None], None)
+    samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), run.reference_n[:, None], None)
     environment = run.scene.environment
     return TwinAcquisition(
         streams=tuple(streams),
@@ -209,9 +245,12 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
             "force_noise_n": environment.force_noise.to("N"),
         },
         drawn=dict(run.drawn),
-        t_ns=np.round(run.t_s * 1e9).astype(np.int64),
         samples=samples,
     )
+
+
+def _ns(t_s: FloatArray) -> npt.NDArray[np.int64]:
+    return np.round(t_s * 1e9).astype(np.int64)
 
 
 def _stored(readings: FloatArray, stream: StreamSpec, channels: tuple[ChannelSpec, ...]) -> npt.NDArray[np.generic]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,14 @@ MOST_NODES = 16
 core, whatever the interpolant: more nodes would follow the mesh, not the physics."""
 
 
+class SkinCurves(NamedTuple):
+    """The skin's scalars at (m,) loads."""
+
+    depth_mm: FloatArray
+    contact_radius_mm: FloatArray
+    fluid_pressure_mpa: FloatArray
+
+
 @dataclass(frozen=True)
 class LoadTable:
     """Readings of one contact for any load from zero to the largest."""
@@ -50,6 +59,8 @@ class LoadTable:
     error: FloatArray
     """(channels,) twice the largest difference between a solved reading and an interpolant it was no part of."""
     interpolant: Interpolant
+    curves: Interpolant
+    """Depth, contact radius and fluid pressure against load."""
     solves: int
 
     @property
@@ -60,6 +71,11 @@ class LoadTable:
     def __call__(self, force_n: FloatArray) -> FloatArray:
         """Return the (m, channels) readings at (m,) forces; forces beyond the table are held at its ends."""
         return self.interpolant(np.clip(force_n, 0.0, self.loads_n[-1]))
+
+    def skin(self, force_n: FloatArray) -> SkinCurves:
+        """Return what the skin as a whole does at (m,) forces, held at the table's ends like the readings."""
+        depth, radius, pressure = self.curves(np.clip(force_n, 0.0, self.loads_n[-1])).T
+        return SkinCurves(depth_mm=depth, contact_radius_mm=radius, fluid_pressure_mpa=pressure)
 
 
 class _Builder:
@@ -77,10 +93,19 @@ class _Builder:
         return self.nodes[force][1]
 
     def interpolant(self, touch_down: tuple[float, float] | None) -> Interpolant:
+        return self._through([self.nodes[load][1] for load in sorted(self.nodes)], touch_down)
+
+    def curves(self, touch_down: tuple[float, float] | None) -> Interpolant:
+        return self._through([_scalars(self.nodes[load][0]) for load in sorted(self.nodes)], touch_down)
+
+    def _through(self, values: list[FloatArray], touch_down: tuple[float, float] | None) -> Interpolant:
         loads = sorted(self.nodes)
-        values = np.stack([self.nodes[load][1] for load in loads])
         breaks = [] if touch_down is None else [loads.index(load) for load in touch_down]
-        return Interpolant(np.array(loads), values, breaks)
+        return Interpolant(np.array(loads), np.stack(values), breaks)
+
+
+def _scalars(state: SkinState) -> FloatArray:
+    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
 
 
 def build_table(
@@ -110,8 +135,9 @@ def build_table(
     if not largest_n > 0:
         rest = builder.node(0.0)
         flat = Interpolant(np.array([0.0, 1.0]), np.stack([rest, rest]))
+        still = Interpolant(np.array([0.0, 1.0]), np.zeros((2, 3)))
         state = builder.nodes[0.0][0]
-        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, 0)
+        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, still, 0)
     for j in range(_FIRST_NODES):
         builder.node(largest_n * (j / (_FIRST_NODES - 1)) ** _POWER)
     touch_down = _bracket(builder, press)
@@ -124,6 +150,7 @@ def build_table(
         touch_down_n=touch_down,
         error=error,
         interpolant=builder.interpolant(touch_down),
+        curves=builder.curves(touch_down),
         solves=press.solves,
     )
 

@@ -15,6 +15,8 @@ from tactbench.plugin import (
     NotApplicable,
     PluginContractError,
     RigError,
+    SensorDescriptor,
+    SkinGrid,
     SkinState,
     load_object,
 )
@@ -42,7 +44,7 @@ _TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
 
 
 def press_skin(run: Synthesis) -> None:
-    """Refuse a contact that cannot be resolved; the solving itself follows the sensor's wish for readings."""
+    """Refuse a contact that cannot be resolved; the solving itself follows the first wish for an answer."""
     skin = run.sensor.spec.skin
     if skin is None:
         raise NotApplicable(f"{run.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
@@ -56,58 +58,56 @@ def watch_fluid(run: Synthesis) -> None:
 
 def read_skin(run: Synthesis) -> None:
     """Add each channel's response: gain times its reading under the effective force, less its reading at rest."""
-    columns = [i for i, channel in enumerate(run.channels) if channel.kind in READ_FROM_THE_SKIN]
-    tabulated = _tabulated(run, columns)
-    table = tabulated.table
-    for kind, own in run.by_kind().items():
-        if kind not in READ_FROM_THE_SKIN:
-            continue
-        among = [columns.index(column) for column in own]
-        response = table(run.effective_n.get(kind, run.force_n))[:, among] - table.readings[0, among]
-        if run.gain is not None:
-            response *= run.gain[own]
-        run.readings[:, own] += response
+    table = skin_under_load(run)
+    names = _read_names(run)
+    for track in run.tracks:
+        for kind, own in track.by_kind().items():
+            if kind not in READ_FROM_THE_SKIN:
+                continue
+            among = [names.index(track.channels[column].name) for column in own]
+            response = table(track.effective_n.get(kind, track.force_n))[:, among] - table.readings[0, among]
+            if track.gain is not None:
+                response *= track.gain[own]
+            track.readings[:, own] += response
+
+
+def skin_under_load(run: Synthesis) -> LoadTable:
+    """Return what the skin and the channels read from it do under any load of this recording; solved once.
+
+    Whether the fluid's pressure belongs to it must be settled before it is first asked for.
+    """
+    tabulated = _tabulated(run)
     _report(run, tabulated)
+    return tabulated.table
 
 
-def _tabulated(run: Synthesis, columns: list[int]) -> _Tabulated:
-    profile = run.scene.profile
-    largest = max(profile.start.to("N"), profile.end.to("N"))
-    text = f"{run.sensor.model_dump_json()}|{run.contact}|{largest!r}|{columns}|{run.fluid_pressure}|{run.lent}"
+def _read_names(run: Synthesis) -> list[str]:
+    """Return the names of the channels that the sensor's transducer answers for, in the sensor's order."""
+    return [channel.name for track in run.tracks for channel in track.channels if channel.kind in READ_FROM_THE_SKIN]
+
+
+def _tabulated(run: Synthesis) -> _Tabulated:
+    largest, names = run.load.largest_n, _read_names(run)
+    text = f"{run.sensor.model_dump_json()}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}"
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
         _TABLES.move_to_end(key)
         return _TABLES[key]
-    made = _tabulate(run, columns, largest)
+    made = _tabulate(run, names, largest)
     _TABLES[key] = made
     if len(_TABLES) > _MOST_TABLES:
         _TABLES.popitem(last=False)
     return made
 
 
-def _tabulate(run: Synthesis, columns: list[int], largest: float) -> _Tabulated:
+def _tabulate(run: Synthesis, names: list[str], largest: float) -> _Tabulated:
     spec, skin = run.sensor.spec, run.sensor.spec.skin
     if skin is None or run.sensor.transducer is None:
         raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
     grid = skin_grid(skin.sheet)
     outer = skin.sheet.outer_radius
     gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"))
-    names = [run.channels[column].name for column in columns]
-    try:
-        transducer = load_object(run.sensor.transducer)(spec, grid, names)
-    except RigError as error:
-        raise NotApplicable(f"The transducer of {spec.name} cannot answer: {error}", hint=error.hint) from error
-
-    def read(state: SkinState) -> FloatArray:
-        readings = np.asarray(transducer(state), dtype=np.float64)
-        if readings.shape != (len(names),) or not np.all(np.isfinite(readings)):
-            raise PluginContractError(
-                f"The transducer of {spec.name} returned shape {readings.shape} at {state.force_n:g} N; "
-                f"expected ({len(names)},) finite readings.",
-                hint="Return one finite number for each wanted channel.",
-            )
-        return readings
-
+    read = _reader(run.sensor, grid, names) if names else _no_channels
     core: Callable[[Medium], Medium] | None = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):
         where = run.lent["core"]
@@ -117,21 +117,53 @@ def _tabulate(run: Synthesis, columns: list[int], largest: float) -> _Tabulated:
             return made
 
     press = Press(medium_of(skin, grid), gap, run.contact, core=core, fluid_pressure=run.fluid_pressure)
-    table = build_table(press, read, largest_n=largest, tolerance=_tolerance(run, columns))
+    table = build_table(press, read, largest_n=largest, tolerance=_tolerance(run, names))
     closing = press.closing_at(largest) if press.medium.has_core else 0.0
     film = float(press.medium.rest_thickness_mm.max()) - press.medium.least_thickness_mm
     return _Tabulated(table, press.touched_core, closing, film)
 
 
-def _tolerance(run: Synthesis, columns: list[int]) -> FloatArray:
+def _reader(sensor: SensorDescriptor, grid: SkinGrid, names: list[str]) -> Callable[[SkinState], FloatArray]:
+    """Return the sensor's transducer, each of its answers looked at before it is used."""
+    try:
+        transducer = load_object(sensor.transducer or "")(sensor.spec, grid, names)
+    except RigError as error:
+        raise NotApplicable(f"The transducer of {sensor.name} cannot answer: {error}", hint=error.hint) from error
+
+    def read(state: SkinState) -> FloatArray:
+        readings = np.asarray(transducer(state), dtype=np.float64)
+        if readings.shape != (len(names),) or not np.all(np.isfinite(readings)):
+            raise PluginContractError(
+                f"The transducer of {sensor.name} returned shape {readings.shape} at {state.force_n:g} N; "
+                f"expected ({len(names)},) finite readings.",
+                hint="Return one finite number for each wanted channel.",
+            )
+        return readings
+
+    return read
+
+
+_NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
+"""Depth and contact radius [mm] and pressure [MPa] where no channel says how closely the skin must be known: a
+hundredth of what a ramp to a few newtons gives."""
+
+
+def _no_channels(state: SkinState) -> FloatArray:
+    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
+
+
+def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
     """Return the interpolation error to aim at: one standard deviation of what noise and rounding hide anyway."""
+    if not names:
+        return _NO_CHANNELS_TOLERANCE
     wanted = []
-    for column in columns:
-        nuisances = run.nuisances(run.channels[column].kind)
+    channels = {channel.name: channel for track in run.tracks for channel in track.channels}
+    for name in names:
+        channel = channels[name]
+        nuisances = run.nuisances(channel.kind)
         hidden = 0.0 if nuisances is None else float(np.hypot(nuisances.white.value, nuisances.step.value / 12**0.5))
         # Without any stated noise: a ten-thousandth of the range, or of one.
-        upper, lower = run.channels[column].upper, run.channels[column].lower
-        span = upper - lower if upper is not None and lower is not None else 1.0
+        span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 1.0
         wanted.append(hidden if hidden > 0 else 1e-4 * span)
     return np.array(wanted)
 
