@@ -13,7 +13,15 @@ _DRIFT, _NOISE = ("drift",), ("noise",)
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
     """Offer the rig."""
-    return [RigDescriptor(name="twin", title="Simulated twin", where=f"{_HERE}.rig:build", simulated=True)]
+    return [
+        RigDescriptor(
+            name="twin",
+            title="Simulated twin",
+            where=f"{_HERE}.rig:build",
+            simulated=True,
+            likeness=f"{_HERE}.likeness.report:checks",
+        )
+    ]
 
 
 @hookimpl

@@ -6,6 +6,7 @@ import math
 
 from tactbench.plugin import FluidBackedShell, Quantity, SensorSpec, SkinSheet, Source, assumed, derived, sourced
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
+from tactbench.sensors.biotac.likeness import LIKENESS
 from tactbench.sensors.biotac.nuisances import NUISANCES
 
 _MESH = "NVlabs/biotac_sim int_ext_skin_combined_ftw.tet and top_side_core_bc.obj"
@@ -67,6 +68,7 @@ SPEC = SensorSpec(
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances=NUISANCES,
+    likeness=LIKENESS,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",
         "Wettels, Santos, Johansson, Loeb 2008 (impedance of the electrodes)",
