@@ -18,6 +18,7 @@ from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import (
     Acquisition,
     Estimator,
+    Explained,
     Reason,
     Rig,
     RigContext,
@@ -66,6 +67,7 @@ __all__ = [
     "Environment",
     "Estimator",
     "EstimatorDescriptor",
+    "Explained",
     "FloatArray",
     "FluidBackedShell",
     "FoamPad",

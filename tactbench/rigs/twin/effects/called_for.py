@@ -96,7 +96,9 @@ def _behind(nuisances: Nuisances, rate: float) -> float | None:
     if nuisances.largest_slope is None:
         return None
     late_s = sum(term.fraction.to("1") * term.tau.to("s") for term in nuisances.creep)
-    return nuisances.largest_slope.to("count/N") * late_s * rate
+    # The slope is that of the nominal gain; four standard deviations cover the largest of some hundred channels.
+    gain = 1.0 + 4.0 * nuisances.gain_scatter.to("1")
+    return nuisances.largest_slope.to("count/N") * gain * late_s * rate
 
 
 def _hidden(nuisances: Nuisances, scene: Scene) -> float:
@@ -131,7 +133,12 @@ def offset(scene: Scene, sensor: SensorSpec) -> Reason:
 def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether rest levels rise to a warm value."""
     rise = _largest(scene, sensor, lambda nuisances: nuisances.warm_up)
-    return _scaled(scene, rise, "warm-up", "rest levels rise by {} from power-on")
+    reason = _scaled(scene, rise, "warm-up", "rest levels rise by {} from power-on")
+    tau = _largest(scene, sensor, lambda nuisances: nuisances.warm_up_tau)
+    if not reason.called_for or tau is None or reason.change is None:
+        return reason
+    since = scene.environment.since_power_on.to("s") + scene.starts_after_s
+    return reason._replace(change=reason.change * math.exp(-since / tau.to("s")))
 
 
 def wander(scene: Scene, sensor: SensorSpec) -> Reason:
