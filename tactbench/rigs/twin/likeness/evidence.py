@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, NotApplicable, RealFigure
 
+IntArray = npt.NDArray[np.int64]
 LOADED_FROM = 10.0
 """Without a pressure channel: a fingertip counts as loaded when a taxel has moved by this many counts."""
 MOVED_FROM = 3.0
@@ -23,10 +25,14 @@ class Evidence:
     """(n, channels) untouched stretches, one a recording."""
     pressure_rest: tuple[FloatArray, ...] = ()
     """(n,) the fluid's pressure meanwhile."""
+    vibration_rest: tuple[FloatArray, ...] = ()
+    """(n,) the fluid's vibration meanwhile, on its own clock."""
     change: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     """(m, channels) loaded states less rest."""
     pressure: FloatArray | None = None
     """(m,) the fluid's pressure above rest."""
+    unit: IntArray | None = None
+    """(m,) which unit a state is of, where there are several: the fingertips of a hand."""
     angle_deg: FloatArray | None = None
     """(m, channels) between each channel's normal and the contact's direction."""
     released: FloatArray | None = None
@@ -36,7 +42,7 @@ class Evidence:
     one_session: bool = True
     """The stretches belong to one session."""
 
-    def within(self, figure: RealFigure) -> FloatArray:
+    def within(self, figure: RealFigure) -> npt.NDArray[np.bool_]:
         """Return (m,) which states lie in the figure's band.
 
         Raises
@@ -44,7 +50,7 @@ class Evidence:
         NotApplicable
             If there is none, or no pressure to tell.
         """
-        inside: FloatArray = np.ones(self.change.shape[0], dtype=bool)
+        inside = np.ones(self.change.shape[0], dtype=np.bool_)
         if figure.band is not None:
             if self.pressure is None:
                 raise NotApplicable("there is no channel of the fluid's pressure to order loads by")

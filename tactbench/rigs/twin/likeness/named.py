@@ -53,6 +53,12 @@ def _pressure_rest(evidence: Evidence) -> list[FloatArray]:
     return rows
 
 
+def _vibration(evidence: Evidence) -> float:
+    if not evidence.vibration_rest:
+        raise NotApplicable("no untouched stretch of the fluid's vibration is known")
+    return float(np.median([rows.std() for rows in evidence.vibration_rest]))
+
+
 def _long(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     """Return times and the longest untouched stretch."""
     if evidence.dt_s is None:
@@ -60,16 +66,16 @@ def _long(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
     rows = max(_stretches(evidence), key=len)
     if rows.shape[0] * evidence.dt_s < LONG_ENOUGH_S:
         raise NotApplicable(f"no untouched stretch lasts {LONG_ENOUGH_S:g} s")
-    return np.arange(rows.shape[0]) * evidence.dt_s, rows
+    return np.arange(rows.shape[0], dtype=np.float64) * evidence.dt_s, rows
 
 
 def _by_seconds(t_s: FloatArray, rows: FloatArray, seconds: float = 5.0) -> tuple[FloatArray, FloatArray]:
     """Return the middles of blocks of `seconds` and their means: what drifts, without the noise."""
-    size = max(1, round(seconds / (t_s[1] - t_s[0])))
+    size = max(1, round(seconds / float(t_s[1] - t_s[0])))
     whole = rows.shape[0] // size
     return (
-        t_s[: whole * size].reshape(whole, size).mean(axis=1),
-        rows[: whole * size].reshape(whole, size, -1).mean(axis=1),
+        np.asarray(t_s[: whole * size].reshape(whole, size).mean(axis=1)),
+        np.asarray(rows[: whole * size].reshape(whole, size, -1).mean(axis=1)),
     )
 
 
@@ -89,7 +95,7 @@ def _warm_up(evidence: Evidence, which: int) -> float:
 
 
 def _warm_up_scatter(evidence: Evidence, figure: RealFigure) -> float:
-    t, levels = _by_seconds(*_long(evidence))
+    _, levels = _by_seconds(*_long(evidence))
     centred = levels - levels.mean(axis=0)
     shared = centred.mean(axis=1)
     factors = shared @ centred / (shared @ shared)
@@ -126,7 +132,8 @@ def _fall_angle(evidence: Evidence, figure: RealFigure) -> float:
 
 def _crossing(evidence: Evidence, figure: RealFigure) -> float:
     angle, change = _angles(evidence, figure), evidence.states(figure)
-    assert evidence.pressure is not None  # a figure of angles has a band
+    if evidence.pressure is None:
+        raise NotApplicable("there is no channel of the fluid's pressure")
     per_count = change / evidence.pressure[evidence.within(figure)][:, None]
     return statistics.zero_crossing(angle, per_count, BINS_DEG)
 
@@ -138,10 +145,14 @@ def _residual(evidence: Evidence, figure: RealFigure) -> float:
 
 
 def _components(evidence: Evidence, figure: RealFigure) -> FloatArray:
+    """Return the components' shares, of each unit on its own; the median over units."""
     states = evidence.states(figure)
-    if states.shape[0] <= states.shape[1]:
+    unit = np.zeros(len(states), dtype=np.int64) if evidence.unit is None else evidence.unit[evidence.within(figure)]
+    apart = [states[unit == which] for which in np.unique(unit)]
+    shares = [statistics.component_shares(own) for own in apart if len(own) > own.shape[1]]
+    if not shares:
         raise NotApplicable(f"{states.shape[0]} loaded states are too few for the components of {states.shape[1]}")
-    return statistics.component_shares(states)
+    return np.asarray(np.median(np.stack(shares), axis=0))
 
 
 STATISTICS: Mapping[str, Statistic] = {
@@ -153,6 +164,7 @@ STATISTICS: Mapping[str, Statistic] = {
     "noise-correlation": lambda e, f: statistics.noise_correlation(max(_stretches(e), key=len)),
     "pressure-rest": lambda e, f: float(np.median([rows.mean() for rows in _pressure_rest(e)])),
     "pressure-noise": lambda e, f: float(_noise(_pressure_rest(e))[0]),
+    "vibration-rms": lambda e, f: _vibration(e),
     "offset-shared": lambda e, f: _offset(e, 0),
     "offset-own": lambda e, f: _offset(e, 1),
     "allan-deviation": _allan,

@@ -3,7 +3,7 @@
 The sheet knows small tilts only: there the gap is linear along the finger, and a plate tilted by 29 degrees would stand
 on the sheet's edge. Here the plate touches the dome where the dome faces it. What is approximated: the dome is a
 hemisphere of the finger's outer radius, begins at x = 0, and is laid out on the sheet by the sensor's own shortened
-meridian (shorter than the real arc); the gap is measured along the plate's normal, and the skin gives way along its own.
+meridian (half of the real arc); the gap is measured along the plate's normal, and the skin gives way along its own.
 """
 
 from __future__ import annotations

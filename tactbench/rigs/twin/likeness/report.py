@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from tactbench.plugin import Check, NotApplicable, RealFigure, SensorDescriptor, UsageError, Verdict
+from tactbench.plugin import ChannelKind, Check, NotApplicable, RealFigure, SensorDescriptor, UsageError, Verdict
 from tactbench.rigs.twin.likeness import recorded, scenes
 from tactbench.rigs.twin.likeness.evidence import Evidence
 from tactbench.rigs.twin.likeness.named import take
 
+NEEDS: Mapping[str, ChannelKind] = {
+    "pressure-rest": "dc_pressure",
+    "pressure-noise": "dc_pressure",
+    "vibration-rms": "ac_pressure",
+}
+"""Channels beside taxels that a statistic at rest is taken from."""
 Source = Callable[[str], Evidence]
 
 
@@ -18,7 +24,7 @@ def checks(sensor: SensorDescriptor, recordings: Path | None = None) -> Sequence
     """Return one check for each figure the sensor declares, in its order.
 
     Nothing is carried out before a check is run; figures of one condition share its scenes. A check that yields no
-    verdict is a figure that cannot be answered: its title says why, once it has been run or where recordings are given.
+    verdict is a figure that cannot be answered: its title says why.
 
     Parameters
     ----------
@@ -42,24 +48,21 @@ def checks(sensor: SensorDescriptor, recordings: Path | None = None) -> Sequence
         )
     if recordings is not None:
         found = recorded.evidence(Path(recordings), sensor.spec)
-        return [_check(figure, lambda condition: found, of_twin=False) for figure in figures]
+        return [_check(sensor, figure, lambda condition: found, of_twin=False) for figure in figures]
 
     @cache
     def carried_out(condition: str) -> Evidence:
         return scenes.evidence(sensor, condition)
 
-    return [_check(figure, carried_out, of_twin=True) for figure in figures]
+    return [_check(sensor, figure, carried_out, of_twin=True) for figure in figures]
 
 
-def _check(figure: RealFigure, source: Source, *, of_twin: bool) -> Check:
+def _check(sensor: SensorDescriptor, figure: RealFigure, source: Source, *, of_twin: bool) -> Check:
     name = f"{figure.condition}: {figure.name}"
     title = f"{figure.statistic} in {figure.low:g} to {figure.high:g} {figure.unit} as on real units"
-    if not of_twin or figure.condition not in scenes.CONDITIONS:
-        # What recordings, or no scene at all, cannot answer is known without solving anything.
-        try:
-            take(source(figure.condition), figure)
-        except NotApplicable as reason:
-            return Check(name=name, group=figure.condition, title=f"left out: {reason.message}", run=lambda: ())
+    reason = _twin_lacks(sensor, figure) if of_twin else _cannot(source, figure)
+    if reason:
+        return Check(name=name, group=figure.condition, title=f"left out: {reason}", run=lambda: ())
 
     def run() -> Sequence[Verdict]:
         try:
@@ -80,3 +83,22 @@ def _check(figure: RealFigure, source: Source, *, of_twin: bool) -> Check:
         )
 
     return Check(name=name, group=figure.condition, title=title, run=run)
+
+
+def _cannot(source: Source, figure: RealFigure) -> str:
+    """Return why the evidence does not answer; empty if it does."""
+    try:
+        take(source(figure.condition), figure)
+    except NotApplicable as reason:
+        return reason.message
+    return ""
+
+
+def _twin_lacks(sensor: SensorDescriptor, figure: RealFigure) -> str:
+    """Return why the twin will not answer, known without solving anything; empty if it should."""
+    if figure.condition not in scenes.CONDITIONS:
+        return f"the twin carries out no scene of the kind {figure.condition!r}"
+    kind = NEEDS.get(figure.statistic)
+    if kind is not None and not scenes.gives(sensor, kind):
+        return f"no installed effect gives {kind} of {sensor.name}"
+    return ""

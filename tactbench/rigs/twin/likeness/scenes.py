@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from tactbench.plugin import (
+    ChannelKind,
     Environment,
     FloatArray,
     FluidBackedShell,
@@ -25,6 +26,7 @@ from tactbench.rigs.twin.likeness.plate import finger_surface, plate_gap_mm, pla
 from tactbench.rigs.twin.likeness.pressing import Bench
 from tactbench.rigs.twin.rig import Twin
 
+_REST_KINDS: tuple[ChannelKind, ...] = ("taxel", "dc_pressure", "ac_pressure")
 SEED = 3
 RATE_HZ = 100.0
 _WHY = "scene of the comparison with real recordings"
@@ -35,7 +37,9 @@ AZIMUTHS_DEG = (-40.0, 0.0, 40.0)
 """Mostly towards the tip."""
 PLATE_N = (0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 13.0, 16.0, 20.0, 25.0)
 """No real recording has a force: states are ordered by the fluid's pressure, and these reach its range."""
-POINT_N = (0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
+POINT_N = (2.0, 6.0, 10.0, 16.0, 20.0, 25.0, 30.0)
+POINT_RADIUS_MM = 3.0
+"""Nobody says what was pointed; sharper ones let the fluid's pressure stay below what was recorded."""
 CAPS_MM = (10.0, 20.0, 40.0, math.inf)
 GRASP_N = (0.5, 1.0, 2.0, 5.0)
 GRASPS = 4
@@ -61,27 +65,18 @@ def _rest(sensor: SensorDescriptor) -> Evidence:
 
 
 def _long_rest(sensor: SensorDescriptor) -> Evidence:
-    """Twelve minutes from power-on, as long as the real records; how warm the real one was at first is not known."""
+    """Rest for twelve minutes from power-on: as long as the real records, whose first temperature nobody knows."""
     return _untouched(sensor, recordings=1, duration_s=720.0, since_power_on_s=0.0)
 
 
 def _untouched(sensor: SensorDescriptor, *, recordings: int, duration_s: float, since_power_on_s: float) -> Evidence:
-    kinds = tuple(kind for kind in ("taxel", "dc_pressure") if sensor.spec.channels(kind))
     twin = Twin(tuple(load_registry().effects))
-    rest, pressure = [], []
+    kinds = tuple(kind for kind in _REST_KINDS if kind == "taxel" or gives(sensor, kind))
+    rest: list[FloatArray] = []
+    pressure: list[FloatArray] = []
+    vibration: list[FloatArray] = []
     for number in range(recordings):
-        scene = Scene(
-            name=f"rest-{number}",
-            placement=Placement(scatter=assumed(0.0, "mm", _WHY)),
-            profile=ForceRamp(
-                end=assumed(0.0, "N", _WHY),
-                hold=assumed(0.0, "s", _WHY),
-                duration=assumed(duration_s, "s", _WHY),
-                samples=round(duration_s * RATE_HZ),
-            ),
-            environment=Environment(since_power_on=assumed(since_power_on_s, "s", _WHY)),
-            observe=kinds,
-        )
+        scene = _untouched_scene(f"rest-{number}", kinds, duration_s, since_power_on_s)
         columns: dict[str, list[FloatArray]] = {}
         with twin.open(sensor, scene, seed=SEED) as acquisition:
             specs = {stream.name: stream for stream in acquisition.streams}
@@ -90,12 +85,43 @@ def _untouched(sensor: SensorDescriptor, *, recordings: int, duration_s: float, 
                     columns.setdefault(channel.name, []).append(block.data[:, column].astype(np.float64))
         whole = {name: np.concatenate(parts) for name, parts in columns.items()}
         rest.append(np.stack([whole[channel.name] for channel in sensor.spec.channels("taxel")], axis=1))
-        pressure.extend(whole[channel.name] for channel in sensor.spec.channels("dc_pressure"))
-    return Evidence(_names(sensor.spec), tuple(rest), tuple(pressure), dt_s=1.0 / RATE_HZ)
+        pressure.extend(whole[channel.name] for channel in sensor.spec.channels("dc_pressure") if channel.name in whole)
+        vibration.extend(
+            whole[channel.name] for channel in sensor.spec.channels("ac_pressure") if channel.name in whole
+        )
+    return Evidence(_names(sensor.spec), tuple(rest), tuple(pressure), tuple(vibration), dt_s=1.0 / RATE_HZ)
+
+
+def _untouched_scene(
+    name: str, kinds: tuple[ChannelKind, ...], duration_s: float = 1.0, since_power_on_s: float = 600.0
+) -> Scene:
+    return Scene(
+        name=name,
+        placement=Placement(scatter=assumed(0.0, "mm", _WHY)),
+        profile=ForceRamp(
+            end=assumed(0.0, "N", _WHY),
+            hold=assumed(0.0, "s", _WHY),
+            duration=assumed(duration_s, "s", _WHY),
+            samples=round(duration_s * RATE_HZ),
+        ),
+        environment=Environment(since_power_on=assumed(since_power_on_s, "s", _WHY)),
+        observe=kinds,
+    )
+
+
+def gives(sensor: SensorDescriptor, kind: ChannelKind) -> bool:
+    """Answer whether the sensor has such channels and the installed effects give them; nothing is solved."""
+    if not sensor.spec.channels(kind):
+        return False
+    try:
+        Twin(tuple(load_registry().effects)).explain(sensor, _untouched_scene("rest", (kind,)))
+    except NotApplicable:
+        return False
+    return True
 
 
 def _plate(sensor: SensorDescriptor) -> Evidence:
-    """A flat plate pressed by hand, tilted towards the tip."""
+    """Press flat plates, tilted towards the tip as a hand held them."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
     par = sensor.spec.parameters
     surface = finger_surface(bench.grid, outer, par["dome_shortening"].value * par["core_radius"].to("mm"))
@@ -117,7 +143,7 @@ def _plate(sensor: SensorDescriptor) -> Evidence:
 
 
 def _pointed(sensor: SensorDescriptor) -> Evidence:
-    """A blunt point, radius 1.5 mm, over electrode 1, at the sheet's own place for it."""
+    """Press a blunt point over electrode 1, at the sheet's own place for it."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
     par = sensor.spec.parameters
     place = sensor.spec.channels("taxel")[0].position_m
@@ -126,12 +152,12 @@ def _pointed(sensor: SensorDescriptor) -> Evidence:
     x, y, z = (1e3 * component for component in place)
     core = par["core_radius"].to("mm")
     axial = x if x <= 0 else par["dome_shortening"].value * core * math.asin(min(x / core, 1.0))
-    change, pressure = bench.press_cap(1.5, axial, outer * math.atan2(y, -z), POINT_N)
+    change, pressure = bench.press_cap(POINT_RADIUS_MM, axial, outer * math.atan2(y, -z), POINT_N)
     return Evidence(_names(sensor.spec), change=change, pressure=pressure)
 
 
 def _release(sensor: SensorDescriptor) -> Evidence:
-    """Plates held for ten seconds, then released; what creep leaves one second later, with the spec's own terms."""
+    """Hold plates for ten seconds and release them: what creep leaves one second later, with the spec's own terms."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
     par = sensor.spec.parameters
     surface = finger_surface(bench.grid, outer, par["dome_shortening"].value * par["core_radius"].to("mm"))
@@ -150,7 +176,7 @@ def _release(sensor: SensorDescriptor) -> Evidence:
 
 
 def _grasp(sensor: SensorDescriptor) -> Evidence:
-    """Caps and flats pressed where a grasp happens to put them; only states that count as loaded."""
+    """Press caps and flats where a grasp happens to put them; only states that count as loaded."""
     bench = Bench(sensor)
     generator = np.random.default_rng(SEED)
     x0, s0 = (sensor.spec.parameters[name].to("mm") for name in ("contact_x", "contact_s"))

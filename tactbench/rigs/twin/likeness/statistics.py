@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -27,7 +28,7 @@ def noise_correlation(counts: FloatArray) -> float:
     second = second[:, second.std(axis=0) > 0]
     if second.shape[1] < 2:
         return float("nan")
-    among = np.corrcoef(second, rowvar=False)
+    among = np.asarray(np.corrcoef(second, rowvar=False))
     return float(np.median(among[np.triu_indices(second.shape[1], 1)]))
 
 
@@ -104,7 +105,7 @@ def zero_crossing(angle_deg: FloatArray, change: FloatArray, edges_deg: Sequence
     Straight between the middles of bins; not a number if it never does. Empty bins are passed over.
     """
     previous: tuple[float, float] | None = None
-    for low, high in zip(edges_deg[:-1], edges_deg[1:], strict=True):
+    for low, high in itertools.pairwise(edges_deg):
         inside = (angle_deg >= low) & (angle_deg < high)
         if not inside.any():
             continue
