@@ -30,8 +30,8 @@ _HISTORY = (
     "them; the model's scene has none"
 )
 _HAND = (
-    "15 orientations of one plate without history or slip; presumably a hand varies more, and the remainders of earlier "
-    "presses make components of their own"
+    "15 orientations of one plate without history or slip; presumably a hand varies more, and the remainders of "
+    "earlier presses make components of their own"
 )
 _TIP = "the tip's four electrodes, furthest from the excitations, rest lowest: nobody measured the film there"
 _ASPERITIES = "the film that asperities keep open under the point, 0.06 mm, is assumed: with 0.02 mm the drop is 1580"
