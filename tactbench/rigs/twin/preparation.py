@@ -16,7 +16,7 @@ from tactbench.plugin import (
     SensorDescriptor,
     SensorSpec,
 )
-from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity, rung
 from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan
 from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
@@ -46,7 +46,7 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidel
         contact=Contact(radius_mm(scene.indenter), 0.0, 0.0),
         reference_n=load.at(t_s),
         lent=dict(plan.lent),
-        fidelity=fidelity,
+        fidelity=fidelity if scene.simulation.rung is None else rung(scene.simulation.rung),
     )
     run.contact = _place(run)
     return run
