@@ -20,6 +20,7 @@ class AnyPress(Protocol):
     """What a load table asks of whatever solves its loads: one interface for every rung."""
 
     medium: Medium
+    contact: Contact
     touched_core: bool
     solves: int
 
@@ -88,17 +89,18 @@ class Press:
         tolerance: float = TOLERANCE,
     ) -> None:
         self.medium = medium
-        self.gap_mm = gap_mm
+        # From first touch: between cells the gap's smallest value on the grid is not zero, and in its rounding the
+        # depth of a piconewton would drown.
+        self.gap_mm = gap_mm - gap_mm.min()
         self.contact = contact
         self.touched_core = False
         self.solves = 0
         self.products = 0
-        self._solver = NewtonSolver(medium, gap_mm)
+        self._solver = NewtonSolver(medium, self.gap_mm)
         self._core = core
         self._wants_fluid_pressure = fluid_pressure
         self._tolerance = tolerance
         self._solutions: dict[float, Solution] = {}
-        self._least_gap = float(gap_mm.min())
 
     def __call__(self, force_n: float) -> SkinState:
         """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
@@ -112,8 +114,7 @@ class Press:
             deflection_mm=solution.deflection_mm,
             pressure_mpa=pressure,
             thickness_mm=self.medium.thickness_mm(solution.deflection_mm),
-            # Counted from first touch: between cells the gap's smallest value on the grid is not zero.
-            depth_mm=solution.depth_mm - self._least_gap,
+            depth_mm=solution.depth_mm,
             fluid_pressure_mpa=self._fluid_pressure(solution),
             contact_radius_mm=contact_radius_mm(self.medium.grid, self.contact, pressure),
             residual=solution.residual,

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, NotApplicable
+from tactbench.plugin import FloatArray, NotApplicable, Scalar
 from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
 from tactbench.rigs.twin.contact.pressing import pressed
-from tactbench.rigs.twin.geometry import check_contact, skin_grid
+from tactbench.rigs.twin.contact.validity import check_reach, remarks
+from tactbench.rigs.twin.geometry import check_contact, pad_of, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
@@ -26,6 +29,7 @@ class _Tabulated:
     touched_core: bool
     closing_mm: float
     film_mm: float
+    remarks: Mapping[str, Scalar]
 
 
 _TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
@@ -113,7 +117,12 @@ def _tabulate(run: Synthesis, names: list[str], largest: float) -> _Tabulated:
     medium = press.medium
     closing = press.closing_at(largest) if medium.has_core else 0.0
     film = float(medium.rest_thickness_mm.max()) - medium.least_thickness_mm
-    return _Tabulated(table, press.touched_core, closing, film)
+    skin = run.sensor.spec.skin
+    sheet = None if skin is None else skin.sheet
+    outer_mm = math.inf if sheet is None or sheet.outer_radius is None else sheet.outer_radius.to("mm")
+    check_reach(press, largest, outer_mm)
+    pad = None if sheet is None else pad_of(sheet, medium.grid)
+    return _Tabulated(table, press.touched_core, closing, film, remarks(press, table.loads_n.tolist(), outer_mm, pad))
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
@@ -151,6 +160,7 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
         table_error_count=float(table.error.max(initial=0.0)),
         solver_residual=table.residual,
         depth_mm=deepest.depth_mm,
+        **tabulated.remarks,
     )
     if run.rung_error is not None:
         total = run.rung_error + float(table.error.max(initial=0.0))
