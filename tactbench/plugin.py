@@ -28,7 +28,9 @@ from tactbench.core.plugins.interfaces import (
     TransducerFactory,
 )
 from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.samples import Block, FloatArray, Quality, SkinGrid, SkinState
+from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import (
@@ -88,7 +90,9 @@ __all__ = [
     "Published",
     "Quality",
     "Quantity",
+    "RealFigure",
     "Reason",
+    "Recording",
     "Rig",
     "RigContext",
     "RigDescriptor",
@@ -118,5 +122,6 @@ __all__ = [
     "load_object",
     "load_registry",
     "measured",
+    "open_recording",
     "sourced",
 ]

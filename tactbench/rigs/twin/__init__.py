@@ -19,6 +19,7 @@ def tactbench_rigs() -> list[RigDescriptor]:
             title="Simulated twin",
             where=f"{_HERE}.rig:build",
             simulated=True,
+            likeness=f"{_HERE}.likeness.report:checks",
             rungs=("closed-form", "default", "fine", "reference"),
             work_precision=f"{_HERE}.work_precision:study",
             verification=f"{_HERE}.verification.everything:checks",
