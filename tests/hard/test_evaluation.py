@@ -9,6 +9,7 @@ import pytest
 
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.interval import block_length
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.plugin import load_registry
 from tests.core.evaluation.made import force_task, label_task, record
@@ -128,6 +129,13 @@ def test_an_inner_set_without_rows_is_no_reason_against_the_others(tmp_path):
         # Shorter than nothing the split needs, but gone once its hold-out has been cut off.
         paths.append(record(tmp_path / f"short{place}.h5", np.ones((2, 2)), np.ones(2), role="train", session="train"))
     _score(force_task(), "ridge", "deployable", paths)
+
+
+@pytest.mark.parametrize("size", [1e-150, 1.0, 1e150])
+def test_the_length_of_a_block_knows_no_unit(size):
+    loss = np.convolve(np.random.default_rng(0).standard_normal(500), np.ones(10), "valid") ** 2
+    assert block_length(size * loss) == block_length(loss) > 8
+    assert block_length(np.zeros(100)) == 5
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
