@@ -7,6 +7,7 @@ import math
 from tactbench.plugin import FluidBackedShell, Quantity, SensorSpec, SkinSheet, Source, assumed, derived, sourced
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.nuisances import NUISANCES
+from tactbench.sensors.biotac.thermal import THERMAL
 
 _MESH = "NVlabs/biotac_sim int_ext_skin_combined_ftw.tet and top_side_core_bc.obj"
 
@@ -51,6 +52,7 @@ PARAMETERS: dict[str, Quantity] = {
     ),
     "excitation_x_back": assumed(-12.0, "mm", _NO_EXCITATION_SOURCE),
     "excitation_arc": assumed(2.2, "mm", f"arc on the core either side of the midline; {_NO_EXCITATION_SOURCE}"),
+    **THERMAL,
 }
 
 SPEC = SensorSpec(

@@ -81,9 +81,14 @@ def skin_under_load(run: Synthesis) -> LoadTable:
 
     Whether the fluid's pressure belongs to it must be settled before it is first asked for.
     """
-    tabulated = _tabulated(run)
+    tabulated = _tabulated(run, _read_names(run), run.load.largest_n)
     _report(run, tabulated)
     return tabulated.table
+
+
+def bare_skin(run: Synthesis, largest_n: float) -> LoadTable:
+    """Return what the skin alone does up to a load, no channel read: for those who decide upon the load."""
+    return _tabulated(run, [], largest_n).table
 
 
 def _read_names(run: Synthesis) -> list[str]:
@@ -91,8 +96,7 @@ def _read_names(run: Synthesis) -> list[str]:
     return [channel.name for track in run.tracks for channel in track.channels if channel.kind in READ_FROM_THE_SKIN]
 
 
-def _tabulated(run: Synthesis) -> _Tabulated:
-    largest, names = run.load.largest_n, _read_names(run)
+def _tabulated(run: Synthesis, names: list[str], largest: float) -> _Tabulated:
     text = f"{run.sensor.model_dump_json()}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}"
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
