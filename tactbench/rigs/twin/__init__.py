@@ -56,7 +56,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
             ("warmth", "taxel"),
             ("disturbance",),
             _HEAT,
-            groups=_DRIFT,
+            groups=("heat",),
         ),
         _effect("rest-spread", "Scatter of rest levels", "effects.rest_spread:apply", (), ("disturbance",)),
         _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",), groups=_DRIFT),

@@ -136,8 +136,10 @@ class Dynamics:
 
     def _velocity(self, way: float, velocity: float, most_change: float) -> float:
         """Return the velocity of this step: that of the lag, unless a limit of the motor holds it back."""
-        # The speed from which steps of `most_change` still stop it within the way that is left.
-        brake = -0.5 * most_change + math.sqrt(0.25 * most_change**2 + 2 * self.acceleration * abs(way))
+        # The speed from which steps of `most_change` still stop it within the way that is left: the root of
+        # v^2 + v change - 2 acceleration way = 0, written so that nothing cancels.
+        room = 2 * self.acceleration * abs(way)
+        brake = room / (0.5 * most_change + math.sqrt(0.25 * most_change**2 + room)) if room > 0 else 0.0
         fastest = min(self.speed, brake)
         wish = min(max(way * (1 - self.left) / self.step_s, -fastest), fastest)
         return min(max(wish, velocity - most_change), velocity + most_change)
