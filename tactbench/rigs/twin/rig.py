@@ -26,6 +26,7 @@ from tactbench.plugin import (
     Source,
     StreamSpec,
 )
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.synthesis import Synthesis
@@ -86,10 +87,13 @@ class Twin:
     ----------
     effects
         All installed effects; a plan takes from them what a scene calls for.
+    fidelity
+        How finely contacts are resolved.
     """
 
-    def __init__(self, effects: Sequence[EffectDescriptor]) -> None:
+    def __init__(self, effects: Sequence[EffectDescriptor], fidelity: Fidelity = DEFAULT) -> None:
         self.effects = tuple(effects)
+        self.fidelity = fidelity
 
     def plan(self, sensor: SensorDescriptor, scene: Scene) -> Plan:
         """Return the plan of a scene without carrying it out.
@@ -116,7 +120,7 @@ class Twin:
             If the contact cannot be resolved or solved.
         """
         plan = self.plan(sensor, scene)
-        run = prepare(sensor, scene, seed, plan)
+        run = prepare(sensor, scene, seed, plan, self.fidelity)
         for effect in plan.stages:
             run.apply(effect)
         yield _acquisition(run, plan)
@@ -180,6 +184,10 @@ def _asked(scene: Scene) -> dict[str, Scalar]:
     asked: dict[str, Scalar] = {}
     if scene.simulation.effects:
         asked["effects"] = " ".join(scene.simulation.effects)
+    if scene.simulation.rung is not None:
+        asked["rung"] = scene.simulation.rung
+    if scene.simulation.tolerance is not None:
+        asked["tolerance_count"] = scene.simulation.tolerance
     return asked
 
 

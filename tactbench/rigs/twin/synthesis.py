@@ -21,6 +21,7 @@ from tactbench.plugin import (
     load_object,
 )
 from tactbench.rigs.twin import draws
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
 
 
@@ -104,6 +105,12 @@ class Synthesis:
     """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
     settled: dict[str, tuple[bool, str]] = field(default_factory=dict)
     """Plan entries that only the solve could decide: name -> (included, reason)."""
+    fidelity: Fidelity = DEFAULT
+    """How finely the contact is resolved."""
+    rung: str = ""
+    """Name of the rung that was chosen to keep a tolerance."""
+    rung_error: float | None = None
+    """Its estimated error in the worst observed channel, in the channel's unit; None: nobody asked."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """What was drawn or achieved."""
     clock: Callable[[], float] = time.perf_counter
