@@ -118,7 +118,8 @@ def _most_k(scene: Scene, sensor: SensorSpec) -> float:
         widest = min(widest, scene.indenter.radius.to("mm"))
     conductance = 4e-3 * sensor.parameters["contact_conductivity"].to("W/m/K") * widest
     profile = scene.profile
-    idle = 0.0 if profile.start.to("N") > 0 else profile.hold.to("s")
+    # A force loop touches the skin while it waits, too.
+    idle = 0.0 if profile.start.to("N") > 0 or scene.drive is not None else profile.hold.to("s")
     pressed_s = max(profile.duration.to("s") - idle, 0.0)
     share = min(1.0, conductance * pressed_s / sensor.parameters["heat_capacity"].to("J/K"))
     return _difference_k(scene, sensor) * share

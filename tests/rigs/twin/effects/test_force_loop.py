@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import Environment, ForceLoop, ForceRamp, Indenter, RigContext, Scene, assumed
+from tactbench.plugin import Environment, ForceLoop, ForceRamp, Indenter, RigContext, RigError, Scene, assumed
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND, depth_of, force_at_depth
@@ -121,6 +121,32 @@ def test_a_drive_is_called_for_by_the_scene_alone(specs):
         assert entry.included is called
         assert "0 N" in entry.reason or "1 Hz" in entry.reason
     assert plan.stages[0].name == "force-loop"
+
+
+def test_what_the_drive_is_made_of_is_printed_with_the_recording(sensors):
+    scene = _scene(_unfiltered(), samples=50)
+    with build(RigContext(effects=tuple(EFFECTS))).open(sensors["icub"], scene, seed=1) as recording:
+        said = recording.assumptions
+    assert said["loop_cutoff_hz"] == "none"
+    assert said["loop_proportional_mm_per_n"] == 0.15
+    assert said["loop_delay_s"] == pytest.approx(0.01)
+
+
+def test_creep_is_never_left_out_behind_a_loop(specs):
+    slow = {"duration": _q(1e5, "s")}
+    for drive, called in ((None, False), (ForceLoop(), True)):
+        plan = plan_scene(EFFECTS, _scene(drive, **slow), specs["icub"])
+        assert next(entry for entry in plan.entries if entry.effect == "creep").included is called
+
+
+@pytest.mark.parametrize("wrong", [{"cutoff": 0.0}, {"delay": -1.0}, {"speed": 0.0}, {"integral": float("nan")}])
+def test_a_loop_that_means_nothing_is_refused_by_the_name_of_its_number(sensors, wrong):
+    ((name, value),) = wrong.items()
+    unit = getattr(ForceLoop(), name).unit
+    scene = _scene(ForceLoop(**{name: _q(value, unit)}))
+    rig = build(RigContext(effects=tuple(EFFECTS)))
+    with pytest.raises(RigError, match=name), rig.open(sensors["icub"], scene, seed=1):
+        pass
 
 
 def test_depth_and_force_undo_each_other(pressed):
