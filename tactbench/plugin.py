@@ -30,6 +30,7 @@ from tactbench.core.plugins.interfaces import (
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.samples import Block, FloatArray, Quality, SkinGrid, SkinState
+from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
@@ -76,6 +77,7 @@ __all__ = [
     "FloatArray",
     "FluidBackedShell",
     "FoamPad",
+    "ForceLoop",
     "ForceRamp",
     "Indenter",
     "LabelTarget",

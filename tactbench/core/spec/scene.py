@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.quantity import Frozen, Quantity, assumed, sourced
 from tactbench.core.spec.sensor import ChannelKind
 
@@ -67,6 +68,13 @@ class Environment(Frozen):
         0.6875, "N", f"{PAPER}: RMSE of the regression on the time index, read as label noise"
     )
     """Standard deviation of the unfiltered force-torque sensor [force]."""
+    force_filter: Quantity | None = None
+    """Cut-off of a low-pass on the recorded force [1/time]; None: recorded unfiltered, as in the paper."""
+    ambient: Quantity = assumed(23.0, "degC", "a laboratory; the paper does not say")
+    """Temperature of the room [degC]."""
+    indenter_temperature: Quantity | None = None
+    """Temperature of the indenter [degC]; None: as warm as what it touches, so that no heat flows. Nobody states it:
+    a cap that lies in the room has that of the room."""
 
 
 class Simulation(Frozen):
@@ -96,6 +104,8 @@ class Scene(Frozen):
     indenter: Indenter = Indenter()
     placement: Placement = Placement()
     profile: ForceRamp = ForceRamp()
+    drive: ForceLoop | None = None
+    """How the force is brought about; None: the indenter follows the profile exactly."""
     environment: Environment = Environment()
     session: str = "1"
     """Recordings of one session were made without re-mounting anything."""

@@ -8,6 +8,7 @@ TACTBENCH_API = 1
 
 _HERE = "tactbench.rigs.twin"
 _DRIFT, _NOISE = ("drift",), ("noise",)
+_HEAT, _FORCE = "effects.thermal_called_for", "effects.force_called_for"
 
 
 @hookimpl
@@ -31,12 +32,43 @@ def tactbench_rigs() -> list[RigDescriptor]:
 def tactbench_effects() -> list[EffectDescriptor]:
     """Offer the twin's own effects."""
     return [
-        _effect("creep", "Creep of the skin", "effects.creep:apply", (), ("effective-force",)),
-        _effect("contact", "Normal contact", "contact.stages:press_skin", ("effective-force", "core"), ("skin",)),
+        _effect("force-loop", "Motor under force control", "effects.force_loop:apply", (), ("load",), _FORCE),
+        _effect("creep", "Creep of the skin", "effects.creep:apply", ("load",), ("effective-force",)),
+        _effect(
+            "contact", "Normal contact", "contact.stages:press_skin", ("load", "effective-force", "core"), ("skin",)
+        ),
         _effect("core", "Touch-down on the core", "contact.core:with_core", (), ("core",)),
         _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure",)),
         _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
         _effect("transduction", "Transduction", "contact.stages:read_skin", ("skin", "gain"), ("taxel", "reading")),
+        _effect(
+            "contact-heat", "Heat through the contact", "effects.contact_heat:apply", ("skin",), ("warmth",), _HEAT
+        ),
+        _effect(
+            "dc-temperature",
+            "Temperature of the core",
+            "effects.temperature:read_dc",
+            ("warmth",),
+            ("dc_temperature", "reading"),
+            _HEAT,
+        ),
+        _effect(
+            "ac-temperature",
+            "Rate of the core's temperature",
+            "effects.temperature:read_ac",
+            ("warmth",),
+            ("ac_temperature", "reading"),
+            _HEAT,
+        ),
+        _effect(
+            "thermal-drift",
+            "Drift with the fluid's temperature",
+            "effects.thermal_drift:apply",
+            ("warmth", "taxel"),
+            ("disturbance",),
+            _HEAT,
+            groups=("heat",),
+        ),
         _effect("rest-spread", "Scatter of rest levels", "effects.rest_spread:apply", (), ("disturbance",)),
         _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",), groups=_DRIFT),
         _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",), groups=_DRIFT),
@@ -47,9 +79,17 @@ def tactbench_effects() -> list[EffectDescriptor]:
             "force-noise",
             "Noise of the force sensor",
             "effects.force_noise:apply",
-            (),
-            ("reference-force",),
+            ("load",),
+            ("raw-force",),
             groups=_NOISE,
+        ),
+        _effect(
+            "force-filter",
+            "Low-pass of the recorded force",
+            "effects.force_filter:apply",
+            ("raw-force",),
+            ("reference-force",),
+            _FORCE,
         ),
     ]
 

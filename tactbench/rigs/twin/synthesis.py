@@ -64,6 +64,8 @@ class Track:
     """(n,) force the response of a kind of channel follows, where it is not the true one."""
     gain: FloatArray | None = None
     """(channels,) factors on the response; None: all one."""
+    warmth_k: FloatArray | None = None
+    """(n,) kelvin by which the contact has warmed the core; None: no heat flows through it."""
 
     def by_kind(self) -> dict[ChannelKind, list[int]]:
         """Return the columns of each kind of channel."""

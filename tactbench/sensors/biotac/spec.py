@@ -8,6 +8,7 @@ from tactbench.plugin import Dome, FluidBackedShell, Quantity, SensorSpec, SkinS
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.likeness import LIKENESS
 from tactbench.sensors.biotac.nuisances import NUISANCES
+from tactbench.sensors.biotac.thermal import THERMAL
 
 _MESH = "NVlabs/biotac_sim int_ext_skin_combined_ftw.tet and top_side_core_bc.obj"
 
@@ -63,6 +64,7 @@ PARAMETERS: dict[str, Quantity] = {
         3.5, "mm", "film behind the skin that can be pressed, where the rear excitations are: it stays as at rest"
     ),
     "excitation_arc_back": derived(3.99, "mm", f"arc on the core, 3.75 mm on the map: 45 degrees; {_EXCITATION}"),
+    **THERMAL,
 }
 
 SPEC = SensorSpec(

@@ -1,6 +1,6 @@
 """From skin states to the BioTac's counts: film, conduction, divider; and the fluid's pressure.
 
-This rung gives the 19 electrodes and PDC. TDC, TAC and PAC need thermal and vibration effects and are refused.
+It gives the 19 electrodes and PDC. TDC and TAC are not read from the skin: the twin's effects of heat give them.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def build(
     for name in wanted:
         if name not in NAMES and name != "PDC":
             raise RigError(
-                f"The twin cannot give {name} of {sensor.name}: temperature and vibration are not modelled yet.",
+                f"{name} of {sensor.name} is not read from the skin.",
                 hint=f"Ask for {NAMES[0]} to {NAMES[-1]} and PDC.",
             )
     return BioTacTransducer(prepared(sensor, grid, refinement), sensor, tuple(wanted), tolerance)

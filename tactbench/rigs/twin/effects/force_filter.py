@@ -1,0 +1,17 @@
+"""A low-pass on the recorded force."""
+
+from __future__ import annotations
+
+from tactbench.rigs.twin.effects.memory import lag
+from tactbench.rigs.twin.effects.temperature import time_constant_s
+from tactbench.rigs.twin.synthesis import Synthesis
+
+
+def apply(run: Synthesis) -> None:
+    """Filter the reference force, noise included, by a first-order low-pass at the scene's ``force_filter``.
+
+    Exact for a force that is straight between samples, whatever the steps. It begins settled on the first sample.
+    """
+    cutoff = run.scene.environment.force_filter
+    if cutoff is not None:
+        run.reference_n = lag(run.t_s, run.reference_n, time_constant_s(cutoff.to("Hz")))
