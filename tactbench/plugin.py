@@ -36,7 +36,7 @@ from tactbench.core.spec.rig import (
     SensorDescriptor,
     TaskDescriptor,
 )
-from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene
+from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Slide, Surface
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
@@ -95,8 +95,10 @@ __all__ = [
     "SkinGrid",
     "SkinSheet",
     "SkinState",
+    "Slide",
     "Source",
     "StreamSpec",
+    "Surface",
     "TactbenchError",
     "TaskDescriptor",
     "TaskSpec",

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import math
 
-from tactbench.plugin import FluidBackedShell, Quantity, SensorSpec, SkinSheet, Source, assumed, derived, sourced
+from tactbench.plugin import (
+    FluidBackedShell,
+    Quantity,
+    SensorSpec,
+    SkinSheet,
+    Source,
+    assumed,
+    derived,
+    measured,
+    sourced,
+)
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.nuisances import NUISANCES
 
@@ -51,6 +61,18 @@ PARAMETERS: dict[str, Quantity] = {
     ),
     "excitation_x_back": assumed(-12.0, "mm", _NO_EXCITATION_SOURCE),
     "excitation_arc": assumed(2.2, "mm", f"arc on the core either side of the midline; {_NO_EXCITATION_SOURCE}"),
+    "skin_mode_frequency": derived(
+        330.0, "Hz", "Fishel and Loeb 2012: the smallest vibrations are felt near 330 Hz; read as the skin's mode"
+    ),
+    "skin_mode_damping": assumed(0.1, "1", "share of the critical damping; no source"),
+    "skin_lift": assumed(
+        0.03, "1", "normal over tangential motion: x^2/(2 Ro) of a patch moved by x on a round finger, at 0.25 mm"
+    ),
+    "hum": measured(
+        4.1, "count", "PAC of three BioTac SP at rest (RuihanGao/BioTacSP_setup): sd 4.5-5.1 in all, 2.4 of it white"
+    ),
+    "hum_low": measured(30.0, "Hz", "the same: the hum sits between 30 and 200 Hz"),
+    "hum_high": measured(200.0, "Hz", "the same: the hum sits between 30 and 200 Hz"),
 }
 
 SPEC = SensorSpec(

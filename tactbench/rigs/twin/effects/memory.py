@@ -6,18 +6,24 @@ dt = 0 and changes nothing.
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 
+ComplexArray = npt.NDArray[np.complex128]
+Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
 
-def recurrence(decay: FloatArray, drive: FloatArray) -> FloatArray:
+
+def recurrence(decay: Numbers, drive: Numbers) -> Numbers:
     """Return ``x_n = decay_n x_{n-1} + drive_n`` for all n, with ``x_0 = drive_0``.
 
     Parameters
     ----------
     decay
-        (n,) between 0 and 1; the first is not used.
+        (n,) of absolute value 0 to 1; the first is not used.
     drive
         (n,) or (n, channels)
 
