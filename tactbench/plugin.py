@@ -18,6 +18,7 @@ from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import (
     Acquisition,
     Estimator,
+    Explained,
     Reason,
     Rig,
     RigContext,
@@ -36,7 +37,7 @@ from tactbench.core.spec.rig import (
     SensorDescriptor,
     TaskDescriptor,
 )
-from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Slide, Surface
+from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Simulation, Slide, Surface
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
@@ -64,6 +65,7 @@ __all__ = [
     "Environment",
     "Estimator",
     "EstimatorDescriptor",
+    "Explained",
     "FloatArray",
     "FluidBackedShell",
     "FoamPad",
@@ -91,6 +93,7 @@ __all__ = [
     "SensorDescriptor",
     "SensorSpec",
     "Shelf",
+    "Simulation",
     "Skin",
     "SkinGrid",
     "SkinSheet",

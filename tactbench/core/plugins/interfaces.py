@@ -50,6 +50,27 @@ class Rig(Protocol):
         """Prepare `scene` with `sensor`; raises RigError or NotApplicable if it cannot be done."""
 
 
+class Explained(NamedTuple):
+    """One effect of a plan, and what it costs."""
+
+    entry: PlanEntry
+    cost_s: float | None
+    """Seconds it takes, or would take if it was asked for, per recording on this machine; None: not measured, or not
+    to be told apart from another one's."""
+    remark: str = ""
+    """Why there is no cost, where that is worth a word."""
+
+
+class Explaining(Rig, Protocol):
+    """A simulated rig that says what it would do, and what that costs."""
+
+    def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
+        """Return every installed effect, those included first, in the order in which they are applied.
+
+        `rounds` > 0 carries the scene out so many times and gives the median cost of each effect.
+        """
+
+
 class Shelf(Protocol):
     """A rig whose scenes were carried out elsewhere: it hands out recordings that exist."""
 
@@ -76,6 +97,11 @@ class Reason(NamedTuple):
 
     called_for: bool
     text: str
+    change: float | None = None
+    """What leaving the effect out changes in an observed channel: at most, if it is not called for (0: exactly
+    nothing); about, if it is. None: unknown without computing it."""
+    unit: str = "count"
+    """Unit of `change`."""
 
 
 class Estimator(Protocol):

@@ -7,6 +7,7 @@ from tactbench.plugin import EffectDescriptor, RigDescriptor, hookimpl
 TACTBENCH_API = 1
 
 _HERE = "tactbench.rigs.twin"
+_DRIFT, _NOISE = ("drift",), ("noise",)
 
 
 @hookimpl
@@ -26,10 +27,10 @@ def tactbench_effects() -> list[EffectDescriptor]:
         _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
         _effect("transduction", "Transduction", "contact.stages:read_skin", ("skin", "gain"), ("taxel", "reading")),
         _effect("rest-spread", "Scatter of rest levels", "effects.rest_spread:apply", (), ("disturbance",)),
-        _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",)),
-        _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",)),
-        _effect("wander", "Free drift", "effects.wander:apply", (), ("disturbance",)),
-        _effect("white-noise", "White noise", "effects.white_noise:apply", (), ("disturbance",)),
+        _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",), groups=_DRIFT),
+        _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",), groups=_DRIFT),
+        _effect("wander", "Free drift", "effects.wander:apply", (), ("disturbance",), groups=_DRIFT),
+        _effect("white-noise", "White noise", "effects.white_noise:apply", (), ("disturbance",), groups=_NOISE),
         *_sliding(),
         _effect("converter", "Converter", "effects.converter:apply", ("reading", "disturbance"), ("stored",)),
         _effect(
@@ -38,21 +39,22 @@ def tactbench_effects() -> list[EffectDescriptor]:
             "effects.force_noise:apply",
             ("tangential-force",),
             ("reference-force",),
+            groups=_NOISE,
         ),
     ]
 
 
 def _sliding() -> list[EffectDescriptor]:
     here = "effects.called_for_sliding"
-    shaken = ("slip", "skin")
-    heard = ("skin", "fluid", "vibration")
+    forces = ("slip", "tangential-force", "reference-force")
+    shakes, hears = ("slip", "skin"), ("skin", "fluid", "vibration")
+    heard = ("ac_pressure", "reading")
     return [
-        _effect("friction", "Friction", "effects.friction:apply", ("skin",),
-                ("slip", "tangential-force", "reference-force"), here),
-        _effect("skin-vibration", "Vibration of the skin", "effects.skin_vibration:apply", shaken, ("vibration",), here),
-        _effect("ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", heard, ("ac_pressure", "reading"), here),
-        _effect("hum", "Hum of dynamic pressure", "effects.hum:apply", (), ("disturbance",), here),
-    ]  # fmt: skip
+        _effect("friction", "Friction", "effects.friction:apply", ("skin",), forces, here),
+        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", shakes, ("vibration",), here),
+        _effect("ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", hears, heard, here),
+        _effect("hum", "Hum of dynamic pressure", "effects.hum:apply", (), ("disturbance",), here, _NOISE),
+    ]
 
 
 def _effect(
@@ -62,6 +64,7 @@ def _effect(
     consumes: tuple[str, ...],
     produces: tuple[str, ...],
     predicates: str = "effects.called_for",
+    groups: tuple[str, ...] = (),
 ) -> EffectDescriptor:
     return EffectDescriptor(
         name=name,
@@ -69,5 +72,6 @@ def _effect(
         where=f"{_HERE}.{where}",
         consumes=consumes,
         produces=produces,
+        groups=groups,
         called_for=f"{_HERE}.{predicates}:{name.replace('-', '_')}",
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from tactbench.plugin import (
     Block,
     ChannelSpec,
     EffectDescriptor,
+    Explained,
     FloatArray,
     NotApplicable,
     PlanEntry,
@@ -23,14 +23,13 @@ from tactbench.plugin import (
     Scalar,
     Scene,
     SensorDescriptor,
-    SensorSpec,
     Source,
     StreamSpec,
-    load_object,
 )
-from tactbench.rigs.twin.geometry import Contact, radius_mm
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
-from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
+from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.synthesis import Synthesis
 
 ROWS_PER_BLOCK = 1000
 REFERENCE_STREAM = "force_torque"
@@ -39,10 +38,6 @@ _ONE_CLOCK = Source(
     reference="the twin samples the sensor and the force sensor at once, on the scene's reference clock, as the "
     "embedded system of Karl et al. 2016 does (5000 samples in 60 s)",
 )
-
-
-_OWN_CLOCK_FROM = 2.0
-"""A stream this many times faster than the sensor's slowest keeps its own clock: it is there to see fast things."""
 
 
 class Samples(NamedTuple):
@@ -92,12 +87,15 @@ class Twin:
     ----------
     effects
         All installed effects; a plan takes from them what a scene calls for.
+    fidelity
+        How finely contacts are resolved.
     """
 
-    def __init__(self, effects: Sequence[EffectDescriptor]) -> None:
+    def __init__(self, effects: Sequence[EffectDescriptor], fidelity: Fidelity = DEFAULT) -> None:
         self.effects = tuple(effects)
+        self.fidelity = fidelity
 
-    def explain(self, sensor: SensorDescriptor, scene: Scene) -> Plan:
+    def plan(self, sensor: SensorDescriptor, scene: Scene) -> Plan:
         """Return the plan of a scene without carrying it out.
 
         Entries that only the solve can decide (the core) are as announced; ``open`` settles them.
@@ -121,91 +119,22 @@ class Twin:
         RigError
             If the contact cannot be resolved or solved.
         """
-        plan = self.explain(sensor, scene)
-        run = _prepare(sensor, scene, seed, plan)
+        plan = self.plan(sensor, scene)
+        run = prepare(sensor, scene, seed, plan, self.fidelity)
         for effect in plan.stages:
-            load_object(effect.where)(run)
+            run.apply(effect)
         yield _acquisition(run, plan)
+
+    def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
+        """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""
+        from tactbench.rigs.twin.costing import explained
+
+        return explained(self.effects, sensor, scene, self.plan(sensor, scene), rounds)
 
 
 def build(context: RigContext) -> Twin:
     """Return the twin with the installed effects."""
     return Twin(context.effects)
-
-
-def _prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan) -> Synthesis:
-    t_s, load = _load(scene)
-    run = Synthesis(
-        sensor=sensor,
-        scene=scene,
-        seed=seed,
-        t_s=t_s,
-        load=load,
-        tracks=tuple(_tracks(sensor.spec, scene, plan, t_s, load)),
-        contact=Contact(radius_mm(scene.indenter), 0.0, 0.0),
-        reference_n=load.at(t_s),
-        lent=dict(plan.lent),
-    )
-    run.contact = _place(run)
-    return run
-
-
-def _load(scene: Scene) -> tuple[FloatArray, Load]:
-    """Return the reference clock and the true force: held at the start, then straight to the end."""
-    profile = scene.profile
-    duration, hold = profile.duration.to("s"), profile.hold.to("s")
-    start, end = profile.start.to("N"), profile.end.to("N")
-    if not duration > 0 or hold < 0 or min(start, end) < 0:
-        raise RigError(
-            f"The scene {scene.name!r} asks for a ramp from {start:g} to {end:g} N within {duration:g} s after "
-            f"{hold:g} s of rest.",
-            hint="Duration must be positive, hold and forces at least zero.",
-        )
-    t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (duration / profile.samples)
-    if hold >= duration:
-        return t_s, Load(np.array([0.0, duration]), np.array([start, start]))
-    return t_s, Load(np.array([0.0, hold, duration]), np.array([start, start, end]))
-
-
-def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: Load) -> Iterator[Track]:
-    """Yield the channels on the reference clock, then those of every stream that keeps its own."""
-    duration = scene.profile.duration.to("s")
-    slowest = min((stream.rate_hz for stream in spec.streams if stream.rate_hz is not None), default=math.inf)
-    slow = tuple(stream for stream in spec.streams if (stream.rate_hz or 0.0) < _OWN_CLOCK_FROM * slowest)
-    for clock, streams in (("", slow), *((stream.name, (stream,)) for stream in spec.streams if stream not in slow)):
-        channels = tuple(channel for stream in streams for channel in stream.channels if channel.kind in plan.kinds)
-        rate = streams[0].rate_hz if clock else None
-        own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
-        if channels:
-            yield Track(
-                clock=clock,
-                channels=channels,
-                t_s=own,
-                force_n=load.at(own),
-                readings=np.tile([_rest(channel) for channel in channels], (own.size, 1)),
-                quality=np.zeros((own.size, len(channels)), dtype=np.uint8),
-            )
-
-
-def _rest(channel: ChannelSpec) -> float:
-    return 0.0 if channel.rest is None else channel.rest.to(channel.unit)
-
-
-def _place(run: Synthesis) -> Contact:
-    """Return where the indenter meets the skin: nominal point, commanded offset, and this mounting's own scatter."""
-    placement, spec = run.scene.placement, run.sensor.spec
-    if spec.skin is None:
-        raise NotApplicable(f"{spec.name} declares no skin.")
-    sheet = spec.skin.sheet
-    middle = (sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2
-    nominal_x = spec.parameters["contact_x"].to("mm") if "contact_x" in spec.parameters else middle
-    nominal_s = spec.parameters["contact_s"].to("mm") if "contact_s" in spec.parameters else 0.0
-    scatter = placement.scatter.to("mm")
-    off_x, off_s = scatter * run.of_recording("placement").standard_normal(2)
-    x, s = nominal_x + placement.x.to("mm") + off_x, nominal_s + placement.s.to("mm") + off_s
-    run.drawn.update(placement_x_mm=float(x), placement_s_mm=float(s))
-    tilt_x, tilt_s = (math.tan(tilt.to("rad")) for tilt in (placement.tilt_x, placement.tilt_s))
-    return Contact(run.contact.radius_mm, float(x), float(s), tilt_x, tilt_s)
 
 
 def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
@@ -247,10 +176,19 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
             "session_offset_scale": environment.session_offset_scale,
             "since_power_on_s": environment.since_power_on.to("s"),
             "force_noise_n": environment.force_noise.to("N"),
+            **_asked(run.scene),
         },
         drawn=dict(run.drawn),
         samples=samples,
     )
+
+
+def _asked(scene: Scene) -> dict[str, Scalar]:
+    """Return what the scene asks of a simulation beyond the default: printed with every row."""
+    asked: dict[str, Scalar] = {}
+    if scene.simulation.effects:
+        asked["effects"] = " ".join(scene.simulation.effects)
+    return asked
 
 
 def _ns(t_s: FloatArray) -> npt.NDArray[np.int64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -9,8 +10,19 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Nuisances, Scalar, Scene, SensorDescriptor
+from tactbench.plugin import (
+    ChannelKind,
+    ChannelSpec,
+    EffectDescriptor,
+    FloatArray,
+    Nuisances,
+    Scalar,
+    Scene,
+    SensorDescriptor,
+    load_object,
+)
 from tactbench.rigs.twin import draws
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
 
 
@@ -115,8 +127,23 @@ class Synthesis:
     """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
     settled: dict[str, tuple[bool, str]] = field(default_factory=dict)
     """Plan entries that only the solve could decide: name -> (included, reason)."""
+    fidelity: Fidelity = DEFAULT
+    """How finely the contact is resolved."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """What was drawn or achieved."""
+    clock: Callable[[], float] = time.perf_counter
+    """Seconds, monotonic."""
+    spent_s: dict[str, float] = field(default_factory=dict)
+    """Seconds each applied effect took: an effect that is not here was not stepped."""
+    elsewhere_s: float = 0.0
+    """Seconds that the effect being applied spent on work booked under another one."""
+
+    def apply(self, effect: EffectDescriptor) -> None:
+        """Apply one effect, and book what it takes."""
+        began, self.elsewhere_s = self.clock(), 0.0
+        load_object(effect.where)(self)
+        own = self.clock() - began - self.elsewhere_s
+        self.spent_s[effect.name] = self.spent_s.get(effect.name, 0.0) + own
 
     def follow(self, load: Load) -> None:
         """Let the true force be `load`: on every clock, and as what the force sensor starts from."""

@@ -9,6 +9,7 @@ bound.
 from __future__ import annotations
 
 import itertools
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -62,6 +63,8 @@ class LoadTable:
     curves: Interpolant
     """Depth, contact radius and fluid pressure against load."""
     solves: int
+    solved_s: float
+    """Seconds spent on the skin; what reading it took is not among them."""
 
     @property
     def residual(self) -> float:
@@ -79,8 +82,10 @@ class LoadTable:
 
 
 class _Builder:
-    def __init__(self, press: Press, read: Callable[[SkinState], FloatArray]) -> None:
+    def __init__(self, press: Press, read: Callable[[SkinState], FloatArray], clock: Callable[[], float]) -> None:
         self._press = press
+        self._clock = clock
+        self.read_s = 0.0
         self._read = read
         self.nodes: dict[float, tuple[SkinState, FloatArray]] = {}
         self.closed: dict[float, bool] = {}
@@ -88,7 +93,9 @@ class _Builder:
     def node(self, force: float) -> FloatArray:
         if force not in self.nodes:
             state = self._press(force)
+            began = self._clock()
             self.nodes[force] = (self._press.scalars(state), self._read(state))
+            self.read_s += self._clock() - began
             self.closed[force] = force > 0 and self._press.closing_mm(state) > 0
         return self.nodes[force][1]
 
@@ -115,6 +122,7 @@ def build_table(
     largest_n: float,
     tolerance: FloatArray,
     most_nodes: int = MOST_NODES,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> LoadTable:
     """Solve and tabulate one contact.
 
@@ -130,14 +138,17 @@ def build_table(
         (channels,) wanted bound on the interpolation error.
     most_nodes
         Nodes after which refining ends even if the bound is missed: the achieved one is reported.
+    clock
+        Seconds, monotonic.
     """
-    builder = _Builder(press, read)
+    began = clock()
+    builder = _Builder(press, read, clock)
     if not largest_n > 0:
         rest = builder.node(0.0)
         flat = Interpolant(np.array([0.0, 1.0]), np.stack([rest, rest]))
         still = Interpolant(np.array([0.0, 1.0]), np.zeros((2, 3)))
         state = builder.nodes[0.0][0]
-        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, still, 0)
+        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, still, 0, 0.0)
     for j in range(_FIRST_NODES):
         builder.node(largest_n * (j / (_FIRST_NODES - 1)) ** _POWER)
     touch_down = _bracket(builder, press)
@@ -152,6 +163,7 @@ def build_table(
         interpolant=builder.interpolant(touch_down),
         curves=builder.curves(touch_down),
         solves=press.solves,
+        solved_s=clock() - began - builder.read_s,
     )
 
 

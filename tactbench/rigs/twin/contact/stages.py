@@ -24,6 +24,7 @@ from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.fidelity import Fidelity
 from tactbench.rigs.twin.geometry import check_contact, gap_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
@@ -48,7 +49,12 @@ def press_skin(run: Synthesis) -> None:
     skin = run.sensor.spec.skin
     if skin is None:
         raise NotApplicable(f"{run.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
-    check_contact(skin_grid(skin.sheet), run.contact)
+    check_contact(skin_grid(skin.sheet, run.fidelity.cells(skin.sheet)), run.contact)
+
+
+def forget_tables() -> None:
+    """Drop all tables of this process: the next recording solves its contact again."""
+    _TABLES.clear()
 
 
 def watch_fluid(run: Synthesis) -> None:
@@ -88,12 +94,16 @@ def _read_names(run: Synthesis) -> list[str]:
 
 def _tabulated(run: Synthesis) -> _Tabulated:
     largest, names = run.load.largest_n, _read_names(run)
-    text = f"{run.sensor.model_dump_json()}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}"
+    spec = run.sensor.model_dump_json()
+    text = f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}"
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
         _TABLES.move_to_end(key)
         return _TABLES[key]
     made = _tabulate(run, names, largest)
+    # Whoever asks first waits for the solving; it belongs to the contact.
+    run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + made.table.solved_s
+    run.elsewhere_s += made.table.solved_s
     _TABLES[key] = made
     if len(_TABLES) > _MOST_TABLES:
         _TABLES.popitem(last=False)
@@ -104,10 +114,11 @@ def _tabulate(run: Synthesis, names: list[str], largest: float) -> _Tabulated:
     spec, skin = run.sensor.spec, run.sensor.spec.skin
     if skin is None or run.sensor.transducer is None:
         raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
-    grid = skin_grid(skin.sheet)
+    fidelity = run.fidelity
+    grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     outer = skin.sheet.outer_radius
     gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"))
-    read = _reader(run.sensor, grid, names) if names else _no_channels
+    read = _reader(run.sensor, grid, names, fidelity) if names else _no_channels
     core: Callable[[Medium], Medium] | None = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):
         where = run.lent["core"]
@@ -116,17 +127,34 @@ def _tabulate(run: Synthesis, names: list[str], largest: float) -> _Tabulated:
             made: Medium = load_object(where)(medium, skin)
             return made
 
-    press = Press(medium_of(skin, grid), gap, run.contact, core=core, fluid_pressure=run.fluid_pressure)
-    table = build_table(press, read, largest_n=largest, tolerance=_tolerance(run, names))
+    press = Press(
+        medium_of(skin, grid),
+        gap,
+        run.contact,
+        core=core,
+        fluid_pressure=run.fluid_pressure,
+        tolerance=fidelity.newton_tolerance,
+    )
+    table = build_table(
+        press,
+        read,
+        largest_n=largest,
+        tolerance=fidelity.table_tolerance_factor * _tolerance(run, names),
+        most_nodes=fidelity.most_nodes,
+        clock=run.clock,
+    )
     closing = press.closing_at(largest) if press.medium.has_core else 0.0
     film = float(press.medium.rest_thickness_mm.max()) - press.medium.least_thickness_mm
     return _Tabulated(table, press.touched_core, closing, film)
 
 
-def _reader(sensor: SensorDescriptor, grid: SkinGrid, names: list[str]) -> Callable[[SkinState], FloatArray]:
+def _reader(
+    sensor: SensorDescriptor, grid: SkinGrid, names: list[str], fidelity: Fidelity
+) -> Callable[[SkinState], FloatArray]:
     """Return the sensor's transducer, each of its answers looked at before it is used."""
     try:
-        transducer = load_object(sensor.transducer or "")(sensor.spec, grid, names)
+        factory = load_object(sensor.transducer or "")
+        transducer = factory(sensor.spec, grid, names, **fidelity.options(factory))
     except RigError as error:
         raise NotApplicable(f"The transducer of {sensor.name} cannot answer: {error}", hint=error.hint) from error
 

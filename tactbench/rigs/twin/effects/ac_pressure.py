@@ -19,11 +19,11 @@ def apply(run: Synthesis) -> None:
     The fluid's pressure follows the load; a vibration of the skin adds its size times the pressure's slope with depth
     at that load, so that its loudness needs no parameter of its own.
     """
-    table = skin_under_load(run)
     for track in run.tracks:
         columns = track.by_kind().get("ac_pressure")
         if not columns:
             continue
+        table = skin_under_load(run)
         pressure_mpa = table.skin(track.force_n).fluid_pressure_mpa
         if track.vibration_mm is not None:
             pressure_mpa = pressure_mpa + stiffness_mpa_mm(table, track.force_n) * track.vibration_mm

@@ -10,15 +10,15 @@ STILL = "no tangential motion: the scene does not slide"
 def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
     slide = scene.slide
     if slide is None:
-        return Reason(False, STILL)
+        return Reason(False, STILL, 0.0)
     if sensor.skin is None:
-        return Reason(False, f"{sensor.name} declares no skin")
+        return Reason(False, f"{sensor.name} declares no skin", 0.0)
     largest = max(scene.profile.start.to("N"), scene.profile.end.to("N"))
     if not largest > 0:
-        return Reason(False, "the scene has no load: 0 N throughout")
+        return Reason(False, "the scene has no load: 0 N throughout", 0.0)
     late = slide.start.to("s") - scene.profile.duration.to("s")
     if late >= 0:
-        return Reason(False, f"the slide would start {late:g} s after the recording's end")
+        return Reason(False, f"the slide would start {late:g} s after the recording's end", 0.0)
     return Reason(True, f"slides at {slide} under up to {largest:g} N")
 
 
@@ -46,10 +46,10 @@ def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
 def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether there is a fluid whose pressure a band lets through."""
     if not isinstance(sensor.skin, FluidBackedShell):
-        return Reason(False, "the skin holds no fluid")
+        return Reason(False, "the skin holds no fluid", 0.0)
     bands = [str(channel.band) for channel in sensor.channels("ac_pressure") if channel.band is not None]
     if not bands:
-        return Reason(False, "no channel of dynamic pressure states its band")
+        return Reason(False, "no channel of dynamic pressure states its band", 0.0)
     return Reason(True, f"the fluid's pressure within {bands[0]}")
 
 
@@ -57,10 +57,12 @@ def hum(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether dynamic pressure hums at rest."""
     size = sensor.parameters.get("hum")
     if "ac_pressure" not in scene.observe:
-        return Reason(False, "no channel of dynamic pressure is observed")
+        return Reason(False, "no channel of dynamic pressure is observed", 0.0)
     if size is None or not size.value:
-        return Reason(False, "the spec states no hum")
+        return Reason(False, "the spec states no hum", 0.0)
     if not scene.environment.noise_scale:
-        return Reason(False, "the scene scales noise by 0")
+        return Reason(False, "the scene scales noise by 0", 0.0)
     low, high = sensor.parameters["hum_low"], sensor.parameters["hum_high"]
-    return Reason(True, f"{size} rms between {low} and {high}, scaled by {scene.environment.noise_scale:g}")
+    scale = scene.environment.noise_scale
+    text = f"{size} rms between {low} and {high}, scaled by {scale:g}"
+    return Reason(True, text, scale * size.value)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tactbench.plugin import ChannelSpec, NotApplicable, Quantity, SensorSpec, assumed, derived
+from tactbench.plugin import ChannelSpec, Quantity, SensorSpec, assumed, derived
 from tactbench.rigs.twin.contact.stages import skin_under_load
 from tactbench.rigs.twin.effects.partial_slip import shear_modulus_mpa, sliding_stiffness
 from tactbench.rigs.twin.effects.slip_event import Mode
@@ -37,8 +37,8 @@ def apply(run: Synthesis) -> None:
     contact slips) and ``stick_ratio``.
     """
     slide, skin = run.scene.slide, run.sensor.spec.skin
-    if slide is None or skin is None:
-        raise NotApplicable(f"{run.sensor.name} is not slid over in scene {run.scene.name!r}.")
+    if slide is None or skin is None or not run.load.largest_n > 0:
+        return
     surface, mode = slide.surface, mode_of(run.sensor.spec)
     duration = run.scene.profile.duration.to("s")
     grid = np.linspace(0.0, duration, max(2, math.ceil(duration * GRID_HZ) + 1))

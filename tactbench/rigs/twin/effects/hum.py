@@ -14,6 +14,8 @@ from tactbench.rigs.twin.synthesis import Synthesis
 def apply(run: Synthesis) -> None:
     """Add the sensor's ``hum`` (rms, counts) between ``hum_low`` and ``hum_high`` to its dynamic pressure."""
     stated = run.sensor.spec.parameters
+    if "hum" not in stated:
+        return
     scale = run.scene.environment.noise_scale
     for track in run.tracks:
         for column in track.by_kind().get("ac_pressure", []):

@@ -35,14 +35,14 @@ class Profile:
         height = np.zeros(place_mm.size)
         for wave, phase in zip(2.0 * np.pi / self.wave_mm, self._phase, strict=True):
             height += patch_mean(wave * contact_radius_mm) * np.cos(wave * place_mm + phase)
-        return self._amplitude_mm * height
+        return np.asarray(self._amplitude_mm * height)
 
 
 def patch_mean(turn: FloatArray) -> FloatArray:
     """Return the mean of a unit cosine over a contact, relative to its middle.
 
-    Weighted with the Hertzian pressure ``sqrt(1 - r^2/a^2)``: ``3 (sin k - k cos k)/k^3`` with ``k = 2 pi a/wavelength``
-    (the transform of a ball, which that weight is the shadow of).
+    Weighted with the Hertzian pressure ``sqrt(1 - r^2/a^2)``: ``3 (sin k - k cos k)/k^3`` with
+    ``k = 2 pi a/wavelength`` (the transform of a ball, which that weight is the shadow of).
     """
     small = np.abs(turn) < 0.05
     safe = np.where(small, 1.0, turn)

@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.rigs.twin.effects.bristle import bristle, coefficient
@@ -81,8 +82,8 @@ class Dragged:
         self.drive = drive
         contact = drive.load_n > _LEAST_LOAD_N
         per_n = np.divide(1.0, drive.stiffness, out=np.zeros_like(drive.stiffness), where=contact)
+        # Viscous force at the drive's speed over the stiffness.
         lag_mm = 2.0 * drive.mode.damping / drive.mode.omega * drive.speed_mm_s
-        """Viscous force at the drive's speed over the stiffness."""
         self._static_mm = np.maximum(drive.static * drive.load_n * per_n - lag_mm, 0.0)
         """(m,) deflection at which it lets go; over the held part there is no viscous force."""
         self._release_mm = drive.static * drive.load_n * per_n
@@ -121,14 +122,14 @@ class Dragged:
         weaker = np.exp(-mean / drive.stribeck_mm_s)
         return np.asarray(drive.kinetic + (drive.static - drive.kinetic) * weaker)
 
-    def _unstable(self) -> FloatArray:
+    def _unstable(self) -> npt.NDArray[np.bool_]:
         """Return (m,) whether friction weakens with speed faster than the skin is damped (N |mu'(V)| > c)."""
         drive = self.drive
         if not drive.stribeck_mm_s > 0:
             return np.zeros(drive.t_s.size, dtype=bool)
         fall = (drive.static - drive.kinetic) / drive.stribeck_mm_s
         fall *= math.exp(-drive.speed_mm_s / drive.stribeck_mm_s)
-        return drive.load_n * fall > 2.0 * drive.mode.damping / drive.mode.omega * drive.stiffness
+        return np.asarray(drive.load_n * fall > 2.0 * drive.mode.damping / drive.mode.omega * drive.stiffness)
 
     def _run(self) -> None:
         drive, phases = self.drive, self._phases
