@@ -5,6 +5,7 @@ from __future__ import annotations
 from tactbench.plugin import FluidBackedShell, Reason, Scene, SensorSpec
 
 STILL = "no tangential motion: the scene does not slide"
+UNSEEN = "no channel of dynamic pressure is observed"
 
 
 def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -44,7 +45,9 @@ def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:
 
 
 def ac_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether there is a fluid whose pressure a band lets through."""
+    """Answer whether somebody looks at what a band lets through of a fluid's pressure."""
+    if "ac_pressure" not in scene.observe:
+        return Reason(False, UNSEEN, 0.0)
     if not isinstance(sensor.skin, FluidBackedShell):
         return Reason(False, "the skin holds no fluid", 0.0)
     bands = [str(channel.band) for channel in sensor.channels("ac_pressure") if channel.band is not None]
@@ -57,7 +60,7 @@ def hum(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether dynamic pressure hums at rest."""
     size = sensor.parameters.get("hum")
     if "ac_pressure" not in scene.observe:
-        return Reason(False, "no channel of dynamic pressure is observed", 0.0)
+        return Reason(False, UNSEEN, 0.0)
     if size is None or not size.value:
         return Reason(False, "the spec states no hum", 0.0)
     if not scene.environment.noise_scale:

@@ -72,7 +72,7 @@ def apply(run: Synthesis) -> None:
         slide_mm_s=drive.speed_mm_s,
         friction_static=drive.static,
         friction_kinetic=drive.kinetic,
-        slips=dragged.slips,
+        slips=int(dragged.let_go_s.size),
         tangential_stiffness_n_mm=float(drive.stiffness[-1]),
         largest_tangential_n=float(np.abs(seen.force_n).max(initial=0.0)),
     )

@@ -108,9 +108,14 @@ class Dragged:
         self._knots_mm = np.concatenate([*self._x_mm, [0.0]])
 
     @property
-    def slips(self) -> int:
-        """How often the skin let go."""
-        return int(np.count_nonzero(self._kind == SLIP))
+    def let_go_s(self) -> FloatArray:
+        """(k,) when the skin let go."""
+        return self._begin[self._kind == SLIP]
+
+    @property
+    def caught_s(self) -> FloatArray:
+        """(k,) when the surface caught the skin again, or took hold of it for the first time."""
+        return self._begin[self._kind == STICK]
 
     def _kinetic(self, per_n: FloatArray) -> FloatArray:
         """Return (m,) the coefficient within a slip: at its mean speed as it would be without damping."""
