@@ -110,12 +110,12 @@ class Dragged:
     @property
     def let_go_s(self) -> FloatArray:
         """(k,) when the skin let go."""
-        return self._begin[self._kind == SLIP]
+        return np.asarray(self._begin[self._kind == SLIP])
 
     @property
     def caught_s(self) -> FloatArray:
         """(k,) when the surface caught the skin again, or took hold of it for the first time."""
-        return self._begin[self._kind == STICK]
+        return np.asarray(self._begin[self._kind == STICK])
 
     def _kinetic(self, per_n: FloatArray) -> FloatArray:
         """Return (m,) the coefficient within a slip: at its mean speed as it would be without damping."""
