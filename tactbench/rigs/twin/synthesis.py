@@ -49,7 +49,7 @@ class Tangential(NamedTuple):
     """What happens along the skin at (n,) moments, in the direction of the slide."""
 
     force_n: FloatArray
-    """Tangential force that the surface exerts on the sensor."""
+    """Tangential force between surface and skin, as a force sensor behind the surface feels it."""
     displacement_mm: FloatArray
     """Of the skin under the contact, against the core."""
     slip_mm_s: FloatArray

@@ -13,14 +13,17 @@ import numpy as np
 from tactbench.plugin import FloatArray
 from tactbench.rigs.twin.effects.memory import recurrence
 
+COULOMB_MM_S = 1e-6
+"""Below this Stribeck speed friction falls at once: nothing measured is slower."""
+
 
 def coefficient(speed_mm_s: float, static: float, kinetic: float, stribeck_mm_s: float) -> float:
     """Return friction over load at a speed: ``mu_k + (mu_s - mu_k) exp(-|v|/v_s)``, Tustin's form (1947).
 
-    Its slope is steepest at rest, so that the slowest slide is the least stable. ``v_s = 0``: Coulomb's two
-    coefficients.
+    Its slope is steepest at rest, so that the slowest slide is the least stable. ``v_s = 0`` (or below a nanometre a
+    second): Coulomb's two coefficients.
     """
-    if not stribeck_mm_s > 0:
+    if stribeck_mm_s < COULOMB_MM_S:
         return kinetic if speed_mm_s else static
     return kinetic + (static - kinetic) * math.exp(-abs(speed_mm_s) / stribeck_mm_s)
 

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
-from tactbench.rigs.twin.effects.bristle import bristle, coefficient
+from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, bristle, coefficient
 from tactbench.rigs.twin.effects.partial_slip import share_of_force, stick_ratio
 from tactbench.rigs.twin.effects.slip_event import Mode, is_caught, slip_s, swing
 from tactbench.rigs.twin.synthesis import Tangential
@@ -61,12 +61,15 @@ class _Phases:
     """Deflection at its beginning."""
     e_mm: list[float] = field(default_factory=list)
     """Equilibrium of a slip."""
+    friction: list[float] = field(default_factory=list)
+    """Coefficient of a slip."""
 
-    def add(self, t_s: float, kind: int, x_mm: float, e_mm: float = 0.0) -> None:
+    def add(self, t_s: float, kind: int, x_mm: float, e_mm: float = 0.0, friction: float = 0.0) -> None:
         self.t_s.append(t_s)
         self.kind.append(kind)
         self.x_mm.append(x_mm)
         self.e_mm.append(e_mm)
+        self.friction.append(friction)
 
 
 class Dragged:
@@ -87,8 +90,8 @@ class Dragged:
         self._static_mm = np.maximum(drive.static * drive.load_n * per_n - lag_mm, 0.0)
         """(m,) deflection at which it lets go; over the held part there is no viscous force."""
         self._release_mm = drive.static * drive.load_n * per_n
-        kinetic = self._kinetic(per_n)
-        self._kinetic_mm = kinetic * drive.load_n * per_n
+        self._kinetic = self._within_slip(per_n)
+        self._kinetic_mm = self._kinetic * drive.load_n * per_n
         steady = coefficient(drive.speed_mm_s, drive.static, drive.kinetic, drive.stribeck_mm_s)
         self._steady_mm = steady * drive.load_n * per_n
         self._breaks = (
@@ -104,6 +107,7 @@ class Dragged:
         self._kind = np.array(self._phases.kind)
         self._from = np.array(self._phases.x_mm)
         self._about = np.array(self._phases.e_mm)
+        self._friction = np.array(self._phases.friction)
         self._knots_t = np.concatenate([*self._x_t, [np.inf]])
         self._knots_mm = np.concatenate([*self._x_mm, [0.0]])
 
@@ -117,10 +121,10 @@ class Dragged:
         """(k,) when the surface caught the skin again, or took hold of it for the first time."""
         return np.asarray(self._begin[self._kind == STICK])
 
-    def _kinetic(self, per_n: FloatArray) -> FloatArray:
+    def _within_slip(self, per_n: FloatArray) -> FloatArray:
         """Return (m,) the coefficient within a slip: at its mean speed as it would be without damping."""
         drive = self.drive
-        if not drive.stribeck_mm_s > 0:
+        if drive.stribeck_mm_s < COULOMB_MM_S:
             return np.full(drive.t_s.size, drive.kinetic)
         u = (drive.static - drive.kinetic) * drive.load_n * per_n
         mean = drive.speed_mm_s + 2.0 / math.pi * drive.mode.omega * u
@@ -130,7 +134,7 @@ class Dragged:
     def _unstable(self) -> npt.NDArray[np.bool_]:
         """Return (m,) whether friction weakens with speed faster than the skin is damped (N |mu'(V)| > c)."""
         drive = self.drive
-        if not drive.stribeck_mm_s > 0:
+        if drive.stribeck_mm_s < COULOMB_MM_S:
             return np.zeros(drive.t_s.size, dtype=bool)
         fall = (drive.static - drive.kinetic) / drive.stribeck_mm_s
         fall *= math.exp(-drive.speed_mm_s / drive.stribeck_mm_s)
@@ -156,7 +160,7 @@ class Dragged:
             sliding = math.isinf(lasting)
             if sliding:
                 lasting = _RUNG_OUT / drive.mode.decay if drive.mode.decay > 0 and x > about else 0.0
-            phases.add(t, SLIP, x, about)
+            phases.add(t, SLIP, x, about, float(np.interp(t, drive.t_s, self._kinetic)))
             lasting = min(lasting, end - t)
             u, _ = swing(drive.mode, np.array([x - about]), np.array([drive.speed_mm_s]), np.array([lasting]))
             # A slip of no length at all would let go again at the same moment, for ever.
@@ -200,7 +204,9 @@ class Dragged:
         until = float(drive.t_s[stop]) if broken.any() else end
         knots = np.concatenate([[t], drive.t_s[first:stop], [until]])
         limit = np.interp(knots, drive.t_s, self._steady_mm)
-        deflection = bristle(knots, drive.speed_mm_s, limit, x)
+        # A load that falls faster than the bristle turns over lets the skin back at once: never above mu_s N.
+        most = np.interp(knots, drive.t_s, self._release_mm)
+        deflection = np.minimum(bristle(knots, drive.speed_mm_s, limit, x), most)
         self._phases.add(t, SLIDE, x)
         self._x_t.append(knots)
         self._x_mm.append(deflection)
@@ -222,36 +228,35 @@ class Dragged:
         stiffness, load, limit = (
             np.interp(t_s, drive.t_s, values) for values in (drive.stiffness, drive.load_n, self._static_mm)
         )
-        x, velocity, slip = np.zeros(t_s.size), np.zeros(t_s.size), np.zeros(t_s.size)
+        x, slip = np.zeros(t_s.size), np.zeros(t_s.size)
         share = np.zeros(t_s.size)
-        elastic = np.zeros(t_s.size)
+        force = np.zeros(t_s.size)
 
         own = kind == STICK
         x[own] = x0[own] + drive.speed_mm_s * (t_s[own] - begin[own])
-        velocity[own] = drive.speed_mm_s
         left = limit[own] - x0[own]
         share[own] = np.divide(x[own] - x0[own], left, out=np.ones(left.size), where=left > 0)
-        elastic[own] = stiffness[own] * (x0[own] + left.clip(0.0) * share_of_force(share[own]))
+        viscous_mm = 2.0 * drive.mode.damping / drive.mode.omega * drive.speed_mm_s
+        force[own] = stiffness[own] * (x0[own] + left.clip(0.0) * share_of_force(share[own]) + viscous_mm)
 
         own = kind == SLIP
-        u, velocity[own] = swing(
+        u, velocity = swing(
             drive.mode, x0[own] - about[own], np.full(int(own.sum()), drive.speed_mm_s), t_s[own] - begin[own]
         )
         x[own] = about[own] + u
-        slip[own] = drive.speed_mm_s - velocity[own]
+        slip[own] = drive.speed_mm_s - velocity
+        force[own] = self._friction[phase[own]] * load[own]
 
         own = (kind == SLIDE) | (kind == HELD)
         if own.any():
             x[own] = np.interp(t_s[own], self._knots_t, self._knots_mm)
+            force[own] = stiffness[own] * x[own]
         slip[kind == SLIDE] = drive.speed_mm_s
-        loose = ~((kind == STICK) | (kind == REST))
-        elastic[loose] = stiffness[loose] * x[loose]
-        viscous = stiffness * 2.0 * drive.mode.damping / drive.mode.omega * velocity
         slipping = (kind == SLIP) | (kind == SLIDE)
         touched = load > _LEAST_LOAD_N
         moved = drive.speed_mm_s * (np.clip(t_s, drive.start_s, drive.end_s) - drive.start_s)
         return Tangential(
-            force_n=np.where(touched, elastic + viscous, 0.0),
+            force_n=np.where(touched, force, 0.0),
             displacement_mm=x,
             slip_mm_s=slip,
             slip_mm=moved - x,
