@@ -1,6 +1,6 @@
 """From skin states to the BioTac's counts: film, conduction, divider; and the fluid's pressure.
 
-This rung gives the 19 electrodes and PDC. TDC, TAC and PAC need thermal and vibration effects and are refused.
+This gives the 19 electrodes and PDC. PAC comes from an effect of its rig; TDC, TAC and PAC are refused here.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def build(
     for name in wanted:
         if name not in NAMES and name != "PDC":
             raise RigError(
-                f"The twin cannot give {name} of {sensor.name}: temperature and vibration are not modelled yet.",
+                f"The twin cannot read {name} of {sensor.name} from the skin's state: it takes an effect of its own.",
                 hint=f"Ask for {NAMES[0]} to {NAMES[-1]} and PDC.",
             )
     return BioTacTransducer(prepared(sensor, grid, refinement), sensor, tuple(wanted), tolerance)

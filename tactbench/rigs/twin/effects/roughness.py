@@ -7,7 +7,9 @@ import numpy as np
 from tactbench.plugin import FloatArray, Surface
 
 COMPONENTS = 48
-"""Cosines the profile is made of: 132,000 samples take 0.3 s, and no wavelength of a texture repeats within 60 s."""
+"""Cosines the profile is made of: enough to be close to Gaussian; they set the effect's cost."""
+_RADII = 1025
+"""Radii for which the mean over the contact is computed; straight between them it is right to 1e-4."""
 
 
 class Profile:
@@ -33,8 +35,10 @@ class Profile:
     def felt_mm(self, place_mm: FloatArray, contact_radius_mm: FloatArray) -> FloatArray:
         """Return (n,) the profile's mean over a contact of (n,) radii around (n,) places."""
         height = np.zeros(place_mm.size)
+        radii = np.linspace(0.0, float(contact_radius_mm.max(initial=0.0)), _RADII)
         for wave, phase in zip(2.0 * np.pi / self.wave_mm, self._phase, strict=True):
-            height += patch_mean(wave * contact_radius_mm) * np.cos(wave * place_mm + phase)
+            felt = np.interp(contact_radius_mm, radii, patch_mean(wave * radii))
+            height += felt * np.cos(wave * place_mm + phase)
         return np.asarray(self._amplitude_mm * height)
 
 

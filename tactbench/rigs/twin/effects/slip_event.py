@@ -55,6 +55,12 @@ def swing(mode: Mode, u: FloatArray, speed: FloatArray, after_s: FloatArray) -> 
     )
 
 
+def deflection_after(mode: Mode, u: float, speed: float, after_s: float) -> float:
+    """Return the deflection of :func:`swing` for one moment, without arrays: it is asked for once a slip."""
+    w, r = mode.swing, mode.decay
+    return math.exp(-r * after_s) * (u * math.cos(w * after_s) + (speed + r * u) / w * math.sin(w * after_s))
+
+
 def _turn(mode: Mode, u: float, speed: float) -> float:
     """Return the phase at which the velocity is lowest, between 0 and pi; half a turn later it is highest."""
     w, r = mode.swing, mode.decay

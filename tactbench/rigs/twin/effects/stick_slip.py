@@ -22,7 +22,7 @@ import numpy.typing as npt
 from tactbench.plugin import FloatArray
 from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, bristle, coefficient
 from tactbench.rigs.twin.effects.partial_slip import share_of_force, stick_ratio
-from tactbench.rigs.twin.effects.slip_event import Mode, is_caught, slip_s, swing
+from tactbench.rigs.twin.effects.slip_event import Mode, deflection_after, is_caught, slip_s, swing
 from tactbench.rigs.twin.synthesis import Tangential
 
 REST, STICK, SLIP, SLIDE, HELD = range(5)
@@ -162,9 +162,9 @@ class Dragged:
                 lasting = _RUNG_OUT / drive.mode.decay if drive.mode.decay > 0 and x > about else 0.0
             phases.add(t, SLIP, x, about, float(np.interp(t, drive.t_s, self._kinetic)))
             lasting = min(lasting, end - t)
-            u, _ = swing(drive.mode, np.array([x - about]), np.array([drive.speed_mm_s]), np.array([lasting]))
+            u = deflection_after(drive.mode, x - about, drive.speed_mm_s, lasting)
             # A slip of no length at all would let go again at the same moment, for ever.
-            t, x = max(t + lasting, math.nextafter(t, math.inf)), about + float(u[0])
+            t, x = max(t + lasting, math.nextafter(t, math.inf)), about + u
         if drive.end_s < drive.t_s[-1]:
             self._hold(max(t, drive.start_s), x)
 
