@@ -14,6 +14,7 @@ from tactbench.core.errors import (
     UsageError,
 )
 from tactbench.core.plugins.checks import Check, Verdict
+from tactbench.core.plugins.cost import CostJob, CostPoint, CostStudy
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import (
     Acquisition,
@@ -59,6 +60,9 @@ __all__ = [
     "ChannelSpec",
     "ChannelTarget",
     "Check",
+    "CostJob",
+    "CostPoint",
+    "CostStudy",
     "Creep",
     "DataError",
     "EffectDescriptor",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import click
 
 from tactbench.core.cli.simulation import simulation_of, simulation_options
 from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
+from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
     from tactbench.core.matrix.run import Outcome
@@ -51,7 +51,7 @@ def command(
 
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.
     """
-    _one_thread()
+    one_thread()
     from tactbench.core.cli.screen import progress
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
@@ -68,15 +68,6 @@ def command(
     print_rows(outcome.rows, shape)
     _farewell(outcome, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
-
-
-def _one_thread() -> None:
-    """Keep numerical libraries at one thread, as the table's times state; before any of them is imported.
-
-    Several threads would also sum in another order on another machine. Whoever sets these variables means it.
-    """
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
 
 
 def _matrix(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from tactbench.core.cli.simulation import simulation_options
+from tactbench.core.cli.threads import one_thread
 
 FORMATS = ("table", "json", "csv")
 
@@ -35,6 +36,7 @@ def explain(
     tolerance: float | None,
 ) -> None:
     """Say which effects a task's scenes get, which they do not, why, and what each costs or would cost."""
+    one_thread()
     from tactbench.core.cli.explanations import print_explanations
     from tactbench.core.cli.simulation import simulation_of
     from tactbench.core.plugins.registry import load_registry
@@ -66,6 +68,7 @@ def verify(
 
     Exit code 1 if an oracle fails. A miss against real sensors is printed with its cause and is no failure.
     """
+    one_thread()
     from pathlib import Path
 
     from tactbench.core.cli.verdicts import carry_out, likeness_checks, oracle_checks, print_verdicts

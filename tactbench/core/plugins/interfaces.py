@@ -38,7 +38,10 @@ class Acquisition(Protocol):
 
     @property
     def drawn(self) -> Mapping[str, Scalar]:
-        """What was drawn or achieved, for example the placement."""
+        """What was drawn or achieved, for example the placement.
+
+        Texts whose names start with ``remark`` are shown with every score from the recording.
+        """
 
     def __iter__(self) -> Iterator[Block]: ...
 

@@ -53,6 +53,8 @@ class RigDescriptor(Frozen):
     """Names of the rungs of its ladder of solvers, the cheapest first; for simulated rigs."""
     verification: str | None = Field(default=None, pattern=_WHERE)
     """``module:callable``, called without arguments: the simulation against its oracles, a sequence of Check."""
+    work_precision: str | None = Field(default=None, pattern=_WHERE)
+    """``module:callable``, called with a SensorDescriptor: a CostStudy of error against seconds per recording."""
     likeness: str | None = Field(default=None, pattern=_WHERE)
     """``module:callable``, called with (SensorDescriptor, folder of recordings or None): Checks of the simulated
     sensor against what was measured on real ones, or of recordings against the same ranges."""

@@ -13,7 +13,17 @@ _DRIFT, _NOISE = ("drift",), ("noise",)
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
     """Offer the rig."""
-    return [RigDescriptor(name="twin", title="Simulated twin", where=f"{_HERE}.rig:build", simulated=True)]
+    return [
+        RigDescriptor(
+            name="twin",
+            title="Simulated twin",
+            where=f"{_HERE}.rig:build",
+            simulated=True,
+            rungs=("closed-form", "default", "fine", "reference"),
+            work_precision=f"{_HERE}.work_precision:study",
+            verification=f"{_HERE}.verification.everything:checks",
+        )
+    ]
 
 
 @hookimpl

@@ -16,9 +16,10 @@ from tactbench.plugin import (
     SensorDescriptor,
     SensorSpec,
 )
-from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity, rung
 from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan
+from tactbench.rigs.twin.stated_numbers import MOST_SAMPLES, check_numbers
 from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
 
 _OWN_CLOCK_FROM = 2.0
@@ -31,10 +32,11 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidel
     Raises
     ------
     RigError
-        If the force profile cannot be carried out.
+        If a number of the scene is none, or its force profile or its clocks cannot be carried out.
     NotApplicable
         If the sensor declares no skin.
     """
+    check_numbers(scene)
     t_s, load = _load(scene)
     run = Synthesis(
         sensor=sensor,
@@ -46,7 +48,7 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidel
         contact=Contact(radius_mm(scene.indenter), 0.0, 0.0),
         reference_n=load.at(t_s),
         lent=dict(plan.lent),
-        fidelity=fidelity,
+        fidelity=fidelity if scene.simulation.rung is None else rung(scene.simulation.rung),
     )
     run.contact = _place(run)
     return run
@@ -76,17 +78,23 @@ def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: L
     slow = tuple(stream for stream in spec.streams if (stream.rate_hz or 0.0) < _OWN_CLOCK_FROM * slowest)
     for clock, streams in (("", slow), *((stream.name, (stream,)) for stream in spec.streams if stream not in slow)):
         channels = tuple(channel for stream in streams for channel in stream.channels if channel.kind in plan.kinds)
+        if not channels:
+            continue
         rate = streams[0].rate_hz if clock else None
-        own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
-        if channels:
-            yield Track(
-                clock=clock,
-                channels=channels,
-                t_s=own,
-                force_n=load.at(own),
-                readings=np.tile([_rest(channel) for channel in channels], (own.size, 1)),
-                quality=np.zeros((own.size, len(channels)), dtype=np.uint8),
+        if rate is not None and not duration * rate <= MOST_SAMPLES:
+            raise RigError(
+                f"The stream {clock} would have {duration * rate:.2g} samples: {duration:g} s at {rate:g} Hz.",
+                hint=f"Up to {MOST_SAMPLES} fit into memory: shorten the scene, or observe slower channels.",
             )
+        own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
+        yield Track(
+            clock=clock,
+            channels=channels,
+            t_s=own,
+            force_n=load.at(own),
+            readings=np.tile([_rest(channel) for channel in channels], (own.size, 1)),
+            quality=np.zeros((own.size, len(channels)), dtype=np.uint8),
+        )
 
 
 def _rest(channel: ChannelSpec) -> float:

@@ -188,6 +188,10 @@ def _asked(scene: Scene) -> dict[str, Scalar]:
     asked: dict[str, Scalar] = {}
     if scene.simulation.effects:
         asked["effects"] = " ".join(scene.simulation.effects)
+    if scene.simulation.rung is not None:
+        asked["rung"] = scene.simulation.rung
+    if scene.simulation.tolerance is not None:
+        asked["tolerance_count"] = scene.simulation.tolerance
     return asked
 
 

@@ -129,6 +129,10 @@ class Synthesis:
     """Plan entries that only the solve could decide: name -> (included, reason)."""
     fidelity: Fidelity = DEFAULT
     """How finely the contact is resolved."""
+    rung: str = ""
+    """Name of the rung that was chosen to keep a tolerance."""
+    rung_error: float | None = None
+    """Its estimated error in the worst observed channel, in the channel's unit; None: nobody asked."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """What was drawn or achieved."""
     clock: Callable[[], float] = time.perf_counter

@@ -18,7 +18,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray, SkinState
 from tactbench.rigs.twin.contact.interpolant import Interpolant
-from tactbench.rigs.twin.contact.press import Press
+from tactbench.rigs.twin.contact.press import AnyPress, scalars
 
 _FIRST_NODES = 6
 _POWER = 1.7
@@ -82,7 +82,7 @@ class LoadTable:
 
 
 class _Builder:
-    def __init__(self, press: Press, read: Callable[[SkinState], FloatArray], clock: Callable[[], float]) -> None:
+    def __init__(self, press: AnyPress, read: Callable[[SkinState], FloatArray], clock: Callable[[], float]) -> None:
         self._press = press
         self._clock = clock
         self.read_s = 0.0
@@ -94,7 +94,7 @@ class _Builder:
         if force not in self.nodes:
             state = self._press(force)
             began = self._clock()
-            self.nodes[force] = (self._press.scalars(state), self._read(state))
+            self.nodes[force] = (scalars(state), self._read(state))
             self.read_s += self._clock() - began
             self.closed[force] = force > 0 and self._press.closing_mm(state) > 0
         return self.nodes[force][1]
@@ -116,7 +116,7 @@ def _scalars(state: SkinState) -> FloatArray:
 
 
 def build_table(
-    press: Press,
+    press: AnyPress,
     read: Callable[[SkinState], FloatArray],
     *,
     largest_n: float,
@@ -167,7 +167,7 @@ def build_table(
     )
 
 
-def _bracket(builder: _Builder, press: Press) -> tuple[float, float] | None:
+def _bracket(builder: _Builder, press: AnyPress) -> tuple[float, float] | None:
     """Bracket touch-down and put a node on either side."""
     closed = [load for load in sorted(builder.nodes) if builder.closed[load]]
     if not closed:
@@ -197,7 +197,7 @@ def _bracket(builder: _Builder, press: Press) -> tuple[float, float] | None:
 
 def _refine(
     builder: _Builder,
-    press: Press,
+    press: AnyPress,
     touch_down: tuple[float, float] | None,
     tolerance: FloatArray,
     most_nodes: int,

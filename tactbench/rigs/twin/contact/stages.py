@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from tactbench.plugin import (
-    FloatArray,
-    FluidBackedShell,
-    NotApplicable,
-    PluginContractError,
-    RigError,
-    SensorDescriptor,
-    SkinGrid,
-    SkinState,
-    load_object,
-)
+from tactbench.plugin import FloatArray, NotApplicable, Scalar
+from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
-from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
-from tactbench.rigs.twin.fidelity import Fidelity
-from tactbench.rigs.twin.geometry import check_contact, gap_mm, skin_grid
+from tactbench.rigs.twin.contact.pressing import pressed
+from tactbench.rigs.twin.contact.validity import check_reach, remarks
+from tactbench.rigs.twin.geometry import check_contact, pad_of, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
@@ -39,6 +29,7 @@ class _Tabulated:
     touched_core: bool
     closing_mm: float
     film_mm: float
+    remarks: Mapping[str, Scalar]
 
 
 _TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
@@ -94,8 +85,10 @@ def _read_names(run: Synthesis) -> list[str]:
 
 def _tabulated(run: Synthesis) -> _Tabulated:
     largest, names = run.load.largest_n, _read_names(run)
-    spec = run.sensor.model_dump_json()
-    text = f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}"
+    if run.scene.simulation.tolerance is not None and run.rung_error is None:
+        choose_rung(run, names, largest)
+    spec, asked = run.sensor.model_dump_json(), run.scene.simulation.tolerance
+    text = f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{asked}"
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
         _TABLES.move_to_end(key)
@@ -111,64 +104,25 @@ def _tabulated(run: Synthesis) -> _Tabulated:
 
 
 def _tabulate(run: Synthesis, names: list[str], largest: float) -> _Tabulated:
-    spec, skin = run.sensor.spec, run.sensor.spec.skin
-    if skin is None or run.sensor.transducer is None:
-        raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
     fidelity = run.fidelity
-    grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
-    outer = skin.sheet.outer_radius
-    gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"))
-    read = _reader(run.sensor, grid, names, fidelity) if names else _no_channels
-    core: Callable[[Medium], Medium] | None = None
-    if "core" in run.lent and isinstance(skin, FluidBackedShell):
-        where = run.lent["core"]
-
-        def core(medium: Medium) -> Medium:
-            made: Medium = load_object(where)(medium, skin)
-            return made
-
-    press = Press(
-        medium_of(skin, grid),
-        gap,
-        run.contact,
-        core=core,
-        fluid_pressure=run.fluid_pressure,
-        tolerance=fidelity.newton_tolerance,
-    )
+    press, read = pressed(run, names, fidelity)
     table = build_table(
         press,
         read,
         largest_n=largest,
-        tolerance=fidelity.table_tolerance_factor * _tolerance(run, names),
+        tolerance=_tolerance(run, names),
         most_nodes=fidelity.most_nodes,
         clock=run.clock,
     )
-    closing = press.closing_at(largest) if press.medium.has_core else 0.0
-    film = float(press.medium.rest_thickness_mm.max()) - press.medium.least_thickness_mm
-    return _Tabulated(table, press.touched_core, closing, film)
-
-
-def _reader(
-    sensor: SensorDescriptor, grid: SkinGrid, names: list[str], fidelity: Fidelity
-) -> Callable[[SkinState], FloatArray]:
-    """Return the sensor's transducer, each of its answers looked at before it is used."""
-    try:
-        factory = load_object(sensor.transducer or "")
-        transducer = factory(sensor.spec, grid, names, **fidelity.options(factory))
-    except RigError as error:
-        raise NotApplicable(f"The transducer of {sensor.name} cannot answer: {error}", hint=error.hint) from error
-
-    def read(state: SkinState) -> FloatArray:
-        readings = np.asarray(transducer(state), dtype=np.float64)
-        if readings.shape != (len(names),) or not np.all(np.isfinite(readings)):
-            raise PluginContractError(
-                f"The transducer of {sensor.name} returned shape {readings.shape} at {state.force_n:g} N; "
-                f"expected ({len(names)},) finite readings.",
-                hint="Return one finite number for each wanted channel.",
-            )
-        return readings
-
-    return read
+    medium = press.medium
+    closing = press.closing_at(largest) if medium.has_core else 0.0
+    film = float(medium.rest_thickness_mm.max()) - medium.least_thickness_mm
+    skin = run.sensor.spec.skin
+    sheet = None if skin is None else skin.sheet
+    outer_mm = math.inf if sheet is None or sheet.outer_radius is None else sheet.outer_radius.to("mm")
+    check_reach(press, largest, outer_mm)
+    pad = None if sheet is None else pad_of(sheet, medium.grid)
+    return _Tabulated(table, press.touched_core, closing, film, remarks(press, table.loads_n.tolist(), outer_mm, pad))
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
@@ -176,12 +130,11 @@ _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
 hundredth of what a ramp to a few newtons gives."""
 
 
-def _no_channels(state: SkinState) -> FloatArray:
-    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
-
-
 def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
-    """Return the interpolation error to aim at: one standard deviation of what noise and rounding hide anyway."""
+    """Return the interpolation error to aim at: one standard deviation of what noise and rounding hide anyway.
+
+    A scene that states a tolerance gets a third of that, if it is less: the rung has the rest.
+    """
     if not names:
         return _NO_CHANNELS_TOLERANCE
     wanted = []
@@ -193,7 +146,9 @@ def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
         # Without any stated noise: a ten-thousandth of the range, or of one.
         span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 1.0
         wanted.append(hidden if hidden > 0 else 1e-4 * span)
-    return np.array(wanted)
+    aim = run.fidelity.table_tolerance_factor * np.array(wanted)
+    asked = run.scene.simulation.tolerance
+    return aim if asked is None else np.minimum(aim, TABLE_SHARE * asked)
 
 
 def _report(run: Synthesis, tabulated: _Tabulated) -> None:
@@ -205,7 +160,11 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
         table_error_count=float(table.error.max(initial=0.0)),
         solver_residual=table.residual,
         depth_mm=deepest.depth_mm,
+        **tabulated.remarks,
     )
+    if run.rung_error is not None:
+        total = run.rung_error + float(table.error.max(initial=0.0))
+        run.drawn.update(rung=run.rung, rung_error_count=run.rung_error, error_estimate_count=total)
     if "core" not in run.lent:
         return
     force = deepest.force_n
