@@ -42,6 +42,7 @@ def steps_s(t_s: FloatArray, tau_s: float) -> FloatArray:
         )
     return dt
 
+
 ComplexArray = npt.NDArray[np.complex128]
 Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
 
