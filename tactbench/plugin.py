@@ -41,7 +41,7 @@ from tactbench.core.spec.rig import (
     SensorDescriptor,
     TaskDescriptor,
 )
-from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Simulation
+from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Simulation, Slide, Surface
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
@@ -109,8 +109,10 @@ __all__ = [
     "SkinGrid",
     "SkinSheet",
     "SkinState",
+    "Slide",
     "Source",
     "StreamSpec",
+    "Surface",
     "TactbenchError",
     "TaskDescriptor",
     "TaskSpec",

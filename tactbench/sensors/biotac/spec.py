@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import math
 
-from tactbench.plugin import Dome, FluidBackedShell, Quantity, SensorSpec, SkinSheet, Source, assumed, derived, sourced
+from tactbench.plugin import (
+    Dome,
+    FluidBackedShell,
+    Quantity,
+    SensorSpec,
+    SkinSheet,
+    Source,
+    assumed,
+    derived,
+    measured,
+    sourced,
+)
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.likeness import LIKENESS
 from tactbench.sensors.biotac.nuisances import NUISANCES
@@ -64,6 +75,18 @@ PARAMETERS: dict[str, Quantity] = {
         3.5, "mm", "film behind the skin that can be pressed, where the rear excitations are: it stays as at rest"
     ),
     "excitation_arc_back": derived(3.99, "mm", f"arc on the core, 3.75 mm on the map: 45 degrees; {_EXCITATION}"),
+    "skin_mode_frequency": derived(
+        330.0, "Hz", "Fishel and Loeb 2012: the smallest vibrations are felt near 330 Hz; read as the skin's mode"
+    ),
+    "skin_mode_damping": assumed(0.1, "1", "share of the critical damping; no source"),
+    "skin_lift": assumed(
+        0.03, "1", "normal over tangential motion: x^2/(2 Ro) of a patch moved by x on a round finger, at 0.25 mm"
+    ),
+    "hum": measured(
+        4.1, "count", "PAC of three BioTac SP at rest (RuihanGao/BioTacSP_setup): sd 4.5-5.1 in all, 2.4 of it white"
+    ),
+    "hum_low": measured(30.0, "Hz", "the same: the hum sits between 30 and 200 Hz"),
+    "hum_high": measured(200.0, "Hz", "the same: the hum sits between 30 and 200 Hz"),
     **THERMAL,
 }
 

@@ -1,6 +1,6 @@
 """From skin states to the BioTac's counts: film, conduction, divider; and the fluid's pressure.
 
-It gives the 19 electrodes and PDC. TDC and TAC are not read from the skin: the twin's effects of heat give them.
+It gives the 19 electrodes and PDC. TDC, TAC and PAC are not read from the skin: effects of the twin give them.
 """
 
 from __future__ import annotations
