@@ -39,18 +39,30 @@ def halve(gap_mm: FloatArray, reachable: Mask) -> tuple[FloatArray, Mask]:
 def double(pressure: FloatArray) -> FloatArray:
     """Return a pressure >= 0 on twice as many cells a side.
 
-    Its square is interpolated: under a smooth indenter that is what falls to zero in a straight line at the rim.
-    Nothing is added outside the coarse contact but the quarter cells around it, which the solver drops again.
+    Its square is interpolated: under a smooth indenter that is what falls to zero in a straight line at the rim, and
+    it is continued below zero by one cell, so that the rim falls between the fine cells as it should.
     """
-    square = np.pad(pressure**2, 1, mode="edge")
+    square = _continued(np.pad(pressure**2, 2, mode="edge"))
     along = np.empty((2 * pressure.shape[0], square.shape[1]))
     along[0::2] = 0.75 * square[1:-1] + 0.25 * square[:-2]
     along[1::2] = 0.75 * square[1:-1] + 0.25 * square[2:]
     both = np.empty((along.shape[0], 2 * pressure.shape[1]))
     both[:, 0::2] = 0.75 * along[:, 1:-1] + 0.25 * along[:, :-2]
     both[:, 1::2] = 0.75 * along[:, 1:-1] + 0.25 * along[:, 2:]
-    fine: FloatArray = np.sqrt(both, out=both)
+    fine: FloatArray = np.sqrt(np.maximum(both, 0.0, out=both), out=both)
     return fine
+
+
+def _continued(square: FloatArray) -> FloatArray:
+    """Return the field without its outermost cells; beside the positive ones, zeros go on in a straight line down."""
+    middle = square[1:-1, 1:-1]
+    best = np.full(middle.shape, -np.inf)
+    for axis in (0, 1):
+        for side in (1, -1):
+            near = np.roll(square, side, axis)[1:-1, 1:-1]
+            far = np.roll(square, 2 * side, axis)[1:-1, 1:-1]
+            best = np.maximum(best, np.where(near > 0, 2 * near - far, -np.inf))
+    return np.where(middle > 0, middle, np.where(np.isfinite(best), np.minimum(best, 0.0), 0.0))
 
 
 def _four(field: FloatArray) -> FloatArray:
