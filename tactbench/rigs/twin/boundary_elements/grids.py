@@ -16,24 +16,34 @@ def can_halve(cells: tuple[int, int]) -> bool:
     return all(n % 2 == 0 and n // 2 >= _COARSEST for n in cells)
 
 
-def halve(gap_mm: FloatArray, reachable: Mask) -> tuple[FloatArray, Mask]:
-    """Return the gap on half as many cells a side, at the coarse centres, and where it can be reached.
+def cell_means(gap_mm: FloatArray, reachable: Mask) -> FloatArray:
+    """Return the mean gap of each cell from the gap at its centre.
 
-    The mean over four cells exceeds the value in their middle by ``h²/32`` times the Laplacian (h: coarse cell),
-    which is taken off where all neighbours exist: exact for a paraboloid. A coarse cell can be reached if one of its
-    four can.
+    ``g + (D²x g + D²s g) / 24`` with second differences: exact for a paraboloid. Of the second difference of a cell
+    and those of its two neighbours the smallest counts, and none if they differ in sign: no bend is seen in a step
+    or at an edge.
     """
+    mean = gap_mm.copy()
+    _add_bend(mean, gap_mm, reachable)
+    _add_bend(mean.T, gap_mm.T, reachable.T)
+    return mean
+
+
+def _add_bend(mean: FloatArray, gap: FloatArray, reachable: Mask) -> None:
+    """Add the bend along the first axis."""
+    second = gap[2:] - 2 * gap[1:-1] + gap[:-2]
+    second *= reachable[2:] & reachable[1:-1] & reachable[:-2]
+    padded = np.concatenate([second[:1], second[:1], second, second[-1:], second[-1:]])
+    low = np.minimum(np.minimum(padded[:-2], padded[1:-1]), padded[2:])
+    high = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    mean += (np.maximum(low, 0.0) + np.minimum(high, 0.0)) / 24
+
+
+def halve(gap_mm: FloatArray, reachable: Mask) -> tuple[FloatArray, Mask]:
+    """Return the mean gap on half as many cells a side, and where it can be reached: if one of four can be."""
     weight = _four(reachable.astype(np.float64))
     known = weight > 0
-    mean = _four(np.where(reachable, gap_mm, 0.0)) / np.where(known, weight, 1.0)
-    full = weight == 4
-    bend, clear = np.zeros_like(mean), full[1:-1, 1:-1].copy()
-    for low, high in (((slice(0, -2), slice(1, -1)), (slice(2, None), slice(1, -1))),
-                      ((slice(1, -1), slice(0, -2)), (slice(1, -1), slice(2, None)))):  # fmt: skip
-        bend[1:-1, 1:-1] += mean[low] + mean[high] - 2 * mean[1:-1, 1:-1]
-        clear &= full[low] & full[high]
-    bend[1:-1, 1:-1] *= clear
-    return mean - bend / 32, known
+    return _four(np.where(reachable, gap_mm, 0.0)) / np.where(known, weight, 1.0), known
 
 
 def double(pressure: FloatArray) -> FloatArray:

@@ -1,4 +1,9 @@
-"""What is pressed: how far a surface sinks under pressure elsewhere. Millimetres, newtons, megapascals."""
+"""What is pressed: how far a surface sinks under pressure elsewhere. Millimetres, newtons, megapascals.
+
+Pressure is constant on each cell, and what counts is the mean displacement of each cell (a Galerkin method): the
+energy is then exact for the pressures that the grid can hold, and the depth under a paraboloid converges with about the
+third power of the cell, where displacements at the centres converge with the second.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +17,11 @@ from tactbench.plugin import FloatArray, RigError
 from tactbench.rigs.twin.layer_kernel import compliance_shape
 
 
+_NEAR = 48
+"""Cells up to which the closed form is used: its cancellation costs (r/cell)⁴ roundings, 4e-9 there."""
+_ALIASES = 2
+
+
 class Kernel(Protocol):
     """A linear elastic surface without friction. Implementations are frozen, so that transforms can be kept."""
 
@@ -20,7 +30,7 @@ class Kernel(Protocol):
         """Whether the domain repeats itself; else pressure outside the domain is zero."""
 
     def influence(self, cells: tuple[int, int], cell_mm: tuple[float, float]) -> FloatArray:
-        """Return the displacement [mm/MPa] that unit pressure on one cell causes (i, j) cells away, i, j >= 0.
+        """Return the mean displacement [mm/MPa] of the cell (i, j) cells away from one under unit pressure, i, j >= 0.
 
         Even in both offsets. As large as any window of the domain needs.
         """
@@ -41,16 +51,23 @@ class HalfSpace:
         _require(self.modulus_mpa > 0 and math.isfinite(self.modulus_mpa), "modulus", self.modulus_mpa, "positive")
 
     def influence(self, cells: tuple[int, int], cell_mm: tuple[float, float]) -> FloatArray:
-        """Return the (nx, ns) displacement by a uniformly pressed rectangle (Love 1929; Johnson 1985, eq. 3.25).
+        """Return the (nx, ns) mean over one cell of ``1 / (pi E* r)``, integrated over the other (Boussinesq).
 
-        ``[f(X+a, Y+b) - f(X-a, Y+b) - f(X+a, Y-b) + f(X-a, Y-b)] / (pi E*)`` at its surroundings (X, Y), with half
-        sides a, b and ``f = X asinh(Y/|X|) + Y asinh(X/|Y|)``. No argument is zero: corners lie between centres.
+        Love's integral over the pressed cell (Love 1929; Johnson 1985, eq. 3.25), integrated once more over the other
+        cell, is a second difference in both directions of
+        ``H = x² y asinh(y/|x|) / 2 + x y² asinh(x/|y|) / 2 - r³ / 6``. Beyond `_NEAR` cells, where that difference
+        would cancel, the series ``1/r + (a² d²/dx² + b² d²/dy²)(1/r) / 12`` in the sides a, b; both are good to 1e-8
+        where they meet.
         """
-        x = ((np.arange(cells[0] + 1) - 0.5) * cell_mm[0])[:, None]
-        s = ((np.arange(cells[1] + 1) - 0.5) * cell_mm[1])[None, :]
-        corner = x * np.arcsinh(s / np.abs(x)) + s * np.arcsinh(x / np.abs(s))
-        spread: FloatArray = corner[1:, 1:] - corner[:-1, 1:] - corner[1:, :-1] + corner[:-1, :-1]
-        return spread / (math.pi * self.modulus_mpa)
+        dx, ds = cell_mm
+        x, s = (np.arange(cells[0]) * dx)[:, None], (np.arange(cells[1]) * ds)[None, :]
+        r2 = x**2 + s**2
+        r2[0, 0] = 1.0
+        bend = (dx**2 * (3 * x**2 - r2) + ds**2 * (3 * s**2 - r2)) / (12 * r2**2)
+        influence: FloatArray = dx * ds * (1 + bend) / np.sqrt(r2)
+        near = _second_difference(_second_difference(_potential(cells, cell_mm)).T).T / (dx * ds)
+        influence[: near.shape[0], : near.shape[1]] = near
+        return influence / (math.pi * self.modulus_mpa)
 
     def stiffness(self, wave_number: FloatArray) -> FloatArray:
         """Return ``E* k / 2`` (Johnson 1985, section 13.2)."""
@@ -87,13 +104,25 @@ class Layer:
         return self.thickness_mm * (1 + nu) * (1 - 2 * nu) / (self.young_mpa * (1 - nu))
 
     def influence(self, cells: tuple[int, int], cell_mm: tuple[float, float]) -> FloatArray:
-        """Return the (nx//2+1, ns//2+1) periodic influence: the transform of the compliance ``2 M(kh) / (E* k)``."""
+        """Return the (nx//2+1, ns//2+1) periodic influence.
+
+        Its transform is the compliance ``2 M(kh) / (E* k)``, weighted by ``sinc²`` in both directions for the means
+        over both cells, and summed over the waves that look alike on the grid (`_ALIASES` on either side: what is
+        left out is below 1 % of the shortest wave's compliance and nothing of the longest's).
+        """
         from scipy import fft
 
-        compliance = np.empty((cells[0], cells[1] // 2 + 1))
-        k = wave_numbers(cells, cell_mm)
-        k[0, 0] = 1.0
-        compliance[:] = 1.0 / self.stiffness(k)
+        half = (cells[0], cells[1] // 2 + 1)
+        x = np.broadcast_to(0.5 * cell_mm[0] * 2 * math.pi * np.fft.fftfreq(cells[0], cell_mm[0])[:, None], half)
+        s = np.broadcast_to(0.5 * cell_mm[1] * 2 * math.pi * np.fft.rfftfreq(cells[1], cell_mm[1])[None, :], half)
+        compliance = np.zeros(half)
+        for m in range(-_ALIASES, _ALIASES + 1):
+            for n in range(-_ALIASES, _ALIASES + 1):
+                along, across = x + math.pi * m, s + math.pi * n
+                k = np.hypot(2 * along / cell_mm[0], 2 * across / cell_mm[1])
+                k[0, 0] = k[0, 0] or 1.0
+                weight = np.sinc(along / math.pi) ** 2 * np.sinc(across / math.pi) ** 2
+                compliance += weight / self.stiffness(k)
         compliance[0, 0] = self.uniform_compliance
         influence: FloatArray = fft.irfft2(compliance, s=cells)
         return influence[: cells[0] // 2 + 1, : cells[1] // 2 + 1].copy()
@@ -111,6 +140,22 @@ def wave_numbers(cells: tuple[int, int], cell_mm: tuple[float, float]) -> FloatA
     ks = 2 * math.pi * np.fft.rfftfreq(cells[1], cell_mm[1])
     k: FloatArray = np.hypot(kx[:, None], ks[None, :])
     return k
+
+
+def _potential(cells: tuple[int, int], cell_mm: tuple[float, float]) -> FloatArray:
+    """Return ``H`` at the near offsets and one more on either side."""
+    x = (np.arange(-1, min(cells[0], _NEAR) + 1) * cell_mm[0])[:, None]
+    s = (np.arange(-1, min(cells[1], _NEAR) + 1) * cell_mm[1])[None, :]
+    # Where a denominator is zero its factor is, too: the product's limit is 0.
+    safe_x, safe_s = np.where(x == 0, 1.0, np.abs(x)), np.where(s == 0, 1.0, np.abs(s))
+    potential: FloatArray = 0.5 * x * s * (x * np.arcsinh(s / safe_x) + s * np.arcsinh(x / safe_s))
+    return potential - np.hypot(x, s) ** 3 / 6
+
+
+def _second_difference(field: FloatArray) -> FloatArray:
+    """Return ``f[i+1] - 2 f[i] + f[i-1]`` along the first axis."""
+    difference: FloatArray = field[2:] - 2 * field[1:-1] + field[:-2]
+    return difference
 
 
 def _require(good: bool, name: str, value: float, expected: str) -> None:
