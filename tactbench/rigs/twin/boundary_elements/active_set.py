@@ -11,6 +11,7 @@ grid.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,10 @@ _INNER = 0.3
 """The linear system is solved until its residual has fallen by this factor; then the set is looked at again."""
 _ROUNDING = 1e-11
 """A penetration below this fraction of the depth is rounding."""
+_WILD = 1e3
+"""Pulling and pushing may not exceed the load by this factor: a far too large contact set, whose sum loses digits."""
+_UNBALANCED = 1e-12
+"""Relative error of the load above which it is restored."""
 
 
 @dataclass(frozen=True)
@@ -68,51 +73,82 @@ def solve(problem: Problem, start: FloatArray, *, tolerance: float, most_product
     most_products
         After these many products with the kernel the state is returned unsettled.
     """
-    apply = problem.operator.displacement
-    gap, total = problem.gap_mm, problem.total_mpa
-    pressure = start * (total / start.sum())
-    displacement = apply(pressure)
-    contact: Mask = pressure > 0
-    depth, products = 0.0, 1
-    while True:
-        condition = _Conditioner(problem.operator, contact)
-        lift = displacement + gap
-        step, rho, depth = condition.begin(lift, depth)
+    total = problem.total_mpa
+    now = _Iterate(start > 0, start * (total / start.sum()), problem.operator.displacement)
+    while now.products < most_products:
+        change = now.relax(problem, tolerance, most_products)
+        if np.abs(now.pressure).sum() > _WILD * total:
+            nearer = problem.gap_mm <= np.median(problem.gap_mm[now.contact])
+            now.restart(now.contact & nearer, None, total)
+        elif change is None:
+            break
+        elif change.any():
+            now.restart(now.contact ^ change, now.pressure, total)
+        elif abs(now.pressure.sum() - total) > _UNBALANCED * total:
+            now.restart(now.contact, now.pressure, total)
+        else:
+            return State(now.pressure, now.displacement, now.depth, now.products, True)
+    now.restart(now.contact, now.pressure, total)
+    return State(now.pressure, now.displacement, now.depth, now.products, False)
+
+
+class _Iterate:
+    """A pressure on its way, its displacement and its contact set."""
+
+    def __init__(self, contact: Mask, pressure: FloatArray, apply: Callable[[FloatArray], FloatArray]) -> None:
+        self.contact, self.pressure, self.depth, self.products = contact, pressure, 0.0, 0
+        self._apply = apply
+        self.displacement = self.apply(pressure)
+
+    def apply(self, pressure: FloatArray) -> FloatArray:
+        """Return the displacement, and count."""
+        self.products += 1
+        return self._apply(pressure)
+
+    def restart(self, contact: Mask, pressure: FloatArray | None, total: float) -> None:
+        """Go on with another contact set. What pulls is cut off and the load restored; None: press evenly."""
+        self.contact = contact
+        pushing = None if pressure is None else np.maximum(pressure, 0.0)
+        if pushing is None or not pushing.sum() > 0:
+            pushing = contact.astype(np.float64)
+        carried = float(pushing.sum())
+        if np.array_equal(pushing, self.pressure) and abs(carried - total) <= _UNBALANCED * total:
+            return
+        self.pressure = pushing * (total / carried)
+        self.displacement = self.apply(self.pressure)
+
+    def relax(self, problem: Problem, tolerance: float, most_products: int) -> Mask | None:
+        """Iterate on the contact set until it has to change.
+
+        Returns
+        -------
+        Mask | None
+            The cells that have to enter or leave; none of them: solved. None: there is no going on.
+        """
+        gap, total = problem.gap_mm, problem.total_mpa
+        condition = _Conditioner(problem.operator, self.contact)
+        lift = self.displacement + gap
+        # About the mean under pressure, not about an earlier depth: that may have been far off, and digits with it.
+        step, rho, self.depth = condition.begin(lift, float(np.vdot(self.pressure, lift)) / total)
         direction, goal = -step, rho * _INNER**2
-        pulls = np.zeros_like(contact)
         while True:
-            small = rho <= tolerance**2 * total * depth
+            small = rho <= tolerance**2 * total * self.depth
             if small or rho <= goal:
-                pulls = contact & (pressure < 0)
-                sinks = problem.reachable & ~contact & (lift < (1 - _ROUNDING) * depth)
-                if pulls.any() or sinks.any():
-                    break
-                if small:
-                    return State(pressure, displacement, depth, products, True)
+                change = problem.reachable & ~self.contact & (lift < (1 - _ROUNDING) * self.depth)
+                change |= self.contact & (self.pressure < 0)
+                if small or change.any():
+                    return change
                 goal = rho * _INNER**2
-            product = apply(direction)
-            products += 1
+            product = self.apply(direction)
             curvature = float(np.vdot(direction, product))
-            if not curvature > 0 or products > most_products:
-                return State(_pushing(pressure, total), displacement, depth, products, False)
-            pressure = pressure + (rho / curvature) * direction
-            displacement = displacement + (rho / curvature) * product
-            lift, before = displacement + gap, rho
-            step, rho, depth = condition(lift, depth)
+            if not curvature > 0 or self.products > most_products:
+                return None
+            self.pressure = self.pressure + (rho / curvature) * direction
+            self.displacement = self.displacement + (rho / curvature) * product
+            lift, before = self.displacement + gap, rho
+            step, rho, self.depth = condition(lift, self.depth)
             direction *= rho / before
             direction -= step
-        if pulls.any():
-            pressure = _pushing(pressure, total)
-            displacement = apply(pressure)
-            products += 1
-        contact = (contact & ~pulls) | sinks
-
-
-def _pushing(pressure: FloatArray, total: float) -> FloatArray:
-    """Return the pressure without what pulls, carrying the same load."""
-    pushing = np.maximum(pressure, 0.0)
-    pushing *= total / pushing.sum()
-    return pushing
 
 
 class _Conditioner:

@@ -27,6 +27,8 @@ _MARGIN = 2
 _PRODUCTS = 400
 """Products with the kernel before the active set is given up for Polonsky-Keer; hard cases take up to 100."""
 _CLASSIC_PRODUCTS = 4000
+_TRUSTED = 100.0
+"""A residual is a largest value and may exceed the tolerance, which is in the norm of the energy, by this factor."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,10 @@ def press(
         coarser = depth
         found = grid.solve(begin, max(tolerance, COARSE_TOLERANCE) if level else tolerance)
         start, depth = found.pressure_mpa, grid.lowest_mm + found.depth_mm
-    return grid.result(found, abs(depth - coarser))
+    result = grid.result(found, abs(depth - coarser))
+    if result.residual > _TRUSTED * tolerance:
+        raise grid.unsettled(tolerance, f"left a residual of {result.residual:.1e}")
+    return result
 
 
 @dataclass(frozen=True)
@@ -178,9 +183,13 @@ class _Grid:
         )
         if classic.settled:
             return classic
-        raise RigError(
-            f"The reference solver did not settle at {self.force_n:g} N on {self.cells[0]} x {self.cells[1]} cells "
-            f"to a tolerance of {tolerance:.0e}.",
+        raise self.unsettled(tolerance, "did not settle")
+
+    def unsettled(self, tolerance: float, what: str) -> RigError:
+        """Return the error to raise."""
+        return RigError(
+            f"The reference solver {what} at {self.force_n:g} N on {self.cells[0]} x {self.cells[1]} cells "
+            f"with a tolerance of {tolerance:.0e}.",
             hint="Ask for a larger tolerance, or check that the gap is that of a solid indenter.",
         )
 

@@ -52,7 +52,7 @@ def double(pressure: FloatArray) -> FloatArray:
     Its square is interpolated: under a smooth indenter that is what falls to zero in a straight line at the rim, and
     it is continued below zero by one cell, so that the rim falls between the fine cells as it should.
     """
-    square = _continued(np.pad(pressure**2, 2, mode="edge"))
+    square = _continued(np.pad(pressure**2, 3, mode="edge"))
     along = np.empty((2 * pressure.shape[0], square.shape[1]))
     along[0::2] = 0.75 * square[1:-1] + 0.25 * square[:-2]
     along[1::2] = 0.75 * square[1:-1] + 0.25 * square[2:]
@@ -64,14 +64,12 @@ def double(pressure: FloatArray) -> FloatArray:
 
 
 def _continued(square: FloatArray) -> FloatArray:
-    """Return the field without its outermost cells; beside the positive ones, zeros go on in a straight line down."""
-    middle = square[1:-1, 1:-1]
-    best = np.full(middle.shape, -np.inf)
-    for axis in (0, 1):
-        for side in (1, -1):
-            near = np.roll(square, side, axis)[1:-1, 1:-1]
-            far = np.roll(square, 2 * side, axis)[1:-1, 1:-1]
-            best = np.maximum(best, np.where(near > 0, 2 * near - far, -np.inf))
+    """Return the field without its two outermost cells; beside the positive ones, zeros go on straight down."""
+    middle, best = square[2:-2, 2:-2], np.full((square.shape[0] - 4, square.shape[1] - 4), -np.inf)
+    near, far, across = (slice(1, -3), slice(3, -1)), (slice(0, -4), slice(4, None)), slice(2, -2)
+    for one, two in zip(near, far, strict=True):
+        for beside, beyond in ((square[one, across], square[two, across]), (square[across, one], square[across, two])):
+            best = np.maximum(best, np.where(beside > 0, 2 * beside - beyond, -np.inf))
     return np.where(middle > 0, middle, np.where(np.isfinite(best), np.minimum(best, 0.0), 0.0))
 
 

@@ -16,10 +16,11 @@ import numpy as np
 from tactbench.plugin import FloatArray, RigError
 from tactbench.rigs.twin.layer_kernel import compliance_shape
 
-
 _NEAR = 48
 """Cells up to which the closed form is used: its cancellation costs (r/cell)⁴ roundings, 4e-9 there."""
 _ALIASES = 2
+_THICK = 12.0
+"""Waves of ``k h`` above this see a half-space: the layer's compliance differs from it by ``q² e^-2q``, 5e-9."""
 
 
 class Kernel(Protocol):
@@ -28,6 +29,8 @@ class Kernel(Protocol):
     @property
     def periodic(self) -> bool:
         """Whether the domain repeats itself; else pressure outside the domain is zero."""
+
+    def __hash__(self) -> int: ...
 
     def influence(self, cells: tuple[int, int], cell_mm: tuple[float, float]) -> FloatArray:
         """Return the mean displacement [mm/MPa] of the cell (i, j) cells away from one under unit pressure, i, j >= 0.
@@ -112,17 +115,19 @@ class Layer:
         """
         from scipy import fft
 
-        half = (cells[0], cells[1] // 2 + 1)
-        x = np.broadcast_to(0.5 * cell_mm[0] * 2 * math.pi * np.fft.fftfreq(cells[0], cell_mm[0])[:, None], half)
-        s = np.broadcast_to(0.5 * cell_mm[1] * 2 * math.pi * np.fft.rfftfreq(cells[1], cell_mm[1])[None, :], half)
-        compliance = np.zeros(half)
+        x = math.pi * np.fft.fftfreq(cells[0])[:, None]
+        s = math.pi * np.fft.rfftfreq(cells[1])[None, :]
+        # Waves that only look like those of the grid are short: the layer is a half-space to them, unless it is thin.
+        thick = math.pi * self.thickness_mm / max(cell_mm) > _THICK
+        compliance = np.zeros((cells[0], cells[1] // 2 + 1))
         for m in range(-_ALIASES, _ALIASES + 1):
             for n in range(-_ALIASES, _ALIASES + 1):
                 along, across = x + math.pi * m, s + math.pi * n
                 k = np.hypot(2 * along / cell_mm[0], 2 * across / cell_mm[1])
                 k[0, 0] = k[0, 0] or 1.0
                 weight = np.sinc(along / math.pi) ** 2 * np.sinc(across / math.pi) ** 2
-                compliance += weight / self.stiffness(k)
+                weight /= 0.5 * self.modulus_mpa * k if thick and (m or n) else self.stiffness(k)
+                compliance += weight
         compliance[0, 0] = self.uniform_compliance
         influence: FloatArray = fft.irfft2(compliance, s=cells)
         return influence[: cells[0] // 2 + 1, : cells[1] // 2 + 1].copy()
@@ -149,7 +154,8 @@ def _potential(cells: tuple[int, int], cell_mm: tuple[float, float]) -> FloatArr
     # Where a denominator is zero its factor is, too: the product's limit is 0.
     safe_x, safe_s = np.where(x == 0, 1.0, np.abs(x)), np.where(s == 0, 1.0, np.abs(s))
     potential: FloatArray = 0.5 * x * s * (x * np.arcsinh(s / safe_x) + s * np.arcsinh(x / safe_s))
-    return potential - np.hypot(x, s) ** 3 / 6
+    potential -= np.hypot(x, s) ** 3 / 6
+    return potential
 
 
 def _second_difference(field: FloatArray) -> FloatArray:

@@ -61,9 +61,7 @@ def window_cells(kernel: Kernel, cells: tuple[int, int], wanted: tuple[int, int]
 
 
 @lru_cache(maxsize=32)
-def operator(
-    kernel: Kernel, cells: tuple[int, int], cell_mm: tuple[float, float], window: tuple[int, int]
-) -> Operator:
+def operator(kernel: Kernel, cells: tuple[int, int], cell_mm: tuple[float, float], window: tuple[int, int]) -> Operator:
     """Return `kernel` on a window of a domain; the last ones are kept.
 
     Parameters

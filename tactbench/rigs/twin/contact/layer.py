@@ -9,6 +9,7 @@ from tactbench.rigs.twin.contact.media import Medium, no_local_law, require_posi
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.layer_kernel import compliance_shape
 
+
 def medium(skin: BondedLayer, grid: SkinGrid) -> Medium:
     """Return the layer on `grid`: ``K = E* k / (2 M(k h))``, and ``E_oed / h`` for a uniform pressure.
 

@@ -7,7 +7,6 @@ import pytest
 
 from tactbench.rigs.twin.contact.newton import NewtonSolver
 
-
 # Force [N] at a depth, h = 2 mm, E = 1 MPa, indenter r² / 2R with R = 10 mm: axisymmetric quadratic finite elements.
 FEM = [
     (0.0, 0.1, 0.21212), (0.3, 0.1, 0.25159), (0.45, 0.1, 0.32848),
