@@ -13,8 +13,8 @@ import numpy as np
 from tactbench.plugin import FloatArray, RigError, SensorSpec, SkinGrid, SkinState
 from tactbench.sensors.biotac.discs import discs_on, shell_of
 from tactbench.sensors.biotac.electrodes import NAMES
-from tactbench.sensors.biotac.film import film_at_rest, refined, spectral_interpolation
-from tactbench.sensors.biotac.sheet import FilmSheet
+from tactbench.sensors.biotac.film import REFINEMENT, film_at_rest, refined, spectral_interpolation
+from tactbench.sensors.biotac.sheet import TOLERANCE, FilmSheet
 
 NEIGHBOURS = 2
 """Earlier potentials kept to begin the next load with; more do not save steps."""
@@ -52,8 +52,11 @@ class BioTacTransducer:
     give the same bits.
     """
 
-    def __init__(self, prepared: Preparation, sensor: SensorSpec, wanted: Sequence[str]) -> None:
+    def __init__(
+        self, prepared: Preparation, sensor: SensorSpec, wanted: Sequence[str], tolerance: float = TOLERANCE
+    ) -> None:
         self._prepared = prepared
+        self._tolerance = tolerance
         self._electrodes = [(place, NAMES.index(name)) for place, name in enumerate(wanted) if name in NAMES]
         self._pressures = [place for place, name in enumerate(wanted) if name == "PDC"]
         self._n_wanted = len(wanted)
@@ -76,7 +79,7 @@ class BioTacTransducer:
         readings = np.empty(self._n_wanted)
         if self._electrodes:
             self._check(state)
-            answer = self._prepared.sheet.solve(self._prepared.film_under(state), self._earlier)
+            answer = self._prepared.sheet.solve(self._prepared.film_under(state), self._earlier, self._tolerance)
             self._earlier = [answer.unknowns, *self._earlier][:NEIGHBOURS]
             for place, electrode in self._electrodes:
                 readings[place] = self._full_scale * answer.electrodes[electrode]
@@ -95,7 +98,14 @@ class BioTacTransducer:
             )
 
 
-def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> BioTacTransducer:
+def build(
+    sensor: SensorSpec,
+    grid: SkinGrid,
+    wanted: Sequence[str],
+    *,
+    refinement: int = REFINEMENT,
+    tolerance: float = TOLERANCE,
+) -> BioTacTransducer:
     """Prepare the BioTac's transduction.
 
     Parameters
@@ -106,6 +116,10 @@ def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> BioTacTr
         The grid on which skin states will come.
     wanted
         Names of channels: E1 to E19 and PDC.
+    refinement
+        Conduction cells per skin cell and axis.
+    tolerance
+        Relative error, in the energy norm, at which the conduction's iteration stops.
 
     Raises
     ------
@@ -118,10 +132,10 @@ def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> BioTacTr
                 f"The twin cannot give {name} of {sensor.name}: temperature and vibration are not modelled yet.",
                 hint=f"Ask for {NAMES[0]} to {NAMES[-1]} and PDC.",
             )
-    return BioTacTransducer(prepared(sensor, grid), sensor, tuple(wanted))
+    return BioTacTransducer(prepared(sensor, grid, refinement), sensor, tuple(wanted), tolerance)
 
 
-def prepared(sensor: SensorSpec, grid: SkinGrid, refinement: int = 2) -> Preparation:
+def prepared(sensor: SensorSpec, grid: SkinGrid, refinement: int = REFINEMENT) -> Preparation:
     """Return the preparation for `sensor` and `grid`, made once and kept."""
     return _prepared(_Key(sensor, grid, refinement))
 

@@ -7,6 +7,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, FoamPad, SkinGrid
 from tactbench.rigs.twin.contact.media import Medium, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
+from tactbench.rigs.twin.geometry import pad_of
 
 CUT_OVER = 0.97
 """Share of the densification strain beyond which the law goes on along its tangent: it cannot divide by zero."""
@@ -58,11 +59,8 @@ def medium(skin: FoamPad, grid: SkinGrid) -> Medium:
     spectrum = Spectrum(grid)
     shear = skin.shear.to("MPa") * thickness / 3 + skin.cover_tension.to("N/mm")
     stiffness = shear * spectrum.k2 + skin.cover_bending.to("N*mm") * spectrum.k2**2
-    weight = np.ones(spectrum.shape)
-    if skin.sheet.pad is not None:
-        low, high, arc = (edge.to("mm") for edge in skin.sheet.pad)
-        inside = ((grid.x_mm >= low) & (grid.x_mm <= high))[:, None] & (np.abs(grid.s_mm) <= arc / 2)[None, :]
-        weight = np.where(inside, 1.0, OUTSIDE_THE_PAD)
+    inside = pad_of(skin.sheet, grid)
+    weight = np.ones(spectrum.shape) if inside is None else np.where(inside, 1.0, OUTSIDE_THE_PAD)
     return Medium(
         grid=grid,
         spectrum=spectrum,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactbench.plugin import FloatArray, FluidBackedShell, SkinGrid
-from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_positive
+from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_poisson, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.geometry import film_at_rest_mm
 
@@ -38,7 +38,9 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
         mid_radius=skin.mid_radius.to("mm"),
         contact_stiffness=contact_stiffness,
         gap=skin.gap.to("mm"),
+        clamp_length=skin.clamp_length.to("mm"),
     )
+    require_poisson(poisson)
     spectrum = Spectrum(grid)
     k2 = spectrum.k2.copy()
     k2[0, 0] = 1.0
@@ -68,13 +70,17 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
 
 
 def clamp(skin: FluidBackedShell, grid: SkinGrid) -> LocalLaw:
-    """Return the clamp ``c (max(e^-(x - a)/l, e^-(b - x)/l) + e^-(arc/2 - |s|)/l)``.
+    """Return the clamp ``c (max(e^-(x - a)/l, e^-(b - x)/l) + e^-(arc/2 - |s|)/l)``, never above c from the ends.
 
-    ``a`` and ``b`` are the outermost cell centres, where the ends' clamp has its full stiffness; the seam's distance
-    counts from the sheet's edge. The reference figures of the solver hold for this choice; measured from the sheet's
-    ends instead, the clamp is weaker by half a cell's decay and the approach under a flat surface grows by 8 %.
+    ``a`` and ``b`` lie half a cell of the *sheet's own* division inside its ends: there the ends' clamp has its full
+    stiffness, on whatever grid, so that a finer one converges to the same skin. The seam's distance counts from the
+    sheet's edge. The reference figures of the solver hold for this choice; measured from the sheet's ends instead,
+    the clamp is weaker by half a cell's decay and the approach under a flat surface grows by 8 %.
     """
-    length = skin.clamp_length.to("mm")
-    ends = np.exp(-np.minimum(grid.x_mm - grid.x_mm[0], grid.x_mm[-1] - grid.x_mm) / length)
+    length, sheet = skin.clamp_length.to("mm"), skin.sheet
+    x_min, x_max = sheet.x_min.to("mm"), sheet.x_max.to("mm")
+    inset = (x_max - x_min) / sheet.cells[0] / 2
+    inside = np.minimum(grid.x_mm - (x_min + inset), (x_max - inset) - grid.x_mm)
+    ends = np.exp(-np.maximum(inside, 0.0) / length)
     seam = np.exp(-(skin.sheet.arc.to("mm") / 2 - np.abs(grid.s_mm)) / length)
     return Clamp(skin.clamp_stiffness.to("MPa/mm") * (ends[:, None] + seam[None, :]))

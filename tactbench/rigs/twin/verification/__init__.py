@@ -1,1 +1,1 @@
-"""What the twin is checked against: laws, closed forms, and independent calculations."""
+"""The simulation held against what must be true."""

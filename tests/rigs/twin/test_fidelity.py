@@ -1,0 +1,66 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import ForceRamp, Indenter, RigContext, RigError, Scene, SensorDescriptor, assumed
+from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.fidelity import DEFAULT, FINE, Fidelity
+from tactbench.rigs.twin.rig import Twin
+
+SCENE = Scene(name="cap", indenter=Indenter(radius=assumed(10.0, "mm", "test")), profile=ForceRamp(samples=50))
+
+
+def test_the_default_leaves_the_sheets_own_cells(specs):
+    assert DEFAULT.cells(specs["biotac"].skin.sheet) == (48, 64)
+    assert FINE.cells(specs["biotac"].skin.sheet) == (144, 192)
+    # 44 and 48 times 1.3 are 57.2 and 62.4: the nearest even numbers.
+    assert Fidelity(cells_factor=1.3).cells(specs["icub"].skin.sheet) == (58, 62)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"cells_factor": 0.0}, {"newton_tolerance": float("nan")}, {"conduction_refinement": 0}, {"most_nodes": 5}],
+)
+def test_what_is_no_fidelity_is_refused(wrong):
+    with pytest.raises(RigError, match=next(iter(wrong))):
+        Fidelity(**wrong)
+
+
+def test_a_factory_gets_what_it_names():
+    assert DEFAULT.options(lambda sensor, grid, wanted: None) == {}
+    assert DEFAULT.options(lambda sensor, grid, wanted, *, refinement=2: None) == {"refinement": 2}
+
+
+GRIDS = []
+
+
+def plain_factory(sensor, grid, wanted):
+    """A third party's transducer that knows nothing of fidelity."""
+    GRIDS.append((grid.x_mm.size, grid.s_mm.size))
+    return lambda state: np.full(len(wanted), float(state.depth_mm))
+
+
+def _deepest(sensor: SensorDescriptor, fidelity: Fidelity) -> float:
+    rig = Twin(tuple(tactbench_effects()), fidelity)
+    with rig.open(sensor, SCENE, seed=3) as acquisition:
+        return float(acquisition.drawn["depth_mm"])
+
+
+def test_a_rig_resolves_as_finely_as_it_is_told_and_keeps_tables_apart(specs):
+    sensor = SensorDescriptor(spec=specs["icub"], transducer=f"{__name__}:plain_factory")
+    GRIDS.clear()
+    coarse = dataclasses.replace(DEFAULT, cells_factor=0.5)
+    depths = [_deepest(sensor, fidelity) for fidelity in (DEFAULT, coarse, DEFAULT)]
+    assert GRIDS == [(44, 48), (22, 24)]  # the third recording found its table
+    assert depths[0] == depths[2]
+    # Half as many cells change the depth, but not by more than a cell's sag, 0.84² / (2 R).
+    assert 0 < abs(depths[1] - depths[0]) < 0.84**2 / 20
+
+
+def test_context_makes_the_default():
+    from tactbench.rigs.twin.rig import build
+
+    assert build(RigContext(effects=())).fidelity is DEFAULT
