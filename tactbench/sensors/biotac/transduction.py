@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, SensorSpec, SkinGrid, SkinState
-from tactbench.sensors.biotac.discs import discs_on, shell_of
+from tactbench.sensors.biotac.discs import discs_on, outer_radius_mm, shell_of
 from tactbench.sensors.biotac.electrodes import NAMES
 from tactbench.sensors.biotac.film import REFINEMENT, film_at_rest, refined, spectral_interpolation
 from tactbench.sensors.biotac.sheet import TOLERANCE, FilmSheet
@@ -26,16 +26,17 @@ class Preparation:
     def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
         self.skin = shell_of(sensor)
         self.coarse_film = film_at_rest(self.skin, grid.s_mm)[None, :]
-        fine = refined(grid, refinement)
+        film_radius = sensor.parameters["film_radius"].to("mm")
+        fine = refined(grid, refinement, shrink_s=film_radius / outer_radius_mm(sensor))
         self.film = np.broadcast_to(film_at_rest(self.skin, fine.s_mm), (len(fine.x_mm), len(fine.s_mm))).copy()
-        self.to_fine_x = spectral_interpolation(len(grid.x_mm), refinement)
-        self.to_fine_s = np.ascontiguousarray(spectral_interpolation(len(grid.s_mm), refinement).T)
+        self.to_fine_x = spectral_interpolation(len(grid.x_mm), len(fine.x_mm))
+        self.to_fine_s = np.ascontiguousarray(spectral_interpolation(len(grid.s_mm), len(fine.s_mm)).T)
         self.residual_film = self.skin.residual_film.to("mm")
-        discs, cell_mm = discs_on(sensor, fine)
+        contacts, cell_mm = discs_on(sensor, fine)
         # S/m times ohm is 1/m: a length, the only electrical scale of the problem.
         conductivity = sensor.parameters["conductivity"].to("S/m")
         leak_mm = 1e3 / (conductivity * sensor.parameters["reference_resistor"].to("ohm"))
-        self.sheet = FilmSheet(cell_mm, discs, leak_mm, np.maximum(self.film, self.residual_film))
+        self.sheet = FilmSheet(cell_mm, contacts, leak_mm, np.maximum(self.film, self.residual_film))
         self.rest = self.sheet.at_rest
 
     def film_under(self, state: SkinState) -> FloatArray:
