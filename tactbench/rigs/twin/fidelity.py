@@ -29,7 +29,7 @@ class Fidelity:
     """Largest relative residual of the contact solver."""
     conduction_tolerance: float = 3e-6
     """Relative error at which a transducer's own iteration stops, for transducers that iterate."""
-    most_nodes: int = 16
+    most_nodes: int = 14
     """Loads after which a load table is refined no further."""
     table_tolerance_factor: float = 1.0
     """Wanted interpolation error of a load table, in units of what noise and rounding hide anyway."""

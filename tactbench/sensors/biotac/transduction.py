@@ -17,7 +17,9 @@ from tactbench.sensors.biotac.film import REFINEMENT, film_at_rest, refined, spe
 from tactbench.sensors.biotac.sheet import TOLERANCE, FilmSheet
 
 NEIGHBOURS = 2
-"""Earlier potentials kept to begin the next load with; more do not save steps."""
+"""Potentials of the nearest loads to begin the next one with; more do not save steps."""
+MOST_KEPT = 16
+"""Loads whose potentials are kept: those of a table."""
 
 
 class Preparation:
@@ -61,7 +63,7 @@ class BioTacTransducer:
         self._electrodes = [(place, NAMES.index(name)) for place, name in enumerate(wanted) if name in NAMES]
         self._pressures = [place for place, name in enumerate(wanted) if name == "PDC"]
         self._n_wanted = len(wanted)
-        self._earlier: list[FloatArray] = []
+        self._earlier: dict[float, FloatArray] = {}
         channels = {channel.name: channel for channel in sensor.channels()}
         self._full_scale = channels[NAMES[0]].upper or 0.0
         pdc = channels["PDC"]
@@ -80,8 +82,12 @@ class BioTacTransducer:
         readings = np.empty(self._n_wanted)
         if self._electrodes:
             self._check(state)
-            answer = self._prepared.sheet.solve(self._prepared.film_under(state), self._earlier, self._tolerance)
-            self._earlier = [answer.unknowns, *self._earlier][:NEIGHBOURS]
+            nearest = sorted(self._earlier, key=lambda force: abs(force - state.force_n))[:NEIGHBOURS]
+            neighbours = [self._earlier[force] for force in nearest]
+            answer = self._prepared.sheet.solve(self._prepared.film_under(state), neighbours, self._tolerance)
+            self._earlier[state.force_n] = answer.unknowns
+            while len(self._earlier) > MOST_KEPT:
+                del self._earlier[next(iter(self._earlier))]
             for place, electrode in self._electrodes:
                 readings[place] = self._full_scale * answer.electrodes[electrode]
         for place in self._pressures:
@@ -90,9 +96,7 @@ class BioTacTransducer:
 
     def _check(self, state: SkinState) -> None:
         expected = np.maximum(self._prepared.coarse_film - state.deflection_mm, self._prepared.residual_film)
-        if state.thickness_mm.shape != expected.shape or not np.allclose(
-            state.thickness_mm, expected, rtol=0.0, atol=1e-6
-        ):
+        if state.thickness_mm.shape != expected.shape or not np.abs(state.thickness_mm - expected).max() <= 1e-6:
             raise RigError(
                 "The skin state's film is not this sensor's film at rest less its deflection.",
                 hint="Use the state of a contact solved with this sensor's skin on the grid given to build().",

@@ -93,5 +93,5 @@ def medium(skin: FoamPad, grid: SkinGrid) -> Medium:
         zero_mean=False,
         rest_thickness_mm=np.full(spectrum.shape, thickness),
         least_thickness_mm=0.0,
-        low_modes=150,
+        low_modes=80,
     )
