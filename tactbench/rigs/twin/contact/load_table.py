@@ -23,7 +23,7 @@ _SCOUTS_POWER = 1.7
 """First loads at ``j^1.7``, above zero: enough to see whether and about where the film closes."""
 _INTERVALS = 6
 """Intervals of a table without touch-down."""
-_INTERVALS_BELOW, _INTERVALS_ABOVE = 5, 5
+_INTERVALS_BELOW, _INTERVALS_ABOVE = 5, 4
 """Intervals below touch-down, dense at both ends, and above it, dense at its beginning."""
 _ABOVE_POWER = 0.75
 """Above touch-down readings follow ``(F - F_td)^0.75`` more smoothly than F: at five nodes above it the rms error over
@@ -32,9 +32,9 @@ _LARGEST_GAP = 1.3
 """A gap between nodes is split when it is wider than this many intervals."""
 _PREDICTED = 2.0
 """How many tolerances the nodes may miss one another by: the error between them is then about a third of that."""
-_UNSEEN = 2.0
+_UNSEEN = 3.0
 """Safety of the reported bound: where readings bend sharply, just above touch-down, the error between two nodes has
-been up to 1.9 times what the nodes miss one another by."""
+been up to 2.4 times what the nodes miss one another by."""
 _NARROWEST_N = 0.02
 """No interval narrower than this is split."""
 _TOUCH_DOWN_N = 0.01
@@ -58,7 +58,7 @@ class LoadTable:
     touch_down_n: tuple[float, float] | None
     """Bracket of the load at which the core is touched; None when it never is."""
     error: FloatArray
-    """(channels,) twice the largest difference between a solved reading and the interpolant through all other nodes."""
+    """(channels,) three times the most by which a solved reading differs from the interpolant through the others."""
     interpolant: Interpolant
     solves: int
 
