@@ -54,7 +54,7 @@ class RimmedDiscs:
     Raises
     ------
     RigError
-        If no cell has its centre under a disc, or a disc reaches the grid's outermost cells.
+        If no cell has its centre under a disc.
     """
 
     def __init__(self, x_mm: FloatArray, s_mm: FloatArray, electrodes: Sequence[Disc], excitation: Sequence[Disc]):
@@ -67,10 +67,10 @@ class RimmedDiscs:
         for number, disc in enumerate(discs):
             along, across = x_mm - disc.x_mm, s_mm - disc.s_mm
             i, j = np.nonzero(along[:, None] ** 2 + across[None, :] ** 2 < disc.radius_mm**2)
-            if i.size == 0 or min(i.min(), j.min()) < 1 or i.max() > x_mm.size - 2 or j.max() > s_mm.size - 2:
+            if i.size == 0:
                 raise RigError(
-                    f"An electrode of {disc.radius_mm:g} mm at {disc.x_mm:.2f}, {disc.s_mm:.2f} mm covers no cell, or "
-                    f"one at the edge, of a conduction grid of {step[0]:.2f} x {step[1]:.2f} mm.",
+                    f"An electrode of {disc.radius_mm:g} mm at {disc.x_mm:.2f}, {disc.s_mm:.2f} mm covers no cell of "
+                    f"a conduction grid of {step[0]:.2f} x {step[1]:.2f} mm.",
                     hint="Correct the sensor's electrode positions or its SkinSheet, or ask for more cells.",
                 )
             owner.append(np.full(i.size, number))
@@ -83,7 +83,7 @@ class RimmedDiscs:
         electrode = whose < self.count
         self.owner, self.under = whose[electrode], self._cell[electrode]
         self._driven = self._cell[~electrode]
-        self._rims(np.concatenate(offset, axis=1), whose, i, j, step, s_mm.size)
+        self._rims(np.concatenate(offset, axis=1), whose, i, j, step, (x_mm.size, s_mm.size))
         plain = np.full(whose.size, self._area)
         plain[self._beside] = self._beside_rim(np.full(self._beside.size, _THICK)) * _THICK**2
         true_area = np.array([np.pi * disc.radius_mm**2 for disc in discs])
@@ -97,26 +97,30 @@ class RimmedDiscs:
         i: npt.NDArray[np.intp],
         j: npt.NDArray[np.intp],
         step: tuple[float, float],
-        columns: int,
+        shape: tuple[int, int],
     ) -> None:
         """Find the faces that cross a rim, and what plane each cell beside one sees."""
         radius = self._radius
         distance = np.maximum(np.hypot(*offset), 1e-9)
         normal = offset / distance
         crossing = np.zeros((4, whose.size), dtype=bool)
+        exists = np.ones((4, whose.size), dtype=bool)
         faces: list[list[npt.NDArray[np.intp]]] = [[], []]
         inner: list[list[npt.NDArray[np.intp]]] = [[], []]
         ways: list[list[FloatArray]] = [[], []]
         slopes: list[list[FloatArray]] = [[], []]
         for place, (axis, sign) in enumerate(_DIRECTIONS):
             beyond = offset[axis] + sign * step[axis]
-            out = beyond**2 + offset[1 - axis] ** 2 >= radius**2
+            there = (i, j)[axis] + sign
+            # At the sheet's insulated edge there is no face.
+            exists[place] = (there >= 0) & (there < shape[axis])
+            out = (beyond**2 + offset[1 - axis] ** 2 >= radius**2) & exists[place]
             crossing[place] = out
             rim = np.sqrt(np.maximum(radius**2 - offset[1 - axis] ** 2, 0.0))
             way = np.clip(sign * beyond - rim, _LEAST_WAY * step[axis], step[axis])
             first = i - (axis == 0) * (sign < 0), j - (axis == 1) * (sign < 0)
             # Faces along x are numbered like cells, those along s have a column less.
-            faces[axis].append((first[0] * (columns - axis) + first[1])[out])
+            faces[axis].append((first[0] * (shape[1] - axis) + first[1])[out])
             inner[axis].append(np.flatnonzero(out))
             ways[axis].append(way[out])
             slopes[axis].append(np.maximum(sign * normal[axis][out], _GRAZING))
@@ -127,6 +131,7 @@ class RimmedDiscs:
         self._step = step
         self._beside = np.flatnonzero(crossing.any(axis=0))
         self._crossing = crossing[:, self._beside]
+        self._exists = exists[:, self._beside]
         self._depth = (radius - distance)[self._beside]
         # Of each face: width over distance, and how far it leads along the normal.
         self._outward = np.stack([sign * normal[axis][self._beside] for axis, sign in _DIRECTIONS])
@@ -141,7 +146,7 @@ class RimmedDiscs:
         """Return joints over film thickness of the cells beside a rim: what balances the plane solution there."""
         entering = self._outward * (self._width / decay) * np.exp(np.minimum(self._depth / decay, _MOST_DECAYS))
         passing = (self._width / self._reach) * np.expm1(np.minimum(self._outward * self._reach / decay, _MOST_DECAYS))
-        return np.asarray(np.maximum(np.where(self._crossing, entering, passing).sum(axis=0), 0.0))
+        return np.asarray(np.maximum((np.where(self._crossing, entering, passing) * self._exists).sum(axis=0), 0.0))
 
     def joints(self, film_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the conductances over sigma to the electrodes (as `owner` and `under`), and to the drive (nx*ns,)."""

@@ -110,5 +110,15 @@ def test_a_disc_that_covers_no_cell_is_refused():
     axis = np.arange(10) + 0.5
     with pytest.raises(RigError, match="covers no cell"):
         RimmedDiscs(axis, axis, [Disc(5.0, 5.0, 0.3)], [Disc(2.5, 2.5, 0.6)])
-    with pytest.raises(RigError, match="at the edge"):
-        RimmedDiscs(axis, axis, [Disc(0.5, 5.0, 0.6)], [Disc(2.5, 2.5, 0.6)])
+
+
+def test_a_disc_may_reach_the_sheets_edge():
+    axis = (np.arange(20) + 0.5) * 0.2
+    discs = RimmedDiscs(axis, axis, [Disc(0.3, 2.0, 0.6)], [Disc(2.5, 2.5, 0.6)])
+    film = np.full((20, 20), 0.5)
+    joints, _ = discs.joints(film)
+    along_x, along_s = np.full((19, 20), 0.5), np.full((20, 19), 0.5)
+    discs.narrow(film, along_x, along_s)
+    assert joints.min() >= 0
+    assert np.isfinite(joints).all()
+    assert min(along_x.min(), along_s.min()) > 0.5 * (1 - 1e-9)
