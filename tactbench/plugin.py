@@ -14,10 +14,12 @@ from tactbench.core.errors import (
     UsageError,
 )
 from tactbench.core.plugins.checks import Check, Verdict
+from tactbench.core.plugins.cost import CostJob, CostPoint, CostStudy
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import (
     Acquisition,
     Estimator,
+    Explained,
     Reason,
     Rig,
     RigContext,
@@ -36,7 +38,7 @@ from tactbench.core.spec.rig import (
     SensorDescriptor,
     TaskDescriptor,
 )
-from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene
+from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Simulation
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
@@ -58,12 +60,16 @@ __all__ = [
     "ChannelSpec",
     "ChannelTarget",
     "Check",
+    "CostJob",
+    "CostPoint",
+    "CostStudy",
     "Creep",
     "DataError",
     "EffectDescriptor",
     "Environment",
     "Estimator",
     "EstimatorDescriptor",
+    "Explained",
     "FloatArray",
     "FluidBackedShell",
     "FoamPad",
@@ -91,6 +97,7 @@ __all__ = [
     "SensorDescriptor",
     "SensorSpec",
     "Shelf",
+    "Simulation",
     "Skin",
     "SkinGrid",
     "SkinSheet",

@@ -20,6 +20,8 @@ VERBS = {
     "record": ("record", "Carry out one scene into one recording."),
     "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
     "import": ("import_", "Turn foreign tables into recordings, as a mapping file says."),
+    "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),
+    "cost": ("cost", "Show what accuracy costs in time."),
     "leaderboard": ("leaderboard", "Show the last run's table again, in any format."),
 }
 

@@ -110,6 +110,14 @@ def _print(about: dict[str, Any]) -> None:
         )
         notes = f"; labels {', '.join(stream['annotations'])}" if stream["annotations"] else ""
         click.echo(f"  {stream['stream']} ({stream['of']}): {stream['rows']} rows, {rate}, {channels}{notes}")
+    for title, taken in (("effects", True), ("left out", False)):
+        names = [
+            f"{one['effect']}{' (asked)' if one['asked'] else ''}" for one in meta["plan"] if one["included"] == taken
+        ]
+        if names:
+            click.echo(f"  {title}: {', '.join(names)}")
+    if meta["assumptions"]:
+        click.echo("  assumed: " + ", ".join(f"{name} = {value}" for name, value in meta["assumptions"].items()))
     for finding in about["findings"]:
         click.secho(f"  {finding['severity']}: ", fg=COLOURS[finding["severity"]], nl=False)
         click.echo(finding["message"])

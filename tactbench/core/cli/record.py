@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.simulation import simulation_of, simulation_options
+
 if TYPE_CHECKING:
     from tactbench.core.plugins.interfaces import Rig
     from tactbench.core.plugins.registry import Registry
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 )
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), metavar="T",
               help="Duration; the ramp keeps its shape. Default 60.")  # fmt: skip
+@simulation_options
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")
 @click.option(
     "--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="The recording, a .h5 file."
@@ -38,6 +41,9 @@ def command(
     seed: int,
     out: Path,
     replace: bool,
+    effects: str | None,
+    rung: str | None,
+    tolerance: float | None,
 ) -> None:
     """Carry out one scene into one recording."""
     import time
@@ -50,6 +56,9 @@ def command(
     registry = load_registry()
     descriptor = registry.sensors[sensor]
     scene = _scene(out.stem, cap_mm, force_n, seconds, descriptor)
+    simulation = simulation_of(registry, rig, effects=effects, rung=rung, tolerance=tolerance)
+    if simulation is not None:
+        scene = scene.model_copy(update={"simulation": simulation})
     built = _built(registry, rig)
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")

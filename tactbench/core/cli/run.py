@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.simulation import simulation_of, simulation_options
 from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
+from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
     from tactbench.core.matrix.run import Outcome
@@ -28,22 +29,38 @@ if TYPE_CHECKING:
 @click.option("--repeats", type=click.IntRange(min=1), metavar="N", help="Repeat everything with N seeds.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
+@simulation_options
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, /, jobs: int, out: Path, shape: str, recordings: Path | None, **asked: Any) -> None:
+def command(
+    ctx: click.Context,
+    /,
+    jobs: int,
+    out: Path,
+    shape: str,
+    recordings: Path | None,
+    effects: str | None,
+    rung: str | None,
+    tolerance: float | None,
+    **asked: Any,
+) -> None:
     """Acquire, evaluate, rank.
 
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.
     """
-    _one_thread()
+    one_thread()
     from tactbench.core.cli.screen import progress
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
+    from tactbench.core.plugins.registry import load_registry
 
     matrix = _matrix(**asked, replaying=recordings is not None)
+    simulation = simulation_of(load_registry(), matrix.rig, effects=effects, rung=rung, tolerance=tolerance)
+    if simulation is not None:
+        matrix = matrix.model_copy(update={"simulation": simulation})
     folder = recordings or (Path(matrix.recordings) if matrix.recordings else None)
     store = Store(out)
     with progress() as told:
@@ -51,15 +68,6 @@ def command(ctx: click.Context, /, jobs: int, out: Path, shape: str, recordings:
     print_rows(outcome.rows, shape)
     _farewell(outcome, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
-
-
-def _one_thread() -> None:
-    """Keep numerical libraries at one thread, as the table's times state; before any of them is imported.
-
-    Several threads would also sum in another order on another machine. Whoever sets these variables means it.
-    """
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
 
 
 def _matrix(

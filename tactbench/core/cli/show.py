@@ -16,13 +16,15 @@ if TYPE_CHECKING:
 @click.command(name="show")
 @click.argument("names", nargs=-1, required=True)
 @click.option("--all", "everything", is_flag=True, help="Every parameter, and who states it.")
-@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
+@click.option("--format", "shape", type=click.Choice(("table", "json", "md")), default="table", show_default=True)
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     """Show sensors side by side (the paper's Table I), or a task, rig or estimator."""
-    from tactbench.core.errors import UnknownNameError
+    from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()
+    if shape == "md" and not all(name in registry.sensors for name in names):
+        raise UsageError("Only sensors can be shown as Markdown.", hint="Leave --format out, or take --format json.")
     if all(name in registry.sensors for name in names):
         _sensors([registry.sensors[name].spec for name in names], everything, shape)
         return
@@ -47,10 +49,13 @@ def _one(name: str, registry: Registry) -> None:
 
 
 def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
-    from tactbench.core.leaderboard.datasheet import details, table_one
+    from tactbench.core.leaderboard.datasheet import details, parameters_markdown, table_one
 
     if shape == "json":
         click.echo(json.dumps([sensor.model_dump(mode="json") for sensor in sensors], indent=1, ensure_ascii=False))
+        return
+    if shape == "md":
+        click.echo(parameters_markdown(sensors), nl=False)
         return
     rows = table_one(sensors)
     _grid("Sensor comparison (Table I of Karl et al. 2016)", sensors, rows, with_source=everything)

@@ -220,7 +220,7 @@ def _fold(
         answers.chosen.append(choice)
         answers.names.append(fold.name)
         answers.scores["validation"] = choice.score
-    elif fold.validation is not None:
+    elif fold.validation is not None and len(fold.validation):
         on_validation = answers_of(model, features_of(fold.validation, estimator), estimator.name, n_classes)
         answers.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
     answers.y_true.append(fold.test.y)

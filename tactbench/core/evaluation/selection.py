@@ -103,14 +103,19 @@ def _pairs(
     pairs = []
     for learn, check in masks:
         ignored: Counter[str] = Counter()
-        train = keep(data, protocol, learn, "training", ignored)
-        other = keep(data, protocol, check, "validation", ignored)
+        try:
+            train = keep(data, protocol, learn, "training", ignored)
+            other = keep(data, protocol, check, "validation", ignored)
+        except DataError:
+            continue  # one inner set without rows is no reason against the others
         scale_train, scale_other = scales(protocol, train, other)
         if train.labelled.any() and other.labelled.any():
             pairs.append((train, scale_train, other, scale_other))
     if not pairs:
         raise DataError(
-            "There is nothing to choose hyper-parameters on.", hint="Fix them in the matrix: estimators: [{params: …}]."
+            f"Fold {assignment.name!r} has too few labelled rows to choose hyper-parameters on: some to learn from and "
+            f"some to check with are needed, {gap} rows apart where one recording must serve both.",
+            hint="Fix the parameters in the matrix (estimators: [{params: …}]), or use longer recordings.",
         )
     return pairs
 

@@ -96,6 +96,11 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
         forces = [np.full(len(table.row), np.nan) if table.force is None else table.force for table in tables]
         force = np.concatenate([column[mask] for column, mask in zip(forces, chosen, strict=True)])
         good = _within_three_sigma(X, force, data.features, what, counts)
+        if not good.any():
+            raise DataError(
+                f"The three-sigma rule of {protocol.name!r} leaves none of the {len(X)} rows of the {what} set.",
+                hint="Look at its channels with `tactbench inspect`, or use --protocol deployable.",
+            )
     sessions = {name: place for place, name in enumerate(sorted({meta.session for meta in data.metas}))}
     cluster = np.repeat([sessions[meta.session] for meta in data.metas], sizes)
     consecutive = protocol.window_over == "consecutive samples"

@@ -67,6 +67,18 @@ def details(sensors: Sequence[SensorSpec]) -> list[Comparison]:
     return rows
 
 
+def parameters_markdown(sensors: Sequence[SensorSpec]) -> str:
+    """Return every quantity the specs state, one table a sensor: value, tag, who says so."""
+    parts = []
+    for sensor in sensors:
+        lines = [f"## {sensor.title}", "", "| parameter | value | tag | source |", "|---|---|---|---|"]
+        for title, quantity in _quantities(sensor).items():
+            cells = (title, str(quantity), quantity.source.tag, quantity.source.reference)
+            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+        parts.append("\n".join(lines) + "\n")
+    return "\n".join(parts)
+
+
 def _row(title: str, sensors: Sequence[SensorSpec], look: Callable[[SensorSpec], Fact]) -> Comparison:
     return Comparison(title, tuple(look(sensor) for sensor in sensors))
 
@@ -144,6 +156,9 @@ def _named(prefix: str, model: object) -> Iterable[tuple[str, Quantity]]:
             yield f"{prefix}: {name.replace('_', ' ')}", value
         elif hasattr(type(value), "model_fields"):
             yield from _named(f"{prefix} {name.replace('_', ' ')}", value)
+        elif isinstance(value, tuple):
+            for place, item in enumerate(value, start=1):
+                yield from _named(f"{prefix} {name.replace('_', ' ')} {place}", item)
 
 
 def _quantity(quantity: Quantity) -> Fact:

@@ -14,7 +14,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.recording import RecordingMeta
-from tactbench.core.spec.scene import Role, Scene
+from tactbench.core.spec.scene import Role, Scene, Simulation
 from tactbench.core.spec.task import TaskSpec
 
 
@@ -31,9 +31,9 @@ class Order:
 
 
 def orders_for(
-    cells: Iterable[Cell], registry: Registry, sources: SourceDigests, store: Store
+    cells: Iterable[Cell], registry: Registry, sources: SourceDigests, store: Store, simulation: Simulation
 ) -> dict[tuple[str, str, int], list[Order]]:
-    """Return the recordings needed, by (sensor, task, seed), in the task's order.
+    """Return the recordings needed, by (sensor, task, seed), in the task's order, carried out as `simulation` asks.
 
     Two tasks that ask for the same scene share the recording.
     """
@@ -44,9 +44,12 @@ def orders_for(
             continue
         orders[wanted] = []
         for planned in registry.tasks[cell.task].spec.scenes:
-            key = recording_key(cell.sensor, cell.rig, planned.scene, planned.role, cell.seed, registry, sources)
-            path = store.recording_path(cell.sensor, planned.scene.name, key)
-            orders[wanted].append(Order(cell.sensor, cell.rig, planned.scene, planned.role, cell.seed, path))
+            scene = planned.scene
+            if simulation != Simulation():
+                scene = scene.model_copy(update={"simulation": simulation})
+            key = recording_key(cell.sensor, cell.rig, scene, planned.role, cell.seed, registry, sources)
+            path = store.recording_path(cell.sensor, scene.name, key)
+            orders[wanted].append(Order(cell.sensor, cell.rig, scene, planned.role, cell.seed, path))
     return orders
 
 

@@ -119,7 +119,7 @@ def _material(
         raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
     sensors = [registry.sensors[name].name for name in matrix.sensors]
     cells = plan_cells(matrix, sensors, registry)
-    return cells, _Material(orders_for(cells, registry, sources, store), {})
+    return cells, _Material(orders_for(cells, registry, sources, store, matrix.simulation), {})
 
 
 def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progress) -> dict[Path, BaseException]:

@@ -38,7 +38,10 @@ class Acquisition(Protocol):
 
     @property
     def drawn(self) -> Mapping[str, Scalar]:
-        """What was drawn or achieved, for example the placement."""
+        """What was drawn or achieved, for example the placement.
+
+        Texts whose names start with ``remark`` are shown with every score from the recording.
+        """
 
     def __iter__(self) -> Iterator[Block]: ...
 
@@ -48,6 +51,27 @@ class Rig(Protocol):
 
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> AbstractContextManager[Acquisition]:
         """Prepare `scene` with `sensor`; raises RigError or NotApplicable if it cannot be done."""
+
+
+class Explained(NamedTuple):
+    """One effect of a plan, and what it costs."""
+
+    entry: PlanEntry
+    cost_s: float | None
+    """Seconds it takes, or would take if it was asked for, per recording on this machine; None: not measured, or not
+    to be told apart from another one's."""
+    remark: str = ""
+    """Why there is no cost, where that is worth a word."""
+
+
+class Explaining(Rig, Protocol):
+    """A simulated rig that says what it would do, and what that costs."""
+
+    def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
+        """Return every installed effect, those included first, in the order in which they are applied.
+
+        `rounds` > 0 carries the scene out so many times and gives the median cost of each effect.
+        """
 
 
 class Shelf(Protocol):
@@ -76,6 +100,11 @@ class Reason(NamedTuple):
 
     called_for: bool
     text: str
+    change: float | None = None
+    """What leaving the effect out changes in an observed channel: at most, if it is not called for (0: exactly
+    nothing); about, if it is. None: unknown without computing it."""
+    unit: str = "count"
+    """Unit of `change`."""
 
 
 class Estimator(Protocol):

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from tactbench.core.spec.quantity import Frozen
+from tactbench.core.spec.scene import Simulation
 
 
 def _by_name(given: Any) -> Any:
@@ -43,6 +44,8 @@ class MatrixSpec(Frozen):
     rig: str = "twin"
     recordings: str | None = None
     """Folder of recordings for rigs that replay; relative to the file."""
+    simulation: Simulation = Simulation()
+    """How a simulated rig is asked to carry out every scene."""
     sensors: tuple[str, ...] = ()
     """Empty: all that the rig's recordings hold."""
     tasks: tuple[Annotated[TaskChoice, BeforeValidator(_by_name)], ...] = Field(min_length=1)

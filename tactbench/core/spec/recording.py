@@ -19,6 +19,13 @@ class PlanEntry(Frozen):
     effect: str
     included: bool
     reason: str
+    change: float | None = None
+    """What leaving it out changes in an observed channel: at most, for an effect left out (0: exactly nothing); about,
+    for an included one. None: nobody can say without computing it."""
+    unit: str = "count"
+    """Unit of `change`."""
+    asked: bool = False
+    """Included or left out because the scene asked for it by name."""
 
 
 class RecordingMeta(Frozen):

@@ -49,8 +49,12 @@ class RigDescriptor(Frozen):
     """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a Shelf."""
     simulated: bool = False
     """Rows from this rig are marked SIM and never ranked against hardware."""
+    rungs: tuple[str, ...] = ()
+    """Names of the rungs of its ladder of solvers, the cheapest first; for simulated rigs."""
     verification: str | None = Field(default=None, pattern=_WHERE)
     """``module:callable``, called without arguments: the simulation against its oracles, a sequence of Check."""
+    work_precision: str | None = Field(default=None, pattern=_WHERE)
+    """``module:callable``, called with a SensorDescriptor: a CostStudy of error against seconds per recording."""
     likeness: str | None = Field(default=None, pattern=_WHERE)
     """``module:callable``, called with (SensorDescriptor, folder of recordings or None): Checks of the simulated
     sensor against what was measured on real ones, or of recordings against the same ranges."""
@@ -88,3 +92,5 @@ class EffectDescriptor(Frozen):
     consumes: tuple[str, ...] = ()
     called_for: str = Field(pattern=_WHERE)
     """``module:callable``, called with (Scene, SensorSpec): a Reason; light, no numerics."""
+    groups: tuple[str, ...] = ()
+    """Words that stand for several effects at once in a scene's ``simulation.effects``: ``drift``, ``noise``."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tactbench.core.spec.quantity import Frozen, Quantity, assumed, sourced
 from tactbench.core.spec.sensor import ChannelKind
@@ -69,6 +69,25 @@ class Environment(Frozen):
     """Standard deviation of the unfiltered force-torque sensor [force]."""
 
 
+class Simulation(Frozen):
+    """How a simulated rig is asked to carry out a scene; a real one ignores it."""
+
+    effects: tuple[Annotated[str, Field(pattern=r"^[+-][a-z][a-z0-9-]*$")], ...] = ()
+    """``+name`` includes an effect (or a group of them) whatever the plan would say, ``-name`` leaves it out; later
+    ones win. ``+all`` and ``-all`` are every effect."""
+    rung: str | None = None
+    """Name of a rung of the ladder of solvers; None: the default one."""
+    tolerance: float | None = Field(default=None, gt=0)
+    """Largest error of an observed channel, in its own unit; the cheapest rung that keeps it is taken. None: the
+    rung's own."""
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Simulation:
+        if self.rung is not None and self.tolerance is not None:
+            raise ValueError("give a rung or a tolerance, not both: a tolerance picks the rung")
+        return self
+
+
 class Scene(Frozen):
     """One recording to be made."""
 
@@ -84,5 +103,6 @@ class Scene(Frozen):
     """Seconds from the session's first sample to this recording's first."""
     observe: tuple[ChannelKind, ...] = ("taxel",)
     """Kinds of channels that somebody will look at; the reference force is always recorded."""
+    simulation: Simulation = Simulation()
     labels: dict[str, str | float | int] = Field(default_factory=dict)
     """Facts about the recording that a task may ask for, for example {"cap_radius_mm": 5.0}."""

@@ -114,6 +114,9 @@ class Nuisances(Frozen):
     step: Quantity
     """Step of the converter."""
     creep: tuple[Creep, ...] = ()
+    largest_slope: Quantity | None = None
+    """Largest change of a reading with load [unit / force]; bounds what a slow effect on the load can do. None: not
+    known, and then no effect on the load is ever left out."""
 
 
 class SensorSpec(Frozen):

@@ -7,12 +7,23 @@ from tactbench.plugin import EffectDescriptor, RigDescriptor, hookimpl
 TACTBENCH_API = 1
 
 _HERE = "tactbench.rigs.twin"
+_DRIFT, _NOISE = ("drift",), ("noise",)
 
 
 @hookimpl
 def tactbench_rigs() -> list[RigDescriptor]:
     """Offer the rig."""
-    return [RigDescriptor(name="twin", title="Simulated twin", where=f"{_HERE}.rig:build", simulated=True)]
+    return [
+        RigDescriptor(
+            name="twin",
+            title="Simulated twin",
+            where=f"{_HERE}.rig:build",
+            simulated=True,
+            rungs=("closed-form", "default", "fine", "reference"),
+            work_precision=f"{_HERE}.work_precision:study",
+            verification=f"{_HERE}.verification.everything:checks",
+        )
+    ]
 
 
 @hookimpl
@@ -26,17 +37,30 @@ def tactbench_effects() -> list[EffectDescriptor]:
         _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
         _effect("transduction", "Transduction", "contact.stages:read_skin", ("skin", "gain"), ("taxel", "reading")),
         _effect("rest-spread", "Scatter of rest levels", "effects.rest_spread:apply", (), ("disturbance",)),
-        _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",)),
-        _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",)),
-        _effect("wander", "Free drift", "effects.wander:apply", (), ("disturbance",)),
-        _effect("white-noise", "White noise", "effects.white_noise:apply", (), ("disturbance",)),
+        _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",), groups=_DRIFT),
+        _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",), groups=_DRIFT),
+        _effect("wander", "Free drift", "effects.wander:apply", (), ("disturbance",), groups=_DRIFT),
+        _effect("white-noise", "White noise", "effects.white_noise:apply", (), ("disturbance",), groups=_NOISE),
         _effect("converter", "Converter", "effects.converter:apply", ("reading", "disturbance"), ("stored",)),
-        _effect("force-noise", "Noise of the force sensor", "effects.force_noise:apply", (), ("reference-force",)),
+        _effect(
+            "force-noise",
+            "Noise of the force sensor",
+            "effects.force_noise:apply",
+            (),
+            ("reference-force",),
+            groups=_NOISE,
+        ),
     ]
 
 
 def _effect(
-    name: str, title: str, where: str, consumes: tuple[str, ...], produces: tuple[str, ...]
+    name: str,
+    title: str,
+    where: str,
+    consumes: tuple[str, ...],
+    produces: tuple[str, ...],
+    predicates: str = "effects.called_for",
+    groups: tuple[str, ...] = (),
 ) -> EffectDescriptor:
     return EffectDescriptor(
         name=name,
@@ -44,5 +68,6 @@ def _effect(
         where=f"{_HERE}.{where}",
         consumes=consumes,
         produces=produces,
-        called_for=f"{_HERE}.effects.called_for:{name.replace('-', '_')}",
+        groups=groups,
+        called_for=f"{_HERE}.{predicates}:{name.replace('-', '_')}",
     )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
-from tactbench.plugin import RigError, SkinSheet
+from tactbench.plugin import RigError, SkinSheet, UsageError
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,8 @@ class Fidelity:
         If a number is not positive, or a count below its least.
     """
 
+    solver: Literal["newton", "local", "elements"] = "newton"
+    """What solves a load: the energy's minimiser with everything in it; each cell on its own; boundary elements."""
     cells_factor: float = 1.0
     """Cells of the skin along each axis, relative to those of the sensor's SkinSheet."""
     conduction_refinement: int = 2
@@ -75,3 +78,18 @@ FINE = Fidelity(
     table_tolerance_factor=0.1,
 )
 """For measuring the error of the others: a hundred times the cost."""
+
+RUNGS: dict[str, Fidelity] = {
+    "closed-form": dataclasses.replace(DEFAULT, solver="local"),
+    "default": DEFAULT,
+    "fine": dataclasses.replace(DEFAULT, cells_factor=2.0, most_nodes=32, table_tolerance_factor=1 / 3),
+    "reference": FINE,
+}
+"""The ladder of contact solvers, the cheapest first."""
+
+
+def rung(name: str) -> Fidelity:
+    """Return a rung by name; raises UsageError if there is none of that name."""
+    if name not in RUNGS:
+        raise UsageError(f"The twin's ladder has no rung {name!r}.", hint=f"Rungs: {', '.join(RUNGS)}.")
+    return RUNGS[name]

@@ -9,9 +9,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, Indenter, RigError, SkinGrid, SkinSheet
 
+STEEPEST = 1.0
+"""Largest slope of an indenter, 45 degrees: the gap is taken along the press axis and the deflection along the skin's
+normal, which agree for gentle slopes only."""
+RIM = 0.999
+"""Share of its radius up to which a cap exists: at its rim the flank is vertical, and no height field can touch it."""
+_FEWEST_CELLS = 4
 BEYOND_THE_CAP_MM = 50.0
 """How far above its radius a cap is put where it does not exist: large, finite, and never touched."""
 
@@ -41,13 +48,36 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
         The rectangle.
     cells
         Cells along x and s instead of the sheet's own.
+
+    Raises
+    ------
+    RigError
+        If the sheet has no area, its radius is none, or it has fewer than four cells either way.
     """
     along, across = cells or sheet.cells
     x_min, x_max, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
+    outer = math.inf if sheet.outer_radius is None else sheet.outer_radius.to("mm")
+    if not (0 < x_max - x_min < math.inf and 0 < arc < math.inf and outer > 0 and min(along, across) >= _FEWEST_CELLS):
+        raise RigError(
+            f"The skin's sheet runs from x = {x_min:g} to {x_max:g} mm and {arc:g} mm across, on a radius of {outer:g} "
+            f"mm, in {along} x {across} cells.",
+            hint=f"Its sides and radius must be positive and finite, its cells at least {_FEWEST_CELLS} either way.",
+        )
     dx, ds = (x_max - x_min) / along, arc / across
     x: FloatArray = np.asarray(x_min + (np.arange(along) + 0.5) * dx, dtype=np.float64)
     s: FloatArray = np.asarray(-arc / 2 + (np.arange(across) + 0.5) * ds, dtype=np.float64)
     return SkinGrid(x_mm=x, s_mm=s)
+
+
+def pad_of(sheet: SkinSheet, grid: SkinGrid) -> npt.NDArray[np.bool_] | None:
+    """Return which (nx, ns) cells belong to the active part; None where the whole sheet does."""
+    if sheet.pad is None:
+        return None
+    low, high, arc = (edge.to("mm") for edge in sheet.pad)
+    inside: npt.NDArray[np.bool_] = ((grid.x_mm >= low) & (grid.x_mm <= high))[:, None] & (
+        np.abs(grid.s_mm) <= arc / 2
+    )[None, :]
+    return inside
 
 
 def radius_mm(indenter: Indenter) -> float:
@@ -80,8 +110,7 @@ def gap_mm(grid: SkinGrid, contact: Contact, outer_radius_mm: float = math.inf) 
 def _sag(r2: FloatArray, radius: float) -> FloatArray:
     if math.isinf(radius):
         return np.zeros_like(r2)
-    # 0.999 R: the cap's flank is vertical at r = R, and no solver on a height field can touch it.
-    exists = r2 < (0.999 * radius) ** 2
+    exists = r2 < (RIM * radius) ** 2
     inside = np.where(exists, r2, 0.0)
     return np.where(exists, inside / (radius + np.sqrt(radius**2 - inside)), radius + BEYOND_THE_CAP_MM)
 
@@ -107,14 +136,21 @@ def check_contact(grid: SkinGrid, contact: Contact) -> None:
     ------
     RigError
         If the cap's radius is below a cell, where a contact would live in one cell and follow the mesh and not the
-        physics; or if its apex is off the sheet, where the periodic sheet would answer for the wrong side.
+        physics; if it is tilted by more than 45 degrees; or if its apex is off the sheet, where the periodic sheet
+        would answer for the wrong side.
     """
     dx, ds = grid.cell_mm
-    if contact.radius_mm < max(dx, ds):
+    if not contact.radius_mm >= max(dx, ds):
         raise RigError(
             f"A cap of radius {contact.radius_mm:g} mm is smaller than a cell of the skin ({dx:.2f} x {ds:.2f} mm): "
             "the contact would be one cell wide whatever the load.",
             hint=f"Use a radius of at least {3 * max(dx, ds):.1f} mm, or a sensor spec with more cells.",
+        )
+    slope = math.hypot(contact.tilt_x, contact.tilt_s)
+    if not slope <= STEEPEST:
+        raise RigError(
+            f"The indenter is tilted to a slope of {slope:.3g}; up to {STEEPEST:g}, 45 degrees, can be pressed.",
+            hint="Correct tilt_x and tilt_s of the scene's placement.",
         )
     x_low, x_high = grid.x_mm[0] - dx / 2, grid.x_mm[-1] + dx / 2
     s_high = grid.s_mm[-1] + ds / 2

@@ -2,7 +2,7 @@
 
 Effects name tokens they produce and consume. What is observed is needed; whoever produces something needed is
 needed, and then everything it consumes. An effect is included when it is needed and its own predicate says that the
-scene calls for it. Nothing else is imported, allocated or stepped.
+scene calls for it, or when the scene asks for it by name. Nothing else is imported, allocated or stepped.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from tactbench.plugin import (
     Reason,
     Scene,
     SensorSpec,
+    UsageError,
     load_object,
 )
 
@@ -47,7 +48,13 @@ class Plan:
     def settled(self, decided: Mapping[str, tuple[bool, str]]) -> tuple[PlanEntry, ...]:
         """Return the entries with those that only the solve could decide replaced."""
         entries = [
-            PlanEntry(effect=entry.effect, included=decided[entry.effect][0], reason=decided[entry.effect][1])
+            entry.model_copy(
+                update={
+                    "included": decided[entry.effect][0],
+                    "reason": decided[entry.effect][1],
+                    "change": None if decided[entry.effect][0] else 0.0,
+                }
+            )
             if entry.effect in decided
             else entry
             for entry in self.entries
@@ -64,39 +71,76 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
         If nothing observed is among the sensor's channels, or no included effect gives an observed kind.
     """
     kinds = _observed(scene, sensor)
-    needed = _closure(effects, {*kinds, STORED, REFERENCE})
+    asked = _asked(effects, scene)
+    added = {token for effect in effects if asked.get(effect.name) for token in effect.produces}
+    needed = _closure(effects, {*kinds, STORED, REFERENCE, *added})
     included: list[EffectDescriptor] = []
-    reasons: dict[str, str] = {}
+    entries: dict[str, PlanEntry] = {}
     for effect in effects:
-        if not needed.intersection(effect.produces):
-            reasons[effect.name] = NOBODY
-            continue
-        reason = load_object(effect.called_for)(scene, sensor)
-        if not isinstance(reason, Reason):
-            raise PluginContractError(
-                f"{effect.called_for} of effect {effect.name} returned {type(reason).__name__}, not Reason.",
-                hint="Return tactbench.plugin.Reason(called_for, text).",
-            )
-        reasons[effect.name] = reason.text
-        if reason.called_for:
+        reason = _reason(effect, scene, sensor) if needed.intersection(effect.produces) else Reason(False, NOBODY, 0.0)
+        taken = asked.get(effect.name, reason.called_for)
+        if taken:
             included.append(effect)
+        entries[effect.name] = _entry(effect, reason, taken, asked=effect.name in asked)
     for kind in kinds:
         if not any(kind in effect.produces for effect in included):
+            without = [name for name, taken in asked.items() if not taken]
             raise NotApplicable(
-                f"The twin does not model {kind} of {sensor.name}: no installed effect produces it in this scene.",
+                f"The twin does not model {kind} of {sensor.name}: no installed effect produces it in this scene"
+                + (f" without {', '.join(without)}." if without else "."),
                 hint="Record it on hardware or replay it, or install a plugin with such an effect.",
             )
     ordered = _ordered(included)
     left_out = [effect for effect in effects if effect not in included]
     return Plan(
         kinds=kinds,
-        entries=tuple(
-            PlanEntry(effect=effect.name, included=effect in included, reason=reasons[effect.name])
-            for effect in (*ordered, *left_out)
-        ),
+        entries=tuple(entries[effect.name] for effect in (*ordered, *left_out)),
         stages=tuple(effect for effect in ordered if LENT not in effect.produces),
         lent={effect.name: effect.where for effect in ordered if LENT in effect.produces},
     )
+
+
+def _asked(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool]:
+    """Return what the scene asks for by name: effect -> whether it is included; later words win.
+
+    Raises
+    ------
+    UsageError
+        If a word is neither an effect, nor a group of them, nor ``all``.
+    """
+    asked: dict[str, bool] = {}
+    for word in scene.simulation.effects:
+        name = word[1:]
+        meant = [effect.name for effect in effects if name in (effect.name, *effect.groups, "all")]
+        if not meant:
+            groups = sorted({group for effect in effects for group in effect.groups} | {"all"})
+            raise UsageError(
+                f"No installed effect is called {name!r}, as {word!r} asks.",
+                hint=f"Effects: {', '.join(effect.name for effect in effects)}. Groups: {', '.join(groups)}.",
+            )
+        for found in meant:
+            asked.pop(found, None)
+            asked[found] = word.startswith("+")
+    return asked
+
+
+def _reason(effect: EffectDescriptor, scene: Scene, sensor: SensorSpec) -> Reason:
+    reason = load_object(effect.called_for)(scene, sensor)
+    if not isinstance(reason, Reason):
+        raise PluginContractError(
+            f"{effect.called_for} of effect {effect.name} returned {type(reason).__name__}, not Reason.",
+            hint="Return tactbench.plugin.Reason(called_for, text).",
+        )
+    return reason
+
+
+def _entry(effect: EffectDescriptor, reason: Reason, taken: bool, *, asked: bool) -> PlanEntry:
+    text = f"asked for; else: {reason.text}" if asked and taken else reason.text
+    if asked and not taken:
+        text = f"left out as asked; else: {reason.text}" if reason.called_for else reason.text
+    # An effect that was called for and is left out all the same: what it would have changed is no bound any more.
+    change = None if asked and not taken and reason.called_for else reason.change
+    return PlanEntry(effect=effect.name, included=taken, reason=text, change=change, unit=reason.unit, asked=asked)
 
 
 def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:

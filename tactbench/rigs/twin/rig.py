@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from tactbench.plugin import (
     Block,
     ChannelSpec,
     EffectDescriptor,
+    Explained,
     FloatArray,
     NotApplicable,
     PlanEntry,
@@ -24,11 +25,10 @@ from tactbench.plugin import (
     SensorDescriptor,
     Source,
     StreamSpec,
-    load_object,
 )
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
-from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan, plan_scene
+from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.synthesis import Synthesis
 
 ROWS_PER_BLOCK = 1000
@@ -40,6 +40,17 @@ _ONE_CLOCK = Source(
 )
 
 
+class Samples(NamedTuple):
+    """What one stream of a recording holds."""
+
+    t_ns: npt.NDArray[np.int64]
+    """(n,) nanoseconds since the first sample."""
+    data: npt.NDArray[np.generic]
+    """(n, channels)"""
+    quality: npt.NDArray[np.uint8] | None
+    """(n, channels); None: all good."""
+
+
 @dataclass(frozen=True)
 class TwinAcquisition:
     """One simulated recording: iterate it for blocks."""
@@ -49,23 +60,24 @@ class TwinAcquisition:
     plan: tuple[PlanEntry, ...]
     assumptions: Mapping[str, Scalar]
     drawn: Mapping[str, Scalar]
-    t_ns: npt.NDArray[np.int64]
-    """(n,) nanoseconds since the first sample."""
-    samples: Mapping[str, tuple[npt.NDArray[np.generic], npt.NDArray[np.uint8] | None]] = field(repr=False)
-    """Stream -> (n, channels) data and quality."""
+    samples: Mapping[str, Samples] = field(repr=False)
+    """By name of the stream."""
 
     def __iter__(self) -> Iterator[Block]:
-        """Yield blocks of up to 1000 rows, the streams in turn, as samples taken at once would arrive."""
-        for start in range(0, self.t_ns.size, ROWS_PER_BLOCK):
-            rows = slice(start, start + ROWS_PER_BLOCK)
+        """Yield blocks, the streams in turn, each up to the same moment, as samples taken at once would arrive."""
+        reference = self.samples[REFERENCE_STREAM].t_ns
+        given = dict.fromkeys(self.samples, 0)
+        for start in range(0, reference.size, ROWS_PER_BLOCK):
+            last = start + ROWS_PER_BLOCK >= reference.size
+            until = None if last else reference[start + ROWS_PER_BLOCK]
             for stream in (*self.streams, *self.reference):
-                data, quality = self.samples[stream.name]
-                yield Block(
-                    stream=stream.name,
-                    t_ns=self.t_ns[rows],
-                    data=data[rows],
-                    quality=None if quality is None else quality[rows],
-                )
+                own, first = self.samples[stream.name], given[stream.name]
+                end = own.t_ns.size if until is None else int(np.searchsorted(own.t_ns, until))
+                rows = slice(first, end)
+                given[stream.name] = end
+                if end > first:
+                    quality = None if own.quality is None else own.quality[rows]
+                    yield Block(stream=stream.name, t_ns=own.t_ns[rows], data=own.data[rows], quality=quality)
 
 
 class Twin:
@@ -83,7 +95,7 @@ class Twin:
         self.effects = tuple(effects)
         self.fidelity = fidelity
 
-    def explain(self, sensor: SensorDescriptor, scene: Scene) -> Plan:
+    def plan(self, sensor: SensorDescriptor, scene: Scene) -> Plan:
         """Return the plan of a scene without carrying it out.
 
         Entries that only the solve can decide (the core) are as announced; ``open`` settles them.
@@ -107,11 +119,17 @@ class Twin:
         RigError
             If the contact cannot be resolved or solved.
         """
-        plan = self.explain(sensor, scene)
-        run = _prepare(sensor, scene, seed, plan, self.fidelity)
+        plan = self.plan(sensor, scene)
+        run = prepare(sensor, scene, seed, plan, self.fidelity)
         for effect in plan.stages:
-            load_object(effect.where)(run)
+            run.apply(effect)
         yield _acquisition(run, plan)
+
+    def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
+        """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""
+        from tactbench.rigs.twin.costing import explained
+
+        return explained(self.effects, sensor, scene, self.plan(sensor, scene), rounds)
 
 
 def build(context: RigContext) -> Twin:
@@ -119,87 +137,29 @@ def build(context: RigContext) -> Twin:
     return Twin(context.effects)
 
 
-def _prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidelity: Fidelity) -> Synthesis:
-    channels = tuple(channel for channel in sensor.spec.channels() if channel.kind in plan.kinds)
-    t_s, force = _load(scene)
-    rest = np.array([_rest(channel) for channel in channels])
-    run = Synthesis(
-        sensor=sensor,
-        scene=scene,
-        seed=seed,
-        channels=channels,
-        t_s=t_s,
-        force_n=force,
-        contact=Contact(radius_mm(scene.indenter), 0.0, 0.0),
-        readings=np.tile(rest, (t_s.size, 1)),
-        quality=np.zeros((t_s.size, len(channels)), dtype=np.uint8),
-        reference_n=force.copy(),
-        lent=dict(plan.lent),
-        fidelity=fidelity,
-    )
-    run.contact = _place(run)
-    return run
-
-
-def _load(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    """Return times and true force: held at the start, then straight to the end."""
-    profile = scene.profile
-    duration, hold = profile.duration.to("s"), profile.hold.to("s")
-    start, end = profile.start.to("N"), profile.end.to("N")
-    if not duration > 0 or hold < 0 or min(start, end) < 0:
-        raise RigError(
-            f"The scene {scene.name!r} asks for a ramp from {start:g} to {end:g} N within {duration:g} s after "
-            f"{hold:g} s of rest.",
-            hint="Duration must be positive, hold and forces at least zero.",
-        )
-    t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (duration / profile.samples)
-    if hold >= duration:
-        return t_s, np.full(t_s.size, start)
-    force: FloatArray = start + (end - start) * np.clip((t_s - hold) / (duration - hold), 0.0, 1.0)
-    return t_s, force
-
-
-def _rest(channel: ChannelSpec) -> float:
-    return 0.0 if channel.rest is None else channel.rest.to(channel.unit)
-
-
-def _place(run: Synthesis) -> Contact:
-    """Return where the indenter meets the skin: nominal point, commanded offset, and this mounting's own scatter."""
-    placement, spec = run.scene.placement, run.sensor.spec
-    if spec.skin is None:
-        raise NotApplicable(f"{spec.name} declares no skin.")
-    sheet = spec.skin.sheet
-    middle = (sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2
-    nominal_x = spec.parameters["contact_x"].to("mm") if "contact_x" in spec.parameters else middle
-    nominal_s = spec.parameters["contact_s"].to("mm") if "contact_s" in spec.parameters else 0.0
-    scatter = placement.scatter.to("mm")
-    off_x, off_s = scatter * run.of_recording("placement").standard_normal(2)
-    x, s = nominal_x + placement.x.to("mm") + off_x, nominal_s + placement.s.to("mm") + off_s
-    run.drawn.update(placement_x_mm=float(x), placement_s_mm=float(s))
-    tilt_x, tilt_s = (math.tan(tilt.to("rad")) for tilt in (placement.tilt_x, placement.tilt_s))
-    return Contact(run.contact.radius_mm, float(x), float(s), tilt_x, tilt_s)
-
-
 def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     profile = run.scene.profile
     rate = profile.samples / profile.duration.to("s")
-    columns = {channel.name: column for column, channel in enumerate(run.channels)}
     streams: list[StreamSpec] = []
-    samples: dict[str, tuple[npt.NDArray[np.generic], npt.NDArray[np.uint8] | None]] = {}
-    for stream in run.sensor.spec.streams:
-        kept = tuple(channel for channel in stream.channels if channel.name in columns)
-        if not kept:
-            continue
-        own = [columns[channel.name] for channel in kept]
-        streams.append(stream.model_copy(update={"channels": kept, "rate_hz": rate, "rate_source": _ONE_CLOCK}))
-        samples[stream.name] = (_stored(run.readings[:, own], stream, kept), run.quality[:, own])
+    samples: dict[str, Samples] = {}
+    for track in run.tracks:
+        columns = {channel.name: column for column, channel in enumerate(track.channels)}
+        for stream in run.sensor.spec.streams:
+            kept = tuple(channel for channel in stream.channels if channel.name in columns)
+            if not kept:
+                continue
+            own = [columns[channel.name] for channel in kept]
+            clock = {} if track.clock else {"rate_hz": rate, "rate_source": _ONE_CLOCK}
+            streams.append(stream.model_copy(update={"channels": kept, **clock}))
+            stored = _stored(track.readings[:, own], stream, kept)
+            samples[stream.name] = Samples(_ns(track.t_s), stored, track.quality[:, own])
     reference = StreamSpec(
         name=REFERENCE_STREAM,
         rate_hz=rate,
         rate_source=_ONE_CLOCK,
         channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),),
     )
-    samples[REFERENCE_STREAM] = (run.reference_n[:, None], None)
+    samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), run.reference_n[:, None], None)
     environment = run.scene.environment
     return TwinAcquisition(
         streams=tuple(streams),
@@ -212,11 +172,27 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
             "session_offset_scale": environment.session_offset_scale,
             "since_power_on_s": environment.since_power_on.to("s"),
             "force_noise_n": environment.force_noise.to("N"),
+            **_asked(run.scene),
         },
         drawn=dict(run.drawn),
-        t_ns=np.round(run.t_s * 1e9).astype(np.int64),
         samples=samples,
     )
+
+
+def _asked(scene: Scene) -> dict[str, Scalar]:
+    """Return what the scene asks of a simulation beyond the default: printed with every row."""
+    asked: dict[str, Scalar] = {}
+    if scene.simulation.effects:
+        asked["effects"] = " ".join(scene.simulation.effects)
+    if scene.simulation.rung is not None:
+        asked["rung"] = scene.simulation.rung
+    if scene.simulation.tolerance is not None:
+        asked["tolerance_count"] = scene.simulation.tolerance
+    return asked
+
+
+def _ns(t_s: FloatArray) -> npt.NDArray[np.int64]:
+    return np.round(t_s * 1e9).astype(np.int64)
 
 
 def _stored(readings: FloatArray, stream: StreamSpec, channels: tuple[ChannelSpec, ...]) -> npt.NDArray[np.generic]:

@@ -2,15 +2,80 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Nuisances, Scalar, Scene, SensorDescriptor
+from tactbench.plugin import (
+    ChannelKind,
+    ChannelSpec,
+    EffectDescriptor,
+    FloatArray,
+    Nuisances,
+    Scalar,
+    Scene,
+    SensorDescriptor,
+    load_object,
+)
 from tactbench.rigs.twin import draws
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
+
+
+@dataclass(frozen=True)
+class Load:
+    """A normal force that is straight between its knots and held beyond them."""
+
+    t_s: FloatArray
+    """(k,) ascending seconds since the recording's first sample."""
+    force_n: FloatArray
+    """(k,)"""
+
+    def at(self, t_s: FloatArray) -> FloatArray:
+        """Return the (n,) force at (n,) times."""
+        return np.asarray(np.interp(t_s, self.t_s, self.force_n), dtype=np.float64)
+
+    @property
+    def largest_n(self) -> float:
+        """The largest force."""
+        return float(self.force_n.max())
+
+
+@dataclass
+class Track:
+    """The channels that share one clock."""
+
+    clock: str
+    """Name of the stream whose own clock it is; empty: the scene's reference clock."""
+    channels: tuple[ChannelSpec, ...]
+    """In order of the sensor's streams."""
+    t_s: FloatArray
+    """(n,) seconds since the recording's first sample."""
+    force_n: FloatArray
+    """(n,) true normal force at this clock's samples."""
+    readings: FloatArray
+    """(n, channels) what the channels would say; starts at rest."""
+    quality: npt.NDArray[np.uint8]
+    """(n, channels)"""
+    effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
+    """(n,) force the response of a kind of channel follows, where it is not the true one."""
+    gain: FloatArray | None = None
+    """(channels,) factors on the response; None: all one."""
+
+    def by_kind(self) -> dict[ChannelKind, list[int]]:
+        """Return the columns of each kind of channel."""
+        columns: dict[ChannelKind, list[int]] = {}
+        for column, channel in enumerate(self.channels):
+            columns.setdefault(channel.kind, []).append(column)
+        return columns
+
+    @property
+    def scope(self) -> tuple[str, ...]:
+        """What tells this clock's random draws from those of another."""
+        return (self.clock,) if self.clock else ()
 
 
 @dataclass
@@ -23,23 +88,15 @@ class Synthesis:
     sensor: SensorDescriptor
     scene: Scene
     seed: int
-    channels: tuple[ChannelSpec, ...]
-    """The channels that will be recorded, in order of the sensor's streams."""
     t_s: FloatArray
-    """(n,) seconds since the recording's first sample."""
-    force_n: FloatArray
-    """(n,) true normal force."""
+    """(n,) the reference clock: seconds since the recording's first sample."""
+    load: Load
+    """The true normal force over time; change it by :meth:`follow`."""
+    tracks: tuple[Track, ...]
+    """The sensor's channels, clock by clock."""
     contact: Contact
-    readings: FloatArray
-    """(n, channels) what the channels would say; starts at rest."""
-    quality: npt.NDArray[np.uint8]
-    """(n, channels)"""
     reference_n: FloatArray
     """(n,) what the force sensor says; starts at the true force."""
-    effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
-    """(n,) force the response of a kind of channel follows, where it is not the true one."""
-    gain: FloatArray | None = None
-    """(channels,) factors on the response; None: all one."""
     fluid_pressure: bool = False
     """Somebody looks at the pressure of the fluid."""
     lent: dict[str, str] = field(default_factory=dict)
@@ -48,19 +105,36 @@ class Synthesis:
     """Plan entries that only the solve could decide: name -> (included, reason)."""
     fidelity: Fidelity = DEFAULT
     """How finely the contact is resolved."""
+    rung: str = ""
+    """Name of the rung that was chosen to keep a tolerance."""
+    rung_error: float | None = None
+    """Its estimated error in the worst observed channel, in the channel's unit; None: nobody asked."""
     drawn: dict[str, Scalar] = field(default_factory=dict)
     """What was drawn or achieved."""
+    clock: Callable[[], float] = time.perf_counter
+    """Seconds, monotonic."""
+    spent_s: dict[str, float] = field(default_factory=dict)
+    """Seconds each applied effect took: an effect that is not here was not stepped."""
+    elsewhere_s: float = 0.0
+    """Seconds that the effect being applied spent on work booked under another one."""
+
+    def apply(self, effect: EffectDescriptor) -> None:
+        """Apply one effect, and book what it takes."""
+        began, self.elsewhere_s = self.clock(), 0.0
+        load_object(effect.where)(self)
+        own = self.clock() - began - self.elsewhere_s
+        self.spent_s[effect.name] = self.spent_s.get(effect.name, 0.0) + own
+
+    def follow(self, load: Load) -> None:
+        """Let the true force be `load`: on every clock, and as what the force sensor starts from."""
+        self.load = load
+        self.reference_n = load.at(self.t_s)
+        for track in self.tracks:
+            track.force_n = load.at(track.t_s)
 
     def nuisances(self, kind: ChannelKind) -> Nuisances | None:
         """Return the nuisances of a kind of channel; None when the spec states none."""
         return self.sensor.spec.nuisances.get(kind)
-
-    def by_kind(self) -> dict[ChannelKind, list[int]]:
-        """Return the columns of each kind of channel."""
-        columns: dict[ChannelKind, list[int]] = {}
-        for column, channel in enumerate(self.channels):
-            columns.setdefault(channel.kind, []).append(column)
-        return columns
 
     def of_unit(self, *what: str) -> np.random.Generator:
         """Return the generator of what belongs to this sensor unit: the same in every recording of a seed."""
@@ -74,11 +148,11 @@ class Synthesis:
         """Return the generator of what is this recording's own."""
         return draws.generator(self.seed, self.sensor.name, "recording", self.scene.session, self.scene.name, *what)
 
-    def of_every_channel(self, kind: ChannelKind, generator: np.random.Generator) -> FloatArray:
-        """Return one standard normal number for each recorded channel of `kind`.
+    def of_every_channel(self, track: Track, kind: ChannelKind, generator: np.random.Generator) -> FloatArray:
+        """Return one standard normal number for each recorded channel of `kind` in `track`.
 
         Drawn for all the sensor's channels of that kind, so that recording fewer of them changes none.
         """
         every = [channel.name for channel in self.sensor.spec.channels(kind)]
         numbers = dict(zip(every, generator.standard_normal(len(every)), strict=True))
-        return np.array([numbers[channel.name] for channel in self.channels if channel.kind == kind])
+        return np.array([numbers[channel.name] for channel in track.channels if channel.kind == kind])

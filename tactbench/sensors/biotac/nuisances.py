@@ -9,6 +9,7 @@ from __future__ import annotations
 from tactbench.plugin import ChannelKind, Creep, Nuisances, Quantity, assumed, derived, measured
 
 _STEP = measured(1.0, "count", "raw channels of RF, DX and RG move in steps of one count")
+_SLOPE = "this model, caps of 5 to 40 mm and flat pressed to 5 N at the nominal contact point"
 _NONE_KNOWN = "no recording shows it; left at 0 rather than invented"
 
 _CREEP = (
@@ -45,6 +46,7 @@ TAXEL = Nuisances(
     wander_tau=_WANDER_TAU,
     step=_STEP,
     creep=_CREEP,
+    largest_slope=derived(250.0, "count/N", f"{_SLOPE}: 246"),
 )
 
 PDC = Nuisances(

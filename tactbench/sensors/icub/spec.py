@@ -68,6 +68,9 @@ NUISANCES = Nuisances(
     wander=measured(0.2, "count", f"an upper bound; {_GRASP}"),
     wander_tau=assumed(60.0, "s", "not identifiable"),
     step=sourced(1.0, "count", "8-bit values on the bus; robotology/icub-firmware"),
+    largest_slope=derived(
+        24.0, "count/N", "this model, caps of 5 to 40 mm and flat pressed to 5 N at the nominal contact point: 23.1"
+    ),
     creep=(
         Creep(
             fraction=measured(0.15, "1", "tacman-fp7/tactile-control: at most 16 % [4, 29], motor and tendon included"),

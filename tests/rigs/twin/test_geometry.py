@@ -78,3 +78,18 @@ def test_what_the_grid_cannot_resolve_is_refused(contact, says):
 
 def test_a_small_but_resolved_cap_is_taken():
     check_contact(GRID, Contact(0.6, 9.9, 9.9))
+
+
+@pytest.mark.parametrize(
+    "contact",
+    [Contact(math.nan, 0.0, 0.0), Contact(-5.0, 0.0, 0.0), Contact(5.0, math.nan, 0.0), Contact(5.0, 0.0, math.nan)],
+)
+def test_a_contact_that_is_none_is_refused(contact):
+    with pytest.raises(RigError):
+        check_contact(GRID, contact)
+
+
+@pytest.mark.parametrize("slope", [1.01, -2.0, math.tan(math.pi / 2), math.nan])
+def test_an_indenter_on_its_side_is_refused(slope):
+    with pytest.raises(RigError, match="tilted"):
+        check_contact(GRID, Contact(5.0, 0.0, 0.0, tilt_s=slope))

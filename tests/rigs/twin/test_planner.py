@@ -1,8 +1,18 @@
 from __future__ import annotations
 
 import pytest
+from pydantic import ValidationError
 
-from tactbench.plugin import EffectDescriptor, ForceRamp, PluginContractError, Scene, assumed
+from tactbench.plugin import (
+    EffectDescriptor,
+    ForceRamp,
+    NotApplicable,
+    PluginContractError,
+    Scene,
+    Simulation,
+    UsageError,
+    assumed,
+)
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.planner import plan_scene
 
@@ -56,3 +66,41 @@ def test_a_predicate_that_answers_something_else_is_refused(specs):
     odd = EffectDescriptor(name="odd", title="odd", where="x:y", produces=("disturbance",), called_for="operator:is_")
     with pytest.raises(PluginContractError, match="not Reason"):
         plan_scene([*EFFECTS, odd], Scene(name="s"), specs["icub"])
+
+
+def _asking(*words):
+    return Scene(name="s", simulation=Simulation(effects=words))
+
+
+def test_effects_are_included_and_left_out_as_asked(specs):
+    plan = _named(plan_scene(EFFECTS, _asking("-drift", "+wander", "+fluid-pressure"), specs["biotac"]))
+    assert not plan["warm-up"].included
+    assert not plan["offset"].included
+    assert plan["warm-up"].change is None, "what was called for and is left out has no bound any more"
+    assert plan["wander"].included
+    assert plan["fluid-pressure"].included
+    assert {name for name, entry in plan.items() if entry.asked} == {"warm-up", "offset", "wander", "fluid-pressure"}
+
+
+def test_everything_can_be_asked_for(specs):
+    plan = _named(plan_scene(EFFECTS, _asking("+all"), specs["icub"]))
+    assert all(entry.included for entry in plan.values())
+
+
+def test_a_word_that_is_no_effect_is_refused_with_what_there_is(specs):
+    with pytest.raises(UsageError, match="'fog'") as refused:
+        plan_scene(EFFECTS, _asking("+fog"), specs["icub"])
+    assert "creep" in refused.value.hint
+    assert "drift" in refused.value.hint
+
+
+def test_leaving_out_what_is_observed_is_refused_by_name(specs):
+    with pytest.raises(NotApplicable, match="without transduction"):
+        plan_scene(EFFECTS, _asking("-transduction"), specs["icub"])
+
+
+def test_a_scene_without_a_sign_is_no_scene():
+    with pytest.raises(ValidationError):
+        _asking("creep")
+    with pytest.raises(ValidationError, match="not both"):
+        Simulation(rung="fine", tolerance=0.1)

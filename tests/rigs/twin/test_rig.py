@@ -206,7 +206,7 @@ def test_a_strangers_effect_takes_part(sensors, tmp_path, monkeypatch):
     (tmp_path / "dew.py").write_text(
         "from tactbench.plugin import Reason\n"
         "def called_for(scene, sensor):\n    return Reason(True, 'it is raining')\n"
-        "def apply(run):\n    run.readings -= 7\n"
+        "def apply(run):\n    for track in run.tracks:\n        track.readings -= 7\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     dew = EffectDescriptor(

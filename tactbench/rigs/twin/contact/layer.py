@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import BondedLayer, FloatArray, RigError, SkinGrid
-from tactbench.rigs.twin.contact.media import Medium, no_local_law, require_positive
+from tactbench.plugin import BondedLayer, FloatArray, SkinGrid
+from tactbench.rigs.twin.contact.media import Medium, no_local_law, require_poisson, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 
 _SERIES_BELOW = 0.35
@@ -46,11 +46,7 @@ def medium(skin: BondedLayer, grid: SkinGrid) -> Medium:
     young, poisson, thickness = skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm")
     contact_stiffness = skin.contact_stiffness.to("MPa/mm")
     require_positive(young=young, thickness=thickness, contact_stiffness=contact_stiffness)
-    if not 0 <= poisson <= 0.5:
-        raise RigError(
-            f"Poisson's ratio of the layer is {poisson:g}; it must lie between 0 and 0.5.",
-            hint="Correct the skin in the sensor's spec.",
-        )
+    require_poisson(poisson)
     spectrum = Spectrum(grid)
     k = np.sqrt(spectrum.k2)
     k[0, 0] = 1.0

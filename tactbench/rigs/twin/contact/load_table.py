@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import itertools
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from tactbench.plugin import FloatArray, SkinState
 from tactbench.rigs.twin.contact.interpolant import Interpolant
-from tactbench.rigs.twin.contact.press import Press
+from tactbench.rigs.twin.contact.press import AnyPress, scalars
 
 _SCOUTS = 4
 _SCOUTS_POWER = 1.7
@@ -45,6 +47,14 @@ MOST_NODES = 14
 """Nodes after which refining ends."""
 
 
+class SkinCurves(NamedTuple):
+    """The skin's scalars at (m,) loads."""
+
+    depth_mm: FloatArray
+    contact_radius_mm: FloatArray
+    fluid_pressure_mpa: FloatArray
+
+
 @dataclass(frozen=True)
 class LoadTable:
     """Readings of one contact for any load from zero to the largest."""
@@ -60,7 +70,11 @@ class LoadTable:
     error: FloatArray
     """(channels,) three times the most by which a solved reading differs from the interpolant through the others."""
     interpolant: Interpolant
+    curves: Interpolant
+    """Depth, contact radius and fluid pressure against load."""
     solves: int
+    solved_s: float
+    """Seconds spent on the skin; what reading it took is not among them."""
 
     @property
     def residual(self) -> float:
@@ -71,10 +85,17 @@ class LoadTable:
         """Return the (m, channels) readings at (m,) forces; forces beyond the table are held at its ends."""
         return self.interpolant(np.clip(force_n, 0.0, self.loads_n[-1]))
 
+    def skin(self, force_n: FloatArray) -> SkinCurves:
+        """Return what the skin as a whole does at (m,) forces, held at the table's ends like the readings."""
+        depth, radius, pressure = self.curves(np.clip(force_n, 0.0, self.loads_n[-1])).T
+        return SkinCurves(depth_mm=depth, contact_radius_mm=radius, fluid_pressure_mpa=pressure)
+
 
 class _Builder:
-    def __init__(self, press: Press, read: Callable[[SkinState], FloatArray]) -> None:
+    def __init__(self, press: AnyPress, read: Callable[[SkinState], FloatArray], clock: Callable[[], float]) -> None:
         self._press = press
+        self._clock = clock
+        self.read_s = 0.0
         self._read = read
         self.nodes: dict[float, tuple[SkinState, FloatArray]] = {}
         self.closed: dict[float, bool] = {}
@@ -82,25 +103,40 @@ class _Builder:
     def node(self, force: float) -> FloatArray:
         if force not in self.nodes:
             state = self._press(force)
-            self.nodes[force] = (self._press.scalars(state), self._read(state))
+            began = self._clock()
+            self.nodes[force] = (scalars(state), self._read(state))
+            self.read_s += self._clock() - began
             self.closed[force] = force > 0 and self._press.closing_mm(state) > 0
         return self.nodes[force][1]
 
     def interpolant(self, touch_down: tuple[float, float] | None, without: float | None = None) -> Interpolant:
         loads = [load for load in sorted(self.nodes) if load != without]
-        values = np.stack([self.nodes[load][1] for load in loads])
-        if touch_down is None:
-            return Interpolant(np.array(loads), values)
-        return Interpolant(np.array(loads), values, [loads.index(load) for load in touch_down], _ABOVE_POWER)
+        return _through(loads, [self.nodes[load][1] for load in loads], touch_down)
+
+    def curves(self, touch_down: tuple[float, float] | None) -> Interpolant:
+        loads = sorted(self.nodes)
+        return _through(loads, [_scalars(self.nodes[load][0]) for load in loads], touch_down)
+
+
+def _through(loads: list[float], values: list[FloatArray], touch_down: tuple[float, float] | None) -> Interpolant:
+    if touch_down is None:
+        return Interpolant(np.array(loads), np.stack(values))
+    breaks = [loads.index(load) for load in touch_down]
+    return Interpolant(np.array(loads), np.stack(values), breaks, _ABOVE_POWER)
+
+
+def _scalars(state: SkinState) -> FloatArray:
+    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])
 
 
 def build_table(
-    press: Press,
+    press: AnyPress,
     read: Callable[[SkinState], FloatArray],
     *,
     largest_n: float,
     tolerance: FloatArray,
     most_nodes: int = MOST_NODES,
+    clock: Callable[[], float] = time.perf_counter,
 ) -> LoadTable:
     """Solve and tabulate one contact.
 
@@ -116,13 +152,17 @@ def build_table(
         (channels,) wanted bound on the interpolation error.
     most_nodes
         Nodes after which refining ends even if the bound is missed: the achieved one is reported.
+    clock
+        Seconds, monotonic.
     """
-    builder = _Builder(press, read)
+    began = clock()
+    builder = _Builder(press, read, clock)
     if not largest_n > 0:
         rest = builder.node(0.0)
         flat = Interpolant(np.array([0.0, 1.0]), np.stack([rest, rest]))
+        still = Interpolant(np.array([0.0, 1.0]), np.zeros((2, 3)))
         state = builder.nodes[0.0][0]
-        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, 0)
+        return LoadTable(np.zeros(1), rest[None, :], (state,), None, np.zeros(rest.size), flat, still, 0, 0.0)
     builder.node(0.0)
     for j in range(1, _SCOUTS + 1):
         builder.node(largest_n * (j / _SCOUTS) ** _SCOUTS_POWER)
@@ -137,11 +177,13 @@ def build_table(
         touch_down_n=touch_down,
         error=error,
         interpolant=builder.interpolant(touch_down),
+        curves=builder.curves(touch_down),
         solves=press.solves,
+        solved_s=clock() - began - builder.read_s,
     )
 
 
-def _bracket(builder: _Builder, press: Press) -> tuple[float, float] | None:
+def _bracket(builder: _Builder, press: AnyPress) -> tuple[float, float] | None:
     """Bracket touch-down and put a node on either side."""
     closed = [load for load in sorted(builder.nodes) if builder.closed[load]]
     if not closed:

@@ -73,3 +73,12 @@ def require_positive(**values: float) -> None:
                 f"The skin's {name} is {value:g}; it must be positive and finite.",
                 hint="Correct the skin in the sensor's spec.",
             )
+
+
+def require_poisson(ratio: float) -> None:
+    """Refuse a Poisson's ratio outside 0 … 1/2; raises RigError."""
+    if not 0 <= ratio <= 0.5:
+        raise RigError(
+            f"Poisson's ratio of the skin is {ratio:g}; it must lie between 0 and 0.5.",
+            hint="Correct the skin in the sensor's spec.",
+        )

@@ -4,15 +4,61 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, SkinState
+from tactbench.plugin import FloatArray, SkinGrid, SkinState
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.newton import TOLERANCE, NewtonSolver, Solution
 from tactbench.rigs.twin.geometry import Contact
 
 _NOTHING = np.zeros((0, 0))
+
+
+class AnyPress(Protocol):
+    """What a load table asks of whatever solves its loads: one interface for every rung."""
+
+    medium: Medium
+    contact: Contact
+    touched_core: bool
+    solves: int
+
+    def __call__(self, force_n: float) -> SkinState:
+        """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
+
+    def closing_at(self, force_n: float) -> float:
+        """Return how far the film is past closing under `force_n` [mm]; minus infinity without a core."""
+
+    def closing_mm(self, state: SkinState) -> float:
+        """Return how far the film of `state` is past closing [mm]; minus infinity without a core."""
+
+
+def at_rest(medium: Medium) -> SkinState:
+    """Return the skin with nothing touching."""
+    zero = np.zeros(medium.spectrum.shape)
+    return SkinState(
+        grid=medium.grid,
+        force_n=0.0,
+        deflection_mm=zero,
+        pressure_mpa=zero,
+        thickness_mm=medium.rest_thickness_mm,
+        depth_mm=0.0,
+        fluid_pressure_mpa=0.0,
+        contact_radius_mm=0.0,
+        residual=0.0,
+    )
+
+
+def scalars(state: SkinState) -> SkinState:
+    """Return `state` without its fields: what a table keeps."""
+    return replace(state, deflection_mm=_NOTHING, pressure_mpa=_NOTHING, thickness_mm=_NOTHING)
+
+
+def contact_radius_mm(grid: SkinGrid, contact: Contact, pressure_mpa: FloatArray) -> float:
+    """Return ``sqrt(5/2 <r²>)`` weighted with the pressure: exact for Hertz, where counting cells is not."""
+    r2 = (grid.x_mm[:, None] - contact.x_mm) ** 2 + (grid.s_mm[None, :] - contact.s_mm) ** 2
+    return float(np.sqrt(2.5 * np.sum(pressure_mpa * r2) / np.sum(pressure_mpa)))
 
 
 class Press:
@@ -43,33 +89,23 @@ class Press:
         tolerance: float = TOLERANCE,
     ) -> None:
         self.medium = medium
-        self.gap_mm = gap_mm
+        # From first touch: between cells the gap's smallest value on the grid is not zero, and in its rounding the
+        # depth of a piconewton would drown.
+        self.gap_mm = gap_mm - gap_mm.min()
         self.contact = contact
         self.touched_core = False
         self.solves = 0
         self.products = 0
-        self._solver = NewtonSolver(medium, gap_mm)
+        self._solver = NewtonSolver(medium, self.gap_mm)
         self._core = core
         self._wants_fluid_pressure = fluid_pressure
         self._tolerance = tolerance
         self._solutions: dict[float, Solution] = {}
-        self._least_gap = float(gap_mm.min())
 
     def __call__(self, force_n: float) -> SkinState:
         """Return the skin under `force_n`; at zero force it is at rest and nothing is solved."""
         if force_n <= 0:
-            zero = np.zeros(self.gap_mm.shape)
-            return SkinState(
-                grid=self.medium.grid,
-                force_n=0.0,
-                deflection_mm=zero,
-                pressure_mpa=zero,
-                thickness_mm=self.medium.rest_thickness_mm,
-                depth_mm=0.0,
-                fluid_pressure_mpa=0.0,
-                contact_radius_mm=0.0,
-                residual=0.0,
-            )
+            return at_rest(self.medium)
         solution = self._solve(force_n)
         pressure = solution.pressure_mpa
         return SkinState(
@@ -78,10 +114,9 @@ class Press:
             deflection_mm=solution.deflection_mm,
             pressure_mpa=pressure,
             thickness_mm=self.medium.thickness_mm(solution.deflection_mm),
-            # Counted from first touch: between cells the gap's smallest value on the grid is not zero.
-            depth_mm=solution.depth_mm - self._least_gap,
+            depth_mm=solution.depth_mm,
             fluid_pressure_mpa=self._fluid_pressure(solution),
-            contact_radius_mm=self._contact_radius(pressure),
+            contact_radius_mm=contact_radius_mm(self.medium.grid, self.contact, pressure),
             residual=solution.residual,
         )
 
@@ -94,10 +129,6 @@ class Press:
     def closing_mm(self, state: SkinState) -> float:
         """Return how far the film of `state` is past closing [mm]; minus infinity without a core."""
         return self.medium.closing_mm(state.deflection_mm) if self.medium.has_core else -np.inf
-
-    def scalars(self, state: SkinState) -> SkinState:
-        """Return `state` without its fields: what a table keeps."""
-        return replace(state, deflection_mm=_NOTHING, pressure_mpa=_NOTHING, thickness_mm=_NOTHING)
 
     def _solve(self, force: float) -> Solution:
         if force in self._solutions:
@@ -141,9 +172,3 @@ class Press:
             return 0.0
         local, _ = self.medium.respond(solution.deflection_mm, np.empty(self.gap_mm.shape))
         return float(np.mean(solution.pressure_mpa - local))
-
-    def _contact_radius(self, pressure: FloatArray) -> float:
-        """Return ``sqrt(5/2 <r²>)`` weighted with the pressure: exact for Hertz, where counting cells is not."""
-        grid, contact = self.medium.grid, self.contact
-        r2 = (grid.x_mm[:, None] - contact.x_mm) ** 2 + (grid.s_mm[None, :] - contact.s_mm) ** 2
-        return float(np.sqrt(2.5 * np.sum(pressure * r2) / np.sum(pressure)))

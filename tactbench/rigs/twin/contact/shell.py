@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactbench.plugin import FloatArray, FluidBackedShell, SkinGrid
-from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_positive
+from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_poisson, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.geometry import film_at_rest_mm
 
@@ -38,7 +38,9 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
         mid_radius=skin.mid_radius.to("mm"),
         contact_stiffness=contact_stiffness,
         gap=skin.gap.to("mm"),
+        clamp_length=skin.clamp_length.to("mm"),
     )
+    require_poisson(poisson)
     spectrum = Spectrum(grid)
     k2 = spectrum.k2.copy()
     k2[0, 0] = 1.0

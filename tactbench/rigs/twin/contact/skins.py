@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import BondedLayer, FluidBackedShell, FoamPad, RigError, SkinGrid
+import math
+
+from tactbench.plugin import BondedLayer, FluidBackedShell, FoamPad, Quantity, RigError, SkinGrid
 from tactbench.rigs.twin.contact.media import Medium
 
 
@@ -14,6 +16,13 @@ def medium_of(skin: FluidBackedShell | FoamPad | BondedLayer, grid: SkinGrid) ->
     RigError
         If the parameters are not physical, or the medium is none the twin can press.
     """
+    for name in type(skin).model_fields:
+        stated = getattr(skin, name)
+        if isinstance(stated, Quantity) and not 0 <= stated.value < math.inf:
+            raise RigError(
+                f"The skin's {name} is {stated}; it must be finite and not below zero.",
+                hint="Correct the skin in the sensor's spec.",
+            )
     if isinstance(skin, FluidBackedShell):
         from tactbench.rigs.twin.contact import shell
 

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from tactbench.plugin import (
-    FloatArray,
-    FluidBackedShell,
-    NotApplicable,
-    PluginContractError,
-    RigError,
-    SkinState,
-    load_object,
-)
+from tactbench.plugin import FloatArray, NotApplicable, Scalar
+from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
-from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import Press
-from tactbench.rigs.twin.contact.skins import medium_of
-from tactbench.rigs.twin.geometry import check_contact, gap_mm, skin_grid
+from tactbench.rigs.twin.contact.pressing import pressed
+from tactbench.rigs.twin.contact.validity import check_reach, remarks
+from tactbench.rigs.twin.geometry import check_contact, pad_of, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
@@ -36,17 +29,23 @@ class _Tabulated:
     touched_core: bool
     closing_mm: float
     film_mm: float
+    remarks: Mapping[str, Scalar]
 
 
 _TABLES: OrderedDict[bytes, _Tabulated] = OrderedDict()
 
 
 def press_skin(run: Synthesis) -> None:
-    """Refuse a contact that cannot be resolved; the solving itself follows the sensor's wish for readings."""
+    """Refuse a contact that cannot be resolved; the solving itself follows the first wish for an answer."""
     skin = run.sensor.spec.skin
     if skin is None:
         raise NotApplicable(f"{run.sensor.name} declares no skin: it can be recorded or replayed, not simulated.")
     check_contact(skin_grid(skin.sheet, run.fidelity.cells(skin.sheet)), run.contact)
+
+
+def forget_tables() -> None:
+    """Drop all tables of this process: the next recording solves its contact again."""
+    _TABLES.clear()
 
 
 def watch_fluid(run: Synthesis) -> None:
@@ -56,100 +55,100 @@ def watch_fluid(run: Synthesis) -> None:
 
 def read_skin(run: Synthesis) -> None:
     """Add each channel's response: gain times its reading under the effective force, less its reading at rest."""
-    columns = [i for i, channel in enumerate(run.channels) if channel.kind in READ_FROM_THE_SKIN]
-    tabulated = _tabulated(run, columns)
-    table = tabulated.table
-    for kind, own in run.by_kind().items():
-        if kind not in READ_FROM_THE_SKIN:
-            continue
-        among = [columns.index(column) for column in own]
-        response = table(run.effective_n.get(kind, run.force_n))[:, among] - table.readings[0, among]
-        if run.gain is not None:
-            response *= run.gain[own]
-        run.readings[:, own] += response
+    table = skin_under_load(run)
+    names = _read_names(run)
+    for track in run.tracks:
+        for kind, own in track.by_kind().items():
+            if kind not in READ_FROM_THE_SKIN:
+                continue
+            among = [names.index(track.channels[column].name) for column in own]
+            response = table(track.effective_n.get(kind, track.force_n))[:, among] - table.readings[0, among]
+            if track.gain is not None:
+                response *= track.gain[own]
+            track.readings[:, own] += response
+
+
+def skin_under_load(run: Synthesis) -> LoadTable:
+    """Return what the skin and the channels read from it do under any load of this recording; solved once.
+
+    Whether the fluid's pressure belongs to it must be settled before it is first asked for.
+    """
+    tabulated = _tabulated(run)
     _report(run, tabulated)
+    return tabulated.table
 
 
-def _tabulated(run: Synthesis, columns: list[int]) -> _Tabulated:
-    profile = run.scene.profile
-    largest = max(profile.start.to("N"), profile.end.to("N"))
-    spec = run.sensor.model_dump_json()
-    text = f"{spec}|{run.contact}|{largest!r}|{columns}|{run.fluid_pressure}|{run.lent}|{run.fidelity}"
+def _read_names(run: Synthesis) -> list[str]:
+    """Return the names of the channels that the sensor's transducer answers for, in the sensor's order."""
+    return [channel.name for track in run.tracks for channel in track.channels if channel.kind in READ_FROM_THE_SKIN]
+
+
+def _tabulated(run: Synthesis) -> _Tabulated:
+    largest, names = run.load.largest_n, _read_names(run)
+    if run.scene.simulation.tolerance is not None and run.rung_error is None:
+        choose_rung(run, names, largest)
+    spec, asked = run.sensor.model_dump_json(), run.scene.simulation.tolerance
+    text = f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{asked}"
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
         _TABLES.move_to_end(key)
         return _TABLES[key]
-    made = _tabulate(run, columns, largest)
+    made = _tabulate(run, names, largest)
+    # Whoever asks first waits for the solving; it belongs to the contact.
+    run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + made.table.solved_s
+    run.elsewhere_s += made.table.solved_s
     _TABLES[key] = made
     if len(_TABLES) > _MOST_TABLES:
         _TABLES.popitem(last=False)
     return made
 
 
-def _tabulate(run: Synthesis, columns: list[int], largest: float) -> _Tabulated:
-    spec, skin = run.sensor.spec, run.sensor.spec.skin
-    if skin is None or run.sensor.transducer is None:
-        raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
+def _tabulate(run: Synthesis, names: list[str], largest: float) -> _Tabulated:
     fidelity = run.fidelity
-    grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
-    outer = skin.sheet.outer_radius
-    gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"))
-    names = [run.channels[column].name for column in columns]
-    try:
-        factory = load_object(run.sensor.transducer)
-        transducer = factory(spec, grid, names, **fidelity.options(factory))
-    except RigError as error:
-        raise NotApplicable(f"The transducer of {spec.name} cannot answer: {error}", hint=error.hint) from error
-
-    def read(state: SkinState) -> FloatArray:
-        readings = np.asarray(transducer(state), dtype=np.float64)
-        if readings.shape != (len(names),) or not np.all(np.isfinite(readings)):
-            raise PluginContractError(
-                f"The transducer of {spec.name} returned shape {readings.shape} at {state.force_n:g} N; "
-                f"expected ({len(names)},) finite readings.",
-                hint="Return one finite number for each wanted channel.",
-            )
-        return readings
-
-    core: Callable[[Medium], Medium] | None = None
-    if "core" in run.lent and isinstance(skin, FluidBackedShell):
-        where = run.lent["core"]
-
-        def core(medium: Medium) -> Medium:
-            made: Medium = load_object(where)(medium, skin)
-            return made
-
-    press = Press(
-        medium_of(skin, grid),
-        gap,
-        run.contact,
-        core=core,
-        fluid_pressure=run.fluid_pressure,
-        tolerance=fidelity.newton_tolerance,
-    )
+    press, read = pressed(run, names, fidelity)
     table = build_table(
         press,
         read,
         largest_n=largest,
-        tolerance=fidelity.table_tolerance_factor * _tolerance(run, columns),
+        tolerance=_tolerance(run, names),
         most_nodes=fidelity.most_nodes,
+        clock=run.clock,
     )
-    closing = press.closing_at(largest) if press.medium.has_core else 0.0
-    film = float(press.medium.rest_thickness_mm.max()) - press.medium.least_thickness_mm
-    return _Tabulated(table, press.touched_core, closing, film)
+    medium = press.medium
+    closing = press.closing_at(largest) if medium.has_core else 0.0
+    film = float(medium.rest_thickness_mm.max()) - medium.least_thickness_mm
+    skin = run.sensor.spec.skin
+    sheet = None if skin is None else skin.sheet
+    outer_mm = math.inf if sheet is None or sheet.outer_radius is None else sheet.outer_radius.to("mm")
+    check_reach(press, largest, outer_mm)
+    pad = None if sheet is None else pad_of(sheet, medium.grid)
+    return _Tabulated(table, press.touched_core, closing, film, remarks(press, table.loads_n.tolist(), outer_mm, pad))
 
 
-def _tolerance(run: Synthesis, columns: list[int]) -> FloatArray:
-    """Return the interpolation error to aim at: one standard deviation of what noise and rounding hide anyway."""
+_NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
+"""Depth and contact radius [mm] and pressure [MPa] where no channel says how closely the skin must be known: a
+hundredth of what a ramp to a few newtons gives."""
+
+
+def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
+    """Return the interpolation error to aim at: one standard deviation of what noise and rounding hide anyway.
+
+    A scene that states a tolerance gets a third of that, if it is less: the rung has the rest.
+    """
+    if not names:
+        return _NO_CHANNELS_TOLERANCE
     wanted = []
-    for column in columns:
-        nuisances = run.nuisances(run.channels[column].kind)
+    channels = {channel.name: channel for track in run.tracks for channel in track.channels}
+    for name in names:
+        channel = channels[name]
+        nuisances = run.nuisances(channel.kind)
         hidden = 0.0 if nuisances is None else float(np.hypot(nuisances.white.value, nuisances.step.value / 12**0.5))
         # Without any stated noise: a ten-thousandth of the range, or of one.
-        upper, lower = run.channels[column].upper, run.channels[column].lower
-        span = upper - lower if upper is not None and lower is not None else 1.0
+        span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 1.0
         wanted.append(hidden if hidden > 0 else 1e-4 * span)
-    return np.array(wanted)
+    aim = run.fidelity.table_tolerance_factor * np.array(wanted)
+    asked = run.scene.simulation.tolerance
+    return aim if asked is None else np.minimum(aim, TABLE_SHARE * asked)
 
 
 def _report(run: Synthesis, tabulated: _Tabulated) -> None:
@@ -161,7 +160,11 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
         table_error_count=float(table.error.max(initial=0.0)),
         solver_residual=table.residual,
         depth_mm=deepest.depth_mm,
+        **tabulated.remarks,
     )
+    if run.rung_error is not None:
+        total = run.rung_error + float(table.error.max(initial=0.0))
+        run.drawn.update(rung=run.rung, rung_error_count=run.rung_error, error_estimate_count=total)
     if "core" not in run.lent:
         return
     force = deepest.force_n

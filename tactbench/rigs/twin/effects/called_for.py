@@ -5,6 +5,7 @@ Each takes the scene and the sensor's spec and answers with a Reason that carrie
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from tactbench.plugin import FluidBackedShell, Nuisances, Quantity, Reason, Scene, SensorSpec
@@ -27,18 +28,18 @@ def contact(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether the skin is pressed."""
     largest = _largest_n(scene)
     if sensor.skin is None:
-        return Reason(False, f"{sensor.name} declares no skin")
+        return Reason(False, f"{sensor.name} declares no skin", 0.0)
     if not largest > 0:
-        return Reason(False, "the scene has no load: 0 N throughout")
+        return Reason(False, "the scene has no load: 0 N throughout", 0.0)
     return Reason(True, f"{scene.indenter} pressed with up to {largest:g} N")
 
 
 def core(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether the skin may touch down on a core."""
     if not isinstance(sensor.skin, FluidBackedShell):
-        return Reason(False, "the skin has no core under a fluid film")
+        return Reason(False, "the skin has no core under a fluid film", 0.0)
     if not _largest_n(scene) > 0:
-        return Reason(False, "the scene has no load: 0 N throughout")
+        return Reason(False, "the scene has no load: 0 N throughout", 0.0)
     left = sensor.skin.gap.to("mm") - sensor.skin.residual_film.to("mm")
     return Reason(True, f"taken into the solve from the load that leaves no more than the film's {left:g} mm")
 
@@ -46,34 +47,69 @@ def core(scene: Scene, sensor: SensorSpec) -> Reason:
 def fluid_pressure(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether there is a fluid whose pressure can be looked at."""
     if not isinstance(sensor.skin, FluidBackedShell):
-        return Reason(False, "the skin holds no fluid")
+        return Reason(False, "the skin holds no fluid", 0.0)
     return Reason(True, "an observed channel reads the pressure of the fluid")
 
 
 def transduction(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether the sensor has a skin to read."""
     if sensor.skin is None:
-        return Reason(False, f"{sensor.name} declares no skin")
+        return Reason(False, f"{sensor.name} declares no skin", 0.0)
     return Reason(True, f"{sensor.principle} channels read the skin")
 
 
 def creep(scene: Scene, sensor: SensorSpec) -> Reason:
-    """Answer whether the response lags behind a load that changes."""
+    """Answer whether the response lags behind a load that changes, by more than noise would hide.
+
+    Behind a load that rises at most at a rate ``r`` a lag of time constant ``tau`` stays back by at most ``tau r``: so
+    the reading is off by at most its largest slope against load times ``r sum(c_i tau_i)``.
+    """
     terms = [term for nuisances in _observed(scene, sensor) for term in nuisances.creep]
     share = sum(term.fraction.to("1") for term in terms)
     if not terms or not share:
-        return Reason(False, "the spec states no creep for the observed channels")
-    if scene.profile.start.to("N") == scene.profile.end.to("N"):
-        return Reason(False, f"the load is constant: {scene.profile.end.to('N'):g} N throughout")
+        return Reason(False, "the spec states no creep for the observed channels", 0.0)
+    rate = _steepest_n_per_s(scene)
+    if not rate:
+        return Reason(False, f"the load is constant: {scene.profile.end.to('N'):g} N throughout", 0.0)
     slowest = max(term.tau.to("s") for term in terms)
-    return Reason(True, f"{100 * share:.0f} % of the response comes late, by up to {slowest:g} s")
+    late = f"{100 * share:.0f} % of the response comes late, by up to {slowest:g} s"
+    bounds = [_behind(nuisances, rate) for nuisances in _observed(scene, sensor)]
+    if any(bound is None for bound in bounds):
+        return Reason(True, late)
+    most = max(bound for bound in bounds if bound is not None)
+    hidden = [_hidden(nuisances, scene) for nuisances in _observed(scene, sensor)]
+    if all(bound <= floor / 3 for bound, floor in zip(bounds, hidden, strict=True) if bound is not None):
+        slow = f"the load changes by {rate:.2g} N/s, slowly against {slowest:g} s: at most {most:.2g} counts late"
+        return Reason(False, f"{slow}, below a third of noise and rounding ({min(hidden):.2g})", most)
+    return Reason(True, f"{late}: up to {most:.2g} counts at {rate:.2g} N/s", most)
+
+
+def _steepest_n_per_s(scene: Scene) -> float:
+    profile = scene.profile
+    ramp = profile.duration.to("s") - profile.hold.to("s")
+    return abs(profile.end.to("N") - profile.start.to("N")) / ramp if ramp > 0 else 0.0
+
+
+def _behind(nuisances: Nuisances, rate: float) -> float | None:
+    if not nuisances.creep:
+        return 0.0
+    if nuisances.largest_slope is None:
+        return None
+    late_s = sum(term.fraction.to("1") * term.tau.to("s") for term in nuisances.creep)
+    # The slope is that of the nominal gain; four standard deviations cover the largest of some hundred channels.
+    gain = 1.0 + 4.0 * nuisances.gain_scatter.to("1")
+    return nuisances.largest_slope.to("count/N") * gain * late_s * rate
+
+
+def _hidden(nuisances: Nuisances, scene: Scene) -> float:
+    return math.hypot(scene.environment.noise_scale * nuisances.white.value, nuisances.step.value / 12**0.5)
 
 
 def gain(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether channels of one unit have different gains."""
     scatter = _largest(scene, sensor, lambda nuisances: nuisances.gain_scatter)
     if scatter is None or not scatter.value:
-        return Reason(False, "the spec states no scatter of gain for the observed channels")
+        return Reason(False, "the spec states no scatter of gain for the observed channels", 0.0)
     return Reason(True, f"gains scatter by {100 * scatter.to('1'):g} % within a unit")
 
 
@@ -85,7 +121,8 @@ def offset(scene: Scene, sensor: SensorSpec) -> Reason:
     session = _largest(scene, sensor, lambda nuisances: nuisances.offset_session)
     if session is not None and session.value and environment.session_offset_scale:
         scale = environment.session_offset_scale
-        return Reason(True, f"levels move by {session} (sd) between sessions, scaled by {scale:g}")
+        moved = f"levels move by {session} (sd) between sessions, scaled by {scale:g}"
+        return Reason(True, moved, scale * session.value, session.unit)
     found = [quantity for quantity in (shared, own) if quantity is not None]
     largest = max(found, key=lambda quantity: quantity.value, default=None)
     return _scaled(
@@ -96,7 +133,12 @@ def offset(scene: Scene, sensor: SensorSpec) -> Reason:
 def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether rest levels rise to a warm value."""
     rise = _largest(scene, sensor, lambda nuisances: nuisances.warm_up)
-    return _scaled(scene, rise, "warm-up", "rest levels rise by {} from power-on")
+    reason = _scaled(scene, rise, "warm-up", "rest levels rise by {} from power-on")
+    tau = _largest(scene, sensor, lambda nuisances: nuisances.warm_up_tau)
+    if not reason.called_for or tau is None or reason.change is None:
+        return reason
+    since = scene.environment.since_power_on.to("s") + scene.starts_after_s
+    return reason._replace(change=reason.change * math.exp(-since / tau.to("s")))
 
 
 def wander(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -109,39 +151,41 @@ def rest_spread(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether channels of one unit rest at different levels."""
     spread = sensor.parameters.get("rest_spread")
     if spread is None or not spread.value:
-        return Reason(False, "the spec states rest levels channel by channel")
-    return Reason(True, f"rest levels scatter by {spread} within a unit")
+        return Reason(False, "the spec states rest levels channel by channel", 0.0)
+    return Reason(True, f"rest levels scatter by {spread} within a unit", spread.value, spread.unit)
 
 
 def white_noise(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether every sample has its own error."""
     noise = _largest(scene, sensor, lambda nuisances: nuisances.white)
     if noise is None or not noise.value:
-        return Reason(False, "the spec states no white noise for the observed channels")
+        return Reason(False, "the spec states no white noise for the observed channels", 0.0)
     if not scene.environment.noise_scale:
-        return Reason(False, "the scene scales noise by 0")
-    return Reason(True, f"noise of {noise} (sd), scaled by {scene.environment.noise_scale:g}")
+        return Reason(False, "the scene scales noise by 0", 0.0)
+    scale = scene.environment.noise_scale
+    return Reason(True, f"noise of {noise} (sd), scaled by {scale:g}", scale * noise.value, noise.unit)
 
 
 def converter(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer that readings are always stored through the converter."""
     step = _largest(scene, sensor, lambda nuisances: nuisances.step)
     stated = f"steps of {step}, " if step is not None and step.value else ""
-    return Reason(True, f"{stated}clipped to each channel's range")
+    half = None if step is None else step.value / 2
+    return Reason(True, f"{stated}clipped to each channel's range", half)
 
 
 def force_noise(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether the reference force differs from the true one."""
     noise = scene.environment.force_noise
     if not noise.value:
-        return Reason(False, "the scene's force sensor is free of noise")
-    return Reason(True, f"the unfiltered force sensor errs by {noise} (sd)")
+        return Reason(False, "the scene's force sensor is free of noise", 0.0, "N")
+    return Reason(True, f"the unfiltered force sensor errs by {noise} (sd)", noise.to("N"), "N")
 
 
 def _scaled(scene: Scene, size: Quantity | None, what: str, text: str) -> Reason:
     scale = scene.environment.drift_scale
     if size is None or not size.value:
-        return Reason(False, f"the spec states no {what} for the observed channels")
+        return Reason(False, f"the spec states no {what} for the observed channels", 0.0)
     if not scale:
-        return Reason(False, "the scene scales drift by 0")
-    return Reason(True, f"{text.format(size)}, scaled by {scale:g}")
+        return Reason(False, "the scene scales drift by 0", 0.0)
+    return Reason(True, f"{text.format(size)}, scaled by {scale:g}", scale * size.value, size.unit)

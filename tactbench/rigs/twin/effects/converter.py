@@ -13,13 +13,14 @@ def apply(run: Synthesis) -> None:
 
     A sample is flagged SATURATED when the converter stands at its end, as the reader of a real one would see it.
     """
-    for column, channel in enumerate(run.channels):
-        nuisances = run.nuisances(channel.kind)
-        reading = run.readings[:, column]
-        if nuisances is not None and nuisances.step.value > 0:
-            reading = np.round(reading / nuisances.step.value) * nuisances.step.value
-        lower = -np.inf if channel.lower is None else channel.lower
-        upper = np.inf if channel.upper is None else channel.upper
-        reading = np.clip(reading, lower, upper)
-        run.quality[(reading <= lower) | (reading >= upper), column] |= np.uint8(Quality.SATURATED)
-        run.readings[:, column] = reading
+    for track in run.tracks:
+        for column, channel in enumerate(track.channels):
+            nuisances = run.nuisances(channel.kind)
+            reading = track.readings[:, column]
+            if nuisances is not None and nuisances.step.value > 0:
+                reading = np.round(reading / nuisances.step.value) * nuisances.step.value
+            lower = -np.inf if channel.lower is None else channel.lower
+            upper = np.inf if channel.upper is None else channel.upper
+            reading = np.clip(reading, lower, upper)
+            track.quality[(reading <= lower) | (reading >= upper), column] |= np.uint8(Quality.SATURATED)
+            track.readings[:, column] = reading

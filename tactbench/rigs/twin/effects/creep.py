@@ -13,13 +13,14 @@ def apply(run: Synthesis) -> None:
 
     Linear viscoelasticity acts on the force before the load table is asked: loops follow from the force's history.
     """
-    for kind in run.by_kind():
-        nuisances = run.nuisances(kind)
-        if nuisances is None or not nuisances.creep:
-            continue
-        fractions = [term.fraction.to("1") for term in nuisances.creep]
-        effective = (1.0 - sum(fractions)) * run.force_n
-        for fraction, term in zip(fractions, nuisances.creep, strict=True):
-            effective = effective + fraction * lag(run.t_s, run.force_n, term.tau.to("s"))
-        # A weighted mean of forces that were: rounding must not leave the table's range.
-        run.effective_n[kind] = np.clip(effective, run.force_n.min(), run.force_n.max())
+    for track in run.tracks:
+        for kind in track.by_kind():
+            nuisances = run.nuisances(kind)
+            if nuisances is None or not nuisances.creep:
+                continue
+            fractions = [term.fraction.to("1") for term in nuisances.creep]
+            effective = (1.0 - sum(fractions)) * track.force_n
+            for fraction, term in zip(fractions, nuisances.creep, strict=True):
+                effective = effective + fraction * lag(track.t_s, track.force_n, term.tau.to("s"))
+            # A weighted mean of forces that were: rounding must not leave the table's range.
+            track.effective_n[kind] = np.clip(effective, track.force_n.min(), track.force_n.max())

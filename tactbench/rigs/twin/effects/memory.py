@@ -1,14 +1,43 @@
 """Linear filters with memory, exact for any step and unconditionally stable.
 
 All follow ``x' = a x + b`` with ``a = exp(-dt / tau)``. Unequal steps use each its own dt; a repeated time stamp has
-dt = 0 and changes nothing.
+dt = 0 and changes nothing. A clock that runs backwards is refused: the twin makes its own time, so one that does is a
+mistake of the caller, and no answer to it would be right.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import FloatArray
+from tactbench.plugin import FloatArray, RigError
+
+
+def steps_s(t_s: FloatArray, tau_s: float) -> FloatArray:
+    """Return the (n,) steps before each sample, the first zero, for a filter of time constant `tau_s`.
+
+    Raises
+    ------
+    RigError
+        If a time stamp is not finite or lies before its predecessor, or the time constant is not positive and finite.
+    """
+    if not (tau_s > 0 and np.isfinite(tau_s)):
+        raise RigError(
+            f"A filter has the time constant {tau_s:g} s; it must be positive and finite.",
+            hint="Correct the time constants among the sensor's nuisances.",
+        )
+    if not np.isfinite(t_s).all():
+        raise RigError(
+            f"{np.count_nonzero(~np.isfinite(t_s))} of {t_s.size} time stamps are not finite numbers.",
+            hint="Filters with memory need finite ascending times.",
+        )
+    dt = np.diff(t_s, prepend=t_s[:1])
+    backward = np.flatnonzero(dt < 0)
+    if backward.size:
+        raise RigError(
+            f"{backward.size} of {t_s.size} time stamps lie before their predecessors, the first at row {backward[0]}.",
+            hint="Filters with memory need ascending times; equal neighbours are allowed.",
+        )
+    return dt
 
 
 def recurrence(decay: FloatArray, drive: FloatArray) -> FloatArray:
@@ -48,19 +77,25 @@ def lag(t_s: FloatArray, load: FloatArray, tau_s: float) -> FloatArray:
     tau_s
         Time constant, above zero.
 
+    Raises
+    ------
+    RigError
+        As :func:`steps_s`.
+
     Notes
     -----
     ``z' = a z + (1-a) x_n + (x_{n+1} - x_n) (1 - (tau/dt) (1-a))``, the exact answer to a straight input.
     """
-    e = np.diff(t_s, prepend=t_s[:1]) / tau_s
+    e = steps_s(t_s, tau_s) / tau_s
     late = -np.expm1(-e)
     # 1 - late/e loses its digits for small e: there by its series, exact to 1e-4^4.
     small = e < 1e-4
     safe = np.where(small, 1.0, e)
-    straight = np.where(small, e / 2 - e**2 / 6 + e**3 / 24, 1.0 - late / safe)
+    series = np.where(small, e, 0.0)
+    straight = np.where(small, series / 2 - series**2 / 6 + series**3 / 24, 1.0 - late / safe)
     before = np.concatenate([load[:1], load[:-1]])
     drive = late * before + (load - before) * straight
-    drive[0] = load[0]
+    drive[:1] = load[:1]
     return recurrence(1.0 - late, drive)
 
 
@@ -69,11 +104,11 @@ def wandering(
 ) -> FloatArray:
     """Return (n, channels) independent Ornstein-Uhlenbeck paths, stationary from the first sample on.
 
-    Mean 0, standard deviation `spread`, correlation ``exp(-|t| / tau)``.
+    Mean 0, standard deviation `spread`, correlation ``exp(-|t| / tau)``. Raises as :func:`steps_s`.
     """
-    dt = np.diff(t_s, prepend=t_s[:1])
+    dt = steps_s(t_s, tau_s)
     fresh = np.sqrt(-np.expm1(-2 * dt / tau_s))
-    fresh[0] = 1.0
+    fresh[:1] = 1.0
     drive = generator.standard_normal((t_s.size, channels))
     drive *= (spread * fresh)[:, None]
     return recurrence(np.exp(-dt / tau_s), drive)

@@ -13,12 +13,13 @@ def apply(run: Synthesis) -> None:
     ``t`` counts from power-on; the factors ``f_i = 1 + scatter n_i`` belong to the unit.
     """
     environment, scene = run.scene.environment, run.scene
-    t = environment.since_power_on.to("s") + scene.starts_after_s + run.t_s
-    for kind, columns in run.by_kind().items():
-        nuisances = run.nuisances(kind)
-        if nuisances is None or not nuisances.warm_up.value:
-            continue
-        numbers = run.of_every_channel(kind, run.of_unit("warm-up", kind))
-        factors = 1.0 + nuisances.warm_up_scatter.to("1") * numbers
-        still_to_come = nuisances.warm_up.value * np.exp(-t / nuisances.warm_up_tau.to("s"))
-        run.readings[:, columns] -= environment.drift_scale * still_to_come[:, None] * factors
+    before = environment.since_power_on.to("s") + scene.starts_after_s
+    for track in run.tracks:
+        for kind, columns in track.by_kind().items():
+            nuisances = run.nuisances(kind)
+            if nuisances is None or not nuisances.warm_up.value:
+                continue
+            numbers = run.of_every_channel(track, kind, run.of_unit("warm-up", kind))
+            factors = 1.0 + nuisances.warm_up_scatter.to("1") * numbers
+            still_to_come = nuisances.warm_up.value * np.exp(-(before + track.t_s) / nuisances.warm_up_tau.to("s"))
+            track.readings[:, columns] -= environment.drift_scale * still_to_come[:, None] * factors

@@ -188,3 +188,26 @@ def test_what_is_no_load_is_refused(solver, force):
 def test_an_unreachable_tolerance_is_an_error_and_not_a_result(solver):
     with pytest.raises(RigError, match="residual"):
         solver("biotac", 5.0, -5.0).solve(1.0, tolerance=1e-17)
+
+
+@given(
+    st.sampled_from(["biotac", "icub"]),
+    st.sampled_from([1.0, 3.0, 10.0, 100.0, 1e9, FLAT]),
+    st.floats(-3, 3),
+    st.floats(-14, 2),
+)
+@settings(max_examples=25)
+def test_force_balances_to_rounding_from_a_cold_start_at_any_load(solver, name, radius, offset, exponent):
+    press = solver(name, radius, PLACES[name] + offset)
+    press.gap_mm -= press.gap_mm.min()
+    found = press.solve(10**exponent)
+    # Rounding of a sum over 3072 cells; the solver's own tolerance is 1e-6.
+    assert found.pressure_mpa.sum() * press.medium.spectrum.area_mm2 == pytest.approx(10**exponent, rel=1e-8)
+    assert found.residual < 1e-6
+
+
+def test_a_shell_of_impossible_poisson_ratio_is_refused(medium, specs):
+    skin = specs["biotac"].skin
+    for ratio in (1.0, 0.51, -0.1, math.nan):
+        with pytest.raises(RigError, match="Poisson"):
+            medium("biotac", skin=skin.model_copy(update={"poisson": skin.poisson.model_copy(update={"value": ratio})}))

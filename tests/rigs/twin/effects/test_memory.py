@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tactbench.plugin import RigError
 from tactbench.rigs.twin.effects.memory import lag, recurrence, wandering
 
 
@@ -87,3 +88,27 @@ def test_wandering_has_the_moments_of_ornstein_and_uhlenbeck():
 def test_wandering_stays_put_at_a_repeated_time_stamp():
     paths = wandering(np.array([0.0, 1.0, 1.0, 2.0]), 1.0, 5.0, 3, np.random.default_rng(0))
     np.testing.assert_array_equal(paths[1], paths[2])
+
+
+@pytest.mark.parametrize("t_s", [[0.0, 1.0, 0.5], [0.0, np.nan, 1.0], [0.0, np.inf, np.inf]])
+def test_a_clock_that_runs_backwards_is_refused(t_s):
+    for use in (lambda t: lag(t, np.ones(3), 1.0), lambda t: wandering(t, 1.0, 1.0, 2, np.random.default_rng(0))):
+        with pytest.raises(RigError, match="time stamps") as refused:
+            use(np.array(t_s))
+        assert "ascending" in refused.value.hint
+
+
+@pytest.mark.parametrize("tau", [0.0, -1.0, np.nan, np.inf])
+def test_a_time_constant_that_is_none_is_refused(tau):
+    with pytest.raises(RigError, match="time constant"):
+        lag(np.arange(3.0), np.ones(3), tau)
+
+
+def test_no_samples_are_no_samples():
+    assert lag(np.zeros(0), np.zeros(0), 1.0).shape == (0,)
+    assert wandering(np.zeros(0), 1.0, 1.0, 3, np.random.default_rng(0)).shape == (0, 3)
+
+
+def test_a_step_of_any_length_warns_of_nothing():
+    # 1e200 time constants in one step: its cube would overflow.
+    assert lag(np.array([0.0, 1e150]), np.array([0.0, 1.0]), 1e-50)[-1] == pytest.approx(1.0)

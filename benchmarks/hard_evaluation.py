@@ -1,0 +1,318 @@
+"""Hard recordings for every protocol and every installed estimator, each made by hand and evaluated from its file.
+
+The right answer of all of them: a finite score within a finite interval, or an error that says what was given, what was
+expected and the next step. Never NaN, never a hang, never a warning.
+"""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.protocols import PROTOCOLS
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.plugin import (
+    Block,
+    ChannelSpec,
+    ChannelTarget,
+    LabelTarget,
+    Quality,
+    SensorSpec,
+    Source,
+    StreamSpec,
+    TaskSpec,
+    load_registry,
+)
+from tactbench.rigs.twin.verification.hard_cases import Case, Family
+
+FORCE = StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
+QUICK: dict[str, dict[str, Any]] = {"forest": {"n_estimators": 5}}
+"""Parameters that make an estimator quick without making it another one."""
+ROLES = ("train", "validation", "test")
+
+
+@dataclass
+class Made:
+    """One recording in the making."""
+
+    X: np.ndarray
+    force: np.ndarray
+    label: str
+    role: str | None
+    session: str
+    quality: np.ndarray
+    t_ns: np.ndarray | None
+    force_t_ns: np.ndarray | None = None
+    dtype: str = "float64"
+    dropped: int = 0
+    """Rows in which some taxel has no sample."""
+    annotated: np.ndarray | None = field(default=None)
+    """(n,) labels of rows instead of one for the recording."""
+
+
+def families() -> dict[str, Family]:
+    """Return one family for each protocol and installed estimator, of each kind of task that it can do."""
+    estimators = load_registry().estimators
+    found: dict[str, Family] = {}
+    for protocol, name in itertools.product(PROTOCOLS, estimators.names()):
+        for kind in estimators[name].kinds:
+            found[f"evaluation: {protocol} x {name} ({kind})"] = partial(
+                any_data, protocol=protocol, name=name, kind=kind
+            )
+    return found
+
+
+def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
+    """Score hard data finitely, or say what is wrong with it."""
+    recordings = _ordinary(case, kind, roles_only=PROTOCOLS[protocol].roles_only)
+    hardships = [one for one in HARDSHIPS if case.chance(0.15)] or [HARDSHIPS[case.rng.integers(len(HARDSHIPS))]]
+    case.says(hardships=", ".join(one.__name__ for one in hardships))
+    for one in hardships:
+        one(case, recordings)
+    case.right = "answer" if kind == "regression" and HARMLESS.issuperset(hardships) else "either"
+    estimator = load_registry().estimators[name]
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [_written(made, Path(folder) / f"r{place}.h5") for place, made in enumerate(recordings)]
+        ticks = itertools.count()
+        splits = [None] if PROTOCOLS[protocol].roles_only else [None, "in-session", "shuffled"]
+        split = splits[case.rng.integers(len(splits))]
+        case.says(split=str(split))
+        result = evaluate(
+            _task(kind), estimator, QUICK.get(name, {}), protocol, split, paths, seed=1,
+            clock=lambda: next(ticks) * 1e-3,
+        )  # fmt: skip
+    for what, value in (("score", result.score), ("low end", result.ci_low), ("high end", result.ci_high)):
+        case.holds(np.isfinite(value), f"the {what} is {value}")
+    case.holds(result.ci_low <= result.ci_high, f"the interval runs from {result.ci_low} to {result.ci_high}")
+    case.holds(np.isfinite(list(result.scores.values())).all(), f"a score is none: {result.scores}")
+    warned = [text for text in result.counts if "RuntimeWarning" in text]
+    case.holds(not warned, f"{warned}")
+    dropped = sum(made.dropped for made in recordings)
+    told = sum(count for text, count in result.counts.items() if text.startswith("rows left out because"))
+    case.holds(told >= dropped, f"{dropped} rows have a dropout, {told} are counted")
+    if kind == "classification":
+        case.holds(0 <= result.score <= 1, f"a score of {result.score}")
+
+
+def _ordinary(case: Case, kind: str, *, roles_only: bool) -> list[Made]:
+    """Return recordings of a press: roles and more than 600 rows where the protocol wants them."""
+    taxels = int(case.rng.integers(1, 6))
+    gain = case.rng.normal(0, 30, taxels)
+    places = list(range(int(case.rng.integers(3 if roles_only else 1, 7))))
+    case.says(recordings=len(places), taxels=taxels)
+    made = []
+    for place in places:
+        n = int(case.rng.integers(620, 760)) if roles_only else int(case.rng.integers(150, 300))
+        force = np.linspace(0.0, 5.0, n)
+        X = 1000.0 + force[:, None] * gain + case.rng.normal(0, 1, (n, taxels))
+        role = ROLES[place % 3] if roles_only or len(places) > 3 else None
+        label = f"class {place // 3 % 2 if roles_only else place % 2}"
+        if kind == "classification":
+            X += 5.0 * int(label[-1])
+        t_ns = np.arange(n, dtype=np.int64) * 10_000_000
+        made.append(Made(X, force, label, role, f"s{place // 2}", np.zeros(X.shape, np.uint8), t_ns))
+    return made
+
+
+def _some(case: Case, recordings: list[Made]) -> list[Made]:
+    """Return one recording, those of one role, or all of them."""
+    which = case.rng.integers(3)
+    if which == 0:
+        return [recordings[case.rng.integers(len(recordings))]]
+    role = recordings[case.rng.integers(len(recordings))].role
+    return [made for made in recordings if which == 2 or made.role == role]
+
+
+def _taxel(case: Case, made: Made) -> int:
+    return int(case.rng.integers(made.X.shape[1]))
+
+
+def constant_taxels(case: Case, recordings: list[Made]) -> None:
+    """Hold a taxel, or all of them, at one number; 0.1 a million times has a rounding error for a deviation."""
+    column = slice(None) if case.chance(0.3) else _taxel(case, recordings[0])
+    for made in _some(case, recordings):
+        made.X[:, column] = float(case.rng.choice([0.0, 0.1, 4095.0, -1e8]))
+
+
+def collinear_taxels(case: Case, recordings: list[Made]) -> None:
+    """Make a taxel the copy, or a multiple, of another."""
+    a, b, factor = _taxel(case, recordings[0]), _taxel(case, recordings[0]), float(case.rng.choice([1.0, -1.0, 1e6]))
+    for made in recordings:
+        made.X[:, b] = factor * made.X[:, a]
+
+
+def saturated_taxels(case: Case, recordings: list[Made]) -> None:
+    """Clip at a converter's end and flag it."""
+    for made in _some(case, recordings):
+        end = np.quantile(made.X, case.uniform(0, 1))
+        made.quality |= np.where(end <= made.X, np.uint8(Quality.SATURATED), np.uint8(0))
+        np.minimum(made.X, end, out=made.X)
+
+
+def dropouts(case: Case, recordings: list[Made]) -> None:
+    """Lose samples: NaN, infinity, or a number marked as missing; one row, some, nearly all, or a whole channel."""
+    for made in _some(case, recordings):
+        share = float(case.rng.choice([0.0, 0.05, 0.5, 0.99, 1.0], p=[0.3, 0.3, 0.2, 0.1, 0.1]))
+        column = _taxel(case, made)
+        lost = case.rng.random(len(made.X)) < share
+        lost[case.rng.integers(len(lost))] = True
+        if case.chance(0.3):
+            made.quality[lost, column] |= np.uint8(Quality.MISSING)
+        else:
+            made.X[lost, column] = float(case.rng.choice([np.nan, np.inf, -np.inf]))
+        made.dropped = max(made.dropped, int(lost.sum()))
+
+
+def dropouts_of_force(case: Case, recordings: list[Made]) -> None:
+    """Lose samples of the reference force."""
+    for made in _some(case, recordings):
+        made.force[case.rng.random(len(made.force)) < case.rng.choice([0.05, 0.9, 1.0])] = np.nan
+
+
+def huge_offsets(case: Case, recordings: list[Made]) -> None:
+    """Put a unit signal on 1e8."""
+    for made in recordings:
+        made.X += case.rng.choice([1e8, -1e8, 1e10])
+
+
+def extreme_sizes(case: Case, recordings: list[Made]) -> None:
+    """Read in units from 1e-150 to 1e100."""
+    factor = case.decades(1e-150, 1e100)
+    column = slice(None) if case.chance(0.5) else _taxel(case, recordings[0])
+    for made in recordings:
+        made.X[:, column] *= factor
+
+
+def single_precision(case: Case, recordings: list[Made]) -> None:
+    """Store as float32, perhaps on an offset of 1e4."""
+    offset = float(case.rng.choice([0.0, 1e4, 1e7]))
+    for made in recordings:
+        made.X = np.where(np.isfinite(made.X), np.clip(made.X + offset, -1e38, 1e38), made.X)
+        made.dtype = "float32"
+
+
+def constant_labels(case: Case, recordings: list[Made]) -> None:
+    """Hold force and label still."""
+    for made in _some(case, recordings):
+        made.force[:] = float(case.rng.choice([0.0, 0.1, 5.0]))
+        made.label = "class 0"
+
+
+def jumping_labels(case: Case, recordings: list[Made]) -> None:
+    """Label single rows, some of them not at all."""
+    for made in _some(case, recordings):
+        made.annotated = case.rng.choice(np.array(["", "class 0", "class 1", "class 2"]), len(made.X))
+
+
+def few_rows(case: Case, recordings: list[Made]) -> None:
+    """Leave one to ten rows, fewer than any window; under the paper's protocol one to ten after its first 600."""
+    rows = int(case.rng.integers(1, 11))
+    for made in _some(case, recordings):
+        rows_kept = rows + (600 if len(made.X) > 600 and case.chance(0.8) else 0)
+        made.X, made.force, made.quality = made.X[:rows_kept], made.force[:rows_kept], made.quality[:rows_kept]
+        made.t_ns = None if made.t_ns is None else made.t_ns[:rows_kept]
+        made.force_t_ns = None if made.force_t_ns is None else made.force_t_ns[:rows_kept]
+        made.annotated = None if made.annotated is None else made.annotated[:rows_kept]
+        made.dropped = 0  # how many of those left is for the package to say
+
+
+def every_row_an_outlier(case: Case, recordings: list[Made]) -> None:
+    """Let every row leave the three-sigma band in one channel of its own: none is left."""
+    n = 12
+    taxels = max(n, max(made.X.shape[1] for made in recordings))
+    hit = _some(case, recordings)
+    for made in recordings:
+        rows = len(made.X)
+        wide = np.ones((rows, taxels))
+        wide[:, : made.X.shape[1]] = made.X
+        quality = np.zeros(wide.shape, np.uint8)
+        quality[:, : made.X.shape[1]] = made.quality
+        made.X, made.quality = wide, quality
+    for made in hit:
+        keep = slice(0, (600 if len(made.X) > 600 else 0) + n)
+        made.X, made.quality, made.force = made.X[keep], made.quality[keep], made.force[keep]
+        made.t_ns = None if made.t_ns is None else made.t_ns[keep]
+        made.force_t_ns = None if made.force_t_ns is None else made.force_t_ns[keep]
+        made.annotated = None if made.annotated is None else made.annotated[keep]
+        last = min(n, len(made.X))
+        made.X[-last:] = 1.0
+        made.X[-last:][np.arange(last), np.arange(last)] = 1e6
+        made.dropped = 0
+
+
+def strange_clocks(case: Case, recordings: list[Made]) -> None:
+    """Repeat time stamps, let them run backwards, shift the force's against the taxels', or leave the clock out."""
+    which = int(case.rng.integers(5))
+    for made in _some(case, recordings):
+        n = len(made.X)
+        if made.t_ns is None:
+            continue
+        if which == 0:
+            made.t_ns = np.repeat(made.t_ns[::3], 3)[:n]
+        elif which == 1:
+            made.t_ns = made.t_ns[::-1].copy()
+        elif which == 2:
+            made.t_ns = np.zeros(n, dtype=np.int64)
+        elif which == 3:
+            made.force_t_ns = made.t_ns + int(case.decades(1e3, 1e12))
+        else:
+            made.t_ns = made.force_t_ns = None
+
+
+def one_kind_of_session(case: Case, recordings: list[Made]) -> None:
+    """Give each session one class only, or all recordings one session."""
+    one = case.chance(0.5)
+    for made in recordings:
+        made.session = "s" if one else made.label
+
+
+Hardship = Callable[[Case, list[Made]], None]
+HARDSHIPS: tuple[Hardship, ...] = (
+    constant_taxels, collinear_taxels, saturated_taxels, dropouts, dropouts_of_force, huge_offsets, extreme_sizes,
+    single_precision, constant_labels, jumping_labels, few_rows, every_row_an_outlier, strange_clocks,
+    one_kind_of_session,
+)  # fmt: skip
+HARMLESS = frozenset(
+    (constant_taxels, collinear_taxels, saturated_taxels, huge_offsets, single_precision, one_kind_of_session)
+)
+"""What no regression may refuse: nothing that is asked for is missing."""
+
+
+def _task(kind: str) -> TaskSpec:
+    regression = kind == "regression"
+    return TaskSpec(
+        name="hard", title="Hard", question="?", kind=kind,
+        target=ChannelTarget(kind="force") if regression else LabelTarget(name="kind"),
+        metric="rmse" if regression else "macro_f1", unit="N" if regression else "",
+        protocols=tuple(PROTOCOLS), estimators=("lasso",), splits=("roles", "session", "in-session", "shuffled"),
+        baselines=("mean",),
+    )  # fmt: skip
+
+
+def _written(made: Made, path: Path) -> Path:
+    channels = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(made.X.shape[1]))
+    stream = StreamSpec(name="taxels", channels=channels, dtype=made.dtype)
+    sensor = SensorSpec(
+        name="made", title="Made by hand", principle="none", streams=(stream,),
+        principle_source=Source(tag="assumed", reference="a hard case"),
+    )  # fmt: skip
+    about = RecordingMeta(
+        name=path.stem, sensor=sensor, reference=(FORCE,), rig="made", clock="none" if made.t_ns is None else "device",
+        role=made.role, session=made.session, labels={} if made.annotated is not None else {"kind": made.label},
+    )  # fmt: skip
+    with RecordingWriter(path, about) as writer:
+        writer.append(Block("taxels", made.t_ns, made.X.astype(made.dtype), made.quality))
+        times = made.t_ns if made.force_t_ns is None else made.force_t_ns
+        writer.append(Block("force_torque", times, made.force[:, None]))
+        if made.annotated is not None:
+            writer.annotate("taxels", "kind", made.annotated)
+    return path

@@ -1,0 +1,14 @@
+"""How many threads numerical libraries may use."""
+
+from __future__ import annotations
+
+import os
+
+
+def one_thread() -> None:
+    """Keep numerical libraries at one thread, as the table's times state; before any of them is imported.
+
+    Several threads would also sum in another order on another machine. Whoever sets these variables means it.
+    """
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")

@@ -1,0 +1,144 @@
+"""``tactbench twin verify``: checks carried out, verdicts as a table."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from tactbench.core.cli.grid import print_grid, print_records
+from tactbench.core.cli.screen import progress, remark
+from tactbench.core.errors import TactbenchError, UnknownNameError, UsageError
+from tactbench.core.plugins.checks import Check, Verdict
+from tactbench.core.plugins.registry import load_object
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tactbench.core.plugins.registry import Registry
+
+Found = tuple[Check, Verdict, float]
+"""A check, one of its verdicts, and the seconds the whole check took."""
+
+_COLUMNS = ("", "check", "what", "found", "allowed", "unit", "s", "source")
+
+
+def oracle_checks(registry: Registry, rig: str) -> list[Check]:
+    """Return the rig's checks against its oracles; raises UsageError if it offers none."""
+    where = registry.rigs[rig].verification
+    if where is None:
+        raise UsageError(f"The rig {rig!r} brings no oracles.", hint="Choose another with --rig.")
+    return list(load_object(where)())
+
+
+def likeness_checks(registry: Registry, rig: str, sensors: Sequence[str], recordings: Path | None) -> list[Check]:
+    """Return the rig's checks against real sensors, for the sensors asked for or for all with measured figures.
+
+    Raises
+    ------
+    UsageError
+        If the rig brings none, or a sensor has no figures to be held against.
+    """
+    where = registry.rigs[rig].likeness
+    if where is None:
+        raise UsageError(f"The rig {rig!r} is not held against real sensors.", hint="Choose another with --rig.")
+    asked = [registry.sensors[name] for name in sensors] or [
+        sensor for sensor in registry.sensors if getattr(sensor.spec, "likeness", ())
+    ]
+    checks = [check for sensor in asked for check in load_object(where)(sensor, recordings)]
+    if not checks:
+        raise UsageError(
+            f"There are no measured figures of {', '.join(sensor.name for sensor in asked) or 'any sensor'}.",
+            hint="State them in the sensor's spec (SensorSpec.likeness).",
+        )
+    return checks
+
+
+def carry_out(checks: Sequence[Check], only: Sequence[str]) -> list[Found]:
+    """Carry out the checks, or those named or of a group named in `only`; a check that raises is a failed verdict."""
+    names = [check.name for check in checks] + [check.group for check in checks]
+    for name in only:
+        if name not in names:
+            raise UnknownNameError("check or group of checks", name, list(dict.fromkeys(names)))
+    chosen = [check for check in checks if not only or check.name in only or check.group in only]
+    found: list[Found] = []
+    with progress() as told:
+        told.begin("verify", len(chosen))
+        for check in chosen:
+            told.working(check.name)
+            began = time.perf_counter()
+            try:
+                verdicts = list(check.run())
+            except TactbenchError as error:
+                verdicts = [Verdict("carried out", math.nan, 0.0, 0.0, note=f"{error} {error.hint or ''}".strip())]
+            spent = time.perf_counter() - began
+            found += [(check, verdict, spent) for verdict in verdicts]
+            told.advance(check.name)
+    return found
+
+
+def print_verdicts(found: Sequence[Found], shape: str, *, real: bool) -> None:
+    """Print the verdicts, then on stderr how many were met."""
+    if shape != "table":
+        print_records([_record(*one) for one in found], shape)
+    else:
+        for group in dict.fromkeys(check.group for check, _, _ in found):
+            rows = [one for one in found if one[0].group == group]
+            styles = ["" if verdict.met else "red" for _, verdict, _ in rows]
+            print_grid(group, _COLUMNS, _lines(rows), numeric=("found", "s"), styles=styles)
+        for check, verdict, _ in found:
+            if not verdict.met and verdict.note:
+                remark(f"{check.name}, {verdict.name}: {verdict.note}")
+    met = sum(verdict.met for _, verdict, _ in found)
+    what = "inside what real sensors show" if real else "within their bounds"
+    remark(f"{met} of {len(found)} {what}.")
+
+
+def _lines(rows: Sequence[Found]) -> list[dict[str, str]]:
+    lines, before = [], ""
+    for check, verdict, spent in rows:
+        first = check.name != before
+        before = check.name
+        lines.append(
+            {
+                "": "ok" if verdict.met else "MISS",
+                "check": check.name if first else "",
+                "what": verdict.name,
+                "found": f"{verdict.found:.4g}",
+                "allowed": _allowed(verdict),
+                "unit": "" if verdict.unit == "1" else verdict.unit,
+                "s": f"{spent:.1f}" if first else "",
+                "source": verdict.source,
+            }
+        )
+    return lines
+
+
+def _allowed(verdict: Verdict) -> str:
+    if math.isinf(verdict.low):
+        return f"<= {verdict.high:.4g}"
+    if math.isinf(verdict.high):
+        return f">= {verdict.low:.4g}"
+    return f"{verdict.low:.4g} … {verdict.high:.4g}"
+
+
+def _record(check: Check, verdict: Verdict, spent: float) -> dict[str, Any]:
+    return {
+        "group": check.group,
+        "check": check.name,
+        "title": check.title,
+        "verdict": verdict.name,
+        "met": verdict.met,
+        "found": _finite(verdict.found),
+        "low": _finite(verdict.low),
+        "high": _finite(verdict.high),
+        "unit": verdict.unit,
+        "source": verdict.source,
+        "note": verdict.note,
+        "seconds": spent,
+    }
+
+
+def _finite(number: float) -> float | None:
+    return float(number) if math.isfinite(number) else None

@@ -1,0 +1,94 @@
+"""The cheapest rung of the ladder that keeps a tolerance."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import itertools
+
+import numpy as np
+
+from tactbench.plugin import FloatArray, RigError
+from tactbench.rigs.twin.contact.pressing import pressed
+from tactbench.rigs.twin.fidelity import FINE, RUNGS
+from tactbench.rigs.twin.synthesis import Synthesis
+
+TABLE_SHARE = 1 / 3
+"""Of a tolerance; the rung may use the rest."""
+_PROBES = (0.3, 1.0)
+"""Shares of the largest load at which neighbouring rungs are compared."""
+_MOST_KEPT = 64
+_CHOSEN: dict[bytes, tuple[str, float]] = {}
+
+
+def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
+    """Give `run` the cheapest rung that keeps the scene's tolerance, and the estimate of its error.
+
+    A rung's error is estimated by what the next one says otherwise at two loads, in the worst channel. The last rung
+    has no next: halving a grid's cells at least halves its error, so that its error is at most what it changed.
+
+    Raises
+    ------
+    RigError
+        If no rung keeps the tolerance; the message has the best there is.
+    """
+    tolerance = run.scene.simulation.tolerance
+    if tolerance is None:
+        return
+    # The place of a recording's contact scatters by a tenth of a millimetre: that changes no rung's error much.
+    spec, radius = run.sensor.model_dump_json(), run.contact.radius_mm
+    text = f"{spec}|{radius}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}"
+    key = hashlib.blake2b(text.encode(), digest_size=16).digest()
+    if key not in _CHOSEN:
+        if len(_CHOSEN) >= _MOST_KEPT:
+            _CHOSEN.pop(next(iter(_CHOSEN)))
+        _CHOSEN[key] = _cheapest(run, names, largest_n, tolerance)
+    run.rung, run.rung_error = _CHOSEN[key]
+    run.fidelity = dataclasses.replace(RUNGS[run.rung], most_nodes=FINE.most_nodes)
+
+
+def rung_errors(run: Synthesis, names: list[str], largest_n: float) -> dict[str, float]:
+    """Return what each rung that does this skin is off by, all of them solved; for diagnosis and diagrams."""
+    said = {name: answer for name in RUNGS if (answer := _probed(run, names, largest_n, name)) is not None}
+    errors = {low: _apart(said[low], said[high]) for low, high in itertools.pairwise(said)}
+    last = list(said)[-1]
+    return {**errors, last: list(errors.values())[-1]}
+
+
+def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: float) -> tuple[str, float]:
+    known: dict[str, FloatArray | None] = {}
+
+    def said(name: str) -> FloatArray | None:
+        if name not in known:
+            known[name] = _probed(run, names, largest_n, name)
+        return known[name]
+
+    error = float("inf")
+    for low, high in itertools.pairwise(RUNGS):
+        own, finer = said(low), said(high)
+        if own is None or finer is None:
+            continue
+        error = _apart(own, finer)
+        if error <= (1 - TABLE_SHARE) * tolerance:
+            return low, error
+    last = list(RUNGS)[-1]
+    if error <= 2 * (1 - TABLE_SHARE) * tolerance:
+        return last, error / 2
+    raise RigError(
+        f"No rung of the ladder keeps an error of {tolerance:g} here: the finest is off by about {error / 2:.2g}.",
+        hint="Ask for a larger tolerance, or a sensor spec with more cells.",
+    )
+
+
+def _probed(run: Synthesis, names: list[str], largest_n: float, name: str) -> FloatArray | None:
+    """Return the readings at the probing loads, less those at rest; None if the rung does not do this skin."""
+    try:
+        press, read = pressed(run, names, RUNGS[name])
+    except RigError:
+        return None
+    rest = read(press(0.0))
+    return np.stack([read(press(share * largest_n)) - rest for share in _PROBES])
+
+
+def _apart(one: FloatArray, other: FloatArray) -> float:
+    return float(np.max(np.abs(one - other)))

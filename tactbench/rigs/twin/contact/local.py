@@ -1,0 +1,132 @@
+"""The cheapest rung: every cell answers for itself, as if the skin were a bed of springs (Winkler).
+
+Right for foams and thin compressible layers, where a neighbour hardly feels a neighbour; hopeless for rubber, whose
+volume has to go somewhere. So it refuses what it is known to be wrong for, instead of being quick and wrong.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactbench.plugin import BondedLayer, FloatArray, FluidBackedShell, FoamPad, RigError, SkinState
+from tactbench.rigs.twin.contact.media import Medium
+from tactbench.rigs.twin.contact.press import at_rest, contact_radius_mm
+from tactbench.rigs.twin.geometry import Contact
+
+LARGEST_POISSON = 0.4
+"""Above it springs are wrong: at 0.45 the depth is off by 19 to 27 % against the layer's own kernel, below 0.3 by 0.1
+to 19 %, least where the contact is wide beside the layer's thickness."""
+_CLOSED = 1e-12
+_STEPS = 60
+
+
+class LocalPress:
+    """Solves a load cell by cell.
+
+    Parameters
+    ----------
+    skin
+        As declared.
+    medium
+        The same on its grid.
+    gap_mm
+        (nx, ns) gap at zero approach.
+    contact
+        Where the apex is.
+
+    Raises
+    ------
+    RigError
+        For a fluid-backed skin, and for a layer whose Poisson's ratio is above 0.4.
+    """
+
+    def __init__(
+        self, skin: FluidBackedShell | FoamPad | BondedLayer, medium: Medium, gap_mm: FloatArray, contact: Contact
+    ) -> None:
+        if isinstance(skin, FluidBackedShell):
+            raise RigError(
+                "The closed-form rung does not do a skin over a fluid: what is pressed in here comes out there.",
+                hint="Use the default rung.",
+            )
+        if isinstance(skin, BondedLayer) and skin.poisson.to("1") > LARGEST_POISSON:
+            raise RigError(
+                f"The closed-form rung does not do a layer with Poisson's ratio {skin.poisson.to('1'):g}: above "
+                f"{LARGEST_POISSON} it would be off by a fifth in depth and a factor in force.",
+                hint="Use the default rung.",
+            )
+        self.medium = medium
+        self.contact = contact
+        self.touched_core = False
+        self.solves = 0
+        self._gap = gap_mm
+        self._least_gap = float(gap_mm.min())
+        self._springs = float(medium.stiffness[0, 0])
+        self._depth = self._least_gap + 0.02
+        self._cell = float(np.prod(medium.grid.cell_mm))
+
+    def __call__(self, force_n: float) -> SkinState:
+        """Return the skin under `force_n`; at zero force it is at rest.
+
+        The force grows ever faster with the approach (the contact widens, foam hardens), so that Newton's steps from
+        above the solution cannot miss it.
+        """
+        if force_n <= 0:
+            return at_rest(self.medium)
+        self.solves += 1
+        depth = self._depth
+        deflection, pressure, slope = self._pushed(depth)
+        while self._cell * pressure.sum() < force_n:
+            depth = self._least_gap + 2 * (depth - self._least_gap)
+            deflection, pressure, slope = self._pushed(depth)
+        for _ in range(_STEPS):
+            excess = self._cell * pressure.sum() - force_n
+            if abs(excess) <= _CLOSED * force_n:
+                break
+            depth -= excess / (self._cell * slope)
+            deflection, pressure, slope = self._pushed(depth)
+        residual = abs(self._cell * float(pressure.sum()) - force_n) / force_n
+        if residual > 1e-8:
+            raise RigError(
+                f"The closed-form rung left a force balance of {residual:.1e} at {force_n:g} N.",
+                hint="Use the default rung, or check the skin's parameters.",
+            )
+        self._depth = depth
+        return SkinState(
+            grid=self.medium.grid,
+            force_n=force_n,
+            deflection_mm=deflection,
+            pressure_mpa=pressure,
+            thickness_mm=self.medium.thickness_mm(deflection),
+            depth_mm=depth - self._least_gap,
+            fluid_pressure_mpa=0.0,
+            contact_radius_mm=contact_radius_mm(self.medium.grid, self.contact, pressure),
+            residual=residual,
+        )
+
+    def closing_at(self, force_n: float) -> float:
+        """Return minus infinity: there is no core."""
+        return -np.inf
+
+    def closing_mm(self, state: SkinState) -> float:
+        """Return minus infinity: there is no core."""
+        return -np.inf
+
+    def _pushed(self, depth: float) -> tuple[FloatArray, FloatArray, float]:
+        """Return deflection, contact pressure and the summed stiffness at an approach of `depth`.
+
+        Each cell's spring stands in series with the contact's own stiffness; its law hardens, so that Newton's steps
+        from the stiff side fall monotonically to the balance.
+        """
+        push, stiffness = np.maximum(depth - self._gap, 0.0), self.medium.contact_stiffness
+        deflection, tangent = push.copy(), np.empty_like(push)
+        for _ in range(_STEPS):
+            carried, _ = self.medium.respond(deflection, tangent)
+            carried += self._springs * deflection
+            tangent += self._springs
+            step = (carried - stiffness * (push - deflection)) / (tangent + stiffness)
+            deflection -= step
+            if float(np.abs(step).max()) <= _CLOSED * max(float(push.max()), 1e-300):
+                break
+        pressure: FloatArray = stiffness * (push - deflection)
+        series = stiffness * tangent / (tangent + stiffness)
+        return deflection, pressure, float(series[push > 0].sum())

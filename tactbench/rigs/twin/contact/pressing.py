@@ -1,0 +1,95 @@
+"""What presses one recording's skin at a given fidelity, and what reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tactbench.plugin import (
+    FloatArray,
+    FluidBackedShell,
+    NotApplicable,
+    PluginContractError,
+    RigError,
+    SensorDescriptor,
+    SkinGrid,
+    SkinState,
+    load_object,
+)
+from tactbench.rigs.twin.contact.media import Medium
+from tactbench.rigs.twin.contact.press import AnyPress, Press
+from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.fidelity import Fidelity
+from tactbench.rigs.twin.geometry import gap_mm, skin_grid
+from tactbench.rigs.twin.synthesis import Synthesis
+
+Read = Callable[[SkinState], FloatArray]
+
+
+def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPress, Read]:
+    """Return what solves the loads of `run` and what reads the channels in `names` from a solved skin.
+
+    Raises
+    ------
+    NotApplicable
+        If the sensor has no skin or transducer, or its transducer cannot give a channel.
+    RigError
+        If this rung is known to be wrong for this skin.
+    """
+    spec, skin = run.sensor.spec, run.sensor.spec.skin
+    if skin is None or run.sensor.transducer is None:
+        raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
+    grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
+    outer = skin.sheet.outer_radius
+    gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"))
+    read = _reader(run.sensor, grid, names, fidelity) if names else no_channels
+    if fidelity.solver == "local":
+        from tactbench.rigs.twin.contact.local import LocalPress
+
+        return LocalPress(skin, medium_of(skin, grid), gap, run.contact), read
+    core: Callable[[Medium], Medium] | None = None
+    if "core" in run.lent and isinstance(skin, FluidBackedShell):
+        where = run.lent["core"]
+
+        def core(medium: Medium) -> Medium:
+            made: Medium = load_object(where)(medium, skin)
+            return made
+
+    press = Press(
+        medium_of(skin, grid),
+        gap,
+        run.contact,
+        core=core,
+        fluid_pressure=run.fluid_pressure,
+        tolerance=fidelity.newton_tolerance,
+    )
+    return press, read
+
+
+def _reader(
+    sensor: SensorDescriptor, grid: SkinGrid, names: list[str], fidelity: Fidelity
+) -> Callable[[SkinState], FloatArray]:
+    """Return the sensor's transducer, each of its answers looked at before it is used."""
+    try:
+        factory = load_object(sensor.transducer or "")
+        transducer = factory(sensor.spec, grid, names, **fidelity.options(factory))
+    except RigError as error:
+        raise NotApplicable(f"The transducer of {sensor.name} cannot answer: {error}", hint=error.hint) from error
+
+    def read(state: SkinState) -> FloatArray:
+        readings = np.asarray(transducer(state), dtype=np.float64)
+        if readings.shape != (len(names),) or not np.all(np.isfinite(readings)):
+            raise PluginContractError(
+                f"The transducer of {sensor.name} returned shape {readings.shape} at {state.force_n:g} N; "
+                f"expected ({len(names)},) finite readings.",
+                hint="Return one finite number for each wanted channel.",
+            )
+        return readings
+
+    return read
+
+
+def no_channels(state: SkinState) -> FloatArray:
+    """Return depth, contact radius and fluid pressure: what is looked at when no channel is."""
+    return np.array([state.depth_mm, state.contact_radius_mm, state.fluid_pressure_mpa])

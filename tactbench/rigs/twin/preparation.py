@@ -1,0 +1,118 @@
+"""From a scene to a recording in the making: its clocks, its load, its place; nothing simulated yet."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from tactbench.plugin import (
+    ChannelSpec,
+    FloatArray,
+    NotApplicable,
+    RigError,
+    Scene,
+    SensorDescriptor,
+    SensorSpec,
+)
+from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity, rung
+from tactbench.rigs.twin.geometry import Contact, radius_mm
+from tactbench.rigs.twin.planner import Plan
+from tactbench.rigs.twin.stated_numbers import MOST_SAMPLES, check_numbers
+from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
+
+_OWN_CLOCK_FROM = 2.0
+"""A stream this many times faster than the sensor's slowest keeps its own clock: it is there to see fast things."""
+
+
+def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidelity: Fidelity = DEFAULT) -> Synthesis:
+    """Return the recording of `scene` before any effect is applied.
+
+    Raises
+    ------
+    RigError
+        If a number of the scene is none, or its force profile or its clocks cannot be carried out.
+    NotApplicable
+        If the sensor declares no skin.
+    """
+    check_numbers(scene)
+    t_s, load = _load(scene)
+    run = Synthesis(
+        sensor=sensor,
+        scene=scene,
+        seed=seed,
+        t_s=t_s,
+        load=load,
+        tracks=tuple(_tracks(sensor.spec, scene, plan, t_s, load)),
+        contact=Contact(radius_mm(scene.indenter), 0.0, 0.0),
+        reference_n=load.at(t_s),
+        lent=dict(plan.lent),
+        fidelity=fidelity if scene.simulation.rung is None else rung(scene.simulation.rung),
+    )
+    run.contact = _place(run)
+    return run
+
+
+def _load(scene: Scene) -> tuple[FloatArray, Load]:
+    """Return the reference clock and the true force: held at the start, then straight to the end."""
+    profile = scene.profile
+    duration, hold = profile.duration.to("s"), profile.hold.to("s")
+    start, end = profile.start.to("N"), profile.end.to("N")
+    if not duration > 0 or hold < 0 or min(start, end) < 0:
+        raise RigError(
+            f"The scene {scene.name!r} asks for a ramp from {start:g} to {end:g} N within {duration:g} s after "
+            f"{hold:g} s of rest.",
+            hint="Duration must be positive, hold and forces at least zero.",
+        )
+    t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (duration / profile.samples)
+    if hold >= duration:
+        return t_s, Load(np.array([0.0, duration]), np.array([start, start]))
+    return t_s, Load(np.array([0.0, hold, duration]), np.array([start, start, end]))
+
+
+def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: Load) -> Iterator[Track]:
+    """Yield the channels on the reference clock, then those of every stream that keeps its own."""
+    duration = scene.profile.duration.to("s")
+    slowest = min((stream.rate_hz for stream in spec.streams if stream.rate_hz is not None), default=math.inf)
+    slow = tuple(stream for stream in spec.streams if (stream.rate_hz or 0.0) < _OWN_CLOCK_FROM * slowest)
+    for clock, streams in (("", slow), *((stream.name, (stream,)) for stream in spec.streams if stream not in slow)):
+        channels = tuple(channel for stream in streams for channel in stream.channels if channel.kind in plan.kinds)
+        if not channels:
+            continue
+        rate = streams[0].rate_hz if clock else None
+        if rate is not None and not duration * rate <= MOST_SAMPLES:
+            raise RigError(
+                f"The stream {clock} would have {duration * rate:.2g} samples: {duration:g} s at {rate:g} Hz.",
+                hint=f"Up to {MOST_SAMPLES} fit into memory: shorten the scene, or observe slower channels.",
+            )
+        own = t_s if rate is None else np.arange(math.ceil(duration * rate), dtype=np.float64) / rate
+        yield Track(
+            clock=clock,
+            channels=channels,
+            t_s=own,
+            force_n=load.at(own),
+            readings=np.tile([_rest(channel) for channel in channels], (own.size, 1)),
+            quality=np.zeros((own.size, len(channels)), dtype=np.uint8),
+        )
+
+
+def _rest(channel: ChannelSpec) -> float:
+    return 0.0 if channel.rest is None else channel.rest.to(channel.unit)
+
+
+def _place(run: Synthesis) -> Contact:
+    """Return where the indenter meets the skin: nominal point, commanded offset, and this mounting's own scatter."""
+    placement, spec = run.scene.placement, run.sensor.spec
+    if spec.skin is None:
+        raise NotApplicable(f"{spec.name} declares no skin.")
+    sheet = spec.skin.sheet
+    middle = (sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2
+    nominal_x = spec.parameters["contact_x"].to("mm") if "contact_x" in spec.parameters else middle
+    nominal_s = spec.parameters["contact_s"].to("mm") if "contact_s" in spec.parameters else 0.0
+    scatter = placement.scatter.to("mm")
+    off_x, off_s = scatter * run.of_recording("placement").standard_normal(2)
+    x, s = nominal_x + placement.x.to("mm") + off_x, nominal_s + placement.s.to("mm") + off_s
+    run.drawn.update(placement_x_mm=float(x), placement_s_mm=float(s))
+    tilt_x, tilt_s = (math.tan(tilt.to("rad")) for tilt in (placement.tilt_x, placement.tilt_s))
+    return Contact(run.contact.radius_mm, float(x), float(s), tilt_x, tilt_s)

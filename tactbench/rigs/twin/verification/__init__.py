@@ -1,0 +1,1 @@
+"""The simulation held against what must be true."""

@@ -1,0 +1,177 @@
+"""Hard skins: moduli over four decades, rubber that keeps its volume, foam gone solid, a film that closes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tactbench.plugin import FluidBackedShell, FoamPad, Quantity
+from tactbench.plugin import Skin as AnySkin
+from tactbench.rigs.twin.contact.foam import CUT_OVER, Foam
+from tactbench.rigs.twin.contact.press import Press
+from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.geometry import skin_grid
+from tactbench.rigs.twin.verification.hard_cases import Case, Family
+from tactbench.rigs.twin.verification.hard_contact import SOLVED, draw_contact, draw_skin, lawful, press_of, skins
+
+_STIFFNESSES = (
+    "young", "shear", "tension", "cover_tension", "cover_bending", "contact_stiffness", "core_stiffness",
+    "clamp_stiffness",
+)  # fmt: skip
+"""Everything in a skin that is measured in newtons."""
+_ABOVE_ZERO = ("young", "thickness", "mid_radius", "contact_stiffness", "gap", "densification")
+
+
+def _changed(skin: AnySkin, **values: float) -> AnySkin:
+    old: dict[str, Quantity] = {name: getattr(skin, name) for name in values}
+    return skin.model_copy(
+        update={name: old[name].model_copy(update={"value": value}) for name, value in values.items()}
+    )
+
+
+def scaled_moduli(case: Case) -> None:
+    """Give the same depth when all stiffnesses and the load are multiplied alike, over four decades."""
+    skin = draw_skin(case)
+    factor, load = case.decades(1e-2, 1e2), case.decades(1e-3, 5.0)
+    case.says(factor=factor)
+    own = [name for name in _STIFFNESSES if hasattr(skin, name)]
+    other = _changed(skin, **{name: factor * getattr(skin, name).value for name in own})
+    contact = draw_contact(case, skin, case.decades(5.0, 100.0))
+    plain = lawful(case, press_of(skin, contact), [load])[0].depth_mm
+    found = lawful(case, press_of(other, contact), [factor * load])[0].depth_mm
+    case.holds(abs(found / plain - 1) <= 2 * SOLVED, f"depth {found!r} mm, unscaled {plain!r} mm")
+
+
+def one_modulus(case: Case) -> None:
+    """Solve a skin one of whose stiffnesses is multiplied over four decades."""
+    skin = draw_skin(case)
+    name = case.one_of(*[name for name in _STIFFNESSES if hasattr(skin, name)])
+    factor = case.decades(1e-2, 1e2)
+    case.says(stiffness=name, factor=factor)
+    contact = draw_contact(case, skin, case.decades(5.0, 100.0))
+    loads = sorted(case.decades(1e-3, 5.0) for _ in range(2))
+    lawful(case, press_of(_changed(skin, **{name: factor * getattr(skin, name).value}), contact), loads)
+
+
+def any_poisson_ratio(case: Case) -> None:
+    """Solve rubber up to Poisson's ratio 1/2 exactly; refuse ratios above it and below 0.
+
+    Within 1e-9 of 1/2 the layer is as deep as at 1/2, to 1 in 1000: the lubrication limit is met, not jumped to.
+    """
+    skin = skins()[case.one_of("ideal", "biotac")]
+    below = case.decades(1e-12, 0.5)
+    ratio = (0.5 - below, 0.5, 0.5 + below, -below)[case.rng.choice(4, p=[0.6, 0.2, 0.1, 0.1])]
+    case.says(medium=skin.medium, poisson=ratio)
+    case.right = "answer" if 0 <= ratio <= 0.5 else "refusal"
+    contact = draw_contact(case, skin, case.decades(5.0, 100.0), margin=0.4)
+    load = case.decades(1e-3, 5.0)
+    state = lawful(case, press_of(_changed(skin, poisson=ratio), contact), [load])[0]
+    if 0.5 - ratio < 1e-9:
+        limit = press_of(_changed(skin, poisson=0.5), contact)(load).depth_mm
+        case.holds(abs(state.depth_mm / limit - 1) <= 1e-3, f"depth {state.depth_mm!r} mm, at 1/2 {limit!r} mm")
+
+
+def foam_gone_solid(case: Case) -> None:
+    """Stay finite, balanced and monotone far beyond densification; keep the law convex, and its energy's slope."""
+    skin = skins()["icub"]
+    if not isinstance(skin, FoamPad):
+        return
+    limit, thickness = case.decades(0.05, 1.0), case.decades(0.5, 5.0)
+    case.says(densification=limit, thickness_mm=thickness)
+    changed = _changed(skin, densification=limit, thickness=thickness)
+    press = press_of(changed, draw_contact(case, skin, case.decades(8.0, 1e3)))
+    lawful(case, press, sorted(case.decades(1e-3, 500.0) for _ in range(3)))
+    law = Foam(1.0, limit, np.ones((1, 400)))
+    share = np.sort(case.rng.uniform(-3.0, 3.0, 400))
+    share[:3] = (-CUT_OVER, 0.0, CUT_OVER)
+    u = np.sort(share)[None, :] * limit
+    tangent = np.empty_like(u)
+    pressure, _ = law(u, tangent)
+    case.holds(np.isfinite(pressure).all() and np.all(np.diff(pressure) >= 0) and np.all(tangent > 0), "no convex law")
+    step = 1e-6 * limit
+    # Central difference of one cell's energy: second order in the step; its rounding, 1e-16 of the energy, over it.
+    one = Foam(1.0, limit, np.ones((1, 1)))
+    at = float(u[0, case.rng.integers(u.size)])
+    up, down = (one(np.array([[at + side * step]]), np.empty((1, 1)))[1] for side in (1, -1))
+    slope = float(one(np.array([[at]]), np.empty((1, 1)))[0][0, 0])
+    energy = one(np.array([[at]]), np.empty((1, 1)))[1]
+    near = 1e-4 * abs(slope) + 1e-15 * energy / step + 1e-9
+    case.holds(
+        abs((up - down) / (2 * step) - slope) <= near, f"energy's slope {(up - down) / (2 * step)!r}, not {slope!r}"
+    )
+
+
+def film_that_closes(case: Case) -> None:
+    """Never thin the film below what asperities keep open, nor jump in depth, around touch-down.
+
+    Below the load that closes it, the core changes nothing.
+    """
+    name = next(name for name, skin in sorted(skins().items()) if isinstance(skin, FluidBackedShell))
+    skin = skins()[name]
+    if not isinstance(skin, FluidBackedShell):
+        return
+    contact = draw_contact(case, skin, case.decades(4.0, 40.0), margin=0.4)
+    press = press_of(skin, contact)
+    low, high = 0.0, 6.0
+    if press.closing_at(high) > 0:
+        while high - low > 1e-3:
+            middle = (low + high) / 2
+            low, high = (low, middle) if press.closing_at(middle) > 0 else (middle, high)
+    loads = [max(low, 1e-2), high, high * 1.01]
+    states = lawful(case, press_of(skin, contact), loads)
+    for state in states:
+        case.holds(state.thickness_mm.min() >= skin.residual_film.to("mm"), f"no film is left at {state.force_n:g} N")
+    jump = states[1].depth_mm - states[0].depth_mm
+    # Depth grows no faster than in proportion to the load (it is concave in it, from zero); 1e-6 N of slack.
+    most = states[0].depth_mm * ((loads[1] + 1e-6) / loads[0] - 1) + SOLVED
+    case.holds(jump <= most, f"depth jumps by {jump:g} mm from {loads[0]:g} to {loads[1]:g} N")
+    bare = Press(medium_of(skin, skin_grid(skin.sheet)), press.gap_mm, contact)(loads[0])
+    if bare.thickness_mm.min() > skin.residual_film.to("mm"):
+        without = bare.depth_mm
+        case.holds(
+            abs(states[0].depth_mm / without - 1) <= SOLVED, f"{states[0].depth_mm!r} mm, coreless {without!r} mm"
+        )
+
+
+def impossible_skins(case: Case) -> None:
+    """Refuse zero, less, infinity and no number where a skin needs one above zero."""
+    skin = draw_skin(case)
+    name = case.one_of(*[name for name in _ABOVE_ZERO if hasattr(skin, name)])
+    value = (0.0, -case.decades(1e-6, 1e6), math.nan, math.inf)[case.rng.integers(4)]
+    case.says(parameter=name, value=value)
+    case.right = "refusal"
+    press_of(_changed(skin, **{name: value}), draw_contact(case, skin, 10.0))(1.0)
+
+
+def half_stated_skins(case: Case) -> None:
+    """Refuse no number, infinity and less than zero where a skin allows zero: tension, shear, cover, clamp."""
+    skin = draw_skin(case)
+    names = [name for name in ("poisson", *_STIFFNESSES, "residual_film", "clamp_length") if hasattr(skin, name)]
+    name = case.one_of(*names)
+    value = (math.nan, math.inf, -case.decades(1e-6, 1e6))[case.rng.integers(3)]
+    case.says(parameter=name, value=value)
+    case.right = "refusal"
+    press_of(_changed(skin, **{name: value}), draw_contact(case, skin, 5.0, margin=0.45))(5.0)
+
+
+def impossible_sheets(case: Case) -> None:
+    """Refuse a sheet without area, without a radius or with hardly a cell."""
+    skin = draw_skin(case)
+    contact = draw_contact(case, skin, 10.0)
+    name = case.one_of("x_max", "arc", "outer_radius", "cells")
+    wrong: object
+    if name == "cells":
+        wrong = (int(case.rng.integers(-3, 4)), int(case.rng.integers(0, 100)))
+    else:
+        value = (-math.inf, 0.0 if name != "x_max" else -1e3, math.nan, -case.decades(1e2, 1e6))[case.rng.integers(4)]
+        wrong = skin.sheet.x_max.model_copy(update={"value": value})
+    case.says(sheet=name, value=str(wrong))
+    case.right = "refusal"
+    press_of(skin.model_copy(update={"sheet": skin.sheet.model_copy(update={name: wrong})}), contact)(1.0)
+
+
+FAMILIES: tuple[Family, ...] = (
+    scaled_moduli, one_modulus, any_poisson_ratio, foam_gone_solid, film_that_closes, impossible_skins,
+    half_stated_skins, impossible_sheets,
+)  # fmt: skip

@@ -1,0 +1,192 @@
+"""The twin's work-precision diagram: rungs, grids and sizes of the load table, error against seconds per recording."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from tactbench.plugin import (
+    ChannelKind,
+    CostJob,
+    CostPoint,
+    CostStudy,
+    FloatArray,
+    FluidBackedShell,
+    Indenter,
+    Placement,
+    RigError,
+    Scalar,
+    Scene,
+    SensorDescriptor,
+    assumed,
+    load_registry,
+)
+from tactbench.rigs.twin.contact.pressing import pressed
+from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, forget_tables, skin_under_load
+from tactbench.rigs.twin.fidelity import DEFAULT, FINE, RUNGS, Fidelity
+from tactbench.rigs.twin.planner import Plan, plan_scene
+from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.synthesis import Synthesis
+
+RADII_MM = (5.0, 40.0)
+"""The sharpest and the bluntest cap of the paper: what lies between them is between them."""
+LOADS = 12
+"""Loads at which readings are compared; drawn between the table's nodes, where interpolation errs most."""
+GRIDS = (0.5, 0.75, 1.0, 1.5, 2.0)
+NODES = (11, 16, 32)
+"""Most nodes of a table; it stops earlier where noise hides the rest, and never has fewer than 11."""
+ROUNDS = 5
+
+
+def study(sensor: SensorDescriptor, clock: Callable[[], float] = time.process_time) -> CostStudy:
+    """Return the diagram of one sensor, still to be measured.
+
+    Raises
+    ------
+    RigError
+        If the sensor cannot be simulated.
+    """
+    if sensor.spec.skin is None or sensor.transducer is None:
+        raise RigError(f"{sensor.name} cannot be simulated.", hint="It needs a skin and a transducer in its plugin.")
+    ways = list(_ways(sensor))
+    caps = ", ".join(f"{radius:g}" for radius in RADII_MM)
+    return CostStudy(
+        title=f"error against time per recording (caps of {caps} mm, 5 N, 5000 samples)",
+        reference=f"Errors are against the rung 'reference' ({FINE.cells_factor:g} times as many cells each way, no "
+        f"table), at {LOADS} loads for each cap, without noise; times are CPU seconds of one thread, medians of "
+        f"{ROUNDS * len(RADII_MM)} whole recordings, nothing kept from the one before.",
+        jobs=_jobs(sensor, ways, clock),
+        total=len(ways),
+    )
+
+
+def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
+    """Yield family, label and fidelity of everything that is measured."""
+    skin = sensor.spec.skin
+    assert skin is not None
+
+    def named(family: str, fidelity: Fidelity) -> tuple[str, str, Fidelity]:
+        along, across = fidelity.cells(skin.sheet)
+        fine = f", film x{fidelity.conduction_refinement}" if fidelity.conduction_refinement != 2 else ""
+        return family, f"{family}, {along} x {across}, up to {fidelity.most_nodes} nodes{fine}", fidelity
+
+    if not isinstance(skin, FluidBackedShell):
+        for nodes in NODES[:2]:
+            yield named("closed form", dataclasses.replace(RUNGS["closed-form"], most_nodes=nodes))
+    for factor in GRIDS:
+        for nodes in NODES:
+            if factor == 1.0 or nodes == DEFAULT.most_nodes or (factor > 1.0 and nodes > DEFAULT.most_nodes):
+                aim = DEFAULT.table_tolerance_factor if nodes <= DEFAULT.most_nodes else 1 / 3
+                yield named(
+                    "newton",
+                    dataclasses.replace(DEFAULT, cells_factor=factor, most_nodes=nodes, table_tolerance_factor=aim),
+                )
+    if isinstance(skin, FluidBackedShell):
+        for refinement in (1, 3):
+            yield named("newton", dataclasses.replace(DEFAULT, conduction_refinement=refinement))
+
+
+def _jobs(
+    sensor: SensorDescriptor, ways: Sequence[tuple[str, str, Fidelity]], clock: Callable[[], float]
+) -> Iterator[CostJob]:
+    truth: dict[float, FloatArray] = {}
+    for family, label, fidelity in ways:
+        yield CostJob(label, functools.partial(_measured, sensor, family, label, fidelity, truth, clock))
+
+
+def _measured(
+    sensor: SensorDescriptor,
+    family: str,
+    label: str,
+    fidelity: Fidelity,
+    truth: dict[float, FloatArray],
+    clock: Callable[[], float],
+) -> list[CostPoint]:
+    seconds: list[float] = []
+    differences: list[FloatArray] = []
+    for radius in RADII_MM:
+        scene, plan = _planned(sensor, radius)
+        names = _names(prepare(sensor, scene, 1, plan))
+        if radius not in truth:
+            truth[radius] = _true(sensor, scene, plan, names)
+        for _ in range(ROUNDS):
+            forget_tables()
+            began = clock()
+            run = prepare(sensor, scene, 1, plan, fidelity)
+            for effect in plan.stages:
+                run.apply(effect)
+            seconds.append(clock() - began)
+        table = skin_under_load(run)
+        differences.append(table(_loads()) - table.readings[0] - truth[radius])
+    apart = np.concatenate(differences)
+    kinds = {channel.name: channel.kind for channel in sensor.spec.channels()}
+    settings: dict[str, Scalar] = {
+        "family": family,
+        "cells_factor": fidelity.cells_factor,
+        "nodes": fidelity.most_nodes,
+        "conduction_refinement": fidelity.conduction_refinement,
+    }
+    found = []
+    for kind in dict.fromkeys(kinds[name] for name in names):
+        own = apart[:, [place for place, name in enumerate(names) if kinds[name] == kind]]
+        found.append(
+            CostPoint(
+                subject=sensor.name,
+                observable=kind,
+                label=label,
+                seconds=statistics.median(seconds),
+                error=float(np.sqrt(np.mean(own**2))),
+                worst=float(np.abs(own).max()),
+                unit=next(channel.unit for channel in sensor.spec.channels(kind)),
+                floor=_noise(sensor, kind),
+                default=fidelity == DEFAULT,
+                settings=settings,
+            )
+        )
+    return found
+
+
+def _planned(sensor: SensorDescriptor, radius_mm: float) -> tuple[Scene, Plan]:
+    present = {channel.kind for channel in sensor.spec.channels()}
+    fluid = isinstance(sensor.spec.skin, FluidBackedShell)
+    wanted: tuple[ChannelKind, ...] = ("taxel", "dc_pressure") if fluid and "dc_pressure" in present else ("taxel",)
+    scene = Scene(
+        name=f"cost-{radius_mm:g}",
+        indenter=Indenter(radius=assumed(radius_mm, "mm", "an end of the paper's range")),
+        placement=Placement(scatter=assumed(0.0, "mm", "the same contact for every way")),
+        observe=wanted,
+    )
+    return scene, plan_scene(tuple(load_registry().effects), scene, sensor.spec)
+
+
+def _names(run: Synthesis) -> list[str]:
+    return [channel.name for track in run.tracks for channel in track.channels if channel.kind in READ_FROM_THE_SKIN]
+
+
+def _loads() -> FloatArray:
+    # The golden ratio's multiples fill an interval evenly and never fall on a table's nodes.
+    places = (0.5 + np.arange(1, LOADS + 1) * (math.sqrt(5) - 1) / 2) % 1.0
+    return np.asarray(5.0 * np.sort(places), dtype=np.float64)
+
+
+def _true(sensor: SensorDescriptor, scene: Scene, plan: Plan, names: list[str]) -> FloatArray:
+    """Return the (loads, channels) changes of the reference, each load solved by itself."""
+    run = prepare(sensor, scene, 1, plan, FINE)
+    run.fluid_pressure = "dc_pressure" in scene.observe
+    press, read = pressed(run, names, FINE)
+    rest = read(press(0.0))
+    return np.stack([read(press(float(load))) - rest for load in _loads()])
+
+
+def _noise(sensor: SensorDescriptor, kind: ChannelKind) -> float:
+    """Return the standard deviation of white noise and rounding; infinity without any."""
+    nuisances = sensor.spec.nuisances.get(kind)
+    if nuisances is None:
+        return math.inf
+    return math.hypot(nuisances.white.value, nuisances.step.value / 12**0.5) or math.inf

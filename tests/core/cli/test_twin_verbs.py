@@ -1,0 +1,63 @@
+"""``twin explain``, ``twin verify`` and ``cost`` as a person meets them."""
+
+import json
+
+import pytest
+
+from tests.core.cli.test_screens import assert_one_clear_screen
+
+
+def test_a_plan_is_explained_with_reasons_costs_and_bounds(shell):
+    done = shell("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1", "--format", "json")
+    rows = {row["effect"]: row for row in json.loads(done.stdout)}
+    assert rows["contact"]["included"]
+    assert rows["contact"]["cost_s"] > 0
+    assert not rows["core"]["included"]
+    assert rows["core"]["change"] == 0
+    assert all(row["reason"] for row in rows.values())
+    assert rows["creep"]["scenes"] == 3
+
+
+def test_what_was_asked_for_shows(shell):
+    words = ("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "0", "--format", "csv")
+    done = shell(*words, "--effects", "-drift,+fluid-pressure")
+    lines = {line.split(",")[4]: line for line in done.stdout.splitlines()}
+    assert ",True,True,asked for" in lines["fluid-pressure"]
+    assert ',False,True,"left out as asked' in lines["wander"]
+
+
+def test_asked_effects_and_rungs_are_kept_with_the_recording(shell):
+    shell("record", "--sensor", "icub", "--out", "a.h5", "--seconds", "2", "--effects=-noise", "--rung", "closed-form")
+    shown = shell("inspect", "a.h5").stdout
+    left_out = next(line for line in shown.splitlines() if "left out:" in line)
+    assert "white-noise (asked)" in left_out
+    assert "force-noise (asked)" in left_out
+    assert "effects = -noise" in shown
+    assert "rung = closed-form" in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("twin", "explain", "--sensor", "icub", "--task", "grasp-stability"), "plans no scenes"),
+        (("twin", "explain", "--sensor", "icub", "--task", "force", "--scene", "flat-trian"), "Did you mean"),
+        (("twin", "explain", "--sensor", "icub", "--task", "force", "--rig", "replay"), "not simulated"),
+        (("twin", "verify", "--sensor", "icub"), "--real"),
+        (("twin", "verify", "--only", "omision"), "Did you mean 'omission'"),
+        (("run", "--effects", "drift"), "Write +drift or -drift"),
+        (("run", "--effects", "+creeep"), "Did you mean 'creep'"),
+        (("run", "--rung", "defaut"), "Did you mean 'default'"),
+        (("run", "--rung", "fine", "--tolerance", "1"), "give one"),
+        (("run", "--rig", "replay", "--recordings", ".", "--rung", "fine"), "for simulated rigs"),
+        (("cost",), "--twin"),
+    ],
+)
+def test_wrong_words_are_answered_with_the_next_step(shell, arguments, says):
+    assert_one_clear_screen(shell(*arguments, code=2), says)
+
+
+def test_an_oracle_can_be_run_alone(shell):
+    done = shell("twin", "verify", "--only", "omission-icub-force", "--format", "json")
+    verdicts = json.loads(done.stdout)
+    assert all(verdict["met"] for verdict in verdicts)
+    assert "2 of 2 within their bounds" in done.stderr

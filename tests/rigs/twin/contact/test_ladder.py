@@ -1,0 +1,141 @@
+"""One interface, several rungs, and the cheapest that keeps a tolerance."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import (
+    Environment,
+    ForceRamp,
+    Indenter,
+    RigContext,
+    RigError,
+    Scene,
+    SensorDescriptor,
+    Simulation,
+    UsageError,
+    assumed,
+)
+from tactbench.rigs.twin import tactbench_effects, tactbench_rigs
+from tactbench.rigs.twin.contact.local import LocalPress
+from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.fidelity import RUNGS, Fidelity, rung
+from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
+from tactbench.rigs.twin.rig import build
+
+QUIET = Environment(noise_scale=0.0, drift_scale=0.0, force_noise=assumed(0.0, "N", "test"))
+
+
+def _q(value, unit):
+    return assumed(value, unit, "test")
+
+
+def _recorded(sensor, simulation, radius=10.0):
+    scene = Scene(
+        name="a", indenter=Indenter(radius=_q(radius, "mm")), profile=ForceRamp(samples=400), environment=QUIET,
+        simulation=simulation,
+    )  # fmt: skip
+    twin = build(RigContext(effects=tuple(tactbench_effects())))
+    with twin.open(sensor, scene, seed=1) as acquisition:
+        data = acquisition.samples[acquisition.streams[0].name].data.astype(float)
+        return acquisition, data
+
+
+@pytest.fixture
+def local(layer):
+    def make(poisson, thickness=0.2, penalty=1e6):
+        skin, _ = layer(poisson, thickness=thickness, penalty=penalty, cells=192)
+        grid = skin_grid(skin.sheet)
+        contact = Contact(10.0, 0.0, 0.0)
+        return LocalPress(skin, medium_of(skin, grid), gap_mm(grid, contact), contact), skin
+
+    return make
+
+
+def test_springs_obey_the_law_of_a_thin_layer(local):
+    # F = pi E_oed R d² / h and a = sqrt(2 R d): Johnson 1985, section 5.8, for a >> h and a compressible layer.
+    press, _ = local(0.2)
+    nu = 0.2
+    oedometric = (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    for force in (1.0, 30.0):
+        state = press(force)
+        depth = math.sqrt(force * 0.2 / (math.pi * oedometric * 10.0))
+        # Cells of 0.125 mm on a contact of 1 mm radius: a hundredth; and it shrinks with the contact's growth.
+        assert state.depth_mm == pytest.approx(depth, rel=2e-2)
+        # Pressure falls as 1 - r²/a²: <r²> = a²/3, and the reported radius is sqrt(5/2 <r²>).
+        assert state.contact_radius_mm == pytest.approx(math.sqrt(2.5 / 3 * 20.0 * depth), rel=2e-2)
+
+
+@pytest.mark.parametrize("force", [1e-12, 1e-6, 0.1, 5.0, 500.0])
+def test_springs_balance_the_load_whatever_it_is(specs, force):
+    skin = specs["icub"].skin
+    grid, contact = skin_grid(skin.sheet), Contact(10.0, 0.0, 0.0)
+    press = LocalPress(skin, medium_of(skin, grid), gap_mm(grid, contact, 6.5), contact)
+    state = press(force)
+    assert float(state.pressure_mpa.sum()) * np.prod(grid.cell_mm) == pytest.approx(force, rel=1e-9)
+    assert state.depth_mm > 0
+    assert np.isfinite(state.deflection_mm).all()
+    assert state.deflection_mm.min() >= 0
+
+
+def test_springs_refuse_what_they_are_wrong_for(specs, local):
+    skin = specs["biotac"].skin
+    grid, contact = skin_grid(skin.sheet), Contact(10.0, 0.0, 0.0)
+    with pytest.raises(RigError, match="over a fluid") as refused:
+        LocalPress(skin, medium_of(skin, grid), gap_mm(grid, contact, 8.2), contact)
+    assert "default" in refused.value.hint
+    with pytest.raises(RigError, match=r"0\.45"):
+        local(0.45)
+    local(0.4)
+
+
+def test_the_rungs_offered_are_the_rungs_there_are():
+    assert tactbench_rigs()[0].rungs == tuple(RUNGS)
+    with pytest.raises(UsageError, match="finest"):
+        rung("finest")
+
+
+def test_a_recording_says_which_rung_it_was_asked_for(sensors):
+    acquisition, quick = _recorded(sensors["icub"], Simulation(rung="closed-form"))
+    _, default = _recorded(sensors["icub"], Simulation())
+    assert acquisition.assumptions["rung"] == "closed-form"
+    apart = np.abs(quick - default).max()
+    # Springs without shear or cover: they are another answer, by counts, and not another world.
+    assert 1 <= apart < 0.5 * np.ptp(default)
+
+
+def test_a_tolerance_takes_the_cheapest_rung_that_keeps_it(sensors):
+    found = {}
+    for tolerance in (40.0, 1.0, 0.1):
+        acquisition, _ = _recorded(sensors["icub"], Simulation(tolerance=tolerance))
+        found[tolerance] = acquisition.drawn
+        assert acquisition.drawn["error_estimate_count"] <= tolerance
+        assert acquisition.assumptions["tolerance_count"] == tolerance
+    order = [list(RUNGS).index(found[tolerance]["rung"]) for tolerance in (40.0, 1.0, 0.1)]
+    assert order == sorted(order)
+    assert found[40.0]["rung"] == "closed-form"
+    assert found[1.0]["rung"] == "default"
+
+
+def test_the_estimate_covers_the_true_error(sensors):
+    # Against the finest rung, which a tolerance of 1 count does not take.
+    acquisition, said = _recorded(sensors["icub"], Simulation(tolerance=1.0), radius=5.0)
+    _, finest = _recorded(sensors["icub"], Simulation(rung="reference"), radius=5.0)
+    # Both are rounded to whole counts.
+    assert np.abs(said - finest).max() <= acquisition.drawn["error_estimate_count"] + 1.0
+
+
+def test_a_tolerance_nobody_can_keep_is_refused_with_the_best_there_is(sensors):
+    with pytest.raises(RigError, match="finest is off by about") as refused:
+        _recorded(sensors["icub"], Simulation(tolerance=1e-9))
+    assert "larger tolerance" in refused.value.hint
+
+
+def test_the_fluid_backed_sensor_starts_at_the_default(sensors):
+    sensor: SensorDescriptor = sensors["biotac"]
+    with pytest.raises(RigError, match="over a fluid"):
+        _recorded(sensor, Simulation(rung="closed-form"))
+    assert isinstance(RUNGS["default"], Fidelity)
