@@ -32,8 +32,6 @@ _ABOVE_POWER = 0.75
 caps of 5 to 40 mm is 0.05 to 0.12 counts instead of 0.08 to 0.14, of 0.05 to 0.2 in the square root."""
 _LARGEST_GAP = 1.3
 """A gap between nodes is split when it is wider than this many intervals."""
-_PREDICTED = 2.0
-"""How many tolerances the nodes may miss one another by: the error between them is then about a third of that."""
 _UNSEEN = 3.0
 """Safety of the reported bound: where readings bend sharply, just above touch-down, the error between two nodes has
 been up to 2.4 times what the nodes miss one another by."""
@@ -258,7 +256,7 @@ def _refine(
         if not missed:
             return np.zeros(tolerance.size)
         bound: FloatArray = np.max(np.stack(list(missed.values())), axis=0)
-        if len(loads) >= most_nodes or np.all(bound <= _PREDICTED * tolerance):
+        if len(loads) >= most_nodes or np.all(_UNSEEN * bound <= tolerance):
             return _UNSEEN * bound
         gaps = []
         for load, difference in missed.items():
@@ -266,7 +264,7 @@ def _refine(
             low, high = max(((loads[k - 1], load), (load, loads[k + 1])), key=lambda pair: pair[1] - pair[0])
             if high - low > 2 * _NARROWEST_N and (low, high) != touch_down:
                 gaps.append((float(np.max(difference / tolerance)), low, high))
-        if not gaps or max(gaps)[0] <= _PREDICTED:
+        if not gaps or _UNSEEN * max(gaps)[0] <= 1.0:
             return _UNSEEN * bound
         _, low, high = max(gaps)
         builder.node(0.5 * (low + high))
