@@ -20,6 +20,7 @@ def tactbench_rigs() -> list[RigDescriptor]:
             title="Simulated twin",
             where=f"{_HERE}.rig:build",
             simulated=True,
+            likeness=f"{_HERE}.likeness.report:checks",
             rungs=("closed-form", "default", "fine", "reference"),
             work_precision=f"{_HERE}.work_precision:study",
             verification=f"{_HERE}.verification.everything:checks",
@@ -37,7 +38,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
             "contact", "Normal contact", "contact.stages:press_skin", ("load", "effective-force", "core"), ("skin",)
         ),
         _effect("core", "Touch-down on the core", "contact.core:with_core", (), ("core",)),
-        _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure",)),
+        _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure", "fluid")),
         _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
         _effect("transduction", "Transduction", "contact.stages:read_skin", ("skin", "gain"), ("taxel", "reading")),
         _effect(
@@ -73,12 +74,13 @@ def tactbench_effects() -> list[EffectDescriptor]:
         _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",), groups=_DRIFT),
         _effect("wander", "Free drift", "effects.wander:apply", (), ("disturbance",), groups=_DRIFT),
         _effect("white-noise", "White noise", "effects.white_noise:apply", (), ("disturbance",), groups=_NOISE),
+        *_sliding(),
         _effect("converter", "Converter", "effects.converter:apply", ("reading", "disturbance"), ("stored",)),
         _effect(
             "force-noise",
             "Noise of the force sensor",
             "effects.force_noise:apply",
-            ("load",),
+            ("load", "tangential-force"),
             ("raw-force",),
             groups=_NOISE,
         ),
@@ -90,6 +92,19 @@ def tactbench_effects() -> list[EffectDescriptor]:
             ("reference-force",),
             _FORCE,
         ),
+    ]
+
+
+def _sliding() -> list[EffectDescriptor]:
+    here = "effects.called_for_sliding"
+    forces = ("slip", "tangential-force", "reference-force")
+    shakes, hears = ("slip", "skin"), ("skin", "fluid", "vibration")
+    heard = ("ac_pressure", "reading")
+    return [
+        _effect("friction", "Friction", "effects.friction:apply", ("skin",), forces, here),
+        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", shakes, ("vibration",), here),
+        _effect("ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", hears, heard, here),
+        _effect("hum", "Hum of dynamic pressure", "effects.hum:apply", (), ("disturbance",), here, _NOISE),
     ]
 
 

@@ -157,9 +157,13 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         name=REFERENCE_STREAM,
         rate_hz=rate,
         rate_source=_ONE_CLOCK,
-        channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),),
+        channels=(
+            ChannelSpec(name="fz", kind="force", unit="N", sign=1),
+            *(channel for channel, _ in run.reference_more.values()),
+        ),
     )
-    samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), run.reference_n[:, None], None)
+    measured = np.column_stack([run.reference_n, *(values for _, values in run.reference_more.values())])
+    samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), measured, None)
     environment = run.scene.environment
     return TwinAcquisition(
         streams=tuple(streams),

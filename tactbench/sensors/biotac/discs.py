@@ -95,9 +95,9 @@ def discs_on(sensor: SensorSpec, grid: SkinGrid) -> tuple[Discs, tuple[float, fl
         axial = x if x <= 0.0 else par["dome_shortening"].value * core * np.arcsin(min(x / core, 1.0))
         centre = (float(axial), float(film * np.arctan2(y, -z)))
         electrodes.append(disc_overlap(grid.x_mm, s_film, centre, electrode_radius))
-    arc = par["excitation_arc"].to("mm") * film / core
     excitation = np.zeros((len(grid.x_mm), len(grid.s_mm)))
-    for x in (par["excitation_x_front"].to("mm"), par["excitation_x_back"].to("mm")):
+    for pair in ("front", "back"):
+        x, arc = par[f"excitation_x_{pair}"].to("mm"), par[f"excitation_arc_{pair}"].to("mm") * film / core
         for side in (-arc, arc):
             excitation += disc_overlap(grid.x_mm, s_film, (x, side), excitation_radius)
     return Discs(np.stack(electrodes), excitation, electrode_radius, excitation_radius), (dx, ds * film / outer)

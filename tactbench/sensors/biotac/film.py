@@ -51,6 +51,14 @@ def refined(grid: SkinGrid, factor: int = REFINEMENT) -> SkinGrid:
     return SkinGrid(x_mm=_refined_axis(grid.x_mm, factor), s_mm=_refined_axis(grid.s_mm, factor))
 
 
+def with_tail(grid: SkinGrid, tail_mm: float) -> tuple[SkinGrid, int]:
+    """Return the grid with cells added before its first, and how many: the least that cover `tail_mm`."""
+    dx, _ = grid.cell_mm
+    added = int(np.ceil(tail_mm / dx - 1e-9))
+    before = grid.x_mm[0] - dx * np.arange(added, 0, -1)
+    return SkinGrid(x_mm=np.concatenate([before, grid.x_mm]), s_mm=grid.s_mm), added
+
+
 def _refined_axis(centres: FloatArray, factor: int) -> FloatArray:
     step = float(centres[1] - centres[0])
     edge = float(centres[0]) - step / 2

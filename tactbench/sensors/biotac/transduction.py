@@ -1,6 +1,6 @@
 """From skin states to the BioTac's counts: film, conduction, divider; and the fluid's pressure.
 
-It gives the 19 electrodes and PDC. TDC and TAC are not read from the skin: the twin's effects of heat give them.
+It gives the 19 electrodes and PDC. TDC, TAC and PAC are not read from the skin: effects of the twin give them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, RigError, SensorSpec, SkinGrid, SkinState
 from tactbench.sensors.biotac.discs import discs_on, shell_of
 from tactbench.sensors.biotac.electrodes import NAMES
-from tactbench.sensors.biotac.film import REFINEMENT, film_at_rest, refined, spectral_interpolation
+from tactbench.sensors.biotac.film import REFINEMENT, film_at_rest, refined, spectral_interpolation, with_tail
 from tactbench.sensors.biotac.sheet import TOLERANCE, FilmSheet
 
 NEIGHBOURS = 2
@@ -26,9 +26,12 @@ class Preparation:
     def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
         self.skin = shell_of(sensor)
         self.coarse_film = film_at_rest(self.skin, grid.s_mm)[None, :]
-        fine = refined(grid, refinement)
+        fine, tail = with_tail(refined(grid, refinement), sensor.parameters["film_tail"].to("mm"))
         self.film = np.broadcast_to(film_at_rest(self.skin, fine.s_mm), (len(fine.x_mm), len(fine.s_mm))).copy()
-        self.to_fine_x = spectral_interpolation(len(grid.x_mm), refinement)
+        # Behind the sheet the skin is not pressed: no deflection.
+        self.to_fine_x = np.vstack(
+            [np.zeros((tail, len(grid.x_mm))), spectral_interpolation(len(grid.x_mm), refinement)]
+        )
         self.to_fine_s = np.ascontiguousarray(spectral_interpolation(len(grid.s_mm), refinement).T)
         self.residual_film = self.skin.residual_film.to("mm")
         discs, cell_mm = discs_on(sensor, fine)

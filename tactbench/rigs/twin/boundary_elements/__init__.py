@@ -1,0 +1,1 @@
+"""Boundary elements: the rung of the contact ladder that the others are held against (see ``docs/contact.md``)."""

@@ -1,0 +1,36 @@
+"""How an elastic layer, bonded to a rigid base and frictionless on top, answers a wave of pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactbench.plugin import FloatArray
+
+_SERIES_BELOW = 0.35
+"""Below this q the numerator is summed as a series: sinh y - y would cancel."""
+_TERMS = 8
+
+
+def compliance_shape(q: FloatArray, poisson: float) -> FloatArray:
+    """Return ``M(q)``, the compliance of the layer relative to a half-space, for ``q = k h``.
+
+    ``M = [(3-4nu) sinh 2q - 2q] / [(3-4nu) cosh 2q + 2q² + 5 - 12nu + 8nu²]``: 1 for short waves,
+    ``q (1-2nu) / (2 (1-nu)²)`` for long ones (Winkler), ``2 q³ / 3`` for an incompressible layer. Valid for every
+    q >= 0 and 0 <= nu <= 1/2. A wave of pressure of amplitude p sinks by ``2 M p / (E* k)``.
+    """
+    q = np.asarray(q, dtype=np.float64)
+    a, c = 3 - 4 * poisson, 5 - 12 * poisson + 8 * poisson**2
+    small = q < _SERIES_BELOW
+    y = 2 * np.where(small, q, 0.0)
+    term = y**3 / 6
+    series = term.copy()
+    for n in range(2, _TERMS + 1):
+        term = term * y**2 / ((2 * n) * (2 * n + 1))
+        series += term
+    # (3-4nu) sinh y - y = (3-4nu) (sinh y - y) + (2-4nu) y, whose last factor is exactly 0 at nu = 1/2.
+    low = (a * series + (2 - 4 * poisson) * y) / (a * np.cosh(y) + y**2 / 2 + c)
+    big = np.where(small, 1.0, q)
+    decay, decay2 = np.exp(-2 * big), np.exp(-4 * big)
+    high = (a * (1 - decay2) / 2 - 2 * big * decay) / (a * (1 + decay2) / 2 + (2 * big**2 + c) * decay)
+    shape: FloatArray = np.where(small, low, high)
+    return shape
