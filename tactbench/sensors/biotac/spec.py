@@ -63,7 +63,7 @@ PARAMETERS: dict[str, Quantity] = {
     "film_radius": derived(5.965, "mm", f"half way between core 5.33 and inner skin 6.6 mm; {_MESH}"),
     "dome_shortening": assumed(0.75, "1", "meridian arc of the dome, shortened to keep electrode 7 on the sheet"),
     "conductivity": assumed(
-        1.215, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
+        1.225, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
     ),
     "reference_resistor": sourced(10e3, "ohm", f"10 kOhm; {MANUAL}"),
     "electrode_radius": assumed(0.6, "mm", "no source"),
@@ -72,7 +72,9 @@ PARAMETERS: dict[str, Quantity] = {
     "excitation_x_back": derived(-15.9, "mm", f"24.48 mm on the map; {_EXCITATION}"),
     "excitation_arc_front": derived(6.85, "mm", f"arc on the core, 6.45 mm on the map: 77 degrees; {_EXCITATION}"),
     "film_tail": assumed(
-        3.5, "mm", "film behind the skin that can be pressed, where the rear excitations are: it stays as at rest"
+        10 / 3,
+        "mm",
+        "film behind the skin that can be pressed, up to the rear excitations: it stays as at rest",
     ),
     "excitation_arc_back": derived(3.99, "mm", f"arc on the core, 3.75 mm on the map: 45 degrees; {_EXCITATION}"),
     "skin_mode_frequency": derived(

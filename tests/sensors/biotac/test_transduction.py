@@ -48,7 +48,7 @@ def test_the_rest_levels_scatter_nearly_as_measured():
 
 def test_the_rear_excitations_lie_on_the_film_behind_the_pressed_sheet(grid, make_state):
     # Without the tail a disc at -15.9 mm covers nothing.
-    with pytest.raises(RigError, match="covers no part"):
+    with pytest.raises(RigError, match="covers no cell"):
         build(with_parameters(film_tail=0.0), grid, NAMES)
     # A longer tail only adds film behind the source: a few counts at the electrodes next to it, none at the tip.
     longer = build(with_parameters(film_tail=6.0), grid, NAMES)(make_state(SPEC, grid, np.zeros((48, 64))))

@@ -62,14 +62,19 @@ class Interpolant:
         (n, c)
     breaks
         Indices of nodes where one cubic ends and the next begins.
+    power
+        Beyond the last break the cubics run in ``(load - load at that break) ** power``; elsewhere in the load itself.
     """
 
-    def __init__(self, loads: FloatArray, values: FloatArray, breaks: Sequence[int] = ()) -> None:
+    def __init__(self, loads: FloatArray, values: FloatArray, breaks: Sequence[int] = (), power: float = 1.0) -> None:
         self.loads = loads
+        self._power = power
+        self._bent_from = max(breaks, default=0)
+        self._x = self._bent(loads)
         edges = [0, *sorted(set(breaks) - {0, loads.size - 1}), loads.size - 1]
         coefficients = []
         for low, high in itertools.pairwise(edges):
-            x, y = loads[low : high + 1], values[low : high + 1]
+            x, y = self._x[low : high + 1], values[low : high + 1]
             d = slopes(x, y)
             h = np.diff(x)[:, None]
             secant = np.diff(y, axis=0) / h
@@ -81,10 +86,17 @@ class Interpolant:
     def __call__(self, load: FloatArray) -> FloatArray:
         """Return the (m, c) values at (m,) loads within the nodes' range."""
         at = np.clip(np.searchsorted(self.loads, load, side="right") - 1, 0, self.loads.size - 2)
-        t = (load - self.loads[at])[:, None]
+        t = (self._bent(load) - self._x[at])[:, None]
         a, b, c, d = self._cubics
         out: FloatArray = d[at]
         for lower in (c, b, a):
             out *= t
             out += lower[at]
         return out
+
+    def _bent(self, load: FloatArray) -> FloatArray:
+        if self._power == 1.0:
+            return load
+        beyond = np.maximum(load - self.loads[self._bent_from], 0.0)
+        # One variable throughout: the load up to the break, then the break's load plus the bent distance.
+        return np.asarray(np.minimum(load, self.loads[self._bent_from]) + beyond**self._power)
