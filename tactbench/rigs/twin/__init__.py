@@ -81,7 +81,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
             "Noise of the force sensor",
             "effects.force_noise:apply",
             ("load", "tangential-force"),
-            ("raw-force",),
+            ("raw-force", "reference-force"),
             groups=_NOISE,
         ),
         _effect(

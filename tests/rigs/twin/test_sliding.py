@@ -122,6 +122,22 @@ def test_the_force_task_still_picks_the_normal_force(rig, sensors, tmp_path):
         assert named[2].name == "fx"
 
 
+def test_every_component_of_the_force_has_its_noise_and_its_low_pass(record):
+    def spread(filtered):
+        more = {"force_filter": _q(1.0, "Hz")} if filtered else {}
+        environment = Environment(force_noise=_q(0.5, "N"), **more)
+        slide = _slide(200.0, 0.0, direction=_q(90.0, "deg"))
+        _, streams, _ = record(profile=_held(), environment=environment, slide=slide)
+        found = _columns(streams["force_torque"])
+        return [found[name][100:].std() for name in ("fx", "fy", "fz")], found["slip"]
+
+    (raw, _), (smooth, slip) = spread(False), spread(True)
+    # 700 numbers: a standard deviation errs by 3 %.
+    assert raw == pytest.approx([0.5] * 3, rel=0.12)
+    assert max(smooth) < 0.2
+    assert set(np.unique(slip)) <= {0.0, 1.0}
+
+
 def test_a_scene_that_only_presses_has_no_tangential_channels_and_says_why(record):
     meta, streams, _ = record(profile=_held())
     assert [channel.name for channel in streams["force_torque"].spec.channels] == ["fz"]
