@@ -217,7 +217,8 @@ class Dragged:
         first = int(np.searchsorted(drive.t_s, t, side="right"))
         self._phases.add(t, HELD, x)
         self._x_t.append(np.concatenate([[t], drive.t_s[first:]]))
-        held = np.concatenate([[x], self._release_mm[first:]])
+        now = min(x, float(np.interp(t, drive.t_s, self._release_mm)))
+        held = np.concatenate([[now], self._release_mm[first:]])
         self._x_mm.append(np.minimum.accumulate(held))
 
     def __call__(self, t_s: FloatArray) -> Tangential:
@@ -235,7 +236,7 @@ class Dragged:
         own = kind == STICK
         x[own] = x0[own] + drive.speed_mm_s * (t_s[own] - begin[own])
         left = limit[own] - x0[own]
-        share[own] = np.divide(x[own] - x0[own], left, out=np.ones(left.size), where=left > 0)
+        share[own] = np.divide(x[own] - x0[own], left, out=np.ones(left.size), where=left > 1e-12)
         viscous_mm = 2.0 * drive.mode.damping / drive.mode.omega * drive.speed_mm_s
         force[own] = stiffness[own] * (x0[own] + left.clip(0.0) * share_of_force(share[own]) + viscous_mm)
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tactbench.plugin import RigError
@@ -28,6 +28,8 @@ stribeck_speeds = st.one_of(st.just(0.0), st.floats(0.1, 50.0))
 
 
 @given(loads, st.floats(0.05, 500.0), st.floats(0.0, 0.9), st.floats(0.0, 0.8), stribeck_speeds, st.floats(0.3, 5))
+@example([1.0, 0.0, 0.0], 348.0, 0.0, 0.0, 0.0, 0.3125)
+@example([1.0, 0.0], 1.0, 0.0, 0.8, 0.0, 0.5)
 def test_whatever_moves_the_laws_of_friction_hold(load, speed, damping, kinetic, stribeck, end):
     drive = _drive(load, 1.0, speed_mm_s=speed, end_s=end, kinetic=kinetic, stribeck_mm_s=stribeck,
                    start_s=0.2, mode=Mode(2000.0, damping))  # fmt: skip
