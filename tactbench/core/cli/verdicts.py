@@ -63,6 +63,7 @@ def carry_out(checks: Sequence[Check], only: Sequence[str]) -> list[Found]:
             raise UnknownNameError("check or group of checks", name, list(dict.fromkeys(names)))
     chosen = [check for check in checks if not only or check.name in only or check.group in only]
     found: list[Found] = []
+    unanswered: list[str] = []
     with progress() as told:
         told.begin("verify", len(chosen))
         for check in chosen:
@@ -74,7 +75,11 @@ def carry_out(checks: Sequence[Check], only: Sequence[str]) -> list[Found]:
                 verdicts = [Verdict("carried out", math.nan, 0.0, 0.0, note=f"{error} {error.hint or ''}".strip())]
             spent = time.perf_counter() - began
             found += [(check, verdict, spent) for verdict in verdicts]
+            if not verdicts:
+                unanswered.append(f"No answer: {check.name}: {check.title}")
             told.advance(check.name)
+    for text in unanswered:
+        remark(text)
     return found
 
 
@@ -87,12 +92,19 @@ def print_verdicts(found: Sequence[Found], shape: str, *, real: bool) -> None:
             rows = [one for one in found if one[0].group == group]
             styles = ["" if verdict.met else "red" for _, verdict, _ in rows]
             print_grid(group, _COLUMNS, _lines(rows), numeric=("found", "s"), styles=styles)
+        notes: dict[str, list[str]] = {}
         for check, verdict, _ in found:
             if not verdict.met and verdict.note:
-                remark(f"{check.name}, {verdict.name}: {verdict.note}")
+                notes.setdefault(verdict.note, []).append(_named(check, verdict))
+        for note, names in notes.items():
+            remark(f"Missed: {'; '.join(names)}:\n  {note}")
     met = sum(verdict.met for _, verdict, _ in found)
     what = "inside what real sensors show" if real else "within their bounds"
     remark(f"{met} of {len(found)} {what}.")
+
+
+def _named(check: Check, verdict: Verdict) -> str:
+    return check.name if verdict.name in check.name else f"{check.name}, {verdict.name}"
 
 
 def _lines(rows: Sequence[Found]) -> list[dict[str, str]]:

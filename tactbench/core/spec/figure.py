@@ -19,6 +19,8 @@ class RealFigure(Frozen):
     """Only states whose fluid pressure lies in this range above rest [counts of the dc_pressure channel]."""
     at: float | None = None
     """The statistic's argument where it has one: an averaging time [s]."""
+    frequency: tuple[float, float] | None = None
+    """Only what vibrates between these frequencies [Hz]."""
     channels: tuple[str, ...] = ()
     """The channels it is about; empty: all of its kind."""
     low: float
@@ -55,6 +57,8 @@ class RealFigure(Frozen):
             parts.append(" ".join(self.channels))
         if self.at is not None:
             parts.append(f"at {self.at:g} s")
+        if self.frequency is not None:
+            parts.append(f"{self.frequency[0]:g}-{self.frequency[1]:g} Hz")
         if self.band is not None:
             parts.append(f"{self.band[0]:g}-{self.band[1]:g} counts")
         return ", ".join(parts)

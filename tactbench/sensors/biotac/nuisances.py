@@ -43,7 +43,12 @@ TAXEL = Nuisances(
     warm_up_tau=_WARM_UP_TAU,
     warm_up_scatter=measured(0.15, "1", "RF: electrodes follow the shared drift with factors of +-10-20 %"),
     wander=measured(0.5, "count", "RF: what is left over 38 s without contact; an upper bound"),
-    wander_tau=_WANDER_TAU,
+    wander_tau=derived(
+        5.0,
+        "s",
+        "RF: with 0.5 counts (sd) it gives the Allan deviation at rest: 0.16, 0.12, 0.19, 0.25 counts at 0.1, "
+        "0.5, 1, 2 s. No OU process is identified by that, only its rise",
+    ),
     step=_STEP,
     creep=_CREEP,
     largest_slope=derived(250.0, "count/N", f"{_SLOPE}: 246"),

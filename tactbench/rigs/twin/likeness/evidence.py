@@ -25,8 +25,10 @@ class Evidence:
     """(n, channels) untouched stretches, one a recording."""
     pressure_rest: tuple[FloatArray, ...] = ()
     """(n,) the fluid's pressure meanwhile."""
-    vibration_rest: tuple[FloatArray, ...] = ()
-    """(n,) the fluid's vibration meanwhile, on its own clock."""
+    vibration: tuple[FloatArray, ...] = ()
+    """(n,) the fluid's vibration in this condition, one a recording, on its own clock."""
+    vibration_hz: float | None = None
+    """Rate of that clock."""
     change: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     """(m, channels) loaded states less rest."""
     pressure: FloatArray | None = None

@@ -53,10 +53,15 @@ def _pressure_rest(evidence: Evidence) -> list[FloatArray]:
     return rows
 
 
-def _vibration(evidence: Evidence) -> float:
-    if not evidence.vibration_rest:
-        raise NotApplicable("no untouched stretch of the fluid's vibration is known")
-    return float(np.median([rows.std() for rows in evidence.vibration_rest]))
+def _vibration(evidence: Evidence, figure: RealFigure) -> float:
+    if not evidence.vibration or evidence.vibration_hz is None:
+        raise NotApplicable("no stretch of the fluid's vibration is known")
+    if figure.frequency is None:
+        return float(np.median([rows.std() for rows in evidence.vibration]))
+    low, high = figure.frequency
+    return float(
+        np.median([statistics.band_rms(rows, evidence.vibration_hz, low, high) for rows in evidence.vibration])
+    )
 
 
 def _long(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
@@ -164,7 +169,7 @@ STATISTICS: Mapping[str, Statistic] = {
     "noise-correlation": lambda e, f: statistics.noise_correlation(max(_stretches(e), key=len)),
     "pressure-rest": lambda e, f: float(np.median([rows.mean() for rows in _pressure_rest(e)])),
     "pressure-noise": lambda e, f: float(_noise(_pressure_rest(e))[0]),
-    "vibration-rms": lambda e, f: _vibration(e),
+    "vibration-rms": _vibration,
     "offset-shared": lambda e, f: _offset(e, 0),
     "offset-own": lambda e, f: _offset(e, 1),
     "allan-deviation": _allan,

@@ -13,11 +13,13 @@ from tactbench.plugin import (
     FloatArray,
     FluidBackedShell,
     ForceRamp,
+    Indenter,
     NotApplicable,
     Placement,
     Scene,
     SensorDescriptor,
     SensorSpec,
+    Slide,
     assumed,
     load_registry,
 )
@@ -45,6 +47,11 @@ GRASP_N = (0.5, 1.0, 2.0, 5.0)
 GRASPS = 4
 """Placements of each cap and force."""
 GRASP_SCATTER_MM = 2.0
+SLIDES = 8
+SLIDE_RADIUS_MM, SLIDE_N, SLIDE_MM_S, SLIDE_S = 20.0, 0.5, 50.0, 6.0
+"""The same as those by which the surface's roughness was set; none is known of the real slides."""
+SLIDE_AFTER_S = 1.0
+"""What sliding begins with is not looked at."""
 
 
 def evidence(sensor: SensorDescriptor, condition: str) -> Evidence:
@@ -77,19 +84,57 @@ def _untouched(sensor: SensorDescriptor, *, recordings: int, duration_s: float, 
     vibration: list[FloatArray] = []
     for number in range(recordings):
         scene = _untouched_scene(f"rest-{number}", kinds, duration_s, since_power_on_s)
-        columns: dict[str, list[FloatArray]] = {}
-        with twin.open(sensor, scene, seed=SEED) as acquisition:
-            specs = {stream.name: stream for stream in acquisition.streams}
-            for block in acquisition:
-                for column, channel in enumerate(specs[block.stream].channels if block.stream in specs else ()):
-                    columns.setdefault(channel.name, []).append(block.data[:, column].astype(np.float64))
-        whole = {name: np.concatenate(parts) for name, parts in columns.items()}
+        whole = _channels(twin, sensor, scene, SEED)
         rest.append(np.stack([whole[channel.name] for channel in sensor.spec.channels("taxel")], axis=1))
         pressure.extend(whole[channel.name] for channel in sensor.spec.channels("dc_pressure") if channel.name in whole)
         vibration.extend(
             whole[channel.name] for channel in sensor.spec.channels("ac_pressure") if channel.name in whole
         )
-    return Evidence(_names(sensor.spec), tuple(rest), tuple(pressure), tuple(vibration), dt_s=1.0 / RATE_HZ)
+    return Evidence(
+        _names(sensor.spec), tuple(rest), tuple(pressure), tuple(vibration), _vibration_hz(sensor), dt_s=1.0 / RATE_HZ
+    )
+
+
+def _channels(twin: Twin, sensor: SensorDescriptor, scene: Scene, seed: int) -> dict[str, FloatArray]:
+    """Carry out a scene; return (n,) samples of every channel of the sensor, by name."""
+    columns: dict[str, list[FloatArray]] = {}
+    with twin.open(sensor, scene, seed=seed) as acquisition:
+        specs = {stream.name: stream for stream in acquisition.streams}
+        for block in acquisition:
+            for column, channel in enumerate(specs[block.stream].channels if block.stream in specs else ()):
+                columns.setdefault(channel.name, []).append(block.data[:, column].astype(np.float64))
+    return {name: np.concatenate(parts) for name, parts in columns.items()}
+
+
+def _vibration_hz(sensor: SensorDescriptor) -> float | None:
+    for stream in sensor.spec.streams:
+        if any(channel.kind == "ac_pressure" for channel in stream.channels):
+            return stream.rate_hz
+    return None
+
+
+def _slide(sensor: SensorDescriptor) -> Evidence:
+    """Slide a blunt cap lightly over the pad: speed, shape and force of the real slides are not known."""
+    twin = Twin(tuple(load_registry().effects))
+    (name,) = (channel.name for channel in sensor.spec.channels("ac_pressure"))
+    scene = Scene(
+        name="slide",
+        indenter=Indenter(radius=assumed(SLIDE_RADIUS_MM, "mm", _WHY)),
+        placement=Placement(scatter=assumed(0.0, "mm", _WHY)),
+        profile=ForceRamp(
+            start=assumed(SLIDE_N, "N", _WHY),
+            end=assumed(SLIDE_N, "N", _WHY),
+            hold=assumed(0.0, "s", _WHY),
+            duration=assumed(SLIDE_S + SLIDE_AFTER_S, "s", _WHY),
+            samples=round((SLIDE_S + SLIDE_AFTER_S) * RATE_HZ),
+        ),
+        slide=Slide(speed=assumed(SLIDE_MM_S, "mm/s", _WHY), start=assumed(0.0, "s", _WHY)),
+        observe=("ac_pressure",),
+    )
+    rate = _vibration_hz(sensor) or RATE_HZ
+    settled = round(SLIDE_AFTER_S * rate)
+    vibration = tuple(_channels(twin, sensor, scene, seed)[name][settled:] for seed in range(1, 1 + SLIDES))
+    return Evidence(_names(sensor.spec), vibration=vibration, vibration_hz=rate)
 
 
 def _untouched_scene(
@@ -206,5 +251,6 @@ CONDITIONS: Mapping[str, Callable[[SensorDescriptor], Evidence]] = {
     "plate": _plate,
     "pointed": _pointed,
     "release": _release,
+    "slide": _slide,
     "grasp": _grasp,
 }

@@ -114,3 +114,17 @@ def zero_crossing(angle_deg: FloatArray, change: FloatArray, edges_deg: Sequence
             return float(previous[0] - previous[1] * (here[0] - previous[0]) / (here[1] - previous[1]))
         previous = here
     return float("nan")
+
+
+def band_rms(rows: FloatArray, rate_hz: float, low_hz: float, high_hz: float) -> float:
+    """Return the root mean square of what vibrates from `low_hz` up to below `high_hz` (Parseval).
+
+    Parameters
+    ----------
+    rows
+        (n,) evenly sampled.
+    """
+    power = np.abs(np.fft.rfft(rows - rows.mean())) ** 2
+    frequency = np.fft.rfftfreq(rows.size, 1.0 / rate_hz)
+    inside = (frequency >= low_hz) & (frequency < high_hz)
+    return float(np.sqrt(2.0 * power[inside].sum()) / rows.size)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 
 from tactbench.rigs.twin.likeness.statistics import (
     allan_deviation,
+    band_rms,
     component_shares,
     noise_correlation,
     offsets,
@@ -114,3 +117,18 @@ def test_the_crossing_is_where_falling_turns_into_rising():
     # Linear in the angle: exact up to the fill of the bins.
     assert zero_crossing(angle, angle - 37.0, edges) == pytest.approx(37.0, abs=0.1)
     assert np.isnan(zero_crossing(angle, angle + 1.0, edges))
+
+
+def test_a_tone_lives_in_its_band_with_its_rms():
+    t = np.arange(2200) / 2200.0
+    tone = 5.0 + 3.0 * np.sin(2 * np.pi * 40.0 * t)
+    assert band_rms(tone, 2200.0, 30.0, 100.0) == pytest.approx(3.0 / np.sqrt(2), rel=1e-9)
+    assert band_rms(tone, 2200.0, 100.0, 1000.0) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_bands_of_noise_add_up_to_all_of_it():
+    rows = np.random.default_rng(1).standard_normal(4400)
+    edges = (0.0, 10.0, 100.0, 500.0, 1101.0)
+    parts = [band_rms(rows, 2200.0, low, high) for low, high in itertools.pairwise(edges)]
+    # Parseval, but for the Nyquist line, which stands once in the spectrum and is counted twice: 1 of 2200 lines.
+    assert np.hypot.reduce(parts) == pytest.approx(rows.std(), rel=1e-3)
