@@ -10,6 +10,7 @@ from tactbench.plugin import (
     PluginContractError,
     Scene,
     Simulation,
+    Slide,
     UsageError,
     assumed,
 )
@@ -48,6 +49,18 @@ def test_what_changes_nothing_is_left_out(specs):
     plan = _named(plan_scene(EFFECTS, Scene(name="idle", profile=idle), specs["biotac"]))
     assert not plan["contact"].included
     assert not plan["core"].included
+
+
+def test_an_effect_that_is_not_called_for_drags_nothing_along(specs):
+    scene = Scene(name="s", observe=("dc_temperature",))
+    plan = _named(plan_scene(EFFECTS, scene, specs["biotac"]))
+    assert not plan["friction"].included
+    assert not plan["contact"].included
+    slides = scene.model_copy(update={"slide": Slide(speed=assumed(5, "mm/s", "t"))})
+    plan = _named(plan_scene(EFFECTS, slides, specs["biotac"]))
+    assert plan["friction"].included
+    assert plan["contact"].included
+    assert not plan["skin-vibration"].included
 
 
 def test_a_circle_of_effects_is_refused(specs):
