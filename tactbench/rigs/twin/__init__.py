@@ -8,6 +8,7 @@ TACTBENCH_API = 1
 
 _HERE = "tactbench.rigs.twin"
 _DRIFT, _NOISE = ("drift",), ("noise",)
+_LOAD, _TOLD = ("load",), ("reference-force",)
 _HEAT, _FORCE = "effects.thermal_called_for", "effects.force_called_for"
 
 
@@ -32,7 +33,7 @@ def tactbench_rigs() -> list[RigDescriptor]:
 def tactbench_effects() -> list[EffectDescriptor]:
     """Offer the twin's own effects."""
     return [
-        _effect("force-loop", "Motor under force control", "effects.force_loop:apply", (), ("load",), _FORCE),
+        _effect("force-loop", "Motor under force control", "effects.force_loop:apply", (), (*_LOAD, *_TOLD), _FORCE),
         _effect("creep", "Creep of the skin", "effects.creep:apply", ("load",), ("effective-force",)),
         _effect(
             "contact", "Normal contact", "contact.stages:press_skin", ("load", "effective-force", "core"), ("skin",)
@@ -80,16 +81,16 @@ def tactbench_effects() -> list[EffectDescriptor]:
             "force-noise",
             "Noise of the force sensor",
             "effects.force_noise:apply",
-            ("load", "tangential-force"),
-            ("raw-force", "reference-force"),
+            (*_LOAD, "tangential-force"),
+            ("raw-force", *_TOLD),
             groups=_NOISE,
         ),
         _effect(
             "force-filter",
             "Low-pass of the recorded force",
             "effects.force_filter:apply",
-            ("raw-force",),
-            ("reference-force",),
+            (*_LOAD, "tangential-force", "raw-force"),
+            _TOLD,
             _FORCE,
         ),
     ]

@@ -51,6 +51,10 @@ def _spline_slopes(h: FloatArray, secant: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
+_ROUNDING_N = 0.05
+"""Added under the power: its slope at the break would be infinite, and no reading's is."""
+
+
 class Interpolant:
     """Piecewise cubic in the load.
 
@@ -63,7 +67,8 @@ class Interpolant:
     breaks
         Indices of nodes where one cubic ends and the next begins.
     power
-        Beyond the last break the cubics run in ``(load - load at that break) ** power``; elsewhere in the load itself.
+        Beyond the last break the cubics run in ``(load - load at that break) ** power``, rounded off; elsewhere in the
+        load itself.
     """
 
     def __init__(self, loads: FloatArray, values: FloatArray, breaks: Sequence[int] = (), power: float = 1.0) -> None:
@@ -99,4 +104,5 @@ class Interpolant:
             return load
         beyond = np.maximum(load - self.loads[self._bent_from], 0.0)
         # One variable throughout: the load up to the break, then the break's load plus the bent distance.
-        return np.asarray(np.minimum(load, self.loads[self._bent_from]) + beyond**self._power)
+        bent = (beyond + _ROUNDING_N) ** self._power - _ROUNDING_N**self._power
+        return np.asarray(np.minimum(load, self.loads[self._bent_from]) + bent)

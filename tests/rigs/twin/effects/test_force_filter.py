@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import Environment, ForceRamp, RigContext, Scene, assumed
+from tactbench.plugin import Environment, ForceLoop, ForceRamp, RigContext, Scene, assumed
 from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.rig import build
 
 
@@ -51,6 +52,17 @@ def test_noise_shrinks_as_a_first_order_filter_shrinks_it(sensors):
     assert filtered[100:].std() / raw.std() == pytest.approx(expected, rel=0.15)
     # What is filtered is the very noise that would have been recorded.
     assert np.corrcoef(raw[1:], np.diff(filtered))[0, 1] > 0.5
+
+
+@pytest.mark.parametrize("cutoff_hz", [None, 1.0])
+@pytest.mark.parametrize("drive", [None, ForceLoop()])
+def test_whatever_moves_the_force_comes_before_what_reads_it(specs, cutoff_hz, drive):
+    environment = Environment(force_filter=None if cutoff_hz is None else _q(cutoff_hz, "Hz"))
+    for effects in (tactbench_effects(), tactbench_effects()[::-1]):
+        plan = plan_scene(effects, Scene(name="f", environment=environment, drive=drive), specs["icub"])
+        names = [effect.name for effect in plan.stages if effect.name.startswith("force-")]
+        expected = {"force-loop": drive, "force-noise": True, "force-filter": cutoff_hz}
+        assert names == [name for name, wanted in expected.items() if wanted]
 
 
 def test_it_begins_settled(sensors):

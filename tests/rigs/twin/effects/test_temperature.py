@@ -9,6 +9,7 @@ from tactbench.plugin import Environment, ForceRamp, Indenter, NotApplicable, Ri
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
 from tactbench.rigs.twin.effects.temperature import time_constant_s
+from tactbench.rigs.twin.effects.thermal_called_for import contact_heat
 from tactbench.rigs.twin.effects.thermistor import Thermistor
 from tactbench.rigs.twin.planner import plan_scene
 from tactbench.rigs.twin.preparation import prepare
@@ -126,10 +127,12 @@ def test_a_sensor_without_a_heated_core_is_refused_and_one_that_is_asked_keeps_s
     ],
 )
 def test_heat_is_called_for_by_a_difference_that_somebody_could_see(scene, called, number, specs):
+    reason = contact_heat(scene, specs["biotac"])
+    assert reason.called_for is called
+    assert number in reason.text
+    assert called or reason.change is not None
     plan = {entry.effect: entry for entry in plan_scene(EFFECTS, scene, specs["biotac"]).entries}
     assert plan["contact-heat"].included is called
-    assert number in plan["contact-heat"].reason
-    assert called or plan["contact-heat"].change is not None
 
 
 @pytest.mark.parametrize("kind", ["dc_temperature", "ac_temperature", "taxel"])
