@@ -156,23 +156,34 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
 def _needed(
     effects: Sequence[EffectDescriptor], wanted: set[str], asked: Mapping[str, bool], scene: Scene, sensor: SensorSpec
 ) -> dict[str, Reason]:
-    """Return what the needed effects say of themselves: name -> reason.
+    """Return what the effects say of themselves that could be needed: name -> reason.
 
-    Only what is included needs what it consumes: an effect that the scene does not call for drags nothing along.
+    Only what is included needs what it consumes: an effect that the scene does not call for drags nothing along, and
+    what would be called for but is consumed by such effects alone is not.
     """
+    begin = wanted.union(*(effect.produces for effect in effects if asked.get(effect.name)))
+    possible = _closure(effects, begin)
+    reasons = {
+        effect.name: _reason(effect, scene, sensor) for effect in effects if possible.intersection(effect.produces)
+    }
+    taking = [effect for effect in effects if effect.name in reasons]
+    taking = [effect for effect in taking if asked.get(effect.name, reasons[effect.name].called_for)]
+    needed = _closure(taking, begin)
+    for effect in taking:
+        if not needed.intersection(effect.produces):
+            reasons[effect.name] = Reason(False, NOBODY, 0.0)
+    return reasons
+
+
+def _closure(effects: Sequence[EffectDescriptor], wanted: set[str]) -> set[str]:
     needed = set(wanted)
-    reasons: dict[str, Reason] = {}
-    for effect in effects:
-        if asked.get(effect.name):
-            needed.update(effect.produces)
     while True:
-        found = [effect for effect in effects if effect.name not in reasons and needed.intersection(effect.produces)]
-        if not found:
-            return reasons
-        for effect in found:
-            reasons[effect.name] = _reason(effect, scene, sensor)
-            if asked.get(effect.name, reasons[effect.name].called_for):
-                needed.update(effect.consumes)
+        more = {
+            token for effect in effects if needed.intersection(effect.produces) for token in effect.consumes
+        } - needed
+        if not more:
+            return needed
+        needed |= more
 
 
 def _ordered(effects: Sequence[EffectDescriptor]) -> list[EffectDescriptor]:

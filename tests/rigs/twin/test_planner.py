@@ -10,6 +10,7 @@ from tactbench.plugin import (
     PluginContractError,
     Scene,
     Simulation,
+    Slide,
     UsageError,
     assumed,
 )
@@ -48,6 +49,24 @@ def test_what_changes_nothing_is_left_out(specs):
     plan = _named(plan_scene(EFFECTS, Scene(name="idle", profile=idle), specs["biotac"]))
     assert not plan["contact"].included
     assert not plan["core"].included
+
+
+def test_an_effect_that_is_not_called_for_drags_nothing_along(specs):
+    def effect(name, consumes, produces, predicate):
+        return EffectDescriptor(
+            name=name, title=name, where="x:y", consumes=consumes, produces=produces,
+            called_for=f"tactbench.rigs.twin.effects.{predicate}",
+        )  # fmt: skip
+
+    heir = effect("heir", ("oil",), ("disturbance",), "called_for_sliding:friction")
+    well = effect("well", (), ("oil",), "called_for:converter")
+    still = Scene(name="s")
+    plan = _named(plan_scene([*EFFECTS, heir, well], still, specs["icub"]))
+    assert (plan["heir"].included, plan["well"].included) == (False, False)
+    assert plan["well"].reason == "no observed channel depends on it"
+    sliding = still.model_copy(update={"slide": Slide(speed=assumed(5, "mm/s", "t"))})
+    plan = _named(plan_scene([*EFFECTS, heir, well], sliding, specs["icub"]))
+    assert (plan["heir"].included, plan["well"].included) == (True, True)
 
 
 def test_a_circle_of_effects_is_refused(specs):

@@ -15,6 +15,8 @@ from tactbench.rigs.twin.effects.memory import recurrence
 
 COULOMB_MM_S = 1e-6
 """Below this Stribeck speed friction falls at once: nothing measured is slower."""
+NOTHING_MM = 1e-12
+"""A deflection below this, a femtometre, is none."""
 
 
 def coefficient(speed_mm_s: float, static: float, kinetic: float, stribeck_mm_s: float) -> float:
@@ -44,7 +46,32 @@ def bristle(t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: 
     """
     way = abs(speed_mm_s) * np.diff(t_s, prepend=t_s[:1])
     held = np.concatenate([limit_mm[:1], limit_mm[:-1]])
-    lost = -np.expm1(-np.divide(way, held, out=np.where(way > 0, np.inf, 0.0), where=held > 0))
+    lost = -np.expm1(-np.divide(way, held, out=np.where(way > 0, np.inf, 0.0), where=held > NOTHING_MM))
     drive = lost * held * np.sign(speed_mm_s)
     drive[0] = start_mm
     return recurrence(1.0 - lost, drive)
+
+
+def bristle_below(
+    t_s: FloatArray, speed_mm_s: float, limit_mm: FloatArray, start_mm: float, most_mm: FloatArray
+) -> FloatArray:
+    """Return :func:`bristle` that at no sample holds more than `most_mm` (n,), but slides back at once.
+
+    Nearly always it never would; only where it would, sample follows sample.
+    """
+    free = bristle(t_s, speed_mm_s, limit_mm, start_mm)
+    over = free > most_mm
+    if not over.any():
+        return free
+    first = int(over.argmax())
+    way = abs(speed_mm_s) * np.diff(t_s)
+    held = limit_mm[:-1]
+    kept = np.exp(-np.divide(way, held, out=np.where(way > 0, np.inf, 0.0), where=held > NOTHING_MM))
+    fresh = (1.0 - kept) * held * np.sign(speed_mm_s)
+    x = float(most_mm[first])
+    free[first] = x
+    steps = zip(kept[first:].tolist(), fresh[first:].tolist(), most_mm[first + 1 :].tolist(), strict=True)
+    for sample, (b, more, most) in enumerate(steps, first + 1):
+        x = min(b * x + more, most)
+        free[sample] = x
+    return free

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
-from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, bristle, coefficient
+from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, NOTHING_MM, bristle_below, coefficient
 from tactbench.rigs.twin.effects.partial_slip import share_of_force, stick_ratio
 from tactbench.rigs.twin.effects.slip_event import Mode, deflection_after, is_caught, slip_s, swing
 from tactbench.rigs.twin.synthesis import Tangential
@@ -206,7 +206,7 @@ class Dragged:
         limit = np.interp(knots, drive.t_s, self._steady_mm)
         # A load that falls faster than the bristle turns over lets the skin back at once: never above mu_s N.
         most = np.interp(knots, drive.t_s, self._release_mm)
-        deflection = np.minimum(bristle(knots, drive.speed_mm_s, limit, x), most)
+        deflection = bristle_below(knots, drive.speed_mm_s, limit, x, most)
         self._phases.add(t, SLIDE, x)
         self._x_t.append(knots)
         self._x_mm.append(deflection)
@@ -236,7 +236,7 @@ class Dragged:
         own = kind == STICK
         x[own] = x0[own] + drive.speed_mm_s * (t_s[own] - begin[own])
         left = limit[own] - x0[own]
-        share[own] = np.divide(x[own] - x0[own], left, out=np.ones(left.size), where=left > 1e-12)
+        share[own] = np.divide(x[own] - x0[own], left, out=np.ones(left.size), where=left > NOTHING_MM)
         viscous_mm = 2.0 * drive.mode.damping / drive.mode.omega * drive.speed_mm_s
         force[own] = stiffness[own] * (x0[own] + left.clip(0.0) * share_of_force(share[own]) + viscous_mm)
 

@@ -29,6 +29,8 @@ stribeck_speeds = st.one_of(st.just(0.0), st.floats(0.1, 50.0))
 
 @given(loads, st.floats(0.05, 500.0), st.floats(0.0, 0.9), st.floats(0.0, 0.8), stribeck_speeds, st.floats(0.3, 5))
 @example([1.0, 0.0, 0.0], 348.0, 0.0, 0.0, 0.0, 0.3125)
+@example([1.0, 0.0, 1.0, 0.0], 1.0, 0.5, 0.75, 0.0, 1.0)
+@example([0.0, 1.0], 23.0, 0.5, 5e-324, 0.0, 1.0)
 @example([1.0, 0.0], 1.0, 0.0, 0.8, 0.0, 0.5)
 def test_whatever_moves_the_laws_of_friction_hold(load, speed, damping, kinetic, stribeck, end):
     drive = _drive(load, 1.0, speed_mm_s=speed, end_s=end, kinetic=kinetic, stribeck_mm_s=stribeck,
