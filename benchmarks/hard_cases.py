@@ -123,7 +123,7 @@ def main() -> int:
     parser.add_argument("cases", nargs="?", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--limit", type=float, default=60.0)
+    parser.add_argument("--limit", type=float, default=120.0)
     parser.add_argument("--only", default="")
     parser.add_argument("--case", type=int)
     asked = parser.parse_args()

@@ -28,7 +28,10 @@ from tactbench.core.plugins.interfaces import (
     TransducerFactory,
 )
 from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.samples import Block, FloatArray, Quality, SkinGrid, SkinState
+from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import (
@@ -38,7 +41,7 @@ from tactbench.core.spec.rig import (
     SensorDescriptor,
     TaskDescriptor,
 )
-from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Simulation
+from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Simulation, Slide, Surface
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
@@ -48,7 +51,7 @@ from tactbench.core.spec.sensor import (
     SensorSpec,
     StreamSpec,
 )
-from tactbench.core.spec.skin import BondedLayer, FluidBackedShell, FoamPad, Skin, SkinSheet
+from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPad, Skin, SkinSheet
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
 
 __all__ = [
@@ -65,6 +68,7 @@ __all__ = [
     "CostStudy",
     "Creep",
     "DataError",
+    "Dome",
     "EffectDescriptor",
     "Environment",
     "Estimator",
@@ -73,6 +77,7 @@ __all__ = [
     "FloatArray",
     "FluidBackedShell",
     "FoamPad",
+    "ForceLoop",
     "ForceRamp",
     "Indenter",
     "LabelTarget",
@@ -87,7 +92,9 @@ __all__ = [
     "Published",
     "Quality",
     "Quantity",
+    "RealFigure",
     "Reason",
+    "Recording",
     "Rig",
     "RigContext",
     "RigDescriptor",
@@ -102,8 +109,10 @@ __all__ = [
     "SkinGrid",
     "SkinSheet",
     "SkinState",
+    "Slide",
     "Source",
     "StreamSpec",
+    "Surface",
     "TactbenchError",
     "TaskDescriptor",
     "TaskSpec",
@@ -117,5 +126,6 @@ __all__ = [
     "load_object",
     "load_registry",
     "measured",
+    "open_recording",
     "sourced",
 ]

@@ -69,7 +69,7 @@ def acquire(
                 plan=tuple(acquisition.plan),
                 assumptions=dict(acquisition.assumptions),
                 drawn=dict(acquisition.drawn),
-                remarks=tuple(str(text) for name, text in acquisition.drawn.items() if name.startswith("remark")),
+                remarks=tuple(str(text) for name, text in acquisition.drawn.items() if name.startswith("remark ")),
                 provenance={**provenance, key: spent},
             )
     return Acquired(writer.meta, writer.content_digest)

@@ -88,6 +88,16 @@ def test_everything_the_rig_says_is_kept(tmp_path):
     assert rig.closed
 
 
+def test_what_a_rig_remarks_is_shown_with_every_score(tmp_path):
+    class Remarks(Weights):
+        def __iter__(self):
+            yield from super().__iter__()
+            self.drawn = {"remark load": "50 N is too much", "remarkable": 1.0, "offset_mm": 0.25}
+
+    meta, _ = run(tmp_path / "r.h5", Remarks())
+    assert meta.remarks == ("50 N is too much",)
+
+
 def test_the_cost_is_the_rigs_alone(tmp_path):
     """Time passes only inside the rig here: opening takes 1 s, each of six blocks 10 s, writing none."""
     now = [0.0]

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 )
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), metavar="T",
               help="Duration; the ramp keeps its shape. Default 60.")  # fmt: skip
+@click.option("--slide-mm-s", type=click.FloatRange(min=0, min_open=True), metavar="V",
+              help="Slide towards the tip at this speed, from the middle on; vibration is recorded too.")  # fmt: skip
 @simulation_options
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")
 @click.option(
@@ -38,6 +40,7 @@ def command(
     cap_mm: float | None,
     force_n: float | None,
     seconds: float | None,
+    slide_mm_s: float | None,
     seed: int,
     out: Path,
     replace: bool,
@@ -56,6 +59,8 @@ def command(
     registry = load_registry()
     descriptor = registry.sensors[sensor]
     scene = _scene(out.stem, cap_mm, force_n, seconds, descriptor)
+    if slide_mm_s is not None:
+        scene = _sliding(scene, slide_mm_s, descriptor)
     simulation = simulation_of(registry, rig, effects=effects, rung=rung, tolerance=tolerance)
     if simulation is not None:
         scene = scene.model_copy(update={"simulation": simulation})
@@ -97,6 +102,18 @@ def _scene(
     labels: dict[str, str | float | int] = {} if cap_mm is None else {"cap_radius_mm": cap_mm}
     observe = ("taxel",) if "taxel" in kinds else kinds
     return Scene(name=name, indenter=indenter, profile=ramp.model_copy(update=change), observe=observe, labels=labels)
+
+
+def _sliding(scene: Scene, speed_mm_s: float, sensor: SensorDescriptor) -> Scene:
+    """Return the scene with a slide from its middle on, and with the channel that hears it, if the sensor has one."""
+    from tactbench.core.spec.quantity import sourced
+    from tactbench.core.spec.scene import Slide
+
+    said = "the command line"
+    middle = scene.profile.duration.to("s") / 2
+    slide = Slide(speed=sourced(speed_mm_s, "mm/s", said), start=sourced(middle, "s", f"{said}: the middle"))
+    hears = ("ac_pressure",) if sensor.spec.channels("ac_pressure") and "ac_pressure" not in scene.observe else ()
+    return scene.model_copy(update={"slide": slide, "observe": (*scene.observe, *hears)})
 
 
 def _built(registry: Registry, name: str) -> Rig:

@@ -152,6 +152,8 @@ def block_length(loss: FloatArray) -> int:
     ``n^(1/3)``: longer blocks than needed stay valid, and a loss that looks independent may only be rare.
     """
     n = len(loss)
+    # The length knows no unit: scaled, so that the fourth power of an absurd error does not overflow.
+    loss = loss / max(float(np.abs(loss).max()), np.finfo(np.float64).tiny)
     centred = loss - loss.mean()
     variance = float(np.mean(centred**2))
     shortest = int(np.ceil(n ** (1 / 3)))
@@ -177,7 +179,7 @@ def block_length(loss: FloatArray) -> int:
     g = float((np.abs(lags) * weighted).sum())
     if g0 == 0.0:
         return shortest
-    length = (2.0 * g**2 / (4.0 / 3.0 * g0**2)) ** (1 / 3) * n ** (1 / 3)
+    length = (2.0 * (g / g0) ** 2 / (4.0 / 3.0)) ** (1 / 3) * n ** (1 / 3)
     return int(np.clip(np.ceil(length), shortest, max(shortest, min(np.ceil(3 * np.sqrt(n)), n // 3))))
 
 

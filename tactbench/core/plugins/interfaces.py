@@ -40,7 +40,7 @@ class Acquisition(Protocol):
     def drawn(self) -> Mapping[str, Scalar]:
         """What was drawn or achieved, for example the placement.
 
-        Texts whose names start with ``remark`` are shown with every score from the recording.
+        Texts whose names start with ``remark`` and a blank are shown with every score from the recording.
         """
 
     def __iter__(self) -> Iterator[Block]: ...

@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from tactbench.core.spec.quantity import Frozen, Quantity, assumed, sourced
+from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.quantity import Frozen, Quantity, assumed, derived, measured, sourced
 from tactbench.core.spec.sensor import ChannelKind
 
 Role = Literal["train", "validation", "test"]
@@ -67,6 +68,76 @@ class Environment(Frozen):
         0.6875, "N", f"{PAPER}: RMSE of the regression on the time index, read as label noise"
     )
     """Standard deviation of the unfiltered force-torque sensor [force]."""
+    force_filter: Quantity | None = None
+    """Cut-off of a low-pass on the recorded force [1/time]; None: recorded unfiltered, as in the paper."""
+    ambient: Quantity = assumed(23.0, "degC", "a laboratory; the paper does not say")
+    """Temperature of the room [degC]."""
+    indenter_temperature: Quantity | None = None
+    """Temperature of the indenter [degC]; None: as warm as what it touches, so that no heat flows. Nobody states it:
+    a cap that lies in the room has that of the room."""
+
+
+class Surface(Frozen):
+    """What slides over the skin: how it holds and how rough it is."""
+
+    static_friction: Quantity = sourced(
+        0.7834, "1", "NVlabs/biotac_sim, sim_biotac.py: default coefficient for a BioTac, read as the static one"
+    )
+    """Largest tangential over normal force before everything slips [1]."""
+    kinetic_friction: Quantity = assumed(0.65, "1", "a sixth below the static coefficient; no source for this skin")
+    """The same ratio at speeds far above `stribeck_speed` [1]."""
+    stribeck_speed: Quantity = assumed(5.0, "mm/s", "no source for this skin")
+    """Speed over which friction falls from static to kinetic [speed]; 0: at once (Coulomb's two coefficients)."""
+    roughness: Quantity = measured(
+        21.0,
+        "um",
+        "set so that PAC holds 77 counts (rms) between 2 and 10 Hz, the median of dexrob/BioTac_slide_20_50, in one "
+        "simulated slide: cap R 20 mm, 0.5 N, 50 mm/s, all three assumed",
+    )
+    """Root mean square of the profile [length]."""
+    wavelength: Quantity = derived(
+        6.25, "mm", "dexrob/BioTac_slide_20_50: median frequency of PAC 8 Hz, at an assumed speed of 50 mm/s"
+    )
+    """Dominant spatial wavelength of the profile [length]."""
+    spread: float = Field(default=0.5, ge=0)
+    """Standard deviation of ln(wavelength) about the dominant one (assumed); 0: a grating."""
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Surface:
+        static, kinetic = self.static_friction.to("1"), self.kinetic_friction.to("1")
+        if not static >= kinetic >= 0:
+            raise ValueError(f"friction must be static >= kinetic >= 0, not {static:g} and {kinetic:g}")
+        if self.stribeck_speed.to("mm/s") < 0 or self.roughness.to("mm") < 0:
+            raise ValueError("a Stribeck speed and a roughness are at least 0")
+        if not self.wavelength.to("mm") > 0:
+            raise ValueError("a wavelength is above 0")
+        return self
+
+
+class Slide(Frozen):
+    """Tangential motion of the indenter at a constant speed, at rest before and after."""
+
+    speed: Quantity
+    """Of the indenter against the sensor's core [speed]; above zero."""
+    direction: Quantity = assumed(0.0, "deg", "along the finger, towards the tip")
+    """Where the indenter moves to [angle]: 0 is along x, 90 deg along s."""
+    start: Quantity = assumed(30.0, "s", "the middle of a recording of the paper's length")
+    """Beginning of the motion, since the recording's first sample [time]."""
+    duration: Quantity | None = None
+    """How long it lasts [time]; None: to the end of the recording."""
+    surface: Surface = Surface()
+
+    @model_validator(mode="after")
+    def _moves(self) -> Slide:
+        if not self.speed.to("mm/s") > 0 or self.start.to("s") < 0:
+            raise ValueError("a slide has a speed above 0 and starts at 0 s or later; leave it out for none")
+        if self.duration is not None and not self.duration.to("s") > 0:
+            raise ValueError("a slide lasts longer than 0 s; leave the duration out for the rest of the recording")
+        self.direction.to("rad")
+        return self
+
+    def __str__(self) -> str:
+        return f"{self.speed} from {self.start} on"
 
 
 class Simulation(Frozen):
@@ -96,6 +167,10 @@ class Scene(Frozen):
     indenter: Indenter = Indenter()
     placement: Placement = Placement()
     profile: ForceRamp = ForceRamp()
+    drive: ForceLoop | None = None
+    """How the force is brought about; None: the indenter follows the profile exactly."""
+    slide: Slide | None = None
+    """Tangential motion; None: the indenter is only pressed."""
     environment: Environment = Environment()
     session: str = "1"
     """Recordings of one session were made without re-mounting anything."""

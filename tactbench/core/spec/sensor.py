@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field, field_validator, model_validator
 
 from tactbench.core.spec import units
+from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.quantity import Frozen, Quantity, Source
 from tactbench.core.spec.skin import Skin
 
@@ -135,6 +136,8 @@ class SensorSpec(Frozen):
     nuisances: dict[ChannelKind, Nuisances] = Field(default_factory=dict)
     """Noise and drift by kind of channel, for the twin."""
     references: tuple[str, ...] = ()
+    likeness: tuple[RealFigure, ...] = Field(default=(), exclude=True)
+    """Figures of real units, to judge by. Left out of recordings and keys: no sample depends on them."""
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> SensorSpec:

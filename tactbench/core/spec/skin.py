@@ -12,6 +12,15 @@ from pydantic import Field
 from tactbench.core.spec.quantity import Frozen, Quantity
 
 
+class Dome(Frozen):
+    """A finger's tip: where its cylinder ends in a dome of the same radius."""
+
+    start: Quantity
+    """Axial coordinate of the sheet at which the dome begins; towards positive x [length]."""
+    arc_per_radian: Quantity
+    """Length of the sheet for one radian of the dome's meridian [length]."""
+
+
 class SkinSheet(Frozen):
     """The unrolled skin: a rectangle, axial coordinate x by arc length s, s = 0 on the midline."""
 
@@ -23,6 +32,8 @@ class SkinSheet(Frozen):
     """Width of the sheet along the surface [length], centred on s = 0."""
     outer_radius: Quantity | None = None
     """Radius of the finger's outer surface [length]; None for a flat pad."""
+    dome: Dome | None = None
+    """The tip, where the finger ends in one; None: a cylinder (or a flat pad) throughout."""
     cells: tuple[int, int] = (48, 64)
     """Default grid, axial x arc."""
     pad: tuple[Quantity, Quantity, Quantity] | None = None

@@ -8,6 +8,7 @@ TACTBENCH_API = 1
 
 _HERE = "tactbench.rigs.twin"
 _DRIFT, _NOISE = ("drift",), ("noise",)
+_HEAT, _FORCE = "effects.thermal_called_for", "effects.force_called_for"
 
 
 @hookimpl
@@ -19,6 +20,7 @@ def tactbench_rigs() -> list[RigDescriptor]:
             title="Simulated twin",
             where=f"{_HERE}.rig:build",
             simulated=True,
+            likeness=f"{_HERE}.likeness.report:checks",
             rungs=("closed-form", "default", "fine", "reference"),
             work_precision=f"{_HERE}.work_precision:study",
             verification=f"{_HERE}.verification.everything:checks",
@@ -30,26 +32,79 @@ def tactbench_rigs() -> list[RigDescriptor]:
 def tactbench_effects() -> list[EffectDescriptor]:
     """Offer the twin's own effects."""
     return [
-        _effect("creep", "Creep of the skin", "effects.creep:apply", (), ("effective-force",)),
-        _effect("contact", "Normal contact", "contact.stages:press_skin", ("effective-force", "core"), ("skin",)),
+        _effect("force-loop", "Motor under force control", "effects.force_loop:apply", (), ("load",), _FORCE),
+        _effect("creep", "Creep of the skin", "effects.creep:apply", ("load",), ("effective-force",)),
+        _effect(
+            "contact", "Normal contact", "contact.stages:press_skin", ("load", "effective-force", "core"), ("skin",)
+        ),
         _effect("core", "Touch-down on the core", "contact.core:with_core", (), ("core",)),
-        _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure",)),
+        _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure", "fluid")),
         _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
         _effect("transduction", "Transduction", "contact.stages:read_skin", ("skin", "gain"), ("taxel", "reading")),
+        _effect(
+            "contact-heat", "Heat through the contact", "effects.contact_heat:apply", ("skin",), ("warmth",), _HEAT
+        ),
+        _effect(
+            "dc-temperature",
+            "Temperature of the core",
+            "effects.temperature:read_dc",
+            ("warmth",),
+            ("dc_temperature", "reading"),
+            _HEAT,
+        ),
+        _effect(
+            "ac-temperature",
+            "Rate of the core's temperature",
+            "effects.temperature:read_ac",
+            ("warmth",),
+            ("ac_temperature", "reading"),
+            _HEAT,
+        ),
+        _effect(
+            "thermal-drift",
+            "Drift with the fluid's temperature",
+            "effects.thermal_drift:apply",
+            ("warmth", "taxel"),
+            ("disturbance",),
+            _HEAT,
+            groups=("heat",),
+        ),
         _effect("rest-spread", "Scatter of rest levels", "effects.rest_spread:apply", (), ("disturbance",)),
         _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",), groups=_DRIFT),
         _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",), groups=_DRIFT),
         _effect("wander", "Free drift", "effects.wander:apply", (), ("disturbance",), groups=_DRIFT),
         _effect("white-noise", "White noise", "effects.white_noise:apply", (), ("disturbance",), groups=_NOISE),
+        *_sliding(),
         _effect("converter", "Converter", "effects.converter:apply", ("reading", "disturbance"), ("stored",)),
         _effect(
             "force-noise",
             "Noise of the force sensor",
             "effects.force_noise:apply",
-            (),
-            ("reference-force",),
+            ("load", "tangential-force"),
+            ("raw-force", "reference-force"),
             groups=_NOISE,
         ),
+        _effect(
+            "force-filter",
+            "Low-pass of the recorded force",
+            "effects.force_filter:apply",
+            ("raw-force",),
+            ("reference-force",),
+            _FORCE,
+        ),
+    ]
+
+
+def _sliding() -> list[EffectDescriptor]:
+    here = "effects.called_for_sliding"
+    forces = ("slip", "tangential-force", "reference-force")
+    shakes, hears = ("slip", "skin"), ("skin", "fluid", "vibration")
+    heard = ("ac_pressure", "reading")
+    return [
+        _effect("friction", "Friction", "effects.friction:apply", ("skin",), forces, here),
+        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", shakes, ("vibration",), here),
+        _effect("ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", hears, heard, here),
+        _effect("hum", "Hum of dynamic pressure", "effects.hum:apply", (), ("disturbance",), here, _NOISE),
     ]
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import FloatArray, Indenter, RigError, SkinGrid, SkinSheet
+from tactbench.plugin import Dome, FloatArray, Indenter, RigError, SkinGrid, SkinSheet
 
 STEEPEST = 1.0
 """Largest slope of an indenter, 45 degrees: the gap is taken along the press axis and the deflection along the skin's
@@ -85,26 +85,58 @@ def radius_mm(indenter: Indenter) -> float:
     return math.inf if indenter.radius is None else indenter.radius.to("mm")
 
 
-def gap_mm(grid: SkinGrid, contact: Contact, outer_radius_mm: float = math.inf) -> FloatArray:
+def gap_mm(grid: SkinGrid, contact: Contact, outer_radius_mm: float = math.inf, dome: Dome | None = None) -> FloatArray:
     """Return the (nx, ns) gap between the unloaded skin and the indenter at zero approach.
 
-    The fall-away of the finger ``2 Ro sin²(theta/2)`` and the sag of the cap ``r² / (R + sqrt(R² - r²))`` are written
-    so that nothing cancels: R = 1e9 mm and a flat surface agree to rounding. Measured along the press axis. With a
-    tilt the smallest gap is subtracted, so that the approach keeps its origin.
+    The press axis is the skin's normal at the contact, on the dome as on the cylinder. The fall-away of the finger
+    (``2 Ro sin²(theta/2)`` on the cylinder) and the sag of the cap ``r² / (R + sqrt(R² - r²))`` are written so that
+    nothing cancels: R = 1e9 mm and a flat surface agree to rounding. With a tilt the smallest gap is subtracted, so
+    that the approach keeps its origin.
     """
-    x = grid.x_mm[:, None] - contact.x_mm
     if math.isinf(outer_radius_mm):
-        y = grid.s_mm[None, :] - contact.s_mm
-        fall = np.zeros_like(y)
+        x, y = grid.x_mm[:, None] - contact.x_mm, grid.s_mm[None, :] - contact.s_mm
+        fall = np.zeros((1, 1))
     else:
-        theta = (grid.s_mm[None, :] - contact.s_mm) / outer_radius_mm
-        y = outer_radius_mm * np.sin(theta)
-        fall = 2.0 * outer_radius_mm * np.sin(theta / 2.0) ** 2
+        x, y, fall = _around(grid, contact, outer_radius_mm, dome)
     gap: FloatArray = fall + _sag(x**2 + y**2, contact.radius_mm)
     if contact.tilt_x or contact.tilt_s:
         gap = gap + contact.tilt_x * x + contact.tilt_s * y
         gap = gap - gap.min()
     return gap
+
+
+def _around(
+    grid: SkinGrid, contact: Contact, outer_radius_mm: float, dome: Dome | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return where the finger's surface lies as seen from the contact: along, across, and below its tangent plane.
+
+    A point at meridian angle phi (0 on the cylinder) and angle theta from the contact lies at ``(X, Ro cos(phi)
+    sin(theta), -Ro cos(phi) cos(theta))`` with ``X = x`` up to the dome and ``Ro sin(phi)`` more on it; the differences
+    to the contact's own point are turned by its meridian angle.
+    """
+    radius = outer_radius_mm
+    theta = (grid.s_mm[None, :] - contact.s_mm) / radius
+    phi, axial = _meridian(grid.x_mm[:, None], radius, dome)
+    (phi0,), (axial0,) = _meridian(np.array([contact.x_mm]), radius, dome)
+    ring = radius * np.cos(phi)
+    along = axial - axial0
+    # cos(phi0) - cos(phi) cos(theta), without the difference of two numbers near one.
+    below = 2.0 * radius * np.sin((phi + phi0) / 2) * np.sin((phi - phi0) / 2) + 2.0 * ring * np.sin(theta / 2) ** 2
+    across = ring * np.sin(theta)
+    return (
+        np.cos(phi0) * along + np.sin(phi0) * below,
+        across,
+        np.cos(phi0) * below - np.sin(phi0) * along,
+    )
+
+
+def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[FloatArray, FloatArray]:
+    """Return the meridian angle at `x_mm` and the true axial place."""
+    if dome is None:
+        return np.zeros_like(x_mm), x_mm
+    start = dome.start.to("mm")
+    phi = np.clip((x_mm - start) / dome.arc_per_radian.to("mm"), 0.0, math.pi / 2)
+    return phi, np.minimum(x_mm, start) + radius * np.sin(phi)
 
 
 def _sag(r2: FloatArray, radius: float) -> FloatArray:

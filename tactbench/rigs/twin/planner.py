@@ -1,8 +1,8 @@
 """Which effects a scene gets, in which order, and why: the closure over what somebody will look at.
 
 Effects name tokens they produce and consume. What is observed is needed; whoever produces something needed is
-needed, and then everything it consumes. An effect is included when it is needed and its own predicate says that the
-scene calls for it, or when the scene asks for it by name. Nothing else is imported, allocated or stepped.
+included if its own predicate says that the scene calls for it, or if the scene asks for it by name; then everything it
+consumes is needed too. Nothing else is imported, allocated or stepped.
 """
 
 from __future__ import annotations
@@ -72,12 +72,11 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
     """
     kinds = _observed(scene, sensor)
     asked = _asked(effects, scene)
-    added = {token for effect in effects if asked.get(effect.name) for token in effect.produces}
-    needed = _closure(effects, {*kinds, STORED, REFERENCE, *added})
+    reasons = _needed(effects, {*kinds, STORED, REFERENCE}, asked, scene, sensor)
     included: list[EffectDescriptor] = []
     entries: dict[str, PlanEntry] = {}
     for effect in effects:
-        reason = _reason(effect, scene, sensor) if needed.intersection(effect.produces) else Reason(False, NOBODY, 0.0)
+        reason = reasons.get(effect.name, Reason(False, NOBODY, 0.0))
         taken = asked.get(effect.name, reason.called_for)
         if taken:
             included.append(effect)
@@ -154,15 +153,26 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
     return kinds
 
 
-def _closure(effects: Sequence[EffectDescriptor], wanted: set[str]) -> set[str]:
+def _needed(
+    effects: Sequence[EffectDescriptor], wanted: set[str], asked: Mapping[str, bool], scene: Scene, sensor: SensorSpec
+) -> dict[str, Reason]:
+    """Return what the needed effects say of themselves: name -> reason.
+
+    Only what is included needs what it consumes: an effect that the scene does not call for drags nothing along.
+    """
     needed = set(wanted)
+    reasons: dict[str, Reason] = {}
+    for effect in effects:
+        if asked.get(effect.name):
+            needed.update(effect.produces)
     while True:
-        more = {
-            token for effect in effects if needed.intersection(effect.produces) for token in effect.consumes
-        } - needed
-        if not more:
-            return needed
-        needed |= more
+        found = [effect for effect in effects if effect.name not in reasons and needed.intersection(effect.produces)]
+        if not found:
+            return reasons
+        for effect in found:
+            reasons[effect.name] = _reason(effect, scene, sensor)
+            if asked.get(effect.name, reasons[effect.name].called_for):
+                needed.update(effect.consumes)
 
 
 def _ordered(effects: Sequence[EffectDescriptor]) -> list[EffectDescriptor]:

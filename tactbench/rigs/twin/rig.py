@@ -157,9 +157,13 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         name=REFERENCE_STREAM,
         rate_hz=rate,
         rate_source=_ONE_CLOCK,
-        channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),),
+        channels=(
+            ChannelSpec(name="fz", kind="force", unit="N", sign=1),
+            *(channel for channel, _ in run.reference_more.values()),
+        ),
     )
-    samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), run.reference_n[:, None], None)
+    measured = np.column_stack([run.reference_n, *(values for _, values in run.reference_more.values())])
+    samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), measured, None)
     environment = run.scene.environment
     return TwinAcquisition(
         streams=tuple(streams),
@@ -172,11 +176,29 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
             "session_offset_scale": environment.session_offset_scale,
             "since_power_on_s": environment.since_power_on.to("s"),
             "force_noise_n": environment.force_noise.to("N"),
+            **_stated(run.scene),
             **_asked(run.scene),
         },
         drawn=dict(run.drawn),
         samples=samples,
     )
+
+
+def _stated(scene: Scene) -> dict[str, Scalar]:
+    """Return what the scene states of its drive, its recorded force and its temperatures beyond the default."""
+    environment, drive = scene.environment, scene.drive
+    stated: dict[str, Scalar] = {}
+    if environment.indenter_temperature is not None:
+        stated["indenter_degc"] = environment.indenter_temperature.to("degC")
+        stated["ambient_degc"] = environment.ambient.to("degC")
+    if environment.force_filter is not None:
+        stated["force_filter_hz"] = environment.force_filter.to("Hz")
+    if drive is not None:
+        stated["loop_proportional_mm_per_n"] = drive.proportional.to("mm/N")
+        stated["loop_integral_mm_per_n_s"] = drive.integral.to("mm/N/s")
+        stated["loop_cutoff_hz"] = "none" if drive.cutoff is None else drive.cutoff.to("Hz")
+        stated["loop_delay_s"] = drive.delay.to("s")
+    return stated
 
 
 def _asked(scene: Scene) -> dict[str, Scalar]:

@@ -13,6 +13,10 @@ MOST_SAMPLES = 20_000_000
 """Samples of a stream that are still made: two and a half hours at 2200 Hz, 160 MB a channel and effect."""
 _NOT_BELOW_ZERO = ("scatter", "start", "end", "hold", "duration", "since_power_on", "force_noise")
 """Fields of a scene's parts for which less than zero means nothing."""
+_LOOP = ("proportional", "integral", "delay", "motor_lag", "resolution")
+"""Those of a force loop."""
+_ABOVE_ZERO = ("force_filter", "cutoff", "rate", "speed", "acceleration")
+"""Fields that divide, or without which nothing moves."""
 
 
 def check_numbers(scene: Scene) -> None:
@@ -32,12 +36,13 @@ def check_numbers(scene: Scene) -> None:
             hint="Record in parts.",
         )
     for name, value, text in _numbers(scene, ()):
-        signed = name[-1] not in _NOT_BELOW_ZERO
+        positive = name[-1] in _ABOVE_ZERO
+        signed = not positive and name[-1] not in (*_NOT_BELOW_ZERO, *_LOOP)
         flat = name[-1] == "radius" and value == math.inf
-        if not (math.isfinite(value) or flat) or (value < 0 and not signed):
+        if not (math.isfinite(value) or flat) or (value < 0 and not signed) or (value == 0 and positive):
             raise RigError(
                 f"The {' '.join(name).replace('_', ' ')} of scene {scene.name!r} is {text}.",
-                hint="Give a finite number." if signed else "Give a finite number, not below zero.",
+                hint="Give a finite number" + ("." if signed else ", above zero." if positive else ", not below zero."),
             )
 
 

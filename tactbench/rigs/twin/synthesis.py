@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +45,23 @@ class Load:
         return float(self.force_n.max())
 
 
+class Tangential(NamedTuple):
+    """What happens along the skin at (n,) moments, in the direction of the slide."""
+
+    force_n: FloatArray
+    """Tangential force between surface and skin, as a force sensor behind the surface feels it."""
+    displacement_mm: FloatArray
+    """Of the skin under the contact, against the core."""
+    slip_mm_s: FloatArray
+    """Speed of the surface over the skin; 0 while they stick."""
+    slip_mm: FloatArray
+    """Way that the surface has slipped over the skin."""
+    slipping: npt.NDArray[np.bool_]
+    """The whole contact slips."""
+    stick_ratio: FloatArray
+    """Radius of the part that sticks over that of the contact, 0 to 1."""
+
+
 @dataclass
 class Track:
     """The channels that share one clock."""
@@ -62,8 +80,12 @@ class Track:
     """(n, channels)"""
     effective_n: dict[ChannelKind, FloatArray] = field(default_factory=dict)
     """(n,) force the response of a kind of channel follows, where it is not the true one."""
+    vibration_mm: FloatArray | None = None
+    """(n,) motion of the skin along its normal, beyond what the load explains; None: nobody shakes it."""
     gain: FloatArray | None = None
     """(channels,) factors on the response; None: all one."""
+    warmth_k: FloatArray | None = None
+    """(n,) kelvin by which the contact has warmed the core; None: no heat flows through it."""
 
     def by_kind(self) -> dict[ChannelKind, list[int]]:
         """Return the columns of each kind of channel."""
@@ -99,6 +121,10 @@ class Synthesis:
     """(n,) what the force sensor says; starts at the true force."""
     fluid_pressure: bool = False
     """Somebody looks at the pressure of the fluid."""
+    reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
+    """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
+    sliding: Callable[[FloatArray], Tangential] | None = None
+    """What happens along the skin at any (n,) seconds; None: nothing."""
     lent: dict[str, str] = field(default_factory=dict)
     """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
     settled: dict[str, tuple[bool, str]] = field(default_factory=dict)

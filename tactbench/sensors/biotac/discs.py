@@ -1,27 +1,75 @@
-"""Electrodes and excitation as discs on the conduction grid.
+"""Electrodes and excitation on the conduction grid.
 
 A point source in two dimensions has a resistance that grows with ln(1/cell), so that an electrode is never one node.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, FluidBackedShell, RigError, SensorSpec, SkinGrid
+from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
+
+DEPTH_AVERAGE = 3.0
+"""Contact conductance of a thin film times h / (sigma A)."""
 
 
-@dataclass(frozen=True)
+class Contacts(Protocol):
+    """What touches the film from the core."""
+
+    count: int
+    """Electrodes."""
+    owner: npt.NDArray[np.intp]
+    under: npt.NDArray[np.intp]
+    """(joints,) electrode and cell that each joint connects."""
+
+    def joints(self, film_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the conductances over sigma of the joints, (joints,), and of the cells to the drive, (nx*ns,)."""
+
+    def narrow(self, film_mm: FloatArray, along_x: FloatArray, along_s: FloatArray) -> None:
+        """Change conductances of faces between cells, (nx-1, ns) and (nx, ns-1), that a contact's rim crosses."""
+
+
 class Discs:
-    """What touches the film from the core: areas of overlap with the cells."""
+    """Contacts of any shape, as areas of overlap with the cells; right where cells are finer than the film.
 
-    electrodes: FloatArray
-    """(n_electrodes, nx, ns) square millimetres."""
-    excitation: FloatArray
-    """(nx, ns) square millimetres, all excitation discs together."""
-    electrode_radius_mm: float
-    excitation_radius_mm: float
+    Parameters
+    ----------
+    electrodes
+        (n_electrodes, nx, ns) square millimetres.
+    excitation
+        (nx, ns) square millimetres, all excitation discs together.
+    electrode_radius_mm, excitation_radius_mm
+        The radius a of the part ``4/(pi a)`` of a contact's conductance.
+    thin_contact
+        Contact conductance of a thin film times h / (sigma A).
+    """
+
+    def __init__(
+        self,
+        electrodes: FloatArray,
+        excitation: FloatArray,
+        electrode_radius_mm: float,
+        excitation_radius_mm: float,
+        thin_contact: float = DEPTH_AVERAGE,
+    ) -> None:
+        self.count = len(electrodes)
+        flat = electrodes.reshape(self.count, -1)
+        self.owner, self.under = np.nonzero(flat)
+        areas, drive = flat[self.owner, self.under], excitation.ravel()
+        self._thin, self._thick = thin_contact * areas, areas * (4.0 / (np.pi * electrode_radius_mm))
+        self._thin_drive, self._thick_drive = thin_contact * drive, drive * (4.0 / (np.pi * excitation_radius_mm))
+
+    def joints(self, film_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ``A (3/h + 4/(pi a))`` of every overlap, and of the excitation in every cell."""
+        flat = film_mm.ravel()
+        return self._thin / flat[self.under] + self._thick, self._thin_drive / flat + self._thick_drive
+
+    def narrow(self, film_mm: FloatArray, along_x: FloatArray, along_s: FloatArray) -> None:
+        """Leave the faces as they are."""
 
 
 def disc_overlap(
@@ -70,8 +118,8 @@ def disc_overlap(
     return overlap
 
 
-def discs_on(sensor: SensorSpec, grid: SkinGrid) -> tuple[Discs, tuple[float, float]]:
-    """Return electrodes and excitation as overlaps with the cells of `grid`, and the cells' size in the film.
+def discs_on(sensor: SensorSpec, grid: SkinGrid) -> tuple[RimmedDiscs, tuple[float, float]]:
+    """Return electrodes and excitation on the cells of `grid`, and the cells' size in the film.
 
     Places on the core are taken over by angle, axial places on the dome by a shortened meridian arc. Lengths along
     the arc are those at the film's own radius, not at the outer surface, on which `grid` is laid out.
@@ -94,13 +142,12 @@ def discs_on(sensor: SensorSpec, grid: SkinGrid) -> tuple[Discs, tuple[float, fl
         x, y, z = (1e3 * component for component in channel.position_m)
         axial = x if x <= 0.0 else par["dome_shortening"].value * core * np.arcsin(min(x / core, 1.0))
         centre = (float(axial), float(film * np.arctan2(y, -z)))
-        electrodes.append(disc_overlap(grid.x_mm, s_film, centre, electrode_radius))
-    arc = par["excitation_arc"].to("mm") * film / core
-    excitation = np.zeros((len(grid.x_mm), len(grid.s_mm)))
-    for x in (par["excitation_x_front"].to("mm"), par["excitation_x_back"].to("mm")):
-        for side in (-arc, arc):
-            excitation += disc_overlap(grid.x_mm, s_film, (x, side), excitation_radius)
-    return Discs(np.stack(electrodes), excitation, electrode_radius, excitation_radius), (dx, ds * film / outer)
+        electrodes.append(Disc(*centre, electrode_radius))
+    excitation = []
+    for pair in ("front", "back"):
+        x, arc = par[f"excitation_x_{pair}"].to("mm"), par[f"excitation_arc_{pair}"].to("mm") * film / core
+        excitation += [Disc(x, side, excitation_radius) for side in (-arc, arc)]
+    return RimmedDiscs(grid.x_mm, s_film, electrodes, excitation), (dx, ds * film / outer)
 
 
 def shell_of(sensor: SensorSpec) -> FluidBackedShell:

@@ -46,38 +46,53 @@ def film_at_rest(skin: FluidBackedShell, s_mm: FloatArray) -> FloatArray:
     return np.maximum(film, skin.gap_side.to("mm"))
 
 
-def refined(grid: SkinGrid, factor: int = REFINEMENT) -> SkinGrid:
-    """Return the grid with each cell cut into `factor` x `factor`; centres of cells, not nodes."""
-    return SkinGrid(x_mm=_refined_axis(grid.x_mm, factor), s_mm=_refined_axis(grid.s_mm, factor))
+def refined(grid: SkinGrid, factor: int = REFINEMENT, shrink_s: float = 1.0) -> SkinGrid:
+    """Return the same sheet with `factor` cells per cell and axis; centres of cells, not nodes.
+
+    Along the arc there are `shrink_s` times as many, rounded: cells about as square on a film whose arc is that much
+    shorter than the outer surface's.
+    """
+    across = max(2, round(grid.s_mm.size * factor * shrink_s))
+    return SkinGrid(
+        x_mm=_divided_axis(grid.x_mm, grid.x_mm.size * factor),
+        s_mm=_divided_axis(grid.s_mm, across),
+    )
 
 
-def _refined_axis(centres: FloatArray, factor: int) -> FloatArray:
+def with_tail(grid: SkinGrid, tail_mm: float) -> tuple[SkinGrid, int]:
+    """Return the grid with cells added before its first, and how many: the least that cover `tail_mm`."""
+    dx, _ = grid.cell_mm
+    added = int(np.ceil(tail_mm / dx - 1e-9))
+    before = grid.x_mm[0] - dx * np.arange(added, 0, -1)
+    return SkinGrid(x_mm=np.concatenate([before, grid.x_mm]), s_mm=grid.s_mm), added
+
+
+def _divided_axis(centres: FloatArray, cells: int) -> FloatArray:
     step = float(centres[1] - centres[0])
     edge = float(centres[0]) - step / 2
-    return np.asarray(edge + (np.arange(len(centres) * factor) + 0.5) * step / factor)
+    return np.asarray(edge + (np.arange(cells) + 0.5) * (step * len(centres) / cells))
 
 
-def spectral_interpolation(n: int, factor: int = REFINEMENT) -> FloatArray:
-    """Return the matrix that takes n periodic cell-centred samples to the refined cells.
+def spectral_interpolation(n: int, cells: int) -> FloatArray:
+    """Return the matrix that takes n periodic cell-centred samples to `cells` cells on the same length.
 
-    It is the Dirichlet kernel, that is a zero-padded Fourier transform with the half-cell shift of cell centres
-    (which do not coincide with the finer ones), written as a matrix: two small
-    products do both axes.
+    It is the Dirichlet kernel, that is a zero-padded Fourier transform with the shift between the cells' centres
+    (which do not coincide), written as a matrix: two small products do both axes.
 
     Parameters
     ----------
     n
         Number of samples, even.
-    factor
-        Refinement.
+    cells
+        Number of cells wanted.
 
     Returns
     -------
-    (n * factor, n); rows sum to 1; exact for every wave below the Nyquist one.
+    (cells, n); rows sum to 1; exact for every wave below the Nyquist one.
     """
-    fine = (np.arange(n * factor) + 0.5) / factor
+    fine = (np.arange(cells) + 0.5) * (n / cells)
     coarse = np.arange(n) + 0.5
-    distance = fine[:, None] - coarse[None, :]  # in coarse cells; never an integer for an even factor
+    distance = fine[:, None] - coarse[None, :]  # in coarse cells
     turn = np.pi * distance / n
     at_node = np.abs(np.sin(turn)) < 1e-12
     kernel = np.sin(n * turn) / (n * np.tan(np.where(at_node, 0.5, turn)))

@@ -86,7 +86,5 @@ NUISANCES: dict[ChannelKind, Nuisances] = {
     "dc_pressure": PDC,
     "dc_temperature": _white_only(measured(0.4, "count", "RG 0.36-0.41, DX 0.45")),
     "ac_temperature": _white_only(measured(0.8, "count", "RG 0.7, DX 1.0")),
-    "ac_pressure": _white_only(
-        measured(2.4, "count", "RG, robust; a hum of 2-3.5 counts between 30 and 200 Hz comes on top")
-    ),
+    "ac_pressure": _white_only(measured(2.4, "count", "RG, robust; the hum on top is the sensor's parameter `hum`")),
 }

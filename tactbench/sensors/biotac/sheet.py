@@ -1,9 +1,11 @@
 """Conduction in a thin film between disc electrodes.
 
 The potential, averaged over the film's depth h, obeys ``div(sigma h grad phi) = 0`` with insulated edges. Finite
-volumes: a face conducts with the harmonic mean of its two cells. Electrodes and excitations are equipotential discs:
-cell k under disc e is joined to it by ``sigma A_ke (3/h_k + 4/(pi a))``, A_ke the overlap, a the disc's radius. Each
-electrode leaks to ground through the reference resistor; its potential is an unknown.
+volumes: a face conducts with the logarithmic mean of its two cells, ``(h2 - h1) / ln(h2 / h1)``, which is exact where
+the film is straight between their centres; beside a closed film, where h changes several times within a cell, the
+harmonic mean is a third too small. Electrodes and excitations are equipotential contacts: cell k under contact e is
+joined to it by about ``sigma A_ke (3/h_k + 4/(pi a))``, A_ke the overlap, a the disc's radius. Each electrode leaks to
+ground through the reference resistor; its potential is an unknown.
 
 The first term is the exact depth average of a film fed from one face, right for h << a; alone it would let a
 *thinner* film conduct *better* into a small disc (for h^2 > 1.5 a^2 ln(r/a)), which no conductor does. The second is
@@ -21,10 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError
-from tactbench.sensors.biotac.discs import Discs
-
-DEPTH_AVERAGE = 3.0
-"""Contact conductance of a thin film times h / (sigma A)."""
+from tactbench.sensors.biotac.discs import Contacts
 
 # Energy norm of the error at which iterating stops, relative to the solution's own. By Cauchy and Schwarz an
 # electrode is then off by at most that times sqrt(r_e), r_e = 1/leak * R_e/(R_e + R_ref) the resistance (times sigma)
@@ -53,76 +52,56 @@ class FilmSheet:
     """A film over electrodes, prepared for one grid; `solve` it for any thickness.
 
     The system is factorised once, for the film at rest. A loaded film is solved by conjugate gradients preconditioned
-    with that factor, rescaled by ``sqrt(h / h_rest)`` on both sides (Concus and Golub 1973): what is left to iterate
-    on is only how strongly the film's thickness varies.
+    with that factor, rescaled on both sides by the root of the diagonals' ratio (Concus and Golub 1973, for the
+    conductivity's own), plus a small system in which every electrode's cells move together (Nicolaides 1987): under a
+    closed film these are joined so strongly that one by one they would be found last.
 
     Parameters
     ----------
     cell_mm
         Spacing in x and s, in the film's metric.
-    discs
-        Overlaps of electrodes and excitation with the cells.
+    contacts
+        Electrodes and excitation on the cells.
     leak_mm
         1 / (sigma R_ref).
     at_rest_mm
         (nx, ns) the film to factorise for, positive.
-    thin_contact
-        Contact conductance of a thin film times h / (sigma A).
     """
 
     def __init__(
         self,
         cell_mm: tuple[float, float],
-        discs: Discs,
+        contacts: Contacts,
         leak_mm: float,
         at_rest_mm: FloatArray,
-        thin_contact: float = DEPTH_AVERAGE,
     ) -> None:
         dx, ds = cell_mm
         self.shape = (at_rest_mm.shape[0], at_rest_mm.shape[1])
         self.cells = at_rest_mm.size
         self.leak = leak_mm
         self._aspect = (ds / dx, dx / ds)
-        flat = discs.electrodes.reshape(len(discs.electrodes), self.cells)
-        self._owner, self._under = np.nonzero(flat)
-        areas = flat[self._owner, self._under]
-        self._thin, self._thick = thin_contact * areas, areas * (4.0 / (np.pi * discs.electrode_radius_mm))
-        excitation = discs.excitation.ravel()
-        self._thin_drive = thin_contact * excitation
-        self._thick_drive = excitation * (4.0 / (np.pi * discs.excitation_radius_mm))
-        self._n_electrodes = len(flat)
-        self._at_rest = at_rest_mm.copy()
-        self._factor = _factorised(self.matrix(at_rest_mm))
-        self._rest_unknowns: FloatArray = self._factor.solve(self._source(at_rest_mm))
+        self._contacts = contacts
+        self._owner, self._under = contacts.owner, contacts.under
+        self._n_electrodes = contacts.count
+        system = _System(self, at_rest_mm)
+        self._factor = _factorised(system.matrix())
+        self._rest_unknowns: FloatArray = self._factor.solve(system.source)
+        self._rest_diagonal = system.diagonal
+        self._groups = _Groups(self.shape, contacts)
 
     @property
     def at_rest(self) -> Answer:
         """The solution for the film at rest."""
         return Answer(self._rest_unknowns[self.cells :].copy(), self._rest_unknowns.copy(), 0, 0.0)
 
-    def matrix(self, film_mm: FloatArray) -> Any:
-        """Return the whole sparse system of `film_mm`, divided by sigma: symmetric and positive definite."""
-        from scipy import sparse
-
-        index = np.arange(self.cells).reshape(self.shape)
-        along_x, along_s = self._faces(film_mm)
-        joints = self._joints(film_mm)
-        row = np.concatenate([index[:-1].ravel(), index[:, :-1].ravel(), self._under])
-        column = np.concatenate([index[1:].ravel(), index[:, 1:].ravel(), self._owner + self.cells])
-        value = np.concatenate([along_x.ravel(), along_s.ravel(), joints])
-        n = self.cells + self._n_electrodes
-        upper = sparse.coo_matrix((value, (row, column)), shape=(n, n))
-        whole = (upper + upper.T).tocsr()
-        grounded = np.concatenate([self._source(film_mm)[: self.cells], np.full(self._n_electrodes, self.leak)])
-        return (sparse.diags(np.asarray(whole.sum(axis=1)).ravel() + grounded) - whole).tocsc()
-
     def solve_directly(self, film_mm: FloatArray) -> FloatArray:
         """Return (cells + n_electrodes,) potentials by factorising anew: slow, the oracle of `solve`."""
-        return np.asarray(_factorised(self.matrix(film_mm)).solve(self._source(film_mm)))
+        system = _System(self, film_mm)
+        return np.asarray(_factorised(system.matrix()).solve(system.source))
 
     def currents(self, film_mm: FloatArray, unknowns: FloatArray) -> tuple[float, float]:
         """Return the current that enters by the excitation and the one that leaves by the electrodes, over sigma."""
-        entering = self._source(film_mm)[: self.cells] * (1.0 - unknowns[: self.cells])
+        entering = _System(self, film_mm).source[: self.cells] * (1.0 - unknowns[: self.cells])
         return float(entering.sum()), float(self.leak * unknowns[self.cells :].sum())
 
     def solve(self, film_mm: FloatArray, neighbours: Sequence[FloatArray] = (), tolerance: float = TOLERANCE) -> Answer:
@@ -148,11 +127,13 @@ class FilmSheet:
                 f"The film's thickness must be finite and positive; its smallest value is {film_mm.min():g} mm.",
                 hint="Check the skin's residual_film and the contact solver's residual.",
             )
-        action = _Action(self, film_mm)
-        source = self._source(film_mm)
-        scale = np.ones(len(source))
-        scale[: self.cells] = np.sqrt(self._at_rest / film_mm).ravel()
-        unknowns, residual = _best_combination(action, source, np.stack([*neighbours, self._rest_unknowns]))
+        system = _System(self, film_mm)
+        source = system.source
+        scale = np.sqrt(self._rest_diagonal / system.diagonal)
+        # An electrode's own diagonal is almost all joints: it goes with its cells in the small system below.
+        scale[self.cells :] = 1.0
+        together = self._groups.inverse(system)
+        unknowns, residual = _best_combination(system, source, np.stack([*neighbours, self._rest_unknowns]))
         # The energy of the solution is u·b.
         size = float(np.sqrt(abs(unknowns @ source)))
         direction = np.zeros_like(unknowns)
@@ -160,13 +141,14 @@ class FilmSheet:
         error = np.inf
         for step in range(MOST_STEPS):
             corrected = scale * self._factor.solve(scale * residual)
+            self._groups.correct(corrected, together, residual)
             energy = float(residual @ corrected)
             error = np.sqrt(max(energy, 0.0)) / size
             if energy <= 0.0:  # nothing left to correct
                 return Answer(unknowns[self.cells :].copy(), unknowns, step, 0.0)
             direction = corrected + (energy / energy_before if step else 0.0) * direction
             energy_before = energy
-            pushed = action(direction)
+            pushed = system(direction)
             length = energy / float(direction @ pushed)
             # The correction at hand is used before stopping: its cost, the factor, is already paid.
             unknowns += length * direction
@@ -179,45 +161,60 @@ class FilmSheet:
             hint="The film may vary too steeply: check the contact solver's residual.",
         )
 
-    def _faces(self, film_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Conductances over sigma of the faces between neighbours along x (nx-1, ns) and along s (nx, ns-1)."""
-        thin = 1.0 / film_mm
-        along_x = (2.0 * self._aspect[0]) / (thin[1:] + thin[:-1])
-        along_s = (2.0 * self._aspect[1]) / (thin[:, 1:] + thin[:, :-1])
-        return along_x, along_s
 
-    def _joints(self, film_mm: FloatArray) -> FloatArray:
-        """Conductances over sigma between cells and the electrodes above them, one per overlap."""
-        return np.asarray(self._thin / film_mm.ravel()[self._under] + self._thick)
-
-    def _source(self, film_mm: FloatArray) -> FloatArray:
-        driven = self._thin_drive / film_mm.ravel() + self._thick_drive
-        return np.concatenate([driven, np.zeros(self._n_electrodes)])
-
-
-class _Action:
-    """The system of one film as a linear map, without a matrix."""
+class _System:
+    """The system of one film, divided by sigma: symmetric and positive definite; as a map it needs no matrix."""
 
     def __init__(self, sheet: FilmSheet, film_mm: FloatArray) -> None:
         self._sheet = sheet
-        self._along_x, self._along_s = sheet._faces(film_mm)
-        self._joints = sheet._joints(film_mm)
-        self._drive = sheet._source(film_mm)[: sheet.cells].reshape(sheet.shape)
+        log = np.log(film_mm)
+        aspect = sheet._aspect
+        self.along_x = aspect[0] * _logarithmic_mean(film_mm[:-1], film_mm[1:], log[1:] - log[:-1])
+        self.along_s = aspect[1] * _logarithmic_mean(film_mm[:, :-1], film_mm[:, 1:], log[:, 1:] - log[:, :-1])
+        sheet._contacts.narrow(film_mm, self.along_x, self.along_s)
+        self.joints, self.drive = sheet._contacts.joints(film_mm)
+        self.source = np.concatenate([self.drive, np.zeros(sheet._n_electrodes)])
+
+    @property
+    def diagonal(self) -> FloatArray:
+        """The (cells + n_electrodes,) diagonal of the matrix."""
+        sheet = self._sheet
+        joined = np.bincount(sheet._under, weights=self.joints, minlength=sheet.cells)
+        cells = (self.drive + joined).reshape(sheet.shape)
+        cells[1:] += self.along_x
+        cells[:-1] += self.along_x
+        cells[:, 1:] += self.along_s
+        cells[:, :-1] += self.along_s
+        electrodes = sheet.leak + np.bincount(sheet._owner, weights=self.joints, minlength=sheet._n_electrodes)
+        return np.concatenate([cells.ravel(), electrodes])
+
+    def matrix(self) -> Any:
+        """Return the sparse matrix."""
+        from scipy import sparse
+
+        sheet = self._sheet
+        index = np.arange(sheet.cells).reshape(sheet.shape)
+        row = np.concatenate([index[:-1].ravel(), index[:, :-1].ravel(), sheet._under])
+        column = np.concatenate([index[1:].ravel(), index[:, 1:].ravel(), sheet._owner + sheet.cells])
+        value = np.concatenate([self.along_x.ravel(), self.along_s.ravel(), self.joints])
+        n = sheet.cells + sheet._n_electrodes
+        upper = sparse.coo_matrix((value, (row, column)), shape=(n, n))
+        return (sparse.diags(self.diagonal) - (upper + upper.T)).tocsc()
 
     def __call__(self, unknowns: FloatArray) -> FloatArray:
         sheet = self._sheet
         out = np.empty_like(unknowns)
         potential = unknowns[: sheet.cells].reshape(sheet.shape)
         flow = out[: sheet.cells].reshape(sheet.shape)
-        np.multiply(self._drive, potential, out=flow)
-        down_x = self._along_x * (potential[1:] - potential[:-1])
+        np.multiply(self.drive.reshape(sheet.shape), potential, out=flow)
+        down_x = self.along_x * (potential[1:] - potential[:-1])
         flow[1:] += down_x
         flow[:-1] -= down_x
-        down_s = self._along_s * (potential[:, 1:] - potential[:, :-1])
+        down_s = self.along_s * (potential[:, 1:] - potential[:, :-1])
         flow[:, 1:] += down_s
         flow[:, :-1] -= down_s
         electrodes = unknowns[sheet.cells :]
-        into = self._joints * (unknowns[sheet._under] - electrodes[sheet._owner])
+        into = self.joints * (unknowns[sheet._under] - electrodes[sheet._owner])
         np.add.at(out, sheet._under, into)
         out[sheet.cells :] = sheet.leak * electrodes - np.bincount(
             sheet._owner, weights=into, minlength=sheet._n_electrodes
@@ -225,9 +222,62 @@ class _Action:
         return out
 
 
-def _best_combination(action: _Action, source: FloatArray, known: FloatArray) -> tuple[FloatArray, FloatArray]:
+class _Groups:
+    """Every electrode with its cells, moving together: a system of as many unknowns as there are electrodes."""
+
+    def __init__(self, shape: tuple[int, int], contacts: Contacts) -> None:
+        self._count, self._cells = contacts.count, shape[0] * shape[1]
+        nobody = contacts.count
+        group = np.full(self._cells, nobody)
+        group[contacts.under] = contacts.owner
+        self._members = np.flatnonzero(group < nobody)
+        self._of = group[self._members]
+        by_cell = group.reshape(shape)
+        pairs = [
+            (by_cell[:-1].ravel(), by_cell[1:].ravel()),
+            (by_cell[:, :-1].ravel(), by_cell[:, 1:].ravel()),
+            (group[contacts.under], contacts.owner),
+        ]
+        # Only what joins two groups, or a group and the film around it, resists their moving.
+        self._between = [np.flatnonzero(one != other) for one, other in pairs]
+        self._ends = [(one[k], other[k]) for (one, other), k in zip(pairs, self._between, strict=True)]
+
+    def inverse(self, system: _System) -> FloatArray:
+        """Return the inverse of the small system."""
+        size = self._count + 1
+        values = (system.along_x.reshape(-1), system.along_s.reshape(-1), system.joints)
+        small = np.zeros((size, size))
+        for value, between, (one, other) in zip(values, self._between, self._ends, strict=True):
+            np.add.at(small, (one, other), value[between])
+        small = -(small + small.T)
+        np.fill_diagonal(small, 0.0)
+        driven = np.bincount(self._of, weights=system.drive[self._members], minlength=size)
+        np.fill_diagonal(small, driven + system._sheet.leak - small.sum(axis=1))
+        return np.asarray(np.linalg.inv(small[:-1, :-1]))
+
+    def correct(self, corrected: FloatArray, inverse: FloatArray, residual: FloatArray) -> None:
+        """Add the small system's answer to `corrected`."""
+        pull = np.bincount(self._of, weights=residual[self._members], minlength=self._count)
+        moved = inverse @ (pull + residual[self._cells :])
+        corrected[self._members] += moved[self._of]
+        corrected[self._cells :] += moved
+
+
+def _logarithmic_mean(one: FloatArray, other: FloatArray, log_ratio: FloatArray) -> FloatArray:
+    """Return ``(b - a) / ln(b/a)``; by its series where the difference of logarithms would cancel."""
+    near = np.abs(log_ratio) < 1e-3
+    log_ratio[near] = 1.0
+    mean = (other - one) / log_ratio
+    a, b = one[near], other[near]
+    # (a+b)/2 (1 - d²/12) with d = ln(b/a) ~ 2 (b-a)/(a+b): next term of order d^4, 1e-12.
+    half = (a + b) / 2
+    mean[near] = half - (b - a) ** 2 / (12 * half)
+    return np.asarray(mean)
+
+
+def _best_combination(system: _System, source: FloatArray, known: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the combination of `known` rows that is nearest to the solution in the energy norm, and its residual."""
-    acted = np.stack([action(row) for row in known])
+    acted = np.stack([system(row) for row in known])
     # Rows of neighbouring loads are almost parallel: least squares drops what rounding cannot tell apart.
     weights = np.linalg.lstsq(known @ acted.T, known @ source, rcond=1e-13)[0]
     return weights @ known, source - weights @ acted

@@ -1,6 +1,6 @@
 """From skin states to the BioTac's counts: film, conduction, divider; and the fluid's pressure.
 
-This rung gives the 19 electrodes and PDC. TDC, TAC and PAC need thermal and vibration effects and are refused.
+It gives the 19 electrodes and PDC. TDC, TAC and PAC are not read from the skin: effects of the twin give them.
 """
 
 from __future__ import annotations
@@ -11,13 +11,15 @@ from functools import lru_cache
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, SensorSpec, SkinGrid, SkinState
-from tactbench.sensors.biotac.discs import discs_on, shell_of
+from tactbench.sensors.biotac.discs import discs_on, outer_radius_mm, shell_of
 from tactbench.sensors.biotac.electrodes import NAMES
-from tactbench.sensors.biotac.film import REFINEMENT, film_at_rest, refined, spectral_interpolation
+from tactbench.sensors.biotac.film import REFINEMENT, film_at_rest, refined, spectral_interpolation, with_tail
 from tactbench.sensors.biotac.sheet import TOLERANCE, FilmSheet
 
 NEIGHBOURS = 2
-"""Earlier potentials kept to begin the next load with; more do not save steps."""
+"""Potentials of the nearest loads to begin the next one with; more do not save steps."""
+MOST_KEPT = 16
+"""Loads whose potentials are kept: those of a table."""
 
 
 class Preparation:
@@ -26,16 +28,21 @@ class Preparation:
     def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
         self.skin = shell_of(sensor)
         self.coarse_film = film_at_rest(self.skin, grid.s_mm)[None, :]
-        fine = refined(grid, refinement)
+        film_radius = sensor.parameters["film_radius"].to("mm")
+        under_skin = refined(grid, refinement, shrink_s=film_radius / outer_radius_mm(sensor))
+        fine, tail = with_tail(under_skin, sensor.parameters["film_tail"].to("mm"))
         self.film = np.broadcast_to(film_at_rest(self.skin, fine.s_mm), (len(fine.x_mm), len(fine.s_mm))).copy()
-        self.to_fine_x = spectral_interpolation(len(grid.x_mm), refinement)
-        self.to_fine_s = np.ascontiguousarray(spectral_interpolation(len(grid.s_mm), refinement).T)
+        # Behind the sheet the skin is not pressed: no deflection.
+        self.to_fine_x = np.vstack(
+            [np.zeros((tail, len(grid.x_mm))), spectral_interpolation(len(grid.x_mm), len(under_skin.x_mm))]
+        )
+        self.to_fine_s = np.ascontiguousarray(spectral_interpolation(len(grid.s_mm), len(fine.s_mm)).T)
         self.residual_film = self.skin.residual_film.to("mm")
-        discs, cell_mm = discs_on(sensor, fine)
+        contacts, cell_mm = discs_on(sensor, fine)
         # S/m times ohm is 1/m: a length, the only electrical scale of the problem.
         conductivity = sensor.parameters["conductivity"].to("S/m")
         leak_mm = 1e3 / (conductivity * sensor.parameters["reference_resistor"].to("ohm"))
-        self.sheet = FilmSheet(cell_mm, discs, leak_mm, np.maximum(self.film, self.residual_film))
+        self.sheet = FilmSheet(cell_mm, contacts, leak_mm, np.maximum(self.film, self.residual_film))
         self.rest = self.sheet.at_rest
 
     def film_under(self, state: SkinState) -> FloatArray:
@@ -60,7 +67,7 @@ class BioTacTransducer:
         self._electrodes = [(place, NAMES.index(name)) for place, name in enumerate(wanted) if name in NAMES]
         self._pressures = [place for place, name in enumerate(wanted) if name == "PDC"]
         self._n_wanted = len(wanted)
-        self._earlier: list[FloatArray] = []
+        self._earlier: dict[float, FloatArray] = {}
         channels = {channel.name: channel for channel in sensor.channels()}
         self._full_scale = channels[NAMES[0]].upper or 0.0
         pdc = channels["PDC"]
@@ -79,8 +86,12 @@ class BioTacTransducer:
         readings = np.empty(self._n_wanted)
         if self._electrodes:
             self._check(state)
-            answer = self._prepared.sheet.solve(self._prepared.film_under(state), self._earlier, self._tolerance)
-            self._earlier = [answer.unknowns, *self._earlier][:NEIGHBOURS]
+            nearest = sorted(self._earlier, key=lambda force: abs(force - state.force_n))[:NEIGHBOURS]
+            neighbours = [self._earlier[force] for force in nearest]
+            answer = self._prepared.sheet.solve(self._prepared.film_under(state), neighbours, self._tolerance)
+            self._earlier[state.force_n] = answer.unknowns
+            while len(self._earlier) > MOST_KEPT:
+                del self._earlier[next(iter(self._earlier))]
             for place, electrode in self._electrodes:
                 readings[place] = self._full_scale * answer.electrodes[electrode]
         for place in self._pressures:
@@ -89,9 +100,7 @@ class BioTacTransducer:
 
     def _check(self, state: SkinState) -> None:
         expected = np.maximum(self._prepared.coarse_film - state.deflection_mm, self._prepared.residual_film)
-        if state.thickness_mm.shape != expected.shape or not np.allclose(
-            state.thickness_mm, expected, rtol=0.0, atol=1e-6
-        ):
+        if state.thickness_mm.shape != expected.shape or not np.abs(state.thickness_mm - expected).max() <= 1e-6:
             raise RigError(
                 "The skin state's film is not this sensor's film at rest less its deflection.",
                 hint="Use the state of a contact solved with this sensor's skin on the grid given to build().",
@@ -129,7 +138,7 @@ def build(
     for name in wanted:
         if name not in NAMES and name != "PDC":
             raise RigError(
-                f"The twin cannot give {name} of {sensor.name}: temperature and vibration are not modelled yet.",
+                f"{name} of {sensor.name} is not read from the skin.",
                 hint=f"Ask for {NAMES[0]} to {NAMES[-1]} and PDC.",
             )
     return BioTacTransducer(prepared(sensor, grid, refinement), sensor, tuple(wanted), tolerance)

@@ -18,6 +18,7 @@ from tactbench.plugin import (
     sourced,
 )
 from tactbench.sensors.icub.channels import OUTER_RADIUS_MM, STREAMS
+from tactbench.sensors.icub.likeness import LIKENESS
 
 _SCHMITZ = "Schmitz et al. 2010, abstract"
 _GRASP = "clear-nus/icub_grasp_dataset, 279 loaded fingertips"
@@ -88,6 +89,7 @@ SPEC = SensorSpec(
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances={"taxel": NUISANCES},
+    likeness=LIKENESS,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",
         "Schmitz et al. 2010 (fingertip, abstract)",

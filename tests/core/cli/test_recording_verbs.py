@@ -85,6 +85,13 @@ def test_record_then_inspect(shell):
     assert "exists already" in shell("record", "--sensor", "icub", "--out", "press.h5", code=2).stderr
 
 
+def test_record_a_slide(shell):
+    shell("record", "--sensor", "biotac", "--seconds", "3", "--slide-mm-s", "40", "--force-n", "1", "--out", "slide.h5")
+    about = json.loads(shell("inspect", "slide.h5", "--format", "json").stdout)
+    assert "vibration" in json.dumps(about)
+    assert "stick_ratio" in json.dumps(about)
+
+
 def test_a_rig_that_cannot_record(shell):
     done = shell("record", "--sensor", "icub", "--rig", "replay", "--out", "press.h5", code=2)
     assert "cannot record" in done.stderr

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import RigError, SkinSheet, assumed
+from tactbench.plugin import Dome, RigError, SkinGrid, SkinSheet, assumed
 from tactbench.rigs.twin.geometry import Contact, check_contact, film_at_rest_mm, gap_mm, skin_grid
 
 SHEET = SkinSheet(
@@ -93,3 +93,38 @@ def test_a_contact_that_is_none_is_refused(contact):
 def test_an_indenter_on_its_side_is_refused(slope):
     with pytest.raises(RigError, match="tilted"):
         check_contact(GRID, Contact(5.0, 0.0, 0.0, tilt_s=slope))
+
+
+DOME = Dome(start=assumed(0.0, "mm", "test"), arc_per_radian=assumed(8.0, "mm", "test"))
+
+
+def test_a_dome_falls_away_along_its_meridian_as_the_finger_does_around():
+    # Sheet length per radian = radius: one sphere octant, pressed at 0.5 rad up its meridian.
+    grid = SkinGrid(x_mm=np.linspace(-4.0, 8.0, 25), s_mm=np.linspace(-8.0, 8.0, 33))
+    gap = gap_mm(grid, Contact(math.inf, 4.0, 0.0), 8.0, DOME)
+    on_it = grid.x_mm >= 0
+    expected = 2 * 8.0 * np.sin((grid.x_mm[on_it] - 4.0) / 16.0) ** 2
+    np.testing.assert_allclose(gap[on_it, 16], expected, atol=1e-14)
+    # Around the pole of the press axis a sphere looks the same to all sides.
+    sphere = gap_mm(grid, Contact(math.inf, 4.0, 0.0), 8.0, DOME)[16]
+    ring = 8.0 * math.cos(0.5)
+    np.testing.assert_allclose(sphere, math.cos(0.5) * 2 * ring * np.sin(grid.s_mm / 16.0) ** 2, atol=1e-14)
+
+
+def test_the_cylinder_does_not_know_of_the_dome_and_joins_it_smoothly():
+    grid = SkinGrid(x_mm=np.linspace(-4.0, 4.0, 801), s_mm=np.linspace(-3.0, 3.0, 31))
+    contact = Contact(12.0, -1.0, 0.4)
+    with_dome, without = gap_mm(grid, contact, 8.0, DOME), gap_mm(grid, contact, 8.0)
+    np.testing.assert_array_equal(with_dome[grid.x_mm <= 0], without[grid.x_mm <= 0])
+    slope = np.diff(with_dome, axis=0) / 0.01
+    # The radius of curvature stays above the cap's and the finger's in series: no kink where they meet.
+    assert np.abs(np.diff(slope, axis=0)).max() < 0.01 * (1 / 8.0 + 1 / 12.0) * 1.6
+
+
+@given(x=st.floats(-4.0, 7.0), s=st.floats(-6.0, 6.0), radius=st.floats(2.0, 1e9))
+def test_nothing_of_a_finger_stands_above_the_contact_on_it(x, s, radius):
+    grid = SkinGrid(x_mm=np.linspace(-4.0, 8.0, 25), s_mm=np.linspace(-8.0, 8.0, 33))
+    gap = gap_mm(grid, Contact(radius, x, s), 8.0, DOME)
+    assert np.isfinite(gap).all()
+    # Convex: rounding of millimetres is all that may stand above the tangent plane.
+    assert gap.min() >= -1e-13

@@ -29,7 +29,7 @@ def test_a_uniform_strip_has_the_resistance_of_a_strip(width, length, film, aspe
     ends = np.zeros((2, length, width))
     ends[0, 0] = ends[1, -1] = 1.0
     thickness = np.full((length, width), film)
-    sheet = FilmSheet((aspect, 1.0), Discs(ends[1:], ends[0], TINY, TINY), 0.3, thickness, PERFECT)
+    sheet = FilmSheet((aspect, 1.0), Discs(ends[1:], ends[0], TINY, TINY, PERFECT), 0.3, thickness)
     expected = (length - 1) * aspect / (film * width)  # L / (h W) between the centres of the end cells
     assert resistance(sheet, thickness, 0.3) == pytest.approx(expected, rel=1e-5)
 
@@ -43,7 +43,7 @@ def test_an_annulus_has_the_resistance_of_an_annulus():
         ring = (np.hypot(x[:, None], x[None, :]) > outer).astype(float)
         disc = (np.hypot(x[:, None], x[None, :]) < inner).astype(float)
         thickness = np.full((n, n), film)
-        sheet = FilmSheet((10 / n, 10 / n), Discs(disc[None], ring, TINY, TINY), leak, thickness, PERFECT)
+        sheet = FilmSheet((10 / n, 10 / n), Discs(disc[None], ring, TINY, TINY, PERFECT), leak, thickness)
         found[n] = resistance(sheet, thickness, leak)
         # The rims run between cell centres, at most one cell inside the disc and one outside the ring.
         widest = np.log((outer + 10 / n) / (inner - 10 / n)) / (2 * np.pi * film)

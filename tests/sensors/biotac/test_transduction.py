@@ -36,12 +36,24 @@ def test_the_stated_rest_levels_are_the_models_own(grid, make_state):
     assert reading == pytest.approx(REST, abs=0.06)
 
 
-def test_the_rest_levels_have_the_measured_median_and_spread():
-    # Public recordings: R/R_ref 0.18-0.37 with median 0.26 and a spread of 0.23 in log R; median 3237 counts. The two
-    # parameters set by these are the conductivity and the front excitation.
-    ratio = 4095.0 / REST - 1.0
+def test_the_rest_levels_have_the_measured_median():
+    # Public recordings: R/R_ref 0.18-0.37 with median 0.26; median 3237 counts. The conductivity is set by it.
     assert np.median(REST) == pytest.approx(3237.0, abs=5.0)
-    assert np.log(ratio).std() == pytest.approx(0.23, abs=0.005)
+
+
+def test_the_rest_levels_scatter_nearly_as_measured():
+    # Public recordings: 0.23 in log R, from which nothing is set. Point electrodes would scatter by 0.59.
+    assert np.log(4095.0 / REST - 1.0).std() == pytest.approx(0.23, rel=0.25)
+
+
+def test_the_rear_excitations_lie_on_the_film_behind_the_pressed_sheet(grid, make_state):
+    # Without the tail a disc at -15.9 mm covers nothing.
+    with pytest.raises(RigError, match="covers no cell"):
+        build(with_parameters(film_tail=0.0), grid, NAMES)
+    # A longer tail only adds film behind the source: a few counts at the electrodes next to it, none at the tip.
+    longer = build(with_parameters(film_tail=6.0), grid, NAMES)(make_state(SPEC, grid, np.zeros((48, 64))))
+    assert np.abs(longer - REST).max() < 15.0
+    assert abs(longer[NAMES.index("E7")] - REST[NAMES.index("E7")]) < 3.0
 
 
 def test_mirrored_electrodes_agree_for_a_mirrored_state(grid, make_state, make_dent):
@@ -59,17 +71,19 @@ def test_a_mirrored_dent_gives_mirrored_readings(grid, make_state, make_dent):
     partner = {a: b for pair in MIRRORS for a, b in (pair, pair[::-1])}
     for row, name in enumerate(NAMES):
         assert one[row] == pytest.approx(other[NAMES.index(partner.get(name, name))], abs=0.04)
-    assert np.abs(one - other).max() > 20.0  # and the test can tell
+    assert np.abs(one - other).max() > 10.0  # and the test can tell
 
 
-@pytest.mark.parametrize("number", [2, 3, 5, 12, 15, 17, 18, 19])
+# Not E19: it lies 0.9 mm from the sheet's end, where the clamp allows no such dent.
+@pytest.mark.parametrize("number", [2, 3, 5, 12, 15, 17, 18])
 def test_an_electrode_falls_where_the_film_thins_and_rises_where_it_thickens(grid, make_state, make_dent, number):
     x, s = place_of(number)
     transducer = build(SPEC, grid, [f"E{number}"])
     for depth in (0.1, 0.4, 0.9):
         hollow = make_dent(grid, depth, x, s, 1.5, keep_volume=False)
-        assert transducer(make_state(SPEC, grid, hollow))[0] < REST[number - 1] - 1.0
-        assert transducer(make_state(SPEC, grid, -hollow))[0] > REST[number - 1] + 1.0
+        # On the midline a tenth of a millimetre moves an electrode by less than a count: above the tolerance of 0.12.
+        assert transducer(make_state(SPEC, grid, hollow))[0] < REST[number - 1] - 0.5
+        assert transducer(make_state(SPEC, grid, -hollow))[0] > REST[number - 1] + 0.5
 
 
 @pytest.mark.parametrize("number", [4, 6, 14, 16])

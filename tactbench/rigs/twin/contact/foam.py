@@ -7,7 +7,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, FoamPad, SkinGrid
 from tactbench.rigs.twin.contact.media import Medium, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
-from tactbench.rigs.twin.geometry import pad_of
+from tactbench.rigs.twin.geometry import skin_grid
 
 CUT_OVER = 0.97
 """Share of the densification strain beyond which the law goes on along its tangent: it cannot divide by zero."""
@@ -48,6 +48,23 @@ class Foam:
         return pressure, energy
 
 
+def _edges(own: FloatArray, low: float, high: float) -> tuple[float, float]:
+    """Return where a pad from `low` to `high` ends: at edges of the sheet's own cells, whose centres lie inside.
+
+    The reference figures of the solver hold for this pad; on whatever grid, so that a finer one converges to it.
+    """
+    half = float(own[1] - own[0]) / 2
+    inside = own[(own >= low) & (own <= high)]
+    return float(inside[0]) - half, float(inside[-1]) + half
+
+
+def _covered(centres: FloatArray, low: float, high: float) -> FloatArray:
+    """Return the share of each cell that lies between `low` and `high`."""
+    step = float(centres[1] - centres[0])
+    ends = np.minimum(centres + step / 2, high) - np.maximum(centres - step / 2, low)
+    return np.asarray(np.clip(ends / step, 0.0, 1.0))
+
+
 def medium(skin: FoamPad, grid: SkinGrid) -> Medium:
     """Return the pad on `grid`.
 
@@ -59,8 +76,14 @@ def medium(skin: FoamPad, grid: SkinGrid) -> Medium:
     spectrum = Spectrum(grid)
     shear = skin.shear.to("MPa") * thickness / 3 + skin.cover_tension.to("N/mm")
     stiffness = shear * spectrum.k2 + skin.cover_bending.to("N*mm") * spectrum.k2**2
-    inside = pad_of(skin.sheet, grid)
-    weight = np.ones(spectrum.shape) if inside is None else np.where(inside, 1.0, OUTSIDE_THE_PAD)
+    weight = np.ones(spectrum.shape)
+    if skin.sheet.pad is not None:
+        low, high, arc = (edge.to("mm") for edge in skin.sheet.pad)
+        own = skin_grid(skin.sheet)
+        along = _covered(grid.x_mm, *_edges(own.x_mm, low, high))
+        across = _covered(grid.s_mm, *_edges(own.s_mm, -arc / 2, arc / 2))
+        inside = along[:, None] * across[None, :]
+        weight = OUTSIDE_THE_PAD + (1.0 - OUTSIDE_THE_PAD) * inside
     return Medium(
         grid=grid,
         spectrum=spectrum,
@@ -70,5 +93,5 @@ def medium(skin: FoamPad, grid: SkinGrid) -> Medium:
         zero_mean=False,
         rest_thickness_mm=np.full(spectrum.shape, thickness),
         least_thickness_mm=0.0,
-        low_modes=150,
+        low_modes=80,
     )

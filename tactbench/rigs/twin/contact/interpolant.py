@@ -51,6 +51,10 @@ def _spline_slopes(h: FloatArray, secant: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
+_ROUNDING_N = 0.05
+"""Added under the power: its slope at the break would be infinite, and no reading's is."""
+
+
 class Interpolant:
     """Piecewise cubic in the load.
 
@@ -62,14 +66,20 @@ class Interpolant:
         (n, c)
     breaks
         Indices of nodes where one cubic ends and the next begins.
+    power
+        Beyond the last break the cubics run in ``(load - load at that break) ** power``, rounded off; elsewhere in the
+        load itself.
     """
 
-    def __init__(self, loads: FloatArray, values: FloatArray, breaks: Sequence[int] = ()) -> None:
+    def __init__(self, loads: FloatArray, values: FloatArray, breaks: Sequence[int] = (), power: float = 1.0) -> None:
         self.loads = loads
+        self._power = power
+        self._bent_from = max(breaks, default=0)
+        self._x = self._bent(loads)
         edges = [0, *sorted(set(breaks) - {0, loads.size - 1}), loads.size - 1]
         coefficients = []
         for low, high in itertools.pairwise(edges):
-            x, y = loads[low : high + 1], values[low : high + 1]
+            x, y = self._x[low : high + 1], values[low : high + 1]
             d = slopes(x, y)
             h = np.diff(x)[:, None]
             secant = np.diff(y, axis=0) / h
@@ -81,10 +91,18 @@ class Interpolant:
     def __call__(self, load: FloatArray) -> FloatArray:
         """Return the (m, c) values at (m,) loads within the nodes' range."""
         at = np.clip(np.searchsorted(self.loads, load, side="right") - 1, 0, self.loads.size - 2)
-        t = (load - self.loads[at])[:, None]
+        t = (self._bent(load) - self._x[at])[:, None]
         a, b, c, d = self._cubics
         out: FloatArray = d[at]
         for lower in (c, b, a):
             out *= t
             out += lower[at]
         return out
+
+    def _bent(self, load: FloatArray) -> FloatArray:
+        if self._power == 1.0:
+            return load
+        beyond = np.maximum(load - self.loads[self._bent_from], 0.0)
+        # One variable throughout: the load up to the break, then the break's load plus the bent distance.
+        bent = (beyond + _ROUNDING_N) ** self._power - _ROUNDING_N**self._power
+        return np.asarray(np.minimum(load, self.loads[self._bent_from]) + bent)

@@ -35,5 +35,5 @@ def medium(skin: BondedLayer, grid: SkinGrid) -> Medium:
         zero_mean=incompressible,
         rest_thickness_mm=np.full(spectrum.shape, thickness),
         least_thickness_mm=0.0,
-        low_modes=150,
+        low_modes=80,
     )

@@ -54,7 +54,8 @@ class Preconditioner:
                 "The skin's stiffness is not positive definite.",
                 hint="Check the skin's parameters: moduli and stiffnesses must be positive.",
             )
-        np.add(self._diagonal, float(stiffness.mean()), out=self._inverse)
+        # Stiff modes are short waves: they live where the local stiffness is large, so its mean is too little for them.
+        np.add(self._diagonal, 2.0 * float(stiffness.mean()), out=self._inverse)
         np.reciprocal(self._inverse, out=self._inverse)
 
     def __call__(self, vector: FloatArray) -> FloatArray:

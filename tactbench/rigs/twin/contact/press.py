@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, SkinGrid, SkinState
+from tactbench.plugin import FloatArray, RigError, SkinGrid, SkinState
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.newton import TOLERANCE, NewtonSolver, Solution
 from tactbench.rigs.twin.geometry import Contact
@@ -133,7 +133,7 @@ class Press:
     def _solve(self, force: float) -> Solution:
         if force in self._solutions:
             return self._solutions[force]
-        solution = self._count(self._solver.solve(force, self._guess(force), tolerance=self._tolerance))
+        solution = self._count(self._started(force))
         if self.medium.has_core and not self.touched_core and self.medium.closing_mm(solution.deflection_mm) > 0:
             self.touched_core = True
             if self._core is not None:
@@ -142,6 +142,19 @@ class Press:
                 solution = self._count(self._solver.solve(force, solution.vector, tolerance=self._tolerance))
         self._solutions[force] = solution
         return solution
+
+    def _started(self, force: float) -> Solution:
+        """Solve from the neighbouring loads' states; from rest where that leads nowhere.
+
+        A state guessed for loads of a fraction of a piconewton is off by more than such a load can move.
+        """
+        guess = self._guess(force)
+        if guess is not None:
+            try:
+                return self._solver.solve(force, guess, tolerance=self._tolerance)
+            except RigError:
+                pass
+        return self._solver.solve(force, None, tolerance=self._tolerance)
 
     def _count(self, solution: Solution) -> Solution:
         self.solves += 1

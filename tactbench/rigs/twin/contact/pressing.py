@@ -42,7 +42,7 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
         raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     outer = skin.sheet.outer_radius
-    gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"))
+    gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"), skin.sheet.dome)
     read = _reader(run.sensor, grid, names, fidelity) if names else no_channels
     if fidelity.solver == "local":
         from tactbench.rigs.twin.contact.local import LocalPress

@@ -64,7 +64,7 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
             side_fraction=skin.gap_side_fraction.to("1"),
         ),
         least_thickness_mm=skin.residual_film.to("mm"),
-        low_modes=110,
+        low_modes=60,
         has_core=True,
     )
 

@@ -7,7 +7,6 @@ energy, gradient and conjugate directions live in Fourier space, where the skin'
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,9 +24,6 @@ class Spectrum:
     """
 
     def __init__(self, grid: SkinGrid) -> None:
-        from scipy import fft
-
-        self._fft: Any = fft
         self.shape = (grid.x_mm.size, grid.s_mm.size)
         nx, ns = self.shape
         self.half = (nx, ns // 2 + 1)
@@ -54,7 +50,8 @@ class Spectrum:
 
     def of(self, field: FloatArray) -> FloatArray:
         """Return the (size,) vector of a (nx, ns) field."""
-        coefficients = self._fft.rfft2(field)
+        # Numpy's transforms are as quick as scipy's, whose package takes 40 ms to import.
+        coefficients = np.fft.fft(np.fft.rfft(field), axis=0)
         coefficients *= self._forward
         flat: FloatArray = coefficients.view(np.float64).reshape(-1)
         return flat
@@ -62,7 +59,7 @@ class Spectrum:
     def field(self, vector: FloatArray) -> FloatArray:
         """Return the (nx, ns) field of a (size,) vector."""
         np.multiply(vector.view(np.complex128).reshape(self.half), self._backward, out=self._buffer)
-        real: FloatArray = self._fft.irfft2(self._buffer, s=self.shape, overwrite_x=True)
+        real: FloatArray = np.fft.irfft(np.fft.ifft(self._buffer, axis=0), self.shape[1])
         return real
 
     def diagonal(self, multiplier: FloatArray) -> FloatArray:
@@ -120,7 +117,6 @@ class LowModes:
         if self._mean:
             parts.append(stiffness.reshape(-1)[:1])
         self._stiffness = np.concatenate(parts)
-        self._fft = spectrum._fft
 
     def take(self, vector: FloatArray) -> FloatArray:
         """Return the (size,) coefficients of a flat vector."""
@@ -134,7 +130,7 @@ class LowModes:
 
     def matrix(self, local: FloatArray, out: FloatArray) -> None:
         """Fill ``out[:size, :size]`` with the matrix of ``K + local`` for a (nx, ns) local stiffness."""
-        spectrum: npt.NDArray[np.complex128] = self._fft.fft2(local).reshape(-1)
+        spectrum: npt.NDArray[np.complex128] = np.fft.fft2(local).reshape(-1)
         spectrum /= self._cells
         difference, total = spectrum[self._difference], spectrum[self._sum]
         n = self._modes

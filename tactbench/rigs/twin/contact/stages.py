@@ -73,9 +73,20 @@ def skin_under_load(run: Synthesis) -> LoadTable:
 
     Whether the fluid's pressure belongs to it must be settled before it is first asked for.
     """
-    tabulated = _tabulated(run)
+    largest, names = run.load.largest_n, _read_names(run)
+    if run.scene.simulation.tolerance is not None and run.rung_error is None:
+        choose_rung(run, names, largest)
+    tabulated = _tabulated(run, names, largest)
     _report(run, tabulated)
     return tabulated.table
+
+
+def bare_skin(run: Synthesis, largest_n: float) -> LoadTable:
+    """Return what the skin alone does up to a load, no channel read: for those who decide upon the load.
+
+    It may end beyond the reach of a cap: whether the load that is decided upon does is looked at when the skin is read.
+    """
+    return _tabulated(run, [], largest_n, only_skin=True).table
 
 
 def _read_names(run: Synthesis) -> list[str]:
@@ -83,17 +94,16 @@ def _read_names(run: Synthesis) -> list[str]:
     return [channel.name for track in run.tracks for channel in track.channels if channel.kind in READ_FROM_THE_SKIN]
 
 
-def _tabulated(run: Synthesis) -> _Tabulated:
-    largest, names = run.load.largest_n, _read_names(run)
-    if run.scene.simulation.tolerance is not None and run.rung_error is None:
-        choose_rung(run, names, largest)
+def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: bool = False) -> _Tabulated:
     spec, asked = run.sensor.model_dump_json(), run.scene.simulation.tolerance
-    text = f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{asked}"
+    text = (
+        f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{asked}|{only_skin}"
+    )
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
         _TABLES.move_to_end(key)
         return _TABLES[key]
-    made = _tabulate(run, names, largest)
+    made = _tabulate(run, names, largest, within_reach=not only_skin)
     # Whoever asks first waits for the solving; it belongs to the contact.
     run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + made.table.solved_s
     run.elsewhere_s += made.table.solved_s
@@ -103,7 +113,7 @@ def _tabulated(run: Synthesis) -> _Tabulated:
     return made
 
 
-def _tabulate(run: Synthesis, names: list[str], largest: float) -> _Tabulated:
+def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> _Tabulated:
     fidelity = run.fidelity
     press, read = pressed(run, names, fidelity)
     table = build_table(
@@ -120,7 +130,8 @@ def _tabulate(run: Synthesis, names: list[str], largest: float) -> _Tabulated:
     skin = run.sensor.spec.skin
     sheet = None if skin is None else skin.sheet
     outer_mm = math.inf if sheet is None or sheet.outer_radius is None else sheet.outer_radius.to("mm")
-    check_reach(press, largest, outer_mm)
+    if within_reach:
+        check_reach(press, largest, outer_mm)
     pad = None if sheet is None else pad_of(sheet, medium.grid)
     return _Tabulated(table, press.touched_core, closing, film, remarks(press, table.loads_n.tolist(), outer_mm, pad))
 

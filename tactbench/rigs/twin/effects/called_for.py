@@ -68,6 +68,8 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
     share = sum(term.fraction.to("1") for term in terms)
     if not terms or not share:
         return Reason(False, "the spec states no creep for the observed channels", 0.0)
+    if scene.drive is not None:
+        return Reason(True, f"a motor's force loop may change the load at any rate; {100 * share:.0f} % comes late")
     rate = _steepest_n_per_s(scene)
     if not rate:
         return Reason(False, f"the load is constant: {scene.profile.end.to('N'):g} N throughout", 0.0)

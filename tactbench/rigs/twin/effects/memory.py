@@ -7,7 +7,10 @@ mistake of the caller, and no answer to it would be right.
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
+import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, RigError
 
@@ -40,13 +43,17 @@ def steps_s(t_s: FloatArray, tau_s: float) -> FloatArray:
     return dt
 
 
-def recurrence(decay: FloatArray, drive: FloatArray) -> FloatArray:
+ComplexArray = npt.NDArray[np.complex128]
+Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
+
+
+def recurrence(decay: Numbers, drive: Numbers) -> Numbers:
     """Return ``x_n = decay_n x_{n-1} + drive_n`` for all n, with ``x_0 = drive_0``.
 
     Parameters
     ----------
     decay
-        (n,) between 0 and 1; the first is not used.
+        (n,) of absolute value 0 to 1; the first is not used.
     drive
         (n,) or (n, channels)
 

@@ -9,6 +9,12 @@ from tactbench.plugin import Check
 
 def checks() -> Sequence[Check]:
     """Return every check of the twin against what must be true."""
-    from tactbench.rigs.twin.verification import omission
+    from tactbench.rigs.twin.verification import contact, hard_cases, memory, omission, tangential
 
-    return [*omission.checks()]
+    return [
+        *contact.checks(),
+        *memory.checks(),
+        *tangential.checks(),
+        *omission.checks(),
+        *hard_cases.checks(),
+    ]

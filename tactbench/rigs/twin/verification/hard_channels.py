@@ -17,6 +17,7 @@ from tactbench.plugin import (
     RigContext,
     Scene,
     SensorDescriptor,
+    Simulation,
     assumed,
     load_registry,
 )
@@ -138,6 +139,19 @@ def same_seed_same_bits(case: Case) -> None:
         case.holds(np.array_equal(samples.data, second.samples[name].data), f"{name} differs with the same seed")
 
 
+def any_rung(case: Case) -> None:
+    """Record on any rung of the ladder and to any tolerance, or refuse: a rung wrong for a skin, a bound none keeps."""
+    sensor = _sensor(case)
+    asked: dict[str, object] = {"rung": case.one_of("closed-form", "default", "fine", "no such rung")}
+    if case.chance(0.2):
+        asked = {"tolerance": case.decades(1e-6, 1e3)}
+    largest = case.decades(1e-12, 50.0)
+    case.says(largest_n=largest, **{name: str(value) for name, value in asked.items()})
+    case.right = "refusal" if "no such rung" in asked.values() else "either"
+    simulation = Simulation.model_validate(asked)
+    _recorded(case, sensor, _scene(case, simulation=simulation, profile=ForceRamp(end=_q(largest, "N"), samples=9)), 1)
+
+
 _NUMBERS = (
     "duration", "hold", "start", "end", "radius", "x", "s", "scatter", "tilt_x", "tilt_s", "since_power_on",
     "force_noise",
@@ -172,5 +186,5 @@ def endless_scales(case: Case) -> None:
 
 
 FAMILIES: tuple[Family, ...] = (
-    any_environment, any_profile, any_force, same_seed_same_bits, impossible_scenes, endless_scales,
+    any_environment, any_profile, any_force, any_rung, same_seed_same_bits, impossible_scenes, endless_scales,
 )  # fmt: skip

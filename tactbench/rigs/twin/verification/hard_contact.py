@@ -122,6 +122,17 @@ def any_radius(case: Case) -> None:
     )
 
 
+def past_the_rim(case: Case) -> None:
+    """Refuse a load under which the skin is touched where the cap has ended, and no other."""
+    skin = draw_skin(case)
+    press = press_of(skin, draw_contact(case, skin, case.uniform(0.5, 2.0)))
+    state = lawful(case, press, [case.decades(1.0, 500.0)])[0]
+    touched = press.gap_mm[state.pressure_mpa > 0]
+    # Every gap under a cap is below its radius and the finger's fall; beyond it there are 50 mm more.
+    case.right = "refusal" if touched.max() > 30.0 else "answer"
+    check_reach(press, state.force_n, outer_mm(skin))
+
+
 def a_cap_that_is_none(case: Case) -> None:
     """Refuse radii of zero, below zero and not a number."""
     case.right = "refusal"
@@ -160,6 +171,8 @@ def flat_is_a_huge_cap(case: Case) -> None:
     first, second = (lawful(case, press_of(skin, one), [load])[0].depth_mm for one in (flat, huge))
     grid = skin_grid(skin.sheet)
     apart = float(np.abs(gap_mm(grid, flat, outer_mm(skin)) - gap_mm(grid, huge, outer_mm(skin))).max())
+    r2 = grid.x_mm.size**2 * grid.cell_mm[0] ** 2 + grid.s_mm.size**2 * grid.cell_mm[1] ** 2
+    case.holds(apart <= r2 / (2 * huge.radius_mm) * 1.01 + 1e-13, f"the cap sags by {apart!r} mm")
     case.holds(abs(first - second) <= 2 * apart + SOLVED * first, f"{first!r} mm flat, {second!r} mm huge")
 
 
@@ -192,7 +205,7 @@ def edge_and_tilt(case: Case) -> None:
     All skins are mirror images of themselves across s = 0, so that a mirrored contact is as deep.
     """
     skin = draw_skin(case)
-    tilt = case.uniform(0.0, 0.9)
+    tilt = case.uniform(0.0, 1.4)
     contact = draw_contact(case, skin, case.decades(3.0, 1e3), margin=-0.05, tilt=tilt)
     sheet = skin.sheet
     inside = (
@@ -212,6 +225,6 @@ def edge_and_tilt(case: Case) -> None:
 
 
 FAMILIES: tuple[Family, ...] = (
-    any_radius, a_cap_that_is_none, unresolved_contact, flat_is_a_huge_cap, any_load, loads_that_are_none,
+    any_radius, past_the_rim, a_cap_that_is_none, unresolved_contact, flat_is_a_huge_cap, any_load, loads_that_are_none,
     edge_and_tilt,
 )  # fmt: skip

@@ -64,6 +64,8 @@ def any_poisson_ratio(case: Case) -> None:
     ratio = (0.5 - below, 0.5, 0.5 + below, -below)[case.rng.choice(4, p=[0.6, 0.2, 0.1, 0.1])]
     case.says(medium=skin.medium, poisson=ratio)
     case.right = "answer" if 0 <= ratio <= 0.5 else "refusal"
+    if skin.medium == "bonded layer":
+        skin = _changed(skin, thickness=case.decades(0.1, 5.0))
     contact = draw_contact(case, skin, case.decades(5.0, 100.0), margin=0.4)
     load = case.decades(1e-3, 5.0)
     state = lawful(case, press_of(_changed(skin, poisson=ratio), contact), [load])[0]
@@ -112,12 +114,13 @@ def film_that_closes(case: Case) -> None:
     if not isinstance(skin, FluidBackedShell):
         return
     contact = draw_contact(case, skin, case.decades(4.0, 40.0), margin=0.4)
-    press = press_of(skin, contact)
+    gap = press_of(skin, contact).gap_mm
+    bare = Press(medium_of(skin, skin_grid(skin.sheet)), gap, contact)
     low, high = 0.0, 6.0
-    if press.closing_at(high) > 0:
+    if bare.closing_at(high) > 0:
         while high - low > 1e-3:
             middle = (low + high) / 2
-            low, high = (low, middle) if press.closing_at(middle) > 0 else (middle, high)
+            low, high = (low, middle) if bare.closing_at(middle) > 0 else (middle, high)
     loads = [max(low, 1e-2), high, high * 1.01]
     states = lawful(case, press_of(skin, contact), loads)
     for state in states:
@@ -126,9 +129,8 @@ def film_that_closes(case: Case) -> None:
     # Depth grows no faster than in proportion to the load (it is concave in it, from zero); 1e-6 N of slack.
     most = states[0].depth_mm * ((loads[1] + 1e-6) / loads[0] - 1) + SOLVED
     case.holds(jump <= most, f"depth jumps by {jump:g} mm from {loads[0]:g} to {loads[1]:g} N")
-    bare = Press(medium_of(skin, skin_grid(skin.sheet)), press.gap_mm, contact)(loads[0])
-    if bare.thickness_mm.min() > skin.residual_film.to("mm"):
-        without = bare.depth_mm
+    if bare.closing_at(loads[0]) <= 0:
+        without = bare(loads[0]).depth_mm
         case.holds(
             abs(states[0].depth_mm / without - 1) <= SOLVED, f"{states[0].depth_mm!r} mm, coreless {without!r} mm"
         )

@@ -1,0 +1,43 @@
+"""How a linear motor is made to press with a wanted force: a controller, a filter, and the motor's own limits."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from tactbench.core.spec.quantity import Frozen, Quantity, assumed, derived
+
+_PAPER_LOOP = "Karl et al. 2016 state a low-pass filter in the loop; neither controller, gains nor motor"
+
+
+class ForceLoop(Frozen):
+    """A force loop around a position-controlled linear motor.
+
+    The force sensor is read once per step, filtered, and a proportional-integral controller on its difference from
+    the profile commands the motor's position. The defaults describe a plausible rig, not the paper's: it names none
+    of these numbers.
+    """
+
+    kind: Literal["force loop"] = "force loop"
+    proportional: Quantity = assumed(0.15, "mm/N", _PAPER_LOOP)
+    """Position commanded per force missing [length / force]."""
+    integral: Quantity = assumed(1.0, "mm/N/s", _PAPER_LOOP)
+    """Rate of position per force missing [length / force / time]."""
+    cutoff: Quantity | None = assumed(1.0, "Hz", f"{_PAPER_LOOP}: no cut-off either")
+    """Cut-off of the first-order low-pass on the measured force [1/time]; None: unfiltered."""
+    rate: Quantity | None = None
+    """Steps of the loop [1/time]; None: one per sample of the reference clock, as the embedded system that reads
+    the sensors would do it."""
+    delay: Quantity = assumed(
+        10.0, "ms", "RS232, as the paper says, at 9600 baud: a command and its answer of 9 to 10 bytes of 10 bits"
+    )
+    """From reading the force to the motor's having the command [time]; rounded up to whole steps."""
+    motor_lag: Quantity = assumed(10.0, "ms", "closed position loop of a small linear motor; no source")
+    """Time constant with which the motor approaches a commanded position [time]."""
+    speed: Quantity = assumed(50.0, "mm/s", "small linear motors reach metres per second; set low for pressing")
+    """Largest speed [length / time]."""
+    acceleration: Quantity = assumed(1000.0, "mm/s/s", "a tenth of gravity; drives allow it to be set")
+    """Largest acceleration [length / time^2]."""
+    resolution: Quantity = derived(
+        0.02, "N", "12 bits on +-10 V of a Nano17 with 3.7 N/V in its worst gauge, upper end of 8 to 20 mN"
+    )
+    """Step of the measured force [force]."""

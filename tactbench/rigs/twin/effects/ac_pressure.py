@@ -1,0 +1,67 @@
+"""Dynamic pressure: the fluid's pressure within the band of its channel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tactbench.plugin import ChannelSpec, FloatArray, NotApplicable
+from tactbench.rigs.twin.contact.load_table import LoadTable
+from tactbench.rigs.twin.contact.stages import skin_under_load
+from tactbench.rigs.twin.effects.memory import lag
+from tactbench.rigs.twin.synthesis import Synthesis
+
+
+def apply(run: Synthesis) -> None:
+    """Add to every channel of dynamic pressure what its band lets through.
+
+    The fluid's pressure follows the load; a vibration of the skin adds its size times the pressure's slope with depth
+    at that load, so that its loudness needs no parameter of its own.
+    """
+    for track in run.tracks:
+        columns = track.by_kind().get("ac_pressure")
+        if not columns:
+            continue
+        table = skin_under_load(run)
+        pressure_mpa = table.skin(track.force_n).fluid_pressure_mpa
+        if track.vibration_mm is not None:
+            pressure_mpa = pressure_mpa + stiffness_mpa_mm(table, track.force_n) * track.vibration_mm
+        for column in columns:
+            channel = track.channels[column]
+            track.readings[:, column] += within_band(track.t_s, 1e6 * pressure_mpa, channel) / _pa_per_count(channel)
+
+
+def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) -> FloatArray:
+    """Return what a band lets through of (n,) pressures that are straight between samples.
+
+    A first-order high-pass and a first-order low-pass with their corners at the band's ends: the makers state the
+    ends, nobody the order. Both are exact for any step.
+    """
+    if channel.band is None:
+        raise NotApplicable(
+            f"{channel.name} states no band: what it lets through of a pressure is not known.",
+            hint="State the channel's band in the sensor's spec.",
+        )
+    low, high = channel.band.lower, channel.band.upper
+    passed = pressure_pa - lag(t_s, pressure_pa, 1.0 / (2.0 * math.pi * low))
+    return lag(t_s, passed, 1.0 / (2.0 * math.pi * high))
+
+
+def stiffness_mpa_mm(table: LoadTable, force_n: FloatArray) -> FloatArray:
+    """Return (n,) how the fluid's pressure grows with depth at (n,) loads: a chord over a fiftieth of the range."""
+    most = float(table.loads_n[-1])
+    nodes = np.linspace(0.0, most, 51)
+    curves = table.skin(nodes)
+    deeper = np.diff(curves.depth_mm)
+    chord = np.divide(np.diff(curves.fluid_pressure_mpa), deeper, out=np.zeros_like(deeper), where=deeper > 0)
+    return np.asarray(np.interp(force_n, 0.5 * (nodes[1:] + nodes[:-1]), chord))
+
+
+def _pa_per_count(channel: ChannelSpec) -> float:
+    if channel.scale is None:
+        raise NotApplicable(
+            f"{channel.name} states no scale: its counts cannot be told from a pressure.",
+            hint="State the channel's scale (Pa/count) in the sensor's spec.",
+        )
+    return channel.scale.to("Pa/count")

@@ -1,0 +1,85 @@
+"""A motor under force control: the true force is what the loop makes of the commanded one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from tactbench.plugin import FloatArray
+from tactbench.rigs.twin.contact.load_table import LoadTable
+from tactbench.rigs.twin.contact.stages import bare_skin
+from tactbench.rigs.twin.effects.loop_dynamics import Dynamics
+from tactbench.rigs.twin.synthesis import Load, Synthesis
+
+BEYOND = 3.0
+"""How far beyond the largest commanded force the skin is known to the loop; the motor goes no deeper than that."""
+RETRACT_MM = 1.0
+"""How far the motor may withdraw from the skin; no source, it only bounds a loop that swings."""
+_CURVE_POINTS = 4001
+"""Depths at which the force is tabulated. Straight between them: against the curve of the solved loads the force is
+off by less than 1e-4 of the largest (test)."""
+
+
+def apply(run: Synthesis) -> None:
+    """Step the scene's loop over the recording and let the load be what it exerts.
+
+    Without a rate of its own the loop reads the force once per recorded sample, and its sensor errs by the very
+    numbers that are recorded: it is one sensor.
+    """
+    drive = run.scene.drive
+    if drive is None or not run.load.largest_n > 0 or run.sensor.spec.skin is None:
+        return
+    duration = run.scene.profile.duration.to("s")
+    per_sample = drive.rate is None
+    step_s = duration / run.t_s.size if drive.rate is None else 1.0 / drive.rate.to("Hz")
+    steps = run.t_s.size if per_sample else math.ceil(duration / step_s)
+    t_s: FloatArray = np.arange(steps, dtype=np.float64) * step_s
+    wanted = run.load.at(t_s)
+    errors = run.of_recording("force") if per_sample else run.of_recording("force", "loop")
+    noise = run.scene.environment.force_noise.to("N") * errors.standard_normal(steps)
+    table = bare_skin(run, BEYOND * run.load.largest_n)
+    force_n, deepest = force_at_depth(table)
+    start = depth_of(table, float(wanted[0]))
+    dynamics = Dynamics.of(drive, step_s)
+    depths = dynamics.carried(force_n, wanted, noise, (-RETRACT_MM, deepest), start)
+    forces = np.array([force_n(depth) for depth in depths.tolist()])
+    run.follow(Load(t_s, forces))
+    run.drawn.update(
+        loop_delay_steps=dynamics.delay_steps,
+        loop_error_rms_n=float(np.sqrt(np.mean((forces - wanted) ** 2))),
+        loop_largest_n=float(forces.max()),
+        loop_steps_at_end=int(np.count_nonzero(depths >= deepest)),
+    )
+
+
+def force_at_depth(table: LoadTable) -> tuple[Callable[[float], float], float]:
+    """Return the force at a depth, and the depth at which the table ends: deeper it is held.
+
+    Depth rises with load, so its curve can be read the other way round; a depth of 0 or less has no force.
+    """
+    loads = np.linspace(0.0, float(table.loads_n[-1]), 20 * _CURVE_POINTS)
+    # Ties and dips by rounding would leave a depth without its force.
+    depths = np.maximum.accumulate(table.skin(loads).depth_mm)
+    deepest = float(depths[-1])
+    spacing = deepest / (_CURVE_POINTS - 1)
+    forces: list[float] = np.interp(np.linspace(0.0, deepest, _CURVE_POINTS), depths, loads).tolist()
+    forces[0] = 0.0
+
+    def force_n(depth_mm: float) -> float:
+        if depth_mm <= 0.0:
+            return 0.0
+        place = depth_mm / spacing
+        before = int(place)
+        if before >= _CURVE_POINTS - 1:
+            return forces[-1]
+        return forces[before] + (place - before) * (forces[before + 1] - forces[before])
+
+    return force_n, deepest
+
+
+def depth_of(table: LoadTable, force_n: float) -> float:
+    """Return the depth at which the skin answers with a force, mm."""
+    depth: FloatArray = table.skin(np.array([force_n])).depth_mm
+    return float(depth[0])

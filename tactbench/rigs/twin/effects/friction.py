@@ -1,0 +1,78 @@
+"""Friction: what the surface does to the skin along the way it slides."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tactbench.plugin import ChannelSpec, Quantity, SensorSpec, assumed, derived
+from tactbench.rigs.twin.contact.stages import skin_under_load
+from tactbench.rigs.twin.effects.partial_slip import shear_modulus_mpa, sliding_stiffness
+from tactbench.rigs.twin.effects.slip_event import Mode
+from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
+from tactbench.rigs.twin.synthesis import Synthesis
+
+GRID_HZ = 500.0
+"""Nodes at which load and stiffness are taken; both change over seconds."""
+MODE: dict[str, Quantity] = {
+    "skin_mode_frequency": derived(
+        330.0, "Hz", "Fishel and Loeb 2012: a BioTac feels the smallest vibrations near 330 Hz"
+    ),
+    "skin_mode_damping": assumed(0.1, "1", "share of the critical damping; no source for any of these skins"),
+}
+"""The skin's mode for sensors whose parameters do not state their own."""
+
+
+def mode_of(sensor: SensorSpec) -> Mode:
+    """Return the mode in which the skin under a contact swings."""
+    found = {**MODE, **sensor.parameters}
+    return Mode(2.0 * math.pi * found["skin_mode_frequency"].to("Hz"), found["skin_mode_damping"].to("1"))
+
+
+def apply(run: Synthesis) -> None:
+    """Drag the skin, and let the force sensor see the tangential force and who keeps score of slip.
+
+    The force sensor's stream gains ``fx`` and ``fy`` (force on the sensor, along x and s), ``slip`` (1 while the whole
+    contact slips) and ``stick_ratio``.
+    """
+    slide, skin = run.scene.slide, run.sensor.spec.skin
+    if slide is None or skin is None or not run.load.largest_n > 0:
+        return
+    surface, mode = slide.surface, mode_of(run.sensor.spec)
+    duration = run.scene.profile.duration.to("s")
+    grid = np.linspace(0.0, duration, max(2, math.ceil(duration * GRID_HZ) + 1))
+    load = run.load.at(grid)
+    radius = skin_under_load(run).skin(load).contact_radius_mm
+    start = slide.start.to("s")
+    drive = Drive(
+        speed_mm_s=slide.speed.to("mm/s"),
+        start_s=start,
+        end_s=math.inf if slide.duration is None else start + slide.duration.to("s"),
+        static=surface.static_friction.to("1"),
+        kinetic=surface.kinetic_friction.to("1"),
+        stribeck_mm_s=surface.stribeck_speed.to("mm/s"),
+        mode=mode,
+        t_s=grid,
+        load_n=load,
+        stiffness=sliding_stiffness(radius, shear_modulus_mpa(skin)),
+    )
+    dragged = Dragged(drive)
+    run.sliding = dragged
+    seen = dragged(run.t_s)
+    angle = slide.direction.to("rad")
+    for name, share in (("fx", math.cos(angle)), ("fy", math.sin(angle))):
+        run.reference_more[name] = (ChannelSpec(name=name, kind="force", unit="N"), share * seen.force_n)
+    for name, values in (("slip", seen.slipping.astype(np.float64)), ("stick_ratio", seen.stick_ratio)):
+        run.reference_more[name] = (
+            ChannelSpec(name=name, kind="other", unit="1", lower=0.0, upper=1.0),
+            values,
+        )
+    run.drawn.update(
+        slide_mm_s=drive.speed_mm_s,
+        friction_static=drive.static,
+        friction_kinetic=drive.kinetic,
+        slips=int(dragged.let_go_s.size),
+        tangential_stiffness_n_mm=float(drive.stiffness[-1]),
+        largest_tangential_n=float(np.abs(seen.force_n).max(initial=0.0)),
+    )

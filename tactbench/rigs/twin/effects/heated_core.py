@@ -1,0 +1,107 @@
+"""A heated core as one lump: a heater, a resistance to the room, another one through the contact.
+
+    C dT/dt = P + (T_room - T)/R + G (T_indenter - T)
+
+With `Y = 1/R + G`, `T_inf = (P + T_room/R + G T_indenter)/Y` and `tau = C/Y`, a step of constant G is
+``T' = T_inf + (T - T_inf) exp(-dt/tau)``: exact for any dt, so a step of a thousand tau lands on T_inf and dt = 0
+changes nothing. G varies along a ramp: each step takes the mean of its ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactbench.plugin import FloatArray, Scene, SensorSpec
+from tactbench.rigs.twin.effects.memory import recurrence
+
+NEEDED = ("heater_power", "heat_resistance", "heat_capacity")
+"""Parameters of a sensor with a heated core."""
+
+
+@dataclass(frozen=True)
+class HeatedCore:
+    """What heats the core, and what it loses heat to."""
+
+    room_c: float
+    power_w: float
+    resistance_k_per_w: float
+    capacity_j_per_k: float
+
+    @classmethod
+    def of(cls, scene: Scene, sensor: SensorSpec) -> HeatedCore | None:
+        """Return the core that the spec declares, in the scene's room; None without one."""
+        if any(name not in sensor.parameters for name in NEEDED):
+            return None
+        return cls(
+            room_c=scene.environment.ambient.to("degC"),
+            power_w=sensor.parameters["heater_power"].to("W"),
+            resistance_k_per_w=sensor.parameters["heat_resistance"].to("K/W"),
+            capacity_j_per_k=sensor.parameters["heat_capacity"].to("J/K"),
+        )
+
+    @property
+    def rise_k(self) -> float:
+        """How far a warm core stands above the room."""
+        return self.power_w * self.resistance_k_per_w
+
+    @property
+    def tau_s(self) -> float:
+        """Time constant without a contact."""
+        return self.capacity_j_per_k * self.resistance_k_per_w
+
+    def untouched(self, scene: Scene, t_s: FloatArray) -> FloatArray:
+        """Return the (n,) temperature without a contact, degC, at (n,) seconds since the recording's first sample.
+
+        At power-on it is the room's. The scene's ``drift_scale`` scales what is still to come, as it does warm-up.
+        """
+        environment = scene.environment
+        since = environment.since_power_on.to("s") + scene.starts_after_s + t_s
+        return self.room_c + self.rise_k * (1.0 - environment.drift_scale * np.exp(-since / self.tau_s))
+
+    def warmth(self, scene: Scene, t_s: FloatArray, conductance_w_per_k: FloatArray, indenter_c: float) -> FloatArray:
+        """Return the (n,) kelvin by which a contact warms the core: its temperature less that without a contact.
+
+        Parameters
+        ----------
+        t_s
+            (n,) ascending; equal neighbours are allowed.
+        conductance_w_per_k
+            (n,) heat flow per temperature difference through the contact.
+        indenter_c
+            Temperature of the indenter, degC.
+        """
+        start = float(self.untouched(scene, t_s[:1])[0])
+        alone = self.carried(t_s, np.zeros_like(t_s), indenter_c, start)
+        return self.carried(t_s, conductance_w_per_k, indenter_c, start) - alone
+
+    def carried(
+        self, t_s: FloatArray, conductance_w_per_k: FloatArray, indenter_c: float, start_c: float
+    ) -> FloatArray:
+        """Return the (n,) temperature, degC, that starts at `start_c`."""
+        before = np.concatenate([conductance_w_per_k[:1], conductance_w_per_k[:-1]])
+        through = 0.5 * (before + conductance_w_per_k)
+        loss = 1.0 / self.resistance_k_per_w + through
+        # Relative to the room: nothing cancels, and a core at rest stays there to the last digit.
+        goal = (self.power_w + through * (indenter_c - self.room_c)) / loss
+        exponent = -np.diff(t_s, prepend=t_s[:1]) * loss / self.capacity_j_per_k
+        drive = -np.expm1(exponent) * goal
+        drive[0] = start_c - self.room_c
+        return self.room_c + recurrence(np.exp(exponent), drive)
+
+
+def disc_conductance_w_per_k(radius_mm: FloatArray, conductivity_w_per_m_k: float) -> FloatArray:
+    """Return ``4 k a``: the flow per kelvin from an isothermal disc of radius a into a half-space.
+
+    Carslaw and Jaeger 1959, Conduction of heat in solids, chapter 8; without a contact it is 0.
+    """
+    return np.asarray(4e-3 * conductivity_w_per_m_k * radius_mm, dtype=np.float64)
+
+
+def relative_conductivity(degc: FloatArray, coefficient_per_k: float) -> FloatArray:
+    """Return the conductivity of an electrolyte relative to that at 25 degC: ``1 + alpha (T - 25)``.
+
+    Raised to a tenth where the straight line would leave the range of liquids (below -20 degC for 2 % per kelvin).
+    """
+    return np.asarray(np.maximum(1.0 + coefficient_per_k * (degc - 25.0), 0.1))

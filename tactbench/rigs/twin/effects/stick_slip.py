@@ -1,0 +1,266 @@
+"""The skin dragged along: sticking, slipping and steady sliding, event by event, each phase in closed form.
+
+The surface moves at a constant speed; load, contact radius and stiffness change slowly and are straight between the
+nodes of a grid. Nothing is stepped through: a phase ends where its closed form says so.
+
+- **stick**: the skin moves with the surface, until elastic and viscous force reach ``mu_s N``. The force follows
+  Cattaneo and Mindlin.
+- **slip**: see :mod:`slip_event`; kinetic friction is that at the slip's mean speed, held at its beginning.
+- **slide**: if the skin is not caught; the force follows the LuGre bristle. It ends where sliding is no longer
+  stable (friction weakens faster than the skin is damped) and a slip would be caught.
+- **held**: after the motion, the skin stays, and slides back as far as a falling load no longer holds it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.plugin import FloatArray
+from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, bristle, coefficient
+from tactbench.rigs.twin.effects.partial_slip import share_of_force, stick_ratio
+from tactbench.rigs.twin.effects.slip_event import Mode, deflection_after, is_caught, slip_s, swing
+from tactbench.rigs.twin.synthesis import Tangential
+
+REST, STICK, SLIP, SLIDE, HELD = range(5)
+_LEAST_LOAD_N = 1e-4
+"""Below it a load has no contact worth a stick-slip cycle: it slides."""
+_RUNG_OUT = math.log(1e3)
+"""A slip that is never caught is followed until its swing has fallen to a thousandth."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What moves over the skin, and what the skin is there."""
+
+    speed_mm_s: float
+    start_s: float
+    end_s: float
+    static: float
+    kinetic: float
+    stribeck_mm_s: float
+    mode: Mode
+    t_s: FloatArray
+    """(m,) grid, ascending, over the whole recording."""
+    load_n: FloatArray
+    """(m,) normal force."""
+    stiffness: FloatArray
+    """(m,) tangential stiffness of the skin, N/mm; above 0 where there is a load."""
+
+
+@dataclass
+class _Phases:
+    """Beginnings of phases and what each needs; a phase lasts to the next one's beginning."""
+
+    t_s: list[float] = field(default_factory=list)
+    kind: list[int] = field(default_factory=list)
+    x_mm: list[float] = field(default_factory=list)
+    """Deflection at its beginning."""
+    e_mm: list[float] = field(default_factory=list)
+    """Equilibrium of a slip."""
+    friction: list[float] = field(default_factory=list)
+    """Coefficient of a slip."""
+
+    def add(self, t_s: float, kind: int, x_mm: float, e_mm: float = 0.0, friction: float = 0.0) -> None:
+        self.t_s.append(t_s)
+        self.kind.append(kind)
+        self.x_mm.append(x_mm)
+        self.e_mm.append(e_mm)
+        self.friction.append(friction)
+
+
+class Dragged:
+    """The skin under a drive, at any moment.
+
+    Parameters
+    ----------
+    drive
+        The motion and the skin.
+    """
+
+    def __init__(self, drive: Drive) -> None:
+        self.drive = drive
+        contact = drive.load_n > _LEAST_LOAD_N
+        per_n = np.divide(1.0, drive.stiffness, out=np.zeros_like(drive.stiffness), where=contact)
+        # Viscous force at the drive's speed over the stiffness.
+        lag_mm = 2.0 * drive.mode.damping / drive.mode.omega * drive.speed_mm_s
+        self._static_mm = np.maximum(drive.static * drive.load_n * per_n - lag_mm, 0.0)
+        """(m,) deflection at which it lets go; over the held part there is no viscous force."""
+        self._release_mm = drive.static * drive.load_n * per_n
+        self._kinetic = self._within_slip(per_n)
+        self._kinetic_mm = self._kinetic * drive.load_n * per_n
+        steady = coefficient(drive.speed_mm_s, drive.static, drive.kinetic, drive.stribeck_mm_s)
+        self._steady_mm = steady * drive.load_n * per_n
+        self._breaks = (
+            contact & self._unstable() & is_caught(drive.mode, self._static_mm - self._kinetic_mm, drive.speed_mm_s)
+        )
+        """(m,) sliding is not stable there, and stick-slip lives."""
+        self._way_mm = drive.speed_mm_s * drive.t_s
+        self._x_t: list[FloatArray] = []
+        self._x_mm: list[FloatArray] = []
+        self._phases = _Phases()
+        self._run()
+        self._begin = np.array(self._phases.t_s)
+        self._kind = np.array(self._phases.kind)
+        self._from = np.array(self._phases.x_mm)
+        self._about = np.array(self._phases.e_mm)
+        self._friction = np.array(self._phases.friction)
+        self._knots_t = np.concatenate([*self._x_t, [np.inf]])
+        self._knots_mm = np.concatenate([*self._x_mm, [0.0]])
+
+    @property
+    def let_go_s(self) -> FloatArray:
+        """(k,) when the skin let go."""
+        return np.asarray(self._begin[self._kind == SLIP])
+
+    @property
+    def caught_s(self) -> FloatArray:
+        """(k,) when the surface caught the skin again, or took hold of it for the first time."""
+        return np.asarray(self._begin[self._kind == STICK])
+
+    def _within_slip(self, per_n: FloatArray) -> FloatArray:
+        """Return (m,) the coefficient within a slip: at its mean speed as it would be without damping."""
+        drive = self.drive
+        if drive.stribeck_mm_s < COULOMB_MM_S:
+            return np.full(drive.t_s.size, drive.kinetic)
+        u = (drive.static - drive.kinetic) * drive.load_n * per_n
+        mean = drive.speed_mm_s + 2.0 / math.pi * drive.mode.omega * u
+        weaker = np.exp(-mean / drive.stribeck_mm_s)
+        return np.asarray(drive.kinetic + (drive.static - drive.kinetic) * weaker)
+
+    def _unstable(self) -> npt.NDArray[np.bool_]:
+        """Return (m,) whether friction weakens with speed faster than the skin is damped (N |mu'(V)| > c)."""
+        drive = self.drive
+        if drive.stribeck_mm_s < COULOMB_MM_S:
+            return np.zeros(drive.t_s.size, dtype=bool)
+        fall = (drive.static - drive.kinetic) / drive.stribeck_mm_s
+        fall *= math.exp(-drive.speed_mm_s / drive.stribeck_mm_s)
+        return np.asarray(drive.load_n * fall > 2.0 * drive.mode.damping / drive.mode.omega * drive.stiffness)
+
+    def _run(self) -> None:
+        drive, phases = self.drive, self._phases
+        phases.add(-math.inf, REST, 0.0)
+        end = min(drive.end_s, float(drive.t_s[-1]))
+        t, x = drive.start_s, 0.0
+        sliding = bool(np.interp(t, drive.t_s, drive.load_n) <= _LEAST_LOAD_N)
+        while t < end:
+            if sliding:
+                t, x = self._slide(t, x, end)
+                sliding = False
+                continue
+            phases.add(t, STICK, x)
+            t, x = self._lets_go(t, x, end)
+            if t >= end:
+                break
+            about = float(np.interp(t, drive.t_s, self._kinetic_mm))
+            lasting = slip_s(drive.mode, x - about, drive.speed_mm_s)
+            sliding = math.isinf(lasting)
+            if sliding:
+                lasting = _RUNG_OUT / drive.mode.decay if drive.mode.decay > 0 and x > about else 0.0
+            phases.add(t, SLIP, x, about, float(np.interp(t, drive.t_s, self._kinetic)))
+            lasting = min(lasting, end - t)
+            u = deflection_after(drive.mode, x - about, drive.speed_mm_s, lasting)
+            # A slip of no length at all would let go again at the same moment, for ever.
+            t, x = max(t + lasting, math.nextafter(t, math.inf)), about + u
+        if drive.end_s < drive.t_s[-1]:
+            self._hold(max(t, drive.start_s), x)
+
+    def _lets_go(self, t: float, x: float, end: float) -> tuple[float, float]:
+        """Return when and where the skin that sticks at x since t lets go; at `end` if not before."""
+        drive = self.drive
+        wanted = drive.speed_mm_s * t - x
+        if x >= np.interp(t, drive.t_s, self._static_mm):
+            return t, x
+        at, size = int(np.searchsorted(drive.t_s, t, side="right")), 8
+        while at < drive.t_s.size:
+            lead = self._way_mm[at : at + size] - self._static_mm[at : at + size]
+            over = lead >= wanted
+            first = int(over.argmax())
+            if over[first]:
+                return self._crossing(at + first, wanted, t, x, end)
+            if drive.t_s[min(at + size, drive.t_s.size) - 1] >= end:
+                break
+            at, size = at + size, 2 * size
+        return end, x + drive.speed_mm_s * (end - t)
+
+    def _crossing(self, node: int, wanted: float, t: float, x: float, end: float) -> tuple[float, float]:
+        drive = self.drive
+        low, high = (self._way_mm[n] - self._static_mm[n] for n in (node - 1, node))
+        share = (wanted - low) / (high - low) if high > low else 1.0
+        cross = drive.t_s[node - 1] + share * (drive.t_s[node] - drive.t_s[node - 1])
+        cross = min(max(float(cross), t), end)
+        return cross, x + drive.speed_mm_s * (cross - t)
+
+    def _slide(self, t: float, x: float, end: float) -> tuple[float, float]:
+        """Slide from t until it turns unstable, or to the end."""
+        drive = self.drive
+        first = int(np.searchsorted(drive.t_s, t, side="right"))
+        last = int(np.searchsorted(drive.t_s, end, side="left"))
+        broken = self._breaks[first:last]
+        stop = first + int(broken.argmax()) if broken.any() else last
+        until = float(drive.t_s[stop]) if broken.any() else end
+        knots = np.concatenate([[t], drive.t_s[first:stop], [until]])
+        limit = np.interp(knots, drive.t_s, self._steady_mm)
+        # A load that falls faster than the bristle turns over lets the skin back at once: never above mu_s N.
+        most = np.interp(knots, drive.t_s, self._release_mm)
+        deflection = np.minimum(bristle(knots, drive.speed_mm_s, limit, x), most)
+        self._phases.add(t, SLIDE, x)
+        self._x_t.append(knots)
+        self._x_mm.append(deflection)
+        return until, float(deflection[-1])
+
+    def _hold(self, t: float, x: float) -> None:
+        drive = self.drive
+        first = int(np.searchsorted(drive.t_s, t, side="right"))
+        self._phases.add(t, HELD, x)
+        self._x_t.append(np.concatenate([[t], drive.t_s[first:]]))
+        now = min(x, float(np.interp(t, drive.t_s, self._release_mm)))
+        held = np.concatenate([[now], self._release_mm[first:]])
+        self._x_mm.append(np.minimum.accumulate(held))
+
+    def __call__(self, t_s: FloatArray) -> Tangential:
+        """Return what happens at (n,) moments."""
+        drive = self.drive
+        phase = np.searchsorted(self._begin, t_s, side="right") - 1
+        kind, begin, x0, about = self._kind[phase], self._begin[phase], self._from[phase], self._about[phase]
+        stiffness, load, limit = (
+            np.interp(t_s, drive.t_s, values) for values in (drive.stiffness, drive.load_n, self._static_mm)
+        )
+        x, slip = np.zeros(t_s.size), np.zeros(t_s.size)
+        share = np.zeros(t_s.size)
+        force = np.zeros(t_s.size)
+
+        own = kind == STICK
+        x[own] = x0[own] + drive.speed_mm_s * (t_s[own] - begin[own])
+        left = limit[own] - x0[own]
+        share[own] = np.divide(x[own] - x0[own], left, out=np.ones(left.size), where=left > 1e-12)
+        viscous_mm = 2.0 * drive.mode.damping / drive.mode.omega * drive.speed_mm_s
+        force[own] = stiffness[own] * (x0[own] + left.clip(0.0) * share_of_force(share[own]) + viscous_mm)
+
+        own = kind == SLIP
+        u, velocity = swing(
+            drive.mode, x0[own] - about[own], np.full(int(own.sum()), drive.speed_mm_s), t_s[own] - begin[own]
+        )
+        x[own] = about[own] + u
+        slip[own] = drive.speed_mm_s - velocity
+        force[own] = self._friction[phase[own]] * load[own]
+
+        own = (kind == SLIDE) | (kind == HELD)
+        if own.any():
+            x[own] = np.interp(t_s[own], self._knots_t, self._knots_mm)
+            force[own] = stiffness[own] * x[own]
+        slip[kind == SLIDE] = drive.speed_mm_s
+        slipping = (kind == SLIP) | (kind == SLIDE)
+        touched = load > _LEAST_LOAD_N
+        moved = drive.speed_mm_s * (np.clip(t_s, drive.start_s, drive.end_s) - drive.start_s)
+        return Tangential(
+            force_n=np.where(touched, force, 0.0),
+            displacement_mm=x,
+            slip_mm_s=slip,
+            slip_mm=moved - x,
+            slipping=slipping,
+            stick_ratio=np.where(touched & ~slipping, stick_ratio(share), 0.0),
+        )

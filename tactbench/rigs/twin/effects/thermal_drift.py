@@ -1,0 +1,41 @@
+"""Drift of resistive channels with the temperature of their fluid, as far as the contact changes it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tactbench.plugin import FloatArray
+from tactbench.rigs.twin.effects.heated_core import HeatedCore, relative_conductivity
+from tactbench.rigs.twin.synthesis import Synthesis
+
+
+def apply(run: Synthesis) -> None:
+    """Scale the resistance behind each reading by the fluid's conductivity without the contact over that with it.
+
+    Only the change by the contact: how readings rise while the core warms up is measured, and the effect "warm-up"
+    holds it.
+    """
+    core = HeatedCore.of(run.scene, run.sensor.spec)
+    coefficient = run.sensor.spec.parameters.get("conductivity_coefficient")
+    if core is None or coefficient is None:
+        return
+    per_k = coefficient.to("1/K")
+    for track in run.tracks:
+        if track.warmth_k is None:
+            continue
+        alone = core.untouched(run.scene, track.t_s)
+        gained = relative_conductivity(alone + track.warmth_k, per_k) / relative_conductivity(alone, per_k)
+        for column in track.by_kind().get("taxel", []):
+            upper = track.channels[column].upper
+            if upper is not None:
+                track.readings[:, column] = through_divider(track.readings[:, column], gained, upper)
+
+
+def through_divider(reading: FloatArray, gained: FloatArray, full_scale: float) -> FloatArray:
+    """Return what a divider reads when its resistance falls by the factor `gained`: ``E = top/(1 + R/R_ref)``.
+
+    Readings at or beyond the ends (no resistance, or no conductance) stay as they are.
+    """
+    inside = (reading > 0) & (reading < full_scale)
+    ratio = full_scale / np.where(inside, reading, 0.5 * full_scale) - 1.0
+    return np.where(inside, full_scale / (1.0 + ratio / gained), reading)

@@ -1,0 +1,1 @@
+"""The twin, or anybody's recordings, held against figures of real units (see ``docs/likeness.md``)."""

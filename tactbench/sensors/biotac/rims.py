@@ -1,0 +1,171 @@
+"""Discs on a grid coarser than their rims: where current enters, between cell centres.
+
+Under a disc the potential obeys ``div(h grad phi) = kappa (phi - V)`` with ``kappa = 3/h + 4/(pi a)``: it falls to the
+disc's own over the length ``lambda = sqrt(h / kappa)``, which under a closed film is a fifth of a cell. A cell that is
+covered in part would then count as covered altogether, and the disc would grow with the cell.
+
+So cells belong to a disc by their centres, and the plane solution across a straight rim, ``phi - V = q n.r / h``
+outside and ``(q / h) lambda exp(n.r / lambda)`` inside (up to ``lambda``'s own shift), is built into the
+conductances: a face across the rim, ``t`` of whose length is outside, conducts ``h w / (t + (lambda / n) (1 -
+exp(-(D - t) n / lambda)))``, and a cell inside beside the rim takes the current that makes this solution balance. Both
+tend to plain area weighting for thick films and to a fixed potential on the very rim for closed ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.plugin import FloatArray, RigError
+
+_DIRECTIONS = ((0, -1), (0, 1), (1, -1), (1, 1))
+"""(axis, sign) of a cell's four faces."""
+_MOST_DECAYS = 9.0
+"""Decay lengths inside the rim beyond which a cell counts as joined perfectly: exp(9) is stiff enough."""
+_LEAST_WAY = 0.02
+"""A cell centre that lies on the rim is kept this share of a cell away from it."""
+_GRAZING = 1e-3
+"""Smallest cosine between a face's direction and the rim's normal: 1/n would overflow for a face along the rim."""
+_THICK = 1e4
+"""Decay lengths, in millimetres, at which joints are plain areas: what the discs' true areas are compared with."""
+
+
+class Disc(NamedTuple):
+    """A round contact on the core, millimetres in the film's own metric."""
+
+    x_mm: float
+    s_mm: float
+    radius_mm: float
+
+
+class RimmedDiscs:
+    """Electrodes and excitations as discs with rims, on one conduction grid.
+
+    Parameters
+    ----------
+    x_mm, s_mm
+        (nx,), (ns,) centres of the cells in the film's own metric.
+    electrodes, excitation
+        The discs.
+
+    Raises
+    ------
+    RigError
+        If no cell has its centre under a disc.
+    """
+
+    def __init__(self, x_mm: FloatArray, s_mm: FloatArray, electrodes: Sequence[Disc], excitation: Sequence[Disc]):
+        self.count = len(electrodes)
+        step = (float(x_mm[1] - x_mm[0]), float(s_mm[1] - s_mm[0]))
+        self._area = step[0] * step[1]
+        discs = [*electrodes, *excitation]
+        owner, row, column = [], [], []
+        offset: list[npt.NDArray[np.float64]] = []
+        for number, disc in enumerate(discs):
+            along, across = x_mm - disc.x_mm, s_mm - disc.s_mm
+            i, j = np.nonzero(along[:, None] ** 2 + across[None, :] ** 2 < disc.radius_mm**2)
+            if i.size == 0:
+                raise RigError(
+                    f"An electrode of {disc.radius_mm:g} mm at {disc.x_mm:.2f}, {disc.s_mm:.2f} mm covers no cell of "
+                    f"a conduction grid of {step[0]:.2f} x {step[1]:.2f} mm.",
+                    hint="Correct the sensor's electrode positions or its SkinSheet, or ask for more cells.",
+                )
+            owner.append(np.full(i.size, number))
+            row.append(i)
+            column.append(j)
+            offset.append(np.stack([along[i], across[j]]))
+        whose, i, j = np.concatenate(owner), np.concatenate(row), np.concatenate(column)
+        self._radius = np.array([disc.radius_mm for disc in discs])[whose]
+        self._cell = i * s_mm.size + j
+        electrode = whose < self.count
+        self.owner, self.under = whose[electrode], self._cell[electrode]
+        self._driven = self._cell[~electrode]
+        self._rims(np.concatenate(offset, axis=1), whose, i, j, step, (x_mm.size, s_mm.size))
+        plain = np.full(whose.size, self._area)
+        plain[self._beside] = self._beside_rim(np.full(self._beside.size, _THICK)) * _THICK**2
+        true_area = np.array([np.pi * disc.radius_mm**2 for disc in discs])
+        # A staircase of cells has the disc's area only roughly.
+        self._scale = (true_area / np.bincount(whose, weights=plain))[whose]
+
+    def _rims(
+        self,
+        offset: FloatArray,
+        whose: npt.NDArray[np.intp],
+        i: npt.NDArray[np.intp],
+        j: npt.NDArray[np.intp],
+        step: tuple[float, float],
+        shape: tuple[int, int],
+    ) -> None:
+        """Find the faces that cross a rim, and what plane each cell beside one sees."""
+        radius = self._radius
+        distance = np.maximum(np.hypot(*offset), 1e-9)
+        normal = offset / distance
+        crossing = np.zeros((4, whose.size), dtype=bool)
+        exists = np.ones((4, whose.size), dtype=bool)
+        faces: list[list[npt.NDArray[np.intp]]] = [[], []]
+        inner: list[list[npt.NDArray[np.intp]]] = [[], []]
+        ways: list[list[FloatArray]] = [[], []]
+        slopes: list[list[FloatArray]] = [[], []]
+        for place, (axis, sign) in enumerate(_DIRECTIONS):
+            beyond = offset[axis] + sign * step[axis]
+            there = (i, j)[axis] + sign
+            # At the sheet's insulated edge there is no face.
+            exists[place] = (there >= 0) & (there < shape[axis])
+            out = (beyond**2 + offset[1 - axis] ** 2 >= radius**2) & exists[place]
+            crossing[place] = out
+            rim = np.sqrt(np.maximum(radius**2 - offset[1 - axis] ** 2, 0.0))
+            way = np.clip(sign * beyond - rim, _LEAST_WAY * step[axis], step[axis])
+            first = i - (axis == 0) * (sign < 0), j - (axis == 1) * (sign < 0)
+            # Faces along x are numbered like cells, those along s have a column less.
+            faces[axis].append((first[0] * (shape[1] - axis) + first[1])[out])
+            inner[axis].append(np.flatnonzero(out))
+            ways[axis].append(way[out])
+            slopes[axis].append(np.maximum(sign * normal[axis][out], _GRAZING))
+        self._faces = [np.concatenate(found) for found in faces]
+        self._inner = [np.concatenate(found) for found in inner]
+        self._way = [np.concatenate(found) for found in ways]
+        self._slope = [np.concatenate(found) for found in slopes]
+        self._step = step
+        self._beside = np.flatnonzero(crossing.any(axis=0))
+        self._crossing = crossing[:, self._beside]
+        self._exists = exists[:, self._beside]
+        self._depth = (radius - distance)[self._beside]
+        # Of each face: width over distance, and how far it leads along the normal.
+        self._outward = np.stack([sign * normal[axis][self._beside] for axis, sign in _DIRECTIONS])
+        self._width = np.array([step[1 - axis] for axis, _ in _DIRECTIONS])[:, None]
+        self._reach = np.array([step[axis] for axis, _ in _DIRECTIONS])[:, None]
+
+    def _decay(self, film: FloatArray, cells: npt.NDArray[np.intp] | slice = slice(None)) -> FloatArray:
+        """Return lambda, for a film given at the discs' cells."""
+        return np.asarray(film / np.sqrt(3.0 + (4.0 / np.pi) * film / self._radius[cells]))
+
+    def _beside_rim(self, decay: FloatArray) -> FloatArray:
+        """Return joints over film thickness of the cells beside a rim: what balances the plane solution there."""
+        entering = self._outward * (self._width / decay) * np.exp(np.minimum(self._depth / decay, _MOST_DECAYS))
+        passing = (self._width / self._reach) * np.expm1(np.minimum(self._outward * self._reach / decay, _MOST_DECAYS))
+        return np.asarray(np.maximum((np.where(self._crossing, entering, passing) * self._exists).sum(axis=0), 0.0))
+
+    def joints(self, film_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the conductances over sigma to the electrodes (as `owner` and `under`), and to the drive (nx*ns,)."""
+        flat = film_mm.reshape(-1)
+        film = flat[self._cell]
+        decay = self._decay(film)
+        joint = film * (self._area / decay**2)
+        beside = self._beside
+        joint[beside] = film[beside] * self._beside_rim(decay[beside])
+        joint *= self._scale
+        drive = np.zeros(flat.size)
+        np.add.at(drive, self._driven, joint[self.owner.size :])
+        return joint[: self.owner.size], drive
+
+    def narrow(self, film_mm: FloatArray, along_x: FloatArray, along_s: FloatArray) -> None:
+        """Shorten the way of the faces that cross a rim; changes the (nx-1, ns) and (nx, ns-1) conductances."""
+        flat = film_mm.reshape(-1)
+        for axis, conductance in enumerate((along_x.reshape(-1), along_s.reshape(-1))):
+            inner, step, slope, way = self._inner[axis], self._step[axis], self._slope[axis], self._way[axis]
+            decay = self._decay(flat[self._cell[inner]], inner)
+            inside = (decay / slope) * -np.expm1(-(step - way) * slope / decay)
+            conductance[self._faces[axis]] *= step / np.maximum(way + inside, _LEAST_WAY * step)

@@ -1,0 +1,55 @@
+"""Properties of the gap over random indenters."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tactbench.plugin import RigError, SkinSheet, assumed
+from tactbench.rigs.twin.geometry import BEYOND_THE_CAP_MM, STEEPEST, Contact, check_contact, gap_mm, skin_grid
+
+SHEET = SkinSheet(
+    x_min=assumed(-10, "mm", "t"), x_max=assumed(10, "mm", "t"), arc=assumed(20, "mm", "t"), cells=(40, 50)
+)
+GRID = skin_grid(SHEET)
+RADII = st.one_of(st.just(math.inf), st.floats(-4, 15).map(lambda exponent: 10.0**exponent))
+PLACES = st.floats(-30, 30)
+SLOPES = st.floats(-2, 2)
+FINGERS = st.one_of(st.just(math.inf), st.floats(4, 100))
+
+
+@given(RADII, PLACES, PLACES, SLOPES, SLOPES, FINGERS)
+def test_a_contact_is_refused_or_has_a_finite_gap_of_at_least_zero(radius, x, s, slope_x, slope_s, finger):
+    contact = Contact(radius, x, s, slope_x, slope_s)
+    right = radius >= 0.5 and abs(x) <= 10 and abs(s) <= 10 and math.hypot(slope_x, slope_s) <= STEEPEST
+    if not right:
+        with pytest.raises(RigError) as refused:
+            check_contact(GRID, contact)
+        assert refused.value.hint
+        return
+    check_contact(GRID, contact)
+    gap = gap_mm(GRID, contact, finger)
+    assert np.isfinite(gap).all()
+    assert gap.min() >= 0
+
+
+@given(st.floats(1, 1e9), st.floats(1, 1e9), st.floats(-9, 9), st.floats(-9, 9), FINGERS)
+def test_a_larger_cap_is_nowhere_further_away(first, second, x, s, finger):
+    small, large = sorted((first, second))
+    gaps = [gap_mm(GRID, Contact(radius, x, s), finger) for radius in (small, large)]
+    # Where the smaller cap has ended, its gap is a number that stands for "never".
+    there = gaps[0] < small + BEYOND_THE_CAP_MM
+    # Rounding of gaps of up to a few finger radii.
+    assert np.all(gaps[1][there] <= gaps[0][there] + 1e-12)
+
+
+@given(st.floats(1, 1e9), st.floats(-9, 9), st.floats(-9, 9), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), FINGERS)
+def test_a_mirrored_indenter_has_a_mirrored_gap(radius, x, s, slope_x, slope_s, finger):
+    gap = gap_mm(GRID, Contact(radius, x, s, slope_x, slope_s), finger)
+    mirrored = gap_mm(GRID, Contact(radius, x, -s, slope_x, -slope_s), finger)
+    # The arc's cell centres are mirror images to rounding; a slope of the cap's flank of up to 22 magnifies it.
+    np.testing.assert_allclose(mirrored[:, ::-1], gap, atol=1e-9)

@@ -1,0 +1,160 @@
+"""The loop around a real skin, through the rig."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import Environment, ForceLoop, ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.contact.stages import bare_skin
+from tactbench.rigs.twin.effects.force_loop import BEYOND, depth_of, force_at_depth
+from tactbench.rigs.twin.effects.loop_dynamics import Dynamics
+from tactbench.rigs.twin.planner import plan_scene
+from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.rig import build
+
+EFFECTS = tactbench_effects()
+CAP = Indenter(radius=assumed(10.0, "mm", "test"))
+
+
+def _q(value, unit):
+    return assumed(value, unit, "test")
+
+
+def _scene(drive, noise_n=0.0, **profile):
+    environment = Environment(noise_scale=0.0, drift_scale=0.0, force_noise=_q(noise_n, "N"))
+    ramp = ForceRamp(**{"samples": 2500, "duration": _q(30, "s"), "hold": _q(2, "s"), **profile})
+    return Scene(name="pressed", indenter=CAP, profile=ramp, environment=environment, drive=drive)
+
+
+@pytest.fixture(scope="module")
+def pressed(sensors):
+    """Carry out a scene on the iCub fingertip: its run."""
+
+    def press(scene, until=None):
+        plan = build(RigContext(effects=tuple(EFFECTS))).plan(sensors["icub"], scene)
+        run = prepare(sensors["icub"], scene, 1, plan)
+        for effect in plan.stages:
+            run.apply(effect)
+            if effect.name == until:
+                break
+        return run
+
+    return press
+
+
+def _unfiltered(**more):
+    return ForceLoop(cutoff=None, **more)
+
+
+def test_without_the_filter_the_loop_oscillates_and_with_it_it_settles(pressed):
+    filtered, plain = (pressed(_scene(drive), "force-loop") for drive in (ForceLoop(), _unfiltered()))
+    wanted = np.interp(filtered.t_s, [0, 2, 30], [0, 0, 5])
+    last = filtered.t_s > 25
+    calm, swinging = (run.load.force_n[last] - wanted[last] for run in (filtered, plain))
+    # Behind a ramp of 0.18 N/s the integral of 1 mm/N/s on more than 10 N/mm stays back by less than 0.02 N.
+    assert np.abs(calm).max() < 0.05
+    assert np.std(swinging) > 20 * np.std(calm)
+    assert np.std(swinging) > 0.5
+    # A line in the spectrum, not noise: most of its power lies within 2 Hz of its peak.
+    power = np.abs(np.fft.rfft((swinging - swinging.mean()) * np.hanning(swinging.size))) ** 2
+    hertz = np.fft.rfftfreq(swinging.size, 0.012)
+    peak = hertz[np.argmax(power)]
+    assert power[np.abs(hertz - peak) < 2].sum() > 0.5 * power.sum()
+    assert peak > 5
+
+
+def test_the_swing_begins_where_the_skin_becomes_too_stiff_for_the_loop(pressed):
+    run = pressed(_scene(_unfiltered()), "force-loop")
+    limit = Dynamics.of(_unfiltered(), 0.012).limit_n_per_mm()
+    table = bare_skin(run, BEYOND * 5.0)
+    loads = np.linspace(0.0, 5.0, 501)
+    stiffness = np.gradient(loads, table.skin(loads).depth_mm)
+    critical = float(np.interp(limit, stiffness, loads))
+    wanted = np.interp(run.t_s, [0, 2, 30], [0, 0, 5])
+    ripple = np.abs(np.diff(run.load.force_n, 2))
+    assert 1.0 < critical < 4.0
+    # Rounding of the force to 0.02 N goes round a loop of gain below one and a half.
+    assert ripple[wanted[1:-1] < 0.9 * critical].max() < 0.05
+    began = wanted[1:-1][np.argmax(ripple > 0.5)]
+    # It needs some swings to grow to that, and the ramp goes on for them.
+    assert critical < began < 1.2 * critical
+
+
+def test_noise_moves_the_motor_less_behind_the_filter(pressed):
+    held = {"start": _q(1.0, "N"), "end": _q(1.0, "N")}
+    filtered, plain = (
+        pressed(_scene(drive, 0.6875, **held), "force-loop").load.force_n[500:]
+        for drive in (ForceLoop(), _unfiltered())
+    )
+    # At 1 N the skin is soft enough for both: white noise behind a one-pole is smaller by sqrt((1-a)/(1+a)) = 0.19.
+    assert 0 < filtered.std() < 0.4 * plain.std()
+
+
+def test_everybody_follows_the_load_of_the_loop(pressed):
+    run = pressed(_scene(ForceLoop(), 0.5))
+    np.testing.assert_allclose(run.tracks[0].force_n, run.load.at(run.t_s))
+    assert run.drawn["loop_steps_at_end"] == 0
+    # Its sensor errs by the very numbers that are recorded.
+    errors = (run.reference_n - run.load.at(run.t_s)) / 0.5
+    np.testing.assert_allclose(errors, run.of_recording("force").standard_normal(run.t_s.size), atol=1e-9)
+
+
+def test_a_loop_with_its_own_rate_reaches_the_same_force(pressed):
+    fast = pressed(_scene(ForceLoop(rate=_q(500, "Hz"))), "force-loop")
+    assert fast.load.t_s.size == 15000
+    assert fast.load.force_n[-1] == pytest.approx(5.0, abs=0.05)
+
+
+def test_a_loop_that_swings_too_far_is_held_at_the_end_of_its_table_and_says_so(pressed):
+    run = pressed(_scene(_unfiltered(proportional=_q(2.0, "mm/N"))), "force-loop")
+    assert run.drawn["loop_steps_at_end"] > 0
+    assert run.load.largest_n <= BEYOND * 5.0 * (1 + 1e-12)
+    assert run.load.force_n.min() >= 0
+
+
+def test_a_drive_is_called_for_by_the_scene_alone(specs):
+    for drive, called in ((None, False), (ForceLoop(), True)):
+        plan = plan_scene(EFFECTS, _scene(drive), specs["icub"])
+        entry = next(entry for entry in plan.entries if entry.effect == "force-loop")
+        assert entry.included is called
+        assert "0 N" in entry.reason or "1 Hz" in entry.reason
+    assert plan.stages[0].name == "force-loop"
+
+
+def test_what_the_drive_is_made_of_is_printed_with_the_recording(sensors):
+    scene = _scene(_unfiltered(), samples=50)
+    with build(RigContext(effects=tuple(EFFECTS))).open(sensors["icub"], scene, seed=1) as recording:
+        said = recording.assumptions
+    assert said["loop_cutoff_hz"] == "none"
+    assert said["loop_proportional_mm_per_n"] == 0.15
+    assert said["loop_delay_s"] == pytest.approx(0.01)
+
+
+def test_creep_is_never_left_out_behind_a_loop(specs):
+    slow = {"duration": _q(1e5, "s")}
+    for drive, called in ((None, False), (ForceLoop(), True)):
+        plan = plan_scene(EFFECTS, _scene(drive, **slow), specs["icub"])
+        assert next(entry for entry in plan.entries if entry.effect == "creep").included is called
+
+
+@pytest.mark.parametrize("wrong", [{"cutoff": 0.0}, {"delay": -1.0}, {"speed": 0.0}, {"integral": float("nan")}])
+def test_a_loop_that_means_nothing_is_refused_by_the_name_of_its_number(sensors, wrong):
+    ((name, value),) = wrong.items()
+    unit = getattr(ForceLoop(), name).unit
+    scene = _scene(ForceLoop(**{name: _q(value, unit)}))
+    rig = build(RigContext(effects=tuple(EFFECTS)))
+    with pytest.raises(RigError, match=name), rig.open(sensors["icub"], scene, seed=1):
+        pass
+
+
+def test_depth_and_force_undo_each_other(pressed):
+    run = pressed(_scene(None), "contact")
+    table = bare_skin(run, 15.0)
+    force_n, deepest = force_at_depth(table)
+    for wanted in np.linspace(0.0, 15.0, 97):
+        # The straight lines between 4001 depths; 1.5 mN of 15 N.
+        assert force_n(depth_of(table, float(wanted))) == pytest.approx(wanted, abs=1.5e-3)
+    assert force_n(-1.0) == force_n(0.0) == 0.0
+    assert force_n(2 * deepest) == pytest.approx(15.0)

@@ -1,0 +1,140 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from tactbench.plugin import RigError
+from tactbench.rigs.twin.effects.bristle import bristle
+from tactbench.rigs.twin.effects.partial_slip import share_of_force, shear_modulus_mpa, stick_ratio
+from tactbench.rigs.twin.effects.slip_event import Mode, is_caught, slip_s, swing
+from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
+
+
+def _drive(load, seconds=4.0, **more):
+    grid = np.linspace(0.0, seconds, 801)
+    load_n = np.interp(grid, np.linspace(0.0, seconds, len(load)), load)
+    return Drive(**{
+        "speed_mm_s": 10.0, "start_s": 0.5, "end_s": math.inf, "static": 0.8, "kinetic": 0.6, "stribeck_mm_s": 5.0,
+        "mode": Mode(2000.0, 0.1), "t_s": grid, "load_n": load_n, "stiffness": 2.0 * np.cbrt(load_n), **more,
+    })  # fmt: skip
+
+
+loads = st.lists(st.floats(0.0, 8.0), min_size=2, max_size=4)
+stribeck_speeds = st.one_of(st.just(0.0), st.floats(0.1, 50.0))
+
+
+@given(loads, st.floats(0.05, 500.0), st.floats(0.0, 0.9), st.floats(0.0, 0.8), stribeck_speeds, st.floats(0.3, 5))
+@example([1.0, 0.0, 0.0], 348.0, 0.0, 0.0, 0.0, 0.3125)
+@example([1.0, 0.0], 1.0, 0.0, 0.8, 0.0, 0.5)
+def test_whatever_moves_the_laws_of_friction_hold(load, speed, damping, kinetic, stribeck, end):
+    drive = _drive(load, 1.0, speed_mm_s=speed, end_s=end, kinetic=kinetic, stribeck_mm_s=stribeck,
+                   start_s=0.2, mode=Mode(2000.0, damping))  # fmt: skip
+    t = np.linspace(0.0, 1.0, 3001)
+    seen = Dragged(drive)(t)
+    limit = drive.static * np.interp(t, drive.t_s, drive.load_n)
+    # Load and stiffness are straight between nodes 5 ms apart, where one is the other's cube: 1e-3 of the load.
+    assert np.all(seen.force_n <= limit + 1e-3 * max(load) + 1e-9)
+    # Surface and skin never pass each other, and the skin is never pushed against the way it is dragged for good.
+    # (A slip that is never caught is followed to a thousandth of its swing, then the skin is taken to be steady.)
+    assert np.all(np.diff(seen.slip_mm) >= -1e-9 - 1e-3 * seen.displacement_mm.max())
+    assert np.all(seen.slip_mm_s >= -1e-9)
+    assert np.all((seen.stick_ratio >= 0) & (seen.stick_ratio <= 1))
+    assert not np.any(seen.slipping & (seen.stick_ratio > 0))
+    assert not np.any(seen.force_n[t < 0.2])
+    for values in seen:
+        assert np.all(np.isfinite(values))
+
+
+def test_the_same_moments_say_the_same_on_any_clock():
+    dragged = Dragged(_drive([1.0, 2.0]))
+    fine = np.linspace(0.0, 4.0, 8001)
+    for values, every in zip(dragged(fine), dragged(fine[::7]), strict=True):
+        np.testing.assert_array_equal(values[::7], every)
+
+
+def test_a_faster_drive_ends_stick_slip():
+    # Sliding is stable from 26 mm/s on (N |mu'(V)| < c); stick-slip that lives already dies once w u, here 200 mm/s
+    # less what damping takes, is below the drive.
+    slow, fast = (Dragged(_drive([1.0, 1.0], speed_mm_s=v)) for v in (5.0, 200.0))
+    assert slow.let_go_s.size > 50
+    assert fast.let_go_s.size == 1
+    steady = fast(np.array([3.0]))
+    expected = 0.6 + 0.2 * math.exp(-200.0 / 5.0)
+    assert steady.force_n[0] == pytest.approx(expected, rel=1e-9)
+    assert steady.slip_mm_s[0] == 200.0
+
+
+def test_a_slide_that_begins_in_the_air_takes_hold_with_the_load():
+    dragged = Dragged(_drive([0.0, 0.0, 2.0]))
+    before, after = dragged(np.array([1.0, 1.9])), dragged(np.linspace(3.0, 4.0, 400))
+    assert np.all(before.force_n == 0)
+    assert np.all(before.stick_ratio == 0)
+    assert after.force_n.max() > 1.0
+    assert dragged.let_go_s.size > 20
+
+
+def test_after_the_motion_the_force_stays_until_the_load_lets_it_go():
+    dragged = Dragged(_drive([2.0, 2.0, 2.0, 0.0], 6.0, end_s=3.0, speed_mm_s=1.0))
+    held = dragged(np.array([3.1, 3.9]))
+    assert held.force_n[0] == pytest.approx(held.force_n[1], rel=1e-12)
+    late = np.linspace(4.0, 6.0, 300)
+    seen = dragged(late)
+    load = np.interp(late, dragged.drive.t_s, dragged.drive.load_n)
+    assert np.all(seen.force_n <= 0.8 * load + 1e-3)
+    assert seen.force_n[-1] == 0
+
+
+def test_the_skin_sticks_less_and_less_on_the_way_to_a_slip():
+    dragged = Dragged(_drive([1.0, 1.0], speed_mm_s=1.0))
+    first = dragged.let_go_s[0]
+    seen = dragged(np.linspace(0.5, first - 1e-9, 50))
+    assert seen.stick_ratio[0] == pytest.approx(1.0)
+    assert np.all(np.diff(seen.stick_ratio) < 0)
+    assert seen.stick_ratio[-1] < 0.01
+    assert not seen.slipping.any()
+    # A small viscous force c V comes with the elastic one: 2 z/w V k = 2e-4 N.
+    elastic = seen.force_n - 2e-4
+    np.testing.assert_allclose(seen.stick_ratio[:-1], np.cbrt(1 - elastic / (0.8 - 2e-4))[:-1], atol=1e-9)
+
+
+@given(st.floats(0.0, 0.95), st.floats(1e-4, 1.0), st.floats(1e-3, 500.0))
+def test_a_slip_ends_at_the_surfaces_speed_for_the_first_time(damping, u, speed):
+    mode = Mode(2000.0, damping)
+    lasting = slip_s(mode, u, speed)
+    assert math.isfinite(lasting) == bool(is_caught(mode, np.array([u]), speed)[0])
+    if math.isfinite(lasting):
+        _, velocity = swing(mode, np.full(200, u), np.full(200, speed), np.linspace(0, lasting, 202)[1:-1])
+        scale = mode.omega * u + speed
+        assert velocity.max() < speed + 1e-9 * scale
+        _, at_end = swing(mode, np.array([u]), np.array([speed]), np.array([lasting]))
+        assert at_end[0] == pytest.approx(speed, abs=1e-9 * scale)
+
+
+def test_equal_coefficients_never_stick_slip():
+    assert Dragged(_drive([1.0, 1.0], kinetic=0.8)).let_go_s.size <= 1
+
+
+def test_a_mode_that_cannot_swing_is_refused():
+    with pytest.raises(RigError, match="cannot swing"):
+        Mode(2000.0, 1.0)
+
+
+@given(st.floats(0, 1))
+def test_cattaneos_radius_belongs_to_mindlins_force(share):
+    s = np.array([share])
+    np.testing.assert_allclose(stick_ratio(s) ** 3, 1.0 - share_of_force(s), atol=1e-15)
+
+
+def test_the_bristle_survives_no_load_and_repeated_stamps():
+    found = bristle(np.array([0.0, 1.0, 1.0, 2.0]), 3.0, np.array([0.5, 0.0, 0.0, 0.0]), 0.2)
+    np.testing.assert_allclose(found, [0.2, 0.5 - 0.3 * math.exp(-6.0), 0.5 - 0.3 * math.exp(-6.0), 0.0])
+
+
+def test_every_medium_has_a_shear_modulus(specs, layer):
+    assert shear_modulus_mpa(specs["biotac"].skin) == pytest.approx(0.8 / 2.96 / 1.52)
+    assert shear_modulus_mpa(specs["icub"].skin) == specs["icub"].skin.shear.to("MPa") / 2
+    assert shear_modulus_mpa(layer(0.3)[0]) == pytest.approx(1.0 / 2.6 / 1.7)

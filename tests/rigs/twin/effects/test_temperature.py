@@ -1,0 +1,142 @@
+"""TDC, TAC and the electrodes' drift, seen on a whole recording."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import Environment, ForceRamp, Indenter, NotApplicable, RigContext, Scene, Simulation, assumed
+from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.effects.heated_core import HeatedCore
+from tactbench.rigs.twin.effects.temperature import time_constant_s
+from tactbench.rigs.twin.effects.thermistor import Thermistor
+from tactbench.rigs.twin.planner import plan_scene
+from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.rig import build
+
+EFFECTS = tactbench_effects()
+HEAT = ("dc_temperature", "ac_temperature")
+FLAT = Indenter()
+REST_C = 56.59
+"""The maker's formula at 2576 counts."""
+
+
+def _q(value, unit):
+    return assumed(value, unit, "test")
+
+
+def _scene(indenter_c=None, observe=HEAT, effects=(), end_n=2.0, **environment):
+    quiet = {"noise_scale": 0.0, "drift_scale": 0.0, "force_noise": _q(0, "N"), **environment}
+    if indenter_c is not None:
+        quiet["indenter_temperature"] = _q(indenter_c, "degC")
+    touch = ForceRamp(end=_q(end_n, "N"), hold=_q(1.0, "s"), duration=_q(1.5, "s"), samples=150)
+    return Scene(
+        name="touch",
+        indenter=FLAT,
+        profile=touch,
+        environment=Environment(**quiet),
+        observe=observe,
+        simulation=Simulation(effects=effects),
+    )
+
+
+@pytest.fixture(scope="module")
+def carried(sensors):
+    """Carry out a scene on the BioTac; the track as it is before the converter."""
+
+    def carry(scene):
+        twin = build(RigContext(effects=tuple(EFFECTS)))
+        plan = twin.plan(sensors["biotac"], scene)
+        run = prepare(sensors["biotac"], scene, 1, plan)
+        for effect in plan.stages:
+            if effect.name != "converter":
+                run.apply(effect)
+        return run.tracks[0]
+
+    return carry
+
+
+def test_a_colder_indenter_cools_the_core_and_a_hotter_one_warms_it(carried):
+    cold, same, hot = (carried(_scene(degc)) for degc in (23.0, None, 90.0))
+    touched = cold.t_s > 1.0
+    for track, sign in ((cold, -1), (same, 0), (hot, 1)):
+        change = track.readings - track.readings[0]
+        np.testing.assert_array_equal(np.sign(np.round(change[touched][5:], 6)), sign)
+        assert np.abs(change[~touched]).max() < 1e-6
+    # In proportion to the difference of temperature, but for the curve of the thermistor.
+    ratio = (hot.readings - hot.readings[0])[-1, 0] / (cold.readings - cold.readings[0])[-1, 0]
+    assert ratio == pytest.approx((90 - REST_C) / (23 - REST_C), rel=0.03)
+
+
+def test_a_sensor_that_warms_up_shows_it_in_tdc(carried, specs):
+    track = carried(_scene(since_power_on=_q(100, "s"), drift_scale=1.0, end_n=0.0))
+    core = HeatedCore.of(_scene(), specs["biotac"])
+    degc = Thermistor.of(specs["biotac"], 4095.0).degc(track.readings[:, 0])
+    left = np.exp(-(100 + track.t_s) / core.tau_s)
+    # The low-pass of 22.6 Hz is 7 ms behind a rate of 0.06 K/s.
+    np.testing.assert_allclose(degc, 23.0 + core.rise_k * (1 - left), atol=1e-3)
+
+
+def test_tac_is_the_amplified_high_pass_of_tdc(carried):
+    track = carried(_scene(23.0))
+    t, tdc, tac = track.t_s, track.readings[:, 0], track.readings[:, 1]
+    tau = time_constant_s(0.45)
+    # z' = (x - z)/tau for a straight x, one sample after the other.
+    slow = [tdc[0]]
+    for n in range(1, t.size):
+        dt, slope = t[n] - t[n - 1], (tdc[n] - tdc[n - 1]) / (t[n] - t[n - 1])
+        slow.append(tdc[n] - slope * tau + (slow[-1] - tdc[n - 1] + slope * tau) * np.exp(-dt / tau))
+    np.testing.assert_allclose(tac - 2037, 98.0 * (tdc - np.array(slow)), atol=1e-6)
+
+
+def test_the_electrodes_fall_when_the_contact_cools_the_fluid_and_not_otherwise(carried):
+    seen = ("taxel", *HEAT)
+    with_heat, without = carried(_scene(23.0, seen, end_n=0.5)), carried(_scene(None, seen, end_n=0.5))
+    fall = (with_heat.readings - without.readings)[:, :19]
+    assert np.all(fall[-1] < 0)
+    # Through the divider and back: rounding of some thousand counts.
+    assert np.abs(fall[with_heat.t_s <= 1.0]).max() < 1e-11
+    # d reading / d ln(sigma) = E (1 - E/4095), conductivity by 2 % of that at 25 degC per kelvin.
+    level = without.readings[-1, :19]
+    expected = level * (1 - level / 4095) * 0.02 / (1 + 0.02 * (REST_C - 25)) * with_heat.warmth_k[-1]
+    np.testing.assert_allclose(fall[-1], expected, rtol=0.01)
+
+
+def test_a_sensor_without_a_heated_core_is_refused_and_one_that_is_asked_keeps_still(sensors):
+    icub = sensors["icub"].spec
+    with pytest.raises(NotApplicable):
+        plan_scene(EFFECTS, _scene(), icub)
+    asked = _scene(5.0, ("taxel",), ("+contact-heat", "+thermal-drift"))
+    run = prepare(sensors["icub"], asked, 1, plan_scene(EFFECTS, asked, icub))
+    before = run.tracks[0].readings.copy()
+    for effect in EFFECTS:
+        if effect.name in ("contact-heat", "thermal-drift", "dc-temperature", "ac-temperature"):
+            run.apply(effect)
+    np.testing.assert_array_equal(run.tracks[0].readings, before)
+
+
+@pytest.mark.parametrize(
+    ("scene", "called", "number"),
+    [
+        (_scene(None, ("taxel",)), False, "0 K"),
+        (_scene(5.0, ("taxel",), end_n=0.0), False, "0 N"),
+        (_scene(5.0, ("taxel",)), True, "K apart"),
+        (_scene(5.0, ("dc_pressure",)), False, "no observed channel"),
+        (_scene(56.55, ("taxel",)), False, "below a third"),
+    ],
+)
+def test_heat_is_called_for_by_a_difference_that_somebody_could_see(scene, called, number, specs):
+    plan = {entry.effect: entry for entry in plan_scene(EFFECTS, scene, specs["biotac"]).entries}
+    assert plan["contact-heat"].included is called
+    assert number in plan["contact-heat"].reason
+    assert called or plan["contact-heat"].change is not None
+
+
+@pytest.mark.parametrize("kind", ["dc_temperature", "ac_temperature", "taxel"])
+def test_what_heat_changes_stays_below_what_the_plan_says(kind, carried, specs):
+    # 3.6 K: a bound that is neither nothing nor cut off by the whole difference.
+    scene, without = (_scene(degc, (kind,), ("+contact-heat", "+thermal-drift"), end_n=0.5) for degc in (53.0, None))
+    entries = plan_scene(EFFECTS, scene, specs["biotac"]).entries
+    (entry,) = [entry for entry in entries if entry.effect == "contact-heat"]
+    found = np.abs(carried(scene).readings - carried(without).readings).max()
+    assert 0 < found <= entry.change

@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tactbench.plugin import RigError, Surface, assumed
+from tactbench.rigs.twin.effects.ac_pressure import within_band
+from tactbench.rigs.twin.effects.hum import band_noise
+from tactbench.rigs.twin.effects.roughness import Profile, patch_mean
+from tactbench.rigs.twin.effects.skin_mode import shaken
+from tactbench.rigs.twin.effects.slip_event import Mode
+
+RATE_HZ = 2200.0
+
+
+def _surface(**more):
+    return Surface(**{
+        name: value if name == "spread" else assumed(*value, "test") for name, value in more.items()
+    })  # fmt: skip
+
+
+def _density(values):
+    """Mean periodogram of 60 stretches: frequencies and power per hertz."""
+    stretches = values.reshape(60, -1)
+    window = np.hanning(stretches.shape[1])
+    power = np.abs(np.fft.rfft(stretches * window, axis=1)) ** 2
+    return np.fft.rfftfreq(stretches.shape[1], 1 / RATE_HZ), 2 * power.mean(axis=0) / (RATE_HZ * np.sum(window**2))
+
+
+@pytest.mark.parametrize(("low", "high"), [(30.0, 200.0), (5.0, 500.0)])
+def test_noise_within_a_band_has_its_size_and_its_spectrum(low, high):
+    t = np.arange(132000) / RATE_HZ
+    noise = band_noise(t, 3.0, low, high, np.random.default_rng(1))
+    # 60 s of a band of B hertz hold about 120 B independent numbers; four of their standard errors.
+    assert noise.std() == pytest.approx(3.0, rel=4 / math.sqrt(240 * (high - low)))
+    assert abs(noise.mean()) < 0.05
+    f, density = _density(noise)
+    corner = np.roots([1.0, -(high - low), high * low]).real
+    model = f**2 / ((f**2 + corner[0] ** 2) * (f**2 + corner[1] ** 2))
+    middle = math.sqrt(low * high)
+    peak = middle**2 / ((middle**2 + corner[0] ** 2) * (middle**2 + corner[1] ** 2))
+    for end in (low, high):
+        assert np.interp(end, f, model) / peak == pytest.approx(0.5, abs=0.01)
+    inside = (f > low) & (f < min(high, 300.0))
+    ratio = density[inside] / model[inside]
+    # 60 stretches, and at least 100 frequencies averaged: 2 % (four standard errors 0.06).
+    halves = np.array_split(ratio, 2)
+    assert halves[0].mean() / halves[1].mean() == pytest.approx(1.0, abs=0.06)
+
+
+@given(st.lists(st.one_of(st.just(0.0), st.floats(1e-6, 10.0)), min_size=1, max_size=30))
+def test_a_hum_takes_any_steps(steps):
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    noise = band_noise(t, 1.0, 30.0, 200.0, np.random.default_rng(2))
+    assert np.all(np.isfinite(noise))
+    still = np.diff(t) == 0
+    np.testing.assert_allclose(np.diff(noise)[still], 0.0, atol=1e-12)
+
+
+def test_a_band_too_narrow_for_its_filter_is_refused():
+    with pytest.raises(RigError, match=r"5\.9 times"):
+        band_noise(np.arange(3.0), 1.0, 30.0, 60.0, np.random.default_rng(0))
+
+
+@given(st.floats(0.0, 40.0))
+def test_a_patch_feels_the_mean_under_it(turn):
+    # Hertz's pressure sqrt(1 - r^2) integrated across leaves 1 - s^2 along the way.
+    s = (np.arange(4000) + 0.5) / 2000 - 1
+    mean = np.sum((1 - s**2) * np.cos(turn * s)) / np.sum(1 - s**2)
+    assert patch_mean(np.array([turn]))[0] == pytest.approx(mean, abs=2e-5)
+
+
+def test_a_profile_has_its_roughness_and_its_wavelength():
+    surface = _surface(roughness=(20.0, "um"), wavelength=(2.0, "mm"), spread=0.4)
+    place = np.linspace(0.0, 4000.0, 200001)
+    heights = [Profile(surface, np.random.default_rng(seed)).felt_mm(place, np.zeros(1)) for seed in range(3)]
+    for height in heights:
+        assert height.std() == pytest.approx(0.02, rel=0.02)
+    grating = Profile(_surface(wavelength=(2.0, "mm"), roughness=(20.0, "um"), spread=0.0), np.random.default_rng(0))
+    one = grating.felt_mm(place, np.zeros(1))
+    assert one.max() == pytest.approx(0.02 * math.sqrt(2), rel=1e-3)  # 100 places a wave
+    np.testing.assert_allclose(one[100:], one[:-100], atol=1e-12)
+
+
+@pytest.mark.parametrize("frequency", [2.0, 10.0, 60.0, 200.0])
+def test_a_band_lets_through_what_two_first_order_filters_do(specs, frequency):
+    (channel,) = specs["biotac"].channels("ac_pressure")
+    t = np.arange(13200) / RATE_HZ
+    passed = within_band(t, np.sin(2 * math.pi * frequency * t), channel)[6600:]
+    gain = math.sqrt(2 * np.mean(passed**2))
+    f = frequency
+    expected = f / math.hypot(f, 10.0) / math.hypot(1.0, f / 1040.0)
+    # Straight between samples: sinc^2 of f/2200 is 2.7 % at 200 Hz, 0.25 % at 60.
+    assert gain == pytest.approx(expected, rel=2e-3 + (math.pi * f / RATE_HZ) ** 2 / 3)
+
+
+@given(st.lists(st.one_of(st.just(0.0), st.floats(1e-5, 2.0)), min_size=1, max_size=20), st.floats(0.0, 0.95))
+def test_a_mode_under_a_held_push_stays_where_it_is(steps, damping):
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    found = shaken(t, np.full(t.size, 0.7), Mode(2000.0, damping))
+    np.testing.assert_allclose(found, 0.7, rtol=1e-9)
+
+
+def test_a_slow_push_is_followed():
+    t = np.linspace(0.0, 1.0, 50)
+    push = np.sin(2 * math.pi * t)
+    # Late by 2 z/w = 0.1 ms of a motion of at most 2 pi/s; and the corners of its straight pieces ring.
+    np.testing.assert_allclose(shaken(t, push, Mode(2000.0, 0.1)), push, atol=2e-3)

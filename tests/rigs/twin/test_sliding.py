@@ -1,0 +1,232 @@
+"""A slide, from the scene to the file and back."""
+
+from __future__ import annotations
+
+import itertools
+import time
+
+import numpy as np
+import pytest
+
+from tactbench.core.acquisition import acquire
+from tactbench.core.evaluation.channels import channels_for
+from tactbench.core.recording.reader import open_recording
+from tactbench.plugin import (
+    ChannelTarget,
+    Environment,
+    ForceRamp,
+    Indenter,
+    NotApplicable,
+    Placement,
+    RigContext,
+    RigDescriptor,
+    Scene,
+    Slide,
+    Surface,
+    assumed,
+)
+from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.rig import build
+
+TWIN = RigDescriptor(name="twin", title="Twin", where="tactbench.rigs.twin.rig:build", simulated=True)
+EDGES = (2, 10, 30, 100, 200, 500, 1000)
+
+
+def _q(value, unit):
+    return assumed(value, unit, "test")
+
+
+CAP = Indenter(radius=_q(20.0, "mm"))
+NOMINAL = Placement(scatter=_q(0.0, "mm"))
+"""So that all recordings of one load share one contact."""
+SILENT = Environment(noise_scale=0.0, drift_scale=0.0, force_noise=_q(0.0, "N"))
+
+
+def _held(force=0.5, seconds=8.0, **more):
+    return ForceRamp(start=_q(force, "N"), end=_q(force, "N"), hold=_q(0.0, "s"), duration=_q(seconds, "s"),
+                     samples=int(100 * seconds), **more)  # fmt: skip
+
+
+def _slide(speed, start=1.0, **more):
+    return Slide(speed=_q(speed, "mm/s"), start=_q(start, "s"), **more)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return build(RigContext(effects=tuple(tactbench_effects())))
+
+
+@pytest.fixture
+def record(rig, sensors, tmp_path):
+    def make(sensor="biotac", name="slide", **scene):
+        scene = Scene(name=name, indenter=CAP, placement=NOMINAL, **{"observe": ("ac_pressure",), **scene})
+        path = tmp_path / f"{name}.h5"
+        meta = acquire(
+            rig, sensors[sensor], TWIN, scene, role=None, seed=1, path=path, clock=time.monotonic, provenance={}
+        ).meta
+        with open_recording(path) as recording:
+            recording.verify()
+            return meta, {stream: recording.read(stream) for stream in recording.stream_names}, recording
+
+    return make
+
+
+def _bands(counts, rate_hz=2200.0):
+    window = np.hanning(counts.size)
+    power = 2 * np.abs(np.fft.rfft((counts - counts.mean()) * window)) ** 2 / (counts.size * np.sum(window**2))
+    f = np.fft.rfftfreq(counts.size, 1 / rate_hz)
+    return [float(np.sqrt(power[(f >= low) & (f < high)].sum())) for low, high in itertools.pairwise(EDGES)]
+
+
+def _columns(stream):
+    return dict(zip([channel.name for channel in stream.spec.channels], stream.data.T, strict=True))
+
+
+def test_a_minute_of_sliding_comes_back_from_its_file(record):
+    ramp = ForceRamp(samples=5000)
+    meta, streams, _ = record(profile=ramp, slide=_slide(20.0, 20.0, duration=_q(30.0, "s"), direction=_q(90.0, "deg")))
+    vibration, force = streams["vibration"], streams["force_torque"]
+    assert vibration.data.shape == (132000, 1)
+    np.testing.assert_array_equal(vibration.t_ns, np.round(np.arange(132000) / 2200 * 1e9).astype(np.int64))
+    assert vibration.data.dtype == np.uint16
+    assert meta.scene.slide.speed.to("mm/s") == 20.0
+    assert {"friction", "skin-vibration", "ac-pressure", "hum"} <= {e.effect for e in meta.plan if e.included}
+    kinds = [(channel.name, channel.kind) for channel in force.spec.channels]
+    assert kinds == [
+        ("fz", "force"), ("fx", "force"), ("fy", "force"), ("slip", "other"), ("stick_ratio", "other")
+    ]  # fmt: skip
+    found, t_s = _columns(force), force.t_ns / 1e9
+    before, moving = t_s < 20, (t_s > 20) & (t_s < 50)
+    assert not found["slip"][before].any()
+    assert set(np.unique(found["slip"])) == {0.0, 1.0}
+    # Stick-slip: it does both, all the time.
+    assert 0.02 < found["slip"][moving].mean() < 0.5
+    assert np.all(found["stick_ratio"][found["slip"] == 1] == 0)
+    assert np.all(found["stick_ratio"][(found["slip"] == 0) & (t_s > 8)] > 0)
+    # Across the finger: fx is the sensor's noise alone (0.6875 N), fy is carried along.
+    assert found["fx"].std() == pytest.approx(0.6875, rel=0.05)
+    assert found["fy"][(t_s > 45) & (t_s < 50)].mean() > 1.0
+    assert meta.drawn["slips"] > 100
+    counts = vibration.data[:, 0].astype(float)
+    assert _bands(counts[50000:100000])[4] > 2 * _bands(counts[:40000])[4]
+
+
+def test_the_force_task_still_picks_the_normal_force(rig, sensors, tmp_path):
+    scene = Scene(name="both", profile=_held(), slide=_slide(20.0), observe=("taxel",))
+    path = tmp_path / "both.h5"
+    acquire(rig, sensors["icub"], TWIN, scene, role=None, seed=1, path=path, clock=time.monotonic, provenance={})
+    with open_recording(path) as recording:
+        (found,) = channels_for(recording, ChannelTarget(kind="force"))
+        assert found[2].name == "fz"
+        (named,) = channels_for(recording, ChannelTarget(kind="force", name="fx"))
+        assert named[2].name == "fx"
+
+
+def test_every_component_of_the_force_has_its_noise_and_its_low_pass(record):
+    def spread(filtered):
+        more = {"force_filter": _q(1.0, "Hz")} if filtered else {}
+        environment = Environment(force_noise=_q(0.5, "N"), **more)
+        slide = _slide(200.0, 0.0, direction=_q(90.0, "deg"))
+        _, streams, _ = record(profile=_held(), environment=environment, slide=slide)
+        found = _columns(streams["force_torque"])
+        return [found[name][100:].std() for name in ("fx", "fy", "fz")], found["slip"]
+
+    (raw, _), (smooth, slip) = spread(False), spread(True)
+    # 700 numbers: a standard deviation errs by 3 %.
+    assert raw == pytest.approx([0.5] * 3, rel=0.12)
+    assert max(smooth) < 0.2
+    assert set(np.unique(slip)) <= {0.0, 1.0}
+
+
+def test_a_scene_that_only_presses_has_no_tangential_channels_and_says_why(record):
+    meta, streams, _ = record(profile=_held())
+    assert [channel.name for channel in streams["force_torque"].spec.channels] == ["fz"]
+    plan = {entry.effect: entry for entry in meta.plan}
+    for name in ("friction", "skin-vibration"):
+        assert not plan[name].included
+        assert plan[name].reason == "no tangential motion: the scene does not slide"
+        assert plan[name].change == 0.0
+    assert plan["ac-pressure"].included
+
+
+def test_pac_at_rest_has_the_measured_floor(record):
+    _, streams, _ = record(profile=_held(seconds=20.0))
+    counts = streams["vibration"].data[:, 0].astype(float)
+    bands = _bands(counts)
+    # Measured on three BioTac SP at rest; total 4.5-5.1. The two lowest bands and the highest are missed: see
+    # docs/effects.md. 20 s of noise are known to 2 %.
+    assert 4.5 * 0.98 < counts.std() < 5.1 * 1.02
+    for found, (low, high) in zip(bands[2:5], ((2.1, 3.5), (1.8, 2.2), (2.4, 2.5)), strict=True):
+        assert low * 0.95 < found < high * 1.06
+    assert counts.mean() == pytest.approx(2043, abs=1)
+
+
+def test_the_roughness_by_default_gives_the_figure_it_was_set_by(record):
+    # 77 counts between 2 and 10 Hz, the median of real slides, in the slide stated in the source of `roughness`.
+    assert "cap R 20 mm, 0.5 N, 50 mm/s" in Surface().roughness.source.reference
+    _, streams, _ = record(profile=_held(seconds=20.0), slide=_slide(50.0))
+    bands = _bands(streams["vibration"].data[6600:, 0].astype(float))
+    # Profiles differ from seed to seed by a third of this.
+    assert bands[0] == pytest.approx(77, rel=0.4)
+    # Held out: energy sits below 30 Hz there, and here.
+    assert np.hypot(*bands[:2]) > 10 * np.hypot.reduce(bands[2:])
+
+
+def test_a_grating_is_heard_at_its_own_frequency(record):
+    grating = Surface(spread=0.0, wavelength=_q(4.0, "mm"), kinetic_friction=_q(0.7834, "1"))
+    _, streams, _ = record(profile=_held(), environment=SILENT, slide=_slide(100.0, surface=grating))
+    counts = streams["vibration"].data[4400:, 0].astype(float)
+    spectrum = np.abs(np.fft.rfft((counts - counts.mean()) * np.hanning(counts.size)))
+    heard = np.fft.rfftfreq(counts.size, 1 / 2200)[spectrum.argmax()]
+    assert heard == pytest.approx(100.0 / 4.0, abs=2200 / counts.size)
+
+
+def test_louder_with_roughness_and_the_same_with_the_same_seed(record):
+    def loud(um, name):
+        surface = Surface(roughness=_q(um, "um"))
+        _, streams, _ = record(
+            name=name, profile=_held(seconds=4.0), environment=SILENT, slide=_slide(50.0, surface=surface)
+        )
+        return streams["vibration"].data[4400:, 0].astype(float)
+
+    first, again = loud(20.0, "a"), loud(20.0, "a")
+    np.testing.assert_array_equal(first, again)
+    # Linear, up to rounding to a count.
+    assert loud(40.0, "a").std() / first.std() == pytest.approx(2.0, rel=0.02)
+    assert loud(20.0, "b").std() != first.std()
+
+
+@pytest.mark.parametrize(
+    ("sensor", "kind", "stream"), [("icub", "taxel", "taxels"), ("biotac", "dc_pressure", "electrodes")]
+)
+def test_sliding_disturbs_no_other_channel(record, sensor, kind, stream):
+    still = record(sensor, "x", profile=_held(), observe=(kind,))[1][stream].data
+    moving = record(sensor, "x", profile=_held(), observe=(kind,), slide=_slide(20.0))[1][stream].data
+    np.testing.assert_array_equal(still, moving)
+
+
+def test_without_the_effects_dynamic_pressure_is_refused(sensors):
+    some = [effect for effect in tactbench_effects() if "ac_pressure" not in effect.produces]
+    scene = Scene(name="deaf", observe=("ac_pressure",))
+    with pytest.raises(NotApplicable, match="ac_pressure"):
+        build(RigContext(effects=tuple(some))).open(sensors["biotac"], scene, seed=1).__enter__()
+
+
+@pytest.mark.parametrize("effects", [("+all",), ("-friction",), ("-skin-vibration",), ("-hum", "-ac-pressure", "+all")])
+def test_effects_asked_for_or_left_out_do_no_harm(record, effects):
+    from tactbench.plugin import Simulation
+
+    for slide in (None, _slide(20.0)):
+        _, streams, _ = record(profile=_held(seconds=2.0), slide=slide, simulation=Simulation(effects=effects))
+        assert len(streams["vibration"].data) == 4400
+
+
+def test_impossible_slides_are_refused():
+    for wrong in ({"speed": 0.0}, {"start": -1.0}, {"duration": 0.0}):
+        with pytest.raises(ValueError, match="slide"):
+            Slide(speed=_q(wrong.get("speed", 1.0), "mm/s"), start=_q(wrong.get("start", 1.0), "s"),
+                  duration=_q(wrong["duration"], "s") if "duration" in wrong else None)  # fmt: skip
+    with pytest.raises(ValueError, match="static >= kinetic"):
+        Surface(kinetic_friction=_q(0.9, "1"))
+    with pytest.raises(ValueError, match="wavelength"):
+        Surface(wavelength=_q(0.0, "mm"))
