@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tactbench.plugin import (
+    BondedLayer,
     FloatArray,
     FluidBackedShell,
     NotApplicable,
@@ -48,6 +49,10 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
         from tactbench.rigs.twin.contact.local import LocalPress
 
         return LocalPress(skin, medium_of(skin, grid), gap, run.contact), read
+    if fidelity.solver == "elements" and isinstance(skin, BondedLayer):
+        from tactbench.rigs.twin.contact.elements import ElementsPress
+
+        return ElementsPress(skin, medium_of(skin, grid), gap, run.contact), read
     core: Callable[[Medium], Medium] | None = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):
         where = run.lent["core"]
