@@ -208,9 +208,9 @@ def _limit() -> list[Verdict]:
         over = max(over, float((seen.force_n - limit).max()))
         released = max(released, float(np.abs(seen.force_n[t < 1.0]).max()))
         negative = max(negative, float(-np.diff(seen.slip_mm).min()))
-    # Stiffness is straight between nodes where the load's cube root is not: 1e-3 of 4 N covers it from 2e-3 s on.
+    # Stiffness is straight between nodes where the load's cube root is not: 2e-5 of 4 N covers it.
     return [
-        Verdict("force above mu_s N", over, 0.0, 4e-3, "N", source="friction's limit; nodes of 2 ms"),
+        Verdict("force above mu_s N", over, 0.0, 1e-4, "N", source="friction's limit; nodes of 2 ms"),
         Verdict("force before the motion", released, 0.0, 0.0, "N", source="nothing moves"),
         Verdict("slip backwards", negative, 0.0, 1e-12, "mm", source="the surface never lags behind the skin"),
     ]
