@@ -33,6 +33,8 @@ def draw(points: Sequence[CostPoint], title: str, paths: Sequence[Path]) -> None
     for axis, ((subject, observable), group) in zip(axes.flat, panels.items(), strict=False):
         for family in families:
             own = [point for point in group if str(point.settings.get("family", "")) == family]
+            if not own:
+                continue
             colour, shape = marks[family]
             axis.loglog([p.seconds for p in own], [max(p.error, 1e-12) for p in own], shape, color=colour, ms=6,
                         label=family, ls="none")  # fmt: skip

@@ -34,13 +34,13 @@ from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.synthesis import Synthesis
 
-RADII_MM = (5.0, 40.0)
-"""The sharpest and the bluntest cap of the paper: what lies between them is between them."""
+RADII_MM = (5.0, 10.0, 40.0, math.inf)
+"""Contacts of the default matrix: caps from the sharpest to the bluntest, and the flat of the force task."""
 LOADS = 12
 """Loads at which readings are compared; drawn between the table's nodes, where interpolation errs most."""
 GRIDS = (0.5, 0.75, 1.0, 1.5, 2.0)
-NODES = (11, 16, 32)
-"""Most nodes of a table; it stops earlier where noise hides the rest, and never has fewer than 11."""
+NODES = (9, 11, DEFAULT.most_nodes, 32)
+"""Most nodes of a table; it stops earlier where noise hides the rest."""
 ROUNDS = 5
 
 
@@ -55,9 +55,9 @@ def study(sensor: SensorDescriptor, clock: Callable[[], float] = time.process_ti
     if sensor.spec.skin is None or sensor.transducer is None:
         raise RigError(f"{sensor.name} cannot be simulated.", hint="It needs a skin and a transducer in its plugin.")
     ways = list(_ways(sensor))
-    caps = ", ".join(f"{radius:g}" for radius in RADII_MM)
+    caps = ", ".join(f"{radius:g}" for radius in RADII_MM if math.isfinite(radius))
     return CostStudy(
-        title=f"error against time per recording (caps of {caps} mm, 5 N, 5000 samples)",
+        title=f"error against time per recording (caps of {caps} mm and flat, 5 N, 5000 samples)",
         reference=f"Errors are against the rung 'reference' ({FINE.cells_factor:g} times as many cells each way, no "
         f"table), at {LOADS} loads for each cap, without noise; times are CPU seconds of one thread, medians of "
         f"{ROUNDS * len(RADII_MM)} whole recordings, nothing kept from the one before.",
@@ -73,8 +73,7 @@ def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
 
     def named(family: str, fidelity: Fidelity) -> tuple[str, str, Fidelity]:
         along, across = fidelity.cells(skin.sheet)
-        fine = f", film x{fidelity.conduction_refinement}" if fidelity.conduction_refinement != 2 else ""
-        return family, f"{family}, {along} x {across}, up to {fidelity.most_nodes} nodes{fine}", fidelity
+        return family, f"{family}, {along} x {across}, up to {fidelity.most_nodes} nodes", fidelity
 
     if not isinstance(skin, FluidBackedShell):
         for nodes in NODES[:2]:
@@ -89,7 +88,7 @@ def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
                 )
     if isinstance(skin, FluidBackedShell):
         for refinement in (1, 3):
-            yield named("newton", dataclasses.replace(DEFAULT, conduction_refinement=refinement))
+            yield named(f"film x{refinement}", dataclasses.replace(DEFAULT, conduction_refinement=refinement))
 
 
 def _jobs(
@@ -158,7 +157,7 @@ def _planned(sensor: SensorDescriptor, radius_mm: float) -> tuple[Scene, Plan]:
     wanted: tuple[ChannelKind, ...] = ("taxel", "dc_pressure") if fluid and "dc_pressure" in present else ("taxel",)
     scene = Scene(
         name=f"cost-{radius_mm:g}",
-        indenter=Indenter(radius=assumed(radius_mm, "mm", "an end of the paper's range")),
+        indenter=Indenter(radius=assumed(radius_mm, "mm", "Karl et al. 2016") if math.isfinite(radius_mm) else None),
         placement=Placement(scatter=assumed(0.0, "mm", "the same contact for every way")),
         observe=wanted,
     )
