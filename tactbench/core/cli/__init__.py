@@ -78,9 +78,9 @@ def _exit_code(arguments: list[str] | None) -> int:
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
     except click.exceptions.Abort:
-        return _interrupted()
+        return _interrupted(arguments)
     except KeyboardInterrupt:
-        return _interrupted()
+        return _interrupted(arguments)
     except click.ClickException as error:
         error.show()
         return error.exit_code
@@ -93,8 +93,10 @@ def _exit_code(arguments: list[str] | None) -> int:
     return int(code) if isinstance(code, int) else 0
 
 
-def _interrupted() -> int:
-    click.echo("Interrupted. What was finished is kept; the same command goes on from there.", err=True)
+def _interrupted(arguments: list[str] | None) -> int:
+    verb = (sys.argv[1:] if arguments is None else arguments)[:1]
+    kept = "What was finished is kept; the same command goes on from there." if verb == ["run"] else "Nothing is kept."
+    click.echo(f"Interrupted. {kept}", err=True)
     return 130
 
 

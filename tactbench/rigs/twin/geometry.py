@@ -130,6 +130,16 @@ def _around(
     )
 
 
+def finger_surface_mm(
+    grid: SkinGrid, outer_radius_mm: float, dome: Dome | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the (nx, ns) places of the cells on the unloaded finger: axial, across, and height (the pad is below)."""
+    theta = grid.s_mm[None, :] / outer_radius_mm
+    phi, axial = _meridian(grid.x_mm[:, None], outer_radius_mm, dome)
+    ring = outer_radius_mm * np.cos(phi)
+    return axial + np.zeros_like(theta), ring * np.sin(theta), -ring * np.cos(theta)
+
+
 def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[FloatArray, FloatArray]:
     """Return the meridian angle at `x_mm` and the true axial place."""
     if dome is None:

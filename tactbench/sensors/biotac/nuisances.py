@@ -51,7 +51,7 @@ TAXEL = Nuisances(
     ),
     step=_STEP,
     creep=_CREEP,
-    largest_slope=derived(250.0, "count/N", f"{_SLOPE}: 246"),
+    largest_slope=derived(200.0, "count/N", f"{_SLOPE}: 192"),
 )
 
 PDC = Nuisances(

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from tactbench.plugin import BondedLayer, FloatArray, SkinState
 from tactbench.rigs.twin.boundary_elements.contact import press
 from tactbench.rigs.twin.boundary_elements.kernels import Layer
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import at_rest
+from tactbench.rigs.twin.contact.press import Coreless, at_rest
 from tactbench.rigs.twin.geometry import Contact
 
 
-class ElementsPress:
+class ElementsPress(Coreless):
     """Solves every load of a layer by itself.
 
     Parameters
@@ -30,7 +28,6 @@ class ElementsPress:
     def __init__(self, skin: BondedLayer, medium: Medium, gap_mm: FloatArray, contact: Contact) -> None:
         self.medium = medium
         self.contact = contact
-        self.touched_core = False
         self.solves = 0
         self._gap = gap_mm
         self._least_gap = float(gap_mm.min())
@@ -53,11 +50,3 @@ class ElementsPress:
             contact_radius_mm=found.contact_radius_mm,
             residual=found.residual,
         )
-
-    def closing_at(self, force_n: float) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
-
-    def closing_mm(self, state: SkinState) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf

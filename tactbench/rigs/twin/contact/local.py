@@ -10,7 +10,7 @@ import numpy as np
 
 from tactbench.plugin import BondedLayer, FloatArray, FluidBackedShell, FoamPad, RigError, SkinState
 from tactbench.rigs.twin.contact.media import Medium
-from tactbench.rigs.twin.contact.press import at_rest, contact_radius_mm
+from tactbench.rigs.twin.contact.press import Coreless, at_rest, contact_radius_mm
 from tactbench.rigs.twin.geometry import Contact
 
 LARGEST_POISSON = 0.4
@@ -20,7 +20,7 @@ _CLOSED = 1e-12
 _STEPS = 60
 
 
-class LocalPress:
+class LocalPress(Coreless):
     """Solves a load cell by cell.
 
     Parameters
@@ -56,7 +56,6 @@ class LocalPress:
             )
         self.medium = medium
         self.contact = contact
-        self.touched_core = False
         self.solves = 0
         self._gap = gap_mm
         self._least_gap = float(gap_mm.min())
@@ -102,14 +101,6 @@ class LocalPress:
             contact_radius_mm=contact_radius_mm(self.medium.grid, self.contact, pressure),
             residual=residual,
         )
-
-    def closing_at(self, force_n: float) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
-
-    def closing_mm(self, state: SkinState) -> float:
-        """Return minus infinity: there is no core."""
-        return -np.inf
 
     def _pushed(self, depth: float) -> tuple[FloatArray, FloatArray, float]:
         """Return deflection, contact pressure and the summed stiffness at an approach of `depth`.

@@ -23,8 +23,9 @@ from tactbench.plugin import (
     assumed,
     load_registry,
 )
+from tactbench.rigs.twin.geometry import finger_surface_mm
 from tactbench.rigs.twin.likeness.evidence import LOADED_FROM, Evidence
-from tactbench.rigs.twin.likeness.plate import finger_surface, plate_gap_mm, plate_normal
+from tactbench.rigs.twin.likeness.plate import plate_gap_mm, plate_normal
 from tactbench.rigs.twin.likeness.pressing import Bench
 from tactbench.rigs.twin.rig import Twin
 
@@ -168,8 +169,7 @@ def gives(sensor: SensorDescriptor, kind: ChannelKind) -> bool:
 def _plate(sensor: SensorDescriptor) -> Evidence:
     """Press flat plates, tilted towards the tip as a hand held them."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
-    par = sensor.spec.parameters
-    surface = finger_surface(bench.grid, outer, par["dome_shortening"].value * par["core_radius"].to("mm"))
+    surface = finger_surface_mm(bench.grid, outer, bench.dome)
     normals = np.array([channel.normal for channel in sensor.spec.channels("taxel")])
     changes, pressures, angles = [], [], []
     for tilt in TILTS_DEG:
@@ -204,8 +204,7 @@ def _pointed(sensor: SensorDescriptor) -> Evidence:
 def _release(sensor: SensorDescriptor) -> Evidence:
     """Hold plates for ten seconds and release them: what creep leaves one second later, with the spec's own terms."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
-    par = sensor.spec.parameters
-    surface = finger_surface(bench.grid, outer, par["dome_shortening"].value * par["core_radius"].to("mm"))
+    surface = finger_surface_mm(bench.grid, outer, bench.dome)
     held, after_s, loads = 10.0, 1.0, (2.0, 5.0, 10.0)
     share = sum(
         term.fraction.to("1") * -math.expm1(-held / term.tau.to("s")) * math.exp(-after_s / term.tau.to("s"))

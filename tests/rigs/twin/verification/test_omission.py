@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from tactbench.plugin import ForceRamp, Indenter, RigContext, Scene, assumed, load_registry
+from tactbench.plugin import ForceRamp, Indenter, Placement, RigContext, Scene, assumed, load_registry
 from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.contact.stages import skin_under_load
+from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.rig import build
 from tactbench.rigs.twin.verification.omission import difference
 
@@ -40,6 +43,18 @@ def test_a_slow_ramp_goes_without_creep_and_the_bound_holds(twin, sensors):
     # Not vacuous: within a factor of ten of what really happens, which is not nothing.
     assert bound / 10 < largest <= bound
     assert largest < hidden / 3
+
+
+@pytest.mark.parametrize(("name", "radius"), [("biotac", 20.0), ("biotac", 40.0), ("icub", 40.0)])
+def test_no_reading_is_steeper_than_the_spec_says(twin, sensors, name, radius):
+    scene = Scene(name="steep", indenter=Indenter(radius=_q(radius, "mm")), placement=Placement(scatter=_q(0.0, "mm")))
+    run = prepare(sensors[name], scene, 1, twin.plan(sensors[name], scene))
+    table = skin_under_load(run)
+    load = np.linspace(0.0, 5.0, 2001)
+    steepest = float(np.abs(np.diff(table(load), axis=0)).max() / 0.0025)
+    stated = sensors[name].spec.nuisances["taxel"].largest_slope.to("count/N")
+    # Bounded, and not by a number from nowhere.
+    assert stated / 2 < steepest <= stated
 
 
 def test_a_ramp_of_a_minute_does_not(twin, sensors):
