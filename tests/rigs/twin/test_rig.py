@@ -24,7 +24,8 @@ from tactbench.plugin import (
     assumed,
 )
 from tactbench.rigs.twin import tactbench_effects
-from tactbench.rigs.twin.rig import build
+from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.rig import Twin, build
 
 
 def _q(value, unit):
@@ -225,7 +226,7 @@ def test_a_strangers_effect_takes_part(sensors, tmp_path, monkeypatch):
     assert isinstance(Reason(True, ""), tuple)
 
 
-def test_what_a_plan_leaves_out_is_never_imported():
+def test_what_a_plan_leaves_out_is_never_imported(sensors):
     code = """
 import sys
 from tactbench.plugin import *
@@ -247,8 +248,32 @@ print(" ".join(mine))
     assert "effects.converter" in answer
     for left_out in ("core", "shell", "layer"):
         assert f"contact.{left_out}" not in answer
-    for left_out in ("offset", "warm_up", "wander", "white_noise", "force_noise"):
-        assert f"effects.{left_out}" not in answer
+    # Whatever is installed: the home of an effect that the plan leaves out is not imported, unless one that is
+    # included shares it.
+    plan = Twin(tuple(tactbench_effects())).plan(sensors["icub"], _scene(environment=QUIET))
+    homes = {
+        effect.name: effect.where.partition(":")[0].removeprefix("tactbench.rigs.twin.")
+        for effect in tactbench_effects()
+    }
+    needed = {homes[entry.effect] for entry in plan.entries if entry.included}
+    left_out = {homes[entry.effect] for entry in plan.entries if not entry.included} - needed
+    assert len(left_out) > 10
+    assert not left_out.intersection(answer)
+    assert "boundary_elements.contact" not in answer
+
+
+@pytest.mark.parametrize("name", ["biotac", "icub"])
+def test_only_what_the_plan_includes_is_stepped(sensors, name):
+    plan = Twin(tuple(tactbench_effects())).plan(sensors[name], _scene())
+    run = prepare(sensors[name], _scene(), 1, plan)
+    for effect in plan.stages:
+        run.apply(effect)
+    included = {entry.effect for entry in plan.settled(run.settled) if entry.included}
+    # The core is called upon by the contact, and counted there.
+    assert set(run.spent_s) | {"core"} == included | {"core"}
+    # Nothing is allocated for channels nobody looks at, nor for clocks nobody needs.
+    assert [track.clock for track in run.tracks] == [""]
+    assert {channel.kind for track in run.tracks for channel in track.channels} == {"taxel"}
 
 
 def test_listing_the_twin_imports_no_numerics():
