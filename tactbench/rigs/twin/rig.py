@@ -185,7 +185,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
 
 
 def _stated(scene: Scene) -> dict[str, Scalar]:
-    """Return what the scene states of its drive, its recorded force and its temperatures beyond the default."""
+    """Return what the scene states of drive, slide, recorded force and temperatures beyond the default."""
     environment, drive = scene.environment, scene.drive
     stated: dict[str, Scalar] = {}
     if environment.indenter_temperature is not None:
@@ -198,6 +198,12 @@ def _stated(scene: Scene) -> dict[str, Scalar]:
         stated["loop_integral_mm_per_n_s"] = drive.integral.to("mm/N/s")
         stated["loop_cutoff_hz"] = "none" if drive.cutoff is None else drive.cutoff.to("Hz")
         stated["loop_delay_s"] = drive.delay.to("s")
+    if scene.slide is not None:
+        surface = scene.slide.surface
+        stated["slide_mm_s"] = scene.slide.speed.to("mm/s")
+        stated["static_friction"] = surface.static_friction.to("1")
+        stated["kinetic_friction"] = surface.kinetic_friction.to("1")
+        stated["roughness_um"] = surface.roughness.to("um")
     return stated
 
 
