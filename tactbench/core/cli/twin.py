@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from tactbench.core.cli.simulation import simulation_options
 from tactbench.core.cli.threads import one_thread
+
+if TYPE_CHECKING:
+    from tactbench.core.plugins.registry import Registry
 
 FORMATS = ("table", "json", "csv")
 
@@ -86,7 +91,7 @@ def verify(
     ctx.exit(0 if real or all(verdict.met for _, verdict, _ in found) else 1)
 
 
-def simulated_rig(registry: object, name: str | None) -> str:
+def simulated_rig(registry: Registry, name: str | None) -> str:
     """Return the name of the simulated rig asked for, or of the first there is.
 
     Raises
@@ -95,9 +100,7 @@ def simulated_rig(registry: object, name: str | None) -> str:
         If the rig is not simulated, or there is none.
     """
     from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.registry import Registry
 
-    assert isinstance(registry, Registry)
     simulated = [rig.name for rig in registry.rigs if rig.simulated]
     if name is not None and not registry.rigs[name].simulated:
         raise UsageError(f"The rig {name!r} is not simulated.", hint=f"Simulated: {', '.join(simulated) or 'none'}.")

@@ -52,6 +52,11 @@ class ForceRamp(Frozen):
     samples: int = Field(default=5000, ge=1)
     """Samples of the reference clock over `duration`."""
 
+    @property
+    def largest_n(self) -> float:
+        """The largest force of the profile [N]."""
+        return max(self.start.to("N"), self.end.to("N"))
+
 
 class Environment(Frozen):
     """What surrounds the contact, and how far the assumed nuisances are scaled."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -118,6 +119,10 @@ class Nuisances(Frozen):
     largest_slope: Quantity | None = None
     """Largest change of a reading with load [unit / force]; bounds what a slow effect on the load can do. None: not
     known, and then no effect on the load is ever left out."""
+
+    def hidden(self, noise_scale: float = 1.0) -> float:
+        """Return the standard deviation that white noise and rounding hide anyway, in the channel's unit."""
+        return math.hypot(noise_scale * self.white.value, self.step.value / math.sqrt(12.0))
 
 
 class SensorSpec(Frozen):

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from tactbench.plugin import EffectDescriptor, Explained, Scene, SensorDescriptor, TactbenchError
 from tactbench.rigs.twin.contact.stages import forget_tables
 from tactbench.rigs.twin.planner import LENT, Plan, plan_scene
-from tactbench.rigs.twin.preparation import prepare
-from tactbench.rigs.twin.synthesis import Synthesis
+from tactbench.rigs.twin.preparation import carried_out
 
 _SEED = 1
 """Costs do not depend on what is drawn."""
@@ -24,11 +23,11 @@ def explained(
     """
     if not rounds:
         return [Explained(entry, None) for entry in plan.entries]
-    _carry_out(sensor, scene, plan)
+    carried_out(sensor, scene, _SEED, plan)
     runs = []
     for _ in range(rounds):
         forget_tables()
-        runs.append(_carry_out(sensor, scene, plan))
+        runs.append(carried_out(sensor, scene, _SEED, plan))
     lent = {effect.name for effect in effects if LENT in effect.produces}
     rows = []
     for entry in plan.settled(runs[-1].settled):
@@ -37,28 +36,20 @@ def explained(
         elif entry.included:
             rows.append(Explained(entry, statistics.median(run.spent_s[entry.effect] for run in runs)))
         else:
-            rows.append(_if_asked_for(effects, sensor, scene, entry.effect, rounds)._replace(entry=entry))
+            rows.append(Explained(entry, *_if_asked_for(effects, sensor, scene, entry.effect, rounds)))
     return rows
-
-
-def _carry_out(sensor: SensorDescriptor, scene: Scene, plan: Plan) -> Synthesis:
-    run = prepare(sensor, scene, _SEED, plan)
-    for effect in plan.stages:
-        run.apply(effect)
-    return run
 
 
 def _if_asked_for(
     effects: Sequence[EffectDescriptor], sensor: SensorDescriptor, scene: Scene, name: str, rounds: int
-) -> Explained:
+) -> tuple[float | None, str]:
+    """Return what `name` would cost, or None and why it cannot be asked for."""
     asked = (*scene.simulation.effects, f"+{name}")
     simulation = scene.simulation.model_copy(update={"effects": asked})
     try:
         plan = plan_scene(effects, scene.model_copy(update={"simulation": simulation}), sensor.spec)
-        entry = next(entry for entry in plan.entries if entry.effect == name)
-        _carry_out(sensor, scene, plan)
-        spent = [_carry_out(sensor, scene, plan).spent_s[name] for _ in range(rounds)]
+        carried_out(sensor, scene, _SEED, plan)
+        spent = [carried_out(sensor, scene, _SEED, plan).spent_s[name] for _ in range(rounds)]
     except TactbenchError as error:
-        entry = next(entry for entry in plan_scene(effects, scene, sensor.spec).entries if entry.effect == name)
-        return Explained(entry, None, f"cannot be asked for here: {error}")
-    return Explained(entry, statistics.median(spent))
+        return None, f"cannot be asked for here: {error}"
+    return statistics.median(spent), ""

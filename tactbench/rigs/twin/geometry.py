@@ -56,7 +56,7 @@ def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGri
     """
     along, across = cells or sheet.cells
     x_min, x_max, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
-    outer = math.inf if sheet.outer_radius is None else sheet.outer_radius.to("mm")
+    outer = outer_radius_mm(sheet)
     if not (0 < x_max - x_min < math.inf and 0 < arc < math.inf and outer > 0 and min(along, across) >= _FEWEST_CELLS):
         raise RigError(
             f"The skin's sheet runs from x = {x_min:g} to {x_max:g} mm and {arc:g} mm across, on a radius of {outer:g} "
@@ -78,6 +78,11 @@ def pad_of(sheet: SkinSheet, grid: SkinGrid) -> npt.NDArray[np.bool_] | None:
         np.abs(grid.s_mm) <= arc / 2
     )[None, :]
     return inside
+
+
+def outer_radius_mm(sheet: SkinSheet) -> float:
+    """Return the radius of the finger's outer surface; infinite for a flat pad."""
+    return math.inf if sheet.outer_radius is None else sheet.outer_radius.to("mm")
 
 
 def radius_mm(indenter: Indenter) -> float:

@@ -1,4 +1,4 @@
-"""From a scene to a recording in the making: its clocks, its load, its place; nothing simulated yet."""
+"""From a scene to a recording in the making: its clocks, its load, its place; then its plan, carried out."""
 
 from __future__ import annotations
 
@@ -51,6 +51,16 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidel
         fidelity=fidelity if scene.simulation.rung is None else rung(scene.simulation.rung),
     )
     run.contact = _place(run)
+    return run
+
+
+def carried_out(
+    sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidelity: Fidelity = DEFAULT
+) -> Synthesis:
+    """Return the recording of `scene` with every effect of its plan applied; raises what they raise."""
+    run = prepare(sensor, scene, seed, plan, fidelity)
+    for effect in plan.stages:
+        run.apply(effect)
     return run
 
 

@@ -28,7 +28,7 @@ from tactbench.plugin import (
 )
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
-from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.preparation import carried_out
 from tactbench.rigs.twin.synthesis import Synthesis
 
 ROWS_PER_BLOCK = 1000
@@ -120,10 +120,7 @@ class Twin:
             If the contact cannot be resolved or solved.
         """
         plan = self.plan(sensor, scene)
-        run = prepare(sensor, scene, seed, plan, self.fidelity)
-        for effect in plan.stages:
-            run.apply(effect)
-        yield _acquisition(run, plan)
+        yield _acquisition(carried_out(sensor, scene, seed, plan, self.fidelity), plan)
 
     def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
         """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""

@@ -31,7 +31,7 @@ from tactbench.rigs.twin.contact.pressing import pressed
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, forget_tables, skin_under_load
 from tactbench.rigs.twin.fidelity import DEFAULT, FINE, RUNGS, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
-from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.preparation import carried_out, prepare
 from tactbench.rigs.twin.synthesis import Synthesis
 
 RADII_MM = (5.0, 10.0, 40.0, math.inf)
@@ -117,9 +117,7 @@ def _measured(
         for _ in range(ROUNDS):
             forget_tables()
             began = clock()
-            run = prepare(sensor, scene, 1, plan, fidelity)
-            for effect in plan.stages:
-                run.apply(effect)
+            run = carried_out(sensor, scene, 1, plan, fidelity)
             seconds.append(clock() - began)
         table = skin_under_load(run)
         differences.append(table(_loads()) - table.readings[0] - truth[radius])
@@ -186,6 +184,4 @@ def _true(sensor: SensorDescriptor, scene: Scene, plan: Plan, names: list[str]) 
 def _noise(sensor: SensorDescriptor, kind: ChannelKind) -> float:
     """Return the standard deviation of white noise and rounding; infinity without any."""
     nuisances = sensor.spec.nuisances.get(kind)
-    if nuisances is None:
-        return math.inf
-    return math.hypot(nuisances.white.value, nuisances.step.value / 12**0.5) or math.inf
+    return math.inf if nuisances is None else nuisances.hidden() or math.inf

@@ -47,14 +47,6 @@ def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
     run.fidelity = dataclasses.replace(RUNGS[run.rung], most_nodes=FINE.most_nodes)
 
 
-def rung_errors(run: Synthesis, names: list[str], largest_n: float) -> dict[str, float]:
-    """Return what each rung that does this skin is off by, all of them solved; for diagnosis and diagrams."""
-    said = {name: answer for name in RUNGS if (answer := _probed(run, names, largest_n, name)) is not None}
-    errors = {low: _apart(said[low], said[high]) for low, high in itertools.pairwise(said)}
-    last = list(said)[-1]
-    return {**errors, last: list(errors.values())[-1]}
-
-
 def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: float) -> tuple[str, float]:
     known: dict[str, FloatArray | None] = {}
 

@@ -22,7 +22,7 @@ from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress, Press
 from tactbench.rigs.twin.contact.skins import medium_of
 from tactbench.rigs.twin.fidelity import Fidelity
-from tactbench.rigs.twin.geometry import gap_mm, skin_grid
+from tactbench.rigs.twin.geometry import gap_mm, outer_radius_mm, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
 Read = Callable[[SkinState], FloatArray]
@@ -42,8 +42,7 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
     if skin is None or run.sensor.transducer is None:
         raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
-    outer = skin.sheet.outer_radius
-    gap = gap_mm(grid, run.contact, np.inf if outer is None else outer.to("mm"), skin.sheet.dome)
+    gap = gap_mm(grid, run.contact, outer_radius_mm(skin.sheet), skin.sheet.dome)
     read = _reader(run.sensor, grid, names, fidelity) if names else no_channels
     if fidelity.solver == "local":
         from tactbench.rigs.twin.contact.local import LocalPress

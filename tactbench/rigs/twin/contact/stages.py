@@ -15,7 +15,7 @@ from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
 from tactbench.rigs.twin.contact.pressing import pressed
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
-from tactbench.rigs.twin.geometry import check_contact, pad_of, skin_grid
+from tactbench.rigs.twin.geometry import check_contact, outer_radius_mm, pad_of, skin_grid
 from tactbench.rigs.twin.synthesis import Synthesis
 
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
@@ -129,7 +129,7 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
     film = float(medium.rest_thickness_mm.max()) - medium.least_thickness_mm
     skin = run.sensor.spec.skin
     sheet = None if skin is None else skin.sheet
-    outer_mm = math.inf if sheet is None or sheet.outer_radius is None else sheet.outer_radius.to("mm")
+    outer_mm = math.inf if sheet is None else outer_radius_mm(sheet)
     if within_reach:
         check_reach(press, largest, outer_mm)
     pad = None if sheet is None else pad_of(sheet, medium.grid)
@@ -153,7 +153,7 @@ def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
     for name in names:
         channel = channels[name]
         nuisances = run.nuisances(channel.kind)
-        hidden = 0.0 if nuisances is None else float(np.hypot(nuisances.white.value, nuisances.step.value / 12**0.5))
+        hidden = 0.0 if nuisances is None else nuisances.hidden()
         # Without any stated noise: a ten-thousandth of the range, or of one.
         span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 1.0
         wanted.append(hidden if hidden > 0 else 1e-4 * span)

@@ -11,10 +11,6 @@ from collections.abc import Callable
 from tactbench.plugin import FluidBackedShell, Nuisances, Quantity, Reason, Scene, SensorSpec
 
 
-def _largest_n(scene: Scene) -> float:
-    return max(scene.profile.start.to("N"), scene.profile.end.to("N"))
-
-
 def _observed(scene: Scene, sensor: SensorSpec) -> list[Nuisances]:
     return [sensor.nuisances[kind] for kind in scene.observe if kind in sensor.nuisances]
 
@@ -26,7 +22,7 @@ def _largest(scene: Scene, sensor: SensorSpec, pick: Callable[[Nuisances], Quant
 
 def contact(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether the skin is pressed."""
-    largest = _largest_n(scene)
+    largest = scene.profile.largest_n
     if sensor.skin is None:
         return Reason(False, f"{sensor.name} declares no skin", 0.0)
     if not largest > 0:
@@ -38,7 +34,7 @@ def core(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether the skin may touch down on a core."""
     if not isinstance(sensor.skin, FluidBackedShell):
         return Reason(False, "the skin has no core under a fluid film", 0.0)
-    if not _largest_n(scene) > 0:
+    if not scene.profile.largest_n > 0:
         return Reason(False, "the scene has no load: 0 N throughout", 0.0)
     left = sensor.skin.gap.to("mm") - sensor.skin.residual_film.to("mm")
     return Reason(True, f"taken into the solve from the load that leaves no more than the film's {left:g} mm")
@@ -79,7 +75,7 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
     if any(bound is None for bound in bounds):
         return Reason(True, late)
     most = max(bound for bound in bounds if bound is not None)
-    hidden = [_hidden(nuisances, scene) for nuisances in _observed(scene, sensor)]
+    hidden = [nuisances.hidden(scene.environment.noise_scale) for nuisances in _observed(scene, sensor)]
     if all(bound <= floor / 3 for bound, floor in zip(bounds, hidden, strict=True) if bound is not None):
         slow = f"the load changes by {rate:.2g} N/s, slowly against {slowest:g} s: at most {most:.2g} counts late"
         return Reason(False, f"{slow}, below a third of noise and rounding ({min(hidden):.2g})", most)
@@ -101,10 +97,6 @@ def _behind(nuisances: Nuisances, rate: float) -> float | None:
     # The slope is that of the nominal gain; four standard deviations cover the largest of some hundred channels.
     gain = 1.0 + 4.0 * nuisances.gain_scatter.to("1")
     return nuisances.largest_slope.to("count/N") * gain * late_s * rate
-
-
-def _hidden(nuisances: Nuisances, scene: Scene) -> float:
-    return math.hypot(scene.environment.noise_scale * nuisances.white.value, nuisances.step.value / 12**0.5)
 
 
 def gain(scene: Scene, sensor: SensorSpec) -> Reason:

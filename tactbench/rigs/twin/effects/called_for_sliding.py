@@ -14,7 +14,7 @@ def _slides(scene: Scene, sensor: SensorSpec) -> Reason:
         return Reason(False, STILL, 0.0)
     if sensor.skin is None:
         return Reason(False, f"{sensor.name} declares no skin", 0.0)
-    largest = max(scene.profile.start.to("N"), scene.profile.end.to("N"))
+    largest = scene.profile.largest_n
     if not largest > 0:
         return Reason(False, "the scene has no load: 0 N throughout", 0.0)
     late = slide.start.to("s") - scene.profile.duration.to("s")

@@ -12,7 +12,7 @@ def force_loop(scene: Scene, sensor: SensorSpec) -> Reason:
         return Reason(False, "the scene declares no drive: the force follows its profile, 0 N off", 0.0, "N")
     if sensor.skin is None:
         return Reason(False, f"{sensor.name} declares no skin to press on", 0.0, "N")
-    if not max(scene.profile.start.to("N"), scene.profile.end.to("N")) > 0:
+    if not scene.profile.largest_n > 0:
         return Reason(False, "the scene has no load: 0 N throughout", 0.0, "N")
     filtered = "unfiltered" if drive.cutoff is None else f"behind a low-pass at {drive.cutoff}"
     steps = "a step per sample" if drive.rate is None else f"steps at {drive.rate}"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from tactbench.rigs.twin.effects.memory import lag
-from tactbench.rigs.twin.effects.temperature import time_constant_s
+from tactbench.rigs.twin.effects.memory import lag, time_constant_s
 from tactbench.rigs.twin.synthesis import Synthesis
 
 

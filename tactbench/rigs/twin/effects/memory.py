@@ -7,6 +7,7 @@ mistake of the caller, and no answer to it would be right.
 
 from __future__ import annotations
 
+import math
 from typing import TypeVar
 
 import numpy as np
@@ -119,3 +120,8 @@ def wandering(
     drive = generator.standard_normal((t_s.size, channels))
     drive *= (spread * fresh)[:, None]
     return recurrence(np.exp(-dt / tau_s), drive)
+
+
+def time_constant_s(cutoff_hz: float) -> float:
+    """Return the time constant of a first-order filter: ``1 / (2 pi f)``."""
+    return 1.0 / (2.0 * math.pi * cutoff_hz)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from tactbench.plugin import FloatArray
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
-from tactbench.rigs.twin.effects.memory import lag
+from tactbench.rigs.twin.effects.memory import lag, time_constant_s
 from tactbench.rigs.twin.effects.thermistor import Thermistor
 from tactbench.rigs.twin.synthesis import Synthesis, Track
 
@@ -33,11 +31,6 @@ def read_ac(run: Synthesis) -> None:
             reading = _thermistor(run, track, column)
             if reading is not None:
                 track.readings[:, column] += gain * (reading - lag(track.t_s, reading, tau_s))
-
-
-def time_constant_s(cutoff_hz: float) -> float:
-    """Return the time constant of a first-order filter: ``1 / (2 pi f)``."""
-    return 1.0 / (2.0 * math.pi * cutoff_hz)
 
 
 def _thermistor(run: Synthesis, track: Track, column: int) -> FloatArray | None:

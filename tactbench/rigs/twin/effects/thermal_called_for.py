@@ -83,7 +83,7 @@ def _silent(scene: Scene, sensor: SensorSpec) -> str | None:
         return f"the spec states no {', '.join(missing)}"
     if scene.environment.indenter_temperature is None:
         return "the scene's indenter is as warm as what it touches: 0 K apart"
-    if not max(scene.profile.start.to("N"), scene.profile.end.to("N")) > 0:
+    if not scene.profile.largest_n > 0:
         return "the scene has no load: 0 N throughout"
     return None
 
@@ -150,6 +150,4 @@ def _counts_per_k(kind: ChannelKind, scene: Scene, sensor: SensorSpec) -> float:
 
 def _hidden(kind: ChannelKind, scene: Scene, sensor: SensorSpec) -> float:
     nuisances = sensor.nuisances.get(kind)
-    if nuisances is None:
-        return 0.0
-    return math.hypot(scene.environment.noise_scale * nuisances.white.value, nuisances.step.value / 12**0.5)
+    return 0.0 if nuisances is None else nuisances.hidden(scene.environment.noise_scale)

@@ -12,7 +12,7 @@ from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.skins import medium_of
-from tactbench.rigs.twin.geometry import Contact, gap_mm, skin_grid
+from tactbench.rigs.twin.geometry import Contact, gap_mm, outer_radius_mm, skin_grid
 
 
 class Bench:
@@ -31,7 +31,7 @@ class Bench:
         self._skin = skin
         self.grid = skin_grid(skin.sheet)
         self.dome = skin.sheet.dome
-        self._outer = math.inf if skin.sheet.outer_radius is None else skin.sheet.outer_radius.to("mm")
+        self._outer = outer_radius_mm(skin.sheet)
         taxels = [channel.name for channel in sensor.spec.channels("taxel")]
         pressure = [channel.name for channel in sensor.spec.channels("dc_pressure")]
         self._taxels = len(taxels)

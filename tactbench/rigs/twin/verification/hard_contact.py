@@ -14,7 +14,7 @@ from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.skins import medium_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
-from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, pad_of, skin_grid
+from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, outer_radius_mm, pad_of, skin_grid
 from tactbench.rigs.twin.verification.hard_cases import Case, Family
 
 BALANCE = 1e-8
@@ -42,11 +42,6 @@ def draw_skin(case: Case) -> AnySkin:
     return known[name]
 
 
-def outer_mm(skin: AnySkin) -> float:
-    """Return the radius of the finger; infinite for a flat pad."""
-    return math.inf if skin.sheet.outer_radius is None else skin.sheet.outer_radius.to("mm")
-
-
 def press_of(skin: AnySkin, contact: Contact, cells: tuple[int, int] | None = None) -> Press:
     """Return `skin` under an indenter, its core included; raises RigError where the contact cannot be."""
     grid = skin_grid(skin.sheet, cells)
@@ -57,7 +52,7 @@ def press_of(skin: AnySkin, contact: Contact, cells: tuple[int, int] | None = No
         def core(medium: Medium) -> Medium:
             return with_core(medium, skin)
 
-    return Press(medium_of(skin, grid), gap_mm(grid, contact, outer_mm(skin)), contact, core=core)
+    return Press(medium_of(skin, grid), gap_mm(grid, contact, outer_radius_mm(skin.sheet)), contact, core=core)
 
 
 def draw_contact(case: Case, skin: AnySkin, radius: float, *, margin: float = 0.25, tilt: float = 0.0) -> Contact:
@@ -114,8 +109,8 @@ def any_radius(case: Case) -> None:
     case.right = "refusal" if radius < cell else "either" if radius < 3.0 else "answer"
     press = press_of(skin, draw_contact(case, skin, radius))
     states = lawful(case, press, loads)
-    check_reach(press, loads[-1], outer_mm(skin))
-    told = remarks(press, loads, outer_mm(skin), pad_of(skin.sheet, press.medium.grid))
+    check_reach(press, loads[-1], outer_radius_mm(skin.sheet))
+    told = remarks(press, loads, outer_radius_mm(skin.sheet), pad_of(skin.sheet, press.medium.grid))
     few = np.count_nonzero(states[-1].pressure_mpa) < 28  # pi 3²
     case.holds(
         ("remark contact" in told) == few, "a contact below three cells in radius must be remarked on, and only it"
@@ -130,7 +125,7 @@ def past_the_rim(case: Case) -> None:
     touched = press.gap_mm[state.pressure_mpa > 0]
     # Every gap under a cap is below its radius and the finger's fall; beyond it there are 50 mm more.
     case.right = "refusal" if touched.max() > 30.0 else "answer"
-    check_reach(press, state.force_n, outer_mm(skin))
+    check_reach(press, state.force_n, outer_radius_mm(skin.sheet))
 
 
 def a_cap_that_is_none(case: Case) -> None:
@@ -170,7 +165,9 @@ def flat_is_a_huge_cap(case: Case) -> None:
     load = case.decades(1e-6, 100.0)
     first, second = (lawful(case, press_of(skin, one), [load])[0].depth_mm for one in (flat, huge))
     grid = skin_grid(skin.sheet)
-    apart = float(np.abs(gap_mm(grid, flat, outer_mm(skin)) - gap_mm(grid, huge, outer_mm(skin))).max())
+    apart = float(
+        np.abs(gap_mm(grid, flat, outer_radius_mm(skin.sheet)) - gap_mm(grid, huge, outer_radius_mm(skin.sheet))).max()
+    )
     r2 = grid.x_mm.size**2 * grid.cell_mm[0] ** 2 + grid.s_mm.size**2 * grid.cell_mm[1] ** 2
     case.holds(apart <= r2 / (2 * huge.radius_mm) * 1.01 + 1e-13, f"the cap sags by {apart!r} mm")
     case.holds(abs(first - second) <= 2 * apart + SOLVED * first, f"{first!r} mm flat, {second!r} mm huge")
@@ -186,8 +183,8 @@ def any_load(case: Case) -> None:
     states = lawful(case, press, loads)
     case.holds(0 < states[0].depth_mm < 1e-9, f"a piconewton presses {states[0].depth_mm:g} mm deep")
     case.right = "either"
-    check_reach(press, loads[-1], outer_mm(skin))
-    case.holds("remark load" in remarks(press, loads, outer_mm(skin)), "500 N and no remark")
+    check_reach(press, loads[-1], outer_radius_mm(skin.sheet))
+    case.holds("remark load" in remarks(press, loads, outer_radius_mm(skin.sheet)), "500 N and no remark")
 
 
 def loads_that_are_none(case: Case) -> None:

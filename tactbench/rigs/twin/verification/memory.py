@@ -10,8 +10,7 @@ import numpy as np
 from tactbench.plugin import Check, FloatArray, ForceLoop, Verdict, assumed
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
 from tactbench.rigs.twin.effects.loop_dynamics import Dynamics
-from tactbench.rigs.twin.effects.memory import lag, wandering
-from tactbench.rigs.twin.effects.temperature import time_constant_s
+from tactbench.rigs.twin.effects.memory import lag, time_constant_s, wandering
 
 _ROUNDING = 1e-12
 """Bound on relative errors of exact filters: some thousand operations, each off by 1e-16."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from tactbench.plugin import (
     Verdict,
     load_registry,
 )
-from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.preparation import carried_out
 from tactbench.rigs.twin.rig import Twin, build
 
 _LAST = "converter"
@@ -84,10 +85,8 @@ def _verdicts(twin: Twin, sensor: SensorDescriptor, scenes: Sequence[Scene]) -> 
 
 def _readings(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[list[FloatArray], float]:
     plan = twin.plan(sensor, scene)
-    run = prepare(sensor, scene, 1, plan)
-    for effect in plan.stages:
-        if effect.name != _LAST:
-            run.apply(effect)
+    stages = tuple(effect for effect in plan.stages if effect.name != _LAST)
+    run = carried_out(sensor, scene, 1, replace(plan, stages=stages))
     entries = plan.settled(run.settled)
     return [track.readings for track in run.tracks], sum(_bound(entry) for entry in entries)
 
@@ -100,9 +99,8 @@ def _bound(entry: PlanEntry) -> float:
 
 def _hidden(sensor: SensorDescriptor, scene: Scene) -> float:
     found = [sensor.spec.nuisances[kind] for kind in scene.observe if kind in sensor.spec.nuisances]
-    scale = scene.environment.noise_scale
     # A sensor without any stated noise hides nothing: its floor says nothing.
-    floors = [math.hypot(scale * n.white.value, n.step.value / 12**0.5) for n in found]
+    floors = [nuisances.hidden(scene.environment.noise_scale) for nuisances in found]
     return min((floor for floor in floors if floor > 0), default=math.inf)
 
 

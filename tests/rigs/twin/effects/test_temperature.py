@@ -8,7 +8,7 @@ import pytest
 from tactbench.plugin import Environment, ForceRamp, Indenter, NotApplicable, RigContext, Scene, Simulation, assumed
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
-from tactbench.rigs.twin.effects.temperature import time_constant_s
+from tactbench.rigs.twin.effects.memory import time_constant_s
 from tactbench.rigs.twin.effects.thermal_called_for import contact_heat
 from tactbench.rigs.twin.effects.thermistor import Thermistor
 from tactbench.rigs.twin.planner import plan_scene
