@@ -7,7 +7,7 @@ import functools
 import math
 import statistics
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from tactbench.plugin import (
     CostJob,
     CostPoint,
     CostStudy,
+    EffectDescriptor,
     FloatArray,
     FluidBackedShell,
     Indenter,
@@ -29,7 +30,7 @@ from tactbench.plugin import (
 )
 from tactbench.rigs.twin.contact.pressing import pressed
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, forget_tables, skin_under_load
-from tactbench.rigs.twin.fidelity import DEFAULT, FINE, RUNGS, Fidelity
+from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, prepare
 from tactbench.rigs.twin.synthesis import Synthesis
@@ -42,6 +43,7 @@ GRIDS = (0.5, 0.75, 1.0, 1.5, 2.0)
 NODES = (9, 11, DEFAULT.most_nodes, 32)
 """Most nodes of a table; it stops earlier where noise hides the rest."""
 ROUNDS = 5
+_REFERENCE = RUNGS["reference"]
 
 
 def study(sensor: SensorDescriptor, clock: Callable[[], float] = time.process_time) -> CostStudy:
@@ -55,13 +57,14 @@ def study(sensor: SensorDescriptor, clock: Callable[[], float] = time.process_ti
     if sensor.spec.skin is None or sensor.transducer is None:
         raise RigError(f"{sensor.name} cannot be simulated.", hint="It needs a skin and a transducer in its plugin.")
     ways = list(_ways(sensor))
+    effects = tuple(load_registry().effects)
     caps = ", ".join(f"{radius:g}" for radius in RADII_MM if math.isfinite(radius))
     return CostStudy(
         title=f"error against time per recording (caps of {caps} mm and flat, 5 N, 5000 samples)",
-        reference=f"Errors are against the rung 'reference' ({FINE.cells_factor:g} times as many cells each way, no "
-        f"table), at {LOADS} loads for each cap, without noise; times are CPU seconds of one thread, medians of "
+        reference=f"Errors are against the rung 'reference' ({_REFERENCE.cells_factor:g} times as many cells each way, "
+        f"no table), at {LOADS} loads for each cap, without noise; times are CPU seconds of one thread, medians of "
         f"{ROUNDS * len(RADII_MM)} whole recordings, nothing kept from the one before.",
-        jobs=_jobs(sensor, ways, clock),
+        jobs=_jobs(sensor, effects, ways, clock),
         total=len(ways),
     )
 
@@ -92,15 +95,20 @@ def _ways(sensor: SensorDescriptor) -> Iterator[tuple[str, str, Fidelity]]:
 
 
 def _jobs(
-    sensor: SensorDescriptor, ways: Sequence[tuple[str, str, Fidelity]], clock: Callable[[], float]
+    sensor: SensorDescriptor,
+    effects: Sequence[EffectDescriptor],
+    ways: Sequence[tuple[str, str, Fidelity]],
+    clock: Callable[[], float],
 ) -> Iterator[CostJob]:
+    scenes = {radius: _planned(sensor, effects, radius) for radius in RADII_MM}
     truth: dict[float, FloatArray] = {}
     for family, label, fidelity in ways:
-        yield CostJob(label, functools.partial(_measured, sensor, family, label, fidelity, truth, clock))
+        yield CostJob(label, functools.partial(_measured, sensor, scenes, family, label, fidelity, truth, clock))
 
 
 def _measured(
     sensor: SensorDescriptor,
+    scenes: Mapping[float, tuple[Scene, Plan]],
     family: str,
     label: str,
     fidelity: Fidelity,
@@ -109,8 +117,7 @@ def _measured(
 ) -> list[CostPoint]:
     seconds: list[float] = []
     differences: list[FloatArray] = []
-    for radius in RADII_MM:
-        scene, plan = _planned(sensor, radius)
+    for radius, (scene, plan) in scenes.items():
         names = _names(prepare(sensor, scene, 1, plan))
         if radius not in truth:
             truth[radius] = _true(sensor, scene, plan, names)
@@ -149,7 +156,7 @@ def _measured(
     return found
 
 
-def _planned(sensor: SensorDescriptor, radius_mm: float) -> tuple[Scene, Plan]:
+def _planned(sensor: SensorDescriptor, effects: Sequence[EffectDescriptor], radius_mm: float) -> tuple[Scene, Plan]:
     present = {channel.kind for channel in sensor.spec.channels()}
     fluid = isinstance(sensor.spec.skin, FluidBackedShell)
     wanted: tuple[ChannelKind, ...] = ("taxel", "dc_pressure") if fluid and "dc_pressure" in present else ("taxel",)
@@ -159,7 +166,7 @@ def _planned(sensor: SensorDescriptor, radius_mm: float) -> tuple[Scene, Plan]:
         placement=Placement(scatter=assumed(0.0, "mm", "the same contact for every way")),
         observe=wanted,
     )
-    return scene, plan_scene(tuple(load_registry().effects), scene, sensor.spec)
+    return scene, plan_scene(effects, scene, sensor.spec)
 
 
 def _names(run: Synthesis) -> list[str]:
@@ -174,9 +181,9 @@ def _loads() -> FloatArray:
 
 def _true(sensor: SensorDescriptor, scene: Scene, plan: Plan, names: list[str]) -> FloatArray:
     """Return the (loads, channels) changes of the reference, each load solved by itself."""
-    run = prepare(sensor, scene, 1, plan, FINE)
+    run = prepare(sensor, scene, 1, plan, _REFERENCE)
     run.fluid_pressure = "dc_pressure" in scene.observe
-    press, read = pressed(run, names, FINE)
+    press, read = pressed(run, names, _REFERENCE)
     rest = read(press(0.0))
     return np.stack([read(press(float(load))) - rest for load in _loads()])
 
