@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.numbers import duration, interval, score, whole
 
@@ -175,6 +176,8 @@ def _notes(rows: Sequence[Row]) -> list[str]:
 def _no_better(row: Row) -> bool:
     if row["status"] != "done" or row["is_baseline"] or row["baseline"] is None:
         return False
+    if row["protocol"] in PROTOCOLS and PROTOCOLS[row["protocol"]].probe:
+        return False  # no better than trivial is what a probe should be
     lower = row["metric"] in LOWER_IS_BETTER
     return bool(row["ci_high"] >= row["baseline"] if lower else row["ci_low"] <= row["baseline"])
 

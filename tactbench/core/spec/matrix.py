@@ -44,6 +44,8 @@ class MatrixSpec(Frozen):
     rig: str = "twin"
     recordings: str | None = None
     """Folder of recordings for rigs that replay; relative to the file."""
+    probe: bool = False
+    """Also run the cells that show what recordings give away; see docs/real-recordings.md."""
     simulation: Simulation = Simulation()
     """How a simulated rig is asked to carry out every scene."""
     sensors: tuple[str, ...] = ()

@@ -1,0 +1,27 @@
+"""Shear force from taxels, from recordings whose load cell measured along the surface."""
+
+from __future__ import annotations
+
+from tactbench.plugin import ChannelTarget, TaskDescriptor, TaskSpec, hookimpl
+
+TACTBENCH_API = 1
+
+SPEC = TaskSpec(
+    name="shear-force",
+    title="Shear force",
+    question="How large is the force along the surface?",
+    kind="regression",
+    target=ChannelTarget(kind="force", name="shear", unit="N"),
+    metric="rmse",
+    unit="N",
+    protocols=("deployable",),
+    splits=("roles", "session", "press", "in-session", "shuffled"),
+    estimators=("forest", "ridge"),
+    baselines=("mean", "time-index"),
+)
+
+
+@hookimpl
+def tactbench_tasks() -> list[TaskDescriptor]:
+    """Offer the task."""
+    return [TaskDescriptor(spec=SPEC)]
