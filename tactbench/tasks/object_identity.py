@@ -14,9 +14,10 @@ SPEC = TaskSpec(
     target=LabelTarget(name="object"),
     metric="accuracy",
     protocols=("deployable",),
-    # Frames of one grasp are near copies: whole recordings are kept together. By `trial`, the n-th grasp of every
-    # object is held out at once: the same if the objects were recorded in turns, and nobody says they were not.
-    splits=("recording", "trial", "shuffled"),
+    # Frames of one grasp are near copies: grasps are kept whole. By `trial`, the n-th grasp of every object is held out
+    # at once, so that every fold tests every object, and what the objects' n-th grasps shared is on one side only. By
+    # `recording`, each grasp for itself: for recordings whose grasps are not numbered.
+    splits=("trial", "recording", "shuffled"),
     estimators=("forest",),
     baselines=("majority", "chance"),
 )

@@ -73,7 +73,8 @@ def score_interval(
             times[:, one] = rng.multinomial(len(one), np.full(len(one), 1 / len(one)), size=RESAMPLES)
         scores = metric.score(times @ sums, n_classes)
         tail = _widened_tail(len(names) - len(strata), min(len(one) for one in strata))
-        return _percentiles(scores, f"bootstrap over {len(names)} {cluster_name}s", tail)
+        plural = cluster_name + ("es" if cluster_name.endswith("s") else "s")
+        return _percentiles(scores, f"bootstrap over {len(names)} {plural}", tail)
     if len(np.unique(recording)) == len(recording):
         return _of_too_few(metric, rows, n_classes)
     total = np.zeros((RESAMPLES, rows.shape[1]))

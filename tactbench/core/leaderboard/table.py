@@ -155,6 +155,12 @@ def _notes(rows: Sequence[Row]) -> list[str]:
         for row in rows
         if row["simulated"]
     )
+    notes += _distinct(
+        f"published for {row['sensor']}/{row['task']}: {score(row['published'], row['unit'])} "
+        f"({row['published_reference']}): {row['published_remark']}."
+        for row in rows
+        if row["published"] is not None and row.get("published_remark")
+    )
     for row in rows:
         if row["chosen"]:
             picked = ", ".join(f"{key.rstrip('_')} = {value:g}" for key, value in sorted(row["chosen"].items()))
