@@ -47,8 +47,8 @@ def build_probe(rows: Sequence[Row]) -> ProbeTable | None:
     for row in rows:
         if row["is_baseline"] or row["status"] != "done" or row["protocol"] != DEPLOYABLE.name:
             continue
-        if row["split"] == "shuffled":
-            continue
+        if row["split"] in ("shuffled", "in-session"):
+            continue  # neither keeps recordings or groups apart: there is nothing to compare with
         first = _partner(row, rows, protocol=FIRST_FRAME.name, split=row["split"])
         shuffled = _partner(row, rows, protocol=DEPLOYABLE.name, split="shuffled")
         if first is None and shuffled is None:
@@ -149,7 +149,8 @@ def _about_shuffled(row: Row, shuffled: Row | None) -> list[str]:
     if _skill(shuffled["score"], best, row) <= 0:
         return []
     suffix = "" if row["unit"] == "1" else f" {row['unit']}"
-    return [f"optimistic by {score(abs(shuffled['score'] - row['score']), row['unit'])}{suffix} when shuffled"]
+    said = f"optimistic by {score(abs(shuffled['score'] - row['score']), row['unit'])}{suffix} when shuffled"
+    return [said if shuffled["n_test"] == row["n_test"] else f"{said} (tested on other rows)"]
 
 
 def _skill(value: float, trivial: float, row: Row) -> float:

@@ -175,14 +175,24 @@ def _notes(rows: Sequence[Row]) -> list[str]:
     notes += _distinct(
         f"{row['task']}: interval by {row['ci_method']}." for row in rows if row["ci_method"] and not row["is_baseline"]
     )
-    notes += [f"{_who(row)} {row['status']}: {row['reason']}" for row in rows if row["status"] != "done"]
+    notes += _distinct(
+        # What makes no sense to probe makes none with any estimator.
+        f"{row['sensor']}/{row['task']}/{row['protocol'] if _is_probe(row) else row['estimator']} {row['status']}: "
+        f"{row['reason']}"
+        for row in rows
+        if row["status"] != "done"
+    )
     return notes
+
+
+def _is_probe(row: Row) -> bool:
+    return row["protocol"] in PROTOCOLS and PROTOCOLS[row["protocol"]].probe
 
 
 def _no_better(row: Row) -> bool:
     if row["status"] != "done" or row["is_baseline"] or row["baseline"] is None:
         return False
-    if row["protocol"] in PROTOCOLS and PROTOCOLS[row["protocol"]].probe:
+    if _is_probe(row):
         return False  # no better than trivial is what a probe should be
     lower = row["metric"] in LOWER_IS_BETTER
     return bool(row["ci_high"] >= row["baseline"] if lower else row["ci_low"] <= row["baseline"])

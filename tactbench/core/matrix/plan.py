@@ -85,13 +85,17 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
 def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     """Return `cells` and, after them, those that show what their recordings give away.
 
-    For every answer, and for its task's first baseline: the same under `deployable` with recordings kept whole as the
-    cell asked for, under `first-frame`, and with rows shuffled.
+    For every answer, and for its task's first baseline: the same under `deployable` with kept apart what the cell keeps
+    apart, under `first-frame`, and with rows shuffled. A split in time keeps no recordings apart and is not probed.
     """
     every = list(cells)
     for cell in cells:
         rules = protocol_called(cell.protocol)
-        if rules.probe or (cell.baseline and cell.estimator != registry.tasks[cell.task].spec.baselines[0]):
+        if (
+            rules.probe
+            or cell.split == "in-session"
+            or (cell.baseline and cell.estimator != registry.tasks[cell.task].spec.baselines[0])
+        ):
             continue
         split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
         honest = replace(cell, protocol=DEPLOYABLE.name, split=split)

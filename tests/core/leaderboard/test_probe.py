@@ -75,6 +75,10 @@ def test_the_first_frame_of_numbers(first, more, says):
         ([classed(0.88), classed(0.90, split="shuffled")], "no leak shown"),
         ([classed(0.88), classed(0.70, split="shuffled")], "no leak shown"),
         ([erring(1.0), erring(0.5, split="shuffled")], "optimistic by 0.5000 N when shuffled"),
+        (
+            [erring(1.0, split="roles"), erring(0.5, split="shuffled", n_test=99)],
+            "optimistic by 0.5000 N when shuffled (tested on other rows)",
+        ),
         ([erring(1.0), erring(0.9, split="shuffled")], "no leak shown"),
         ([erring(1.0), erring(1.5, split="shuffled")], "no leak shown"),
     ],
@@ -105,6 +109,7 @@ def test_other_sensors_estimators_and_repeats_are_no_partners():
 
 def test_nothing_is_shown_where_nothing_was_probed():
     assert build_probe([classed(0.9), classed(0.2, is_baseline=True)]) is None
+    assert build_probe([erring(1.0, split="in-session"), erring(0.5, split="shuffled")]) is None
     assert "Probe" not in to_markdown([classed(0.9)])
 
 

@@ -48,6 +48,10 @@ def test_probes_keep_apart_what_the_cell_keeps_apart(registry, split, expected):
     assert ways(plan(registry, protocol="deployable", split=split)) == expected
 
 
+def test_a_split_in_time_keeps_nothing_apart_and_is_not_probed(registry):
+    assert ways(plan(registry, protocol="deployable", split="in-session")) == [("deployable", "in-session")]
+
+
 def test_a_probe_may_be_asked_of_any_task_by_name(registry):
     assert "first-frame" not in registry.tasks["curvature"].spec.protocols
     assert ways(plan(registry, probe=False, protocol="first-frame")) == [("first-frame", None)]
