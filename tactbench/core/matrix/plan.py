@@ -91,11 +91,8 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     every = list(cells)
     for cell in cells:
         rules = protocol_called(cell.protocol)
-        if (
-            rules.probe
-            or cell.split == "in-session"
-            or (cell.baseline and cell.estimator != registry.tasks[cell.task].spec.baselines[0])
-        ):
+        trivial = registry.tasks[cell.task].spec.baselines[0]
+        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != trivial):
             continue
         split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
         honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
