@@ -78,6 +78,8 @@ def command(
     with progress() as told:
         outcome = run_matrix(matrix, store, jobs=jobs, recordings=folder, progress=told)
     print_rows(outcome.rows, shape)
+    if shape == "table":
+        _side_by_side(outcome)
     _farewell(outcome, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
 
@@ -127,6 +129,16 @@ def _matrix(
         over["estimators"] = tuple(EstimatorChoice(name=name) for name in dict.fromkeys(estimators))
     change["tasks"] = tuple(choice.model_copy(update=over) for choice in chosen)
     return matrix.model_copy(update=change)
+
+
+def _side_by_side(outcome: Outcome) -> None:
+    """Print what was asked under several protocols or splits once more, side by side."""
+    from tactbench.core.cli.comparisons import print_comparisons
+    from tactbench.core.leaderboard.comparison import compare
+
+    for by in ("protocol", "split"):
+        if compare(outcome.rows, by):
+            print_comparisons(outcome.rows, by, "table")
 
 
 def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:

@@ -21,5 +21,9 @@ def apply(run: Synthesis) -> None:
                 gain[columns] += nuisances.gain_scatter.to("1") * numbers
                 if nuisances.unit_gain is not None and not run.scene.first_unit:
                     shared = float(run.of_unit("shared gain", kind).standard_normal())
+                    stated = f"{nuisances.unit_gain.to('%'):g} % (sd, {nuisances.unit_gain.source.tag})"
+                    run.drawn["remark unit gain"] = (
+                        f"units beside 1 are drawn: gains of {kind} channels differ by {stated}"
+                    )
                     gain[columns] *= max(1.0 + nuisances.unit_gain.to("1") * shared, 0.0)
         track.gain = gain
