@@ -78,6 +78,13 @@ def test_few_shots_train_on_nested_sets_and_test_on_the_same(shelf, name):
     assert len(sets[10][0]) == 10 * len(sets[1][0])
 
 
+def test_of_more_sessions_than_asked_for_the_first_train(shelf):
+    data = loaded(shelf, "force", "few-shot-10")
+    for number in (1, 2, 5, 10):
+        (fold,) = make_splits(data, f"few-shot-{number}", 0)
+        assert values(data, "session", fold.train) == {f"session-{place}" for place in range(1, number + 1)}
+
+
 def test_sessions_are_taken_in_order_of_their_numbers(tmp_path):
     X = np.zeros((ROWS, 2)) + np.arange(ROWS)[:, None]
     names = ("day-10", "day-9", "day-2", "both", "last")
