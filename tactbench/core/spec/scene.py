@@ -66,7 +66,9 @@ class Environment(Frozen):
     noise_scale: float = Field(default=1.0, ge=0)
     """Factor on white noise of the sensor."""
     drift_scale: float = Field(default=1.0, ge=0)
-    """Factor on offsets, wander and warm-up."""
+    """Factor on wander and warm-up, and on offsets unless they have their own."""
+    offset_scale: float | None = Field(default=None, ge=0)
+    """Factor on the offsets between recordings of a session; None: that of drift."""
     session_offset_scale: float = Field(default=0.0, ge=0)
     """Factor on the offsets between sessions; 0: the sessions follow each other on one warm set-up, as in the paper."""
     force_noise: Quantity = sourced(
@@ -80,6 +82,11 @@ class Environment(Frozen):
     indenter_temperature: Quantity | None = None
     """Temperature of the indenter [degC]; None: as warm as what it touches, so that no heat flows. Nobody states it:
     a cap that lies in the room has that of the room."""
+
+    @property
+    def scale_of_offsets(self) -> float:
+        """The factor on the offsets between recordings [1]."""
+        return self.drift_scale if self.offset_scale is None else self.offset_scale
 
 
 class Surface(Frozen):
