@@ -69,9 +69,7 @@ def test_own_offsets_change_with_the_recording_and_session_offsets_do_not(sensor
 def test_a_stated_scale_of_offsets_takes_over_from_that_of_drift(sensors, drift, own, factor):
     plain, scaled = _run(sensors["biotac"]), _run(sensors["biotac"])
     plain.scene = plain.scene.model_copy(update={"environment": Environment()})
-    scaled.scene = scaled.scene.model_copy(
-        update={"environment": Environment(drift_scale=drift, offset_scale=own)}
-    )
+    scaled.scene = scaled.scene.model_copy(update={"environment": Environment(drift_scale=drift, offset_scale=own)})
     for run in (plain, scaled):
         offset.apply(run)
     assert np.abs(plain.tracks[0].readings).max() > 1
