@@ -34,10 +34,12 @@ class Journal:
         """Processor time of those."""
         self.remark = ""
         """Something the reader should know about what was found."""
-        self._head = {
+        self.made_by = dict(made_by)
+        """Who made the draws; if others went on, who did last."""
+        self._head: dict[str, Any] = {
             "procedure": decides_draws(spec),
             "seed": seed,
-            "made_by": dict(made_by),
+            "made_by": self.made_by,
         }
         self._read()
 
@@ -60,6 +62,7 @@ class Journal:
             )
         if head.get("made_by") != self._head["made_by"]:
             self.remark = f"The first draws were made with {_told(head.get('made_by'))}."
+            self.made_by = {**dict(head.get("made_by") or {}), "continued with": _told(made_by)}
         for line in lines[1:]:
             fields = self._parsed(line)
             self.seconds += float(fields.pop("cpu_s", 0.0))

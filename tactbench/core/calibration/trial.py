@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.calibration.draw import Draw, parameters_of
@@ -122,7 +123,7 @@ def _rig(name: str, registry: Registry) -> Rig:
     rig = rig_of(name, registry)
     if not hasattr(rig, "open"):
         raise UsageError(f"The rig {name!r} carries out no scenes.", hint="Name a simulated one in `rig:`.")
-    return rig
+    return cast(Rig, rig)
 
 
 def _answer(
