@@ -62,7 +62,7 @@ class Journal:
             )
         if head.get("made_by") != self._head["made_by"]:
             self.remark = f"The first draws were made with {_told(head.get('made_by'))}."
-            self.made_by = {**dict(head.get("made_by") or {}), "continued with": _told(made_by)}
+            self.made_by = {**dict(head.get("made_by") or {}), "continued with": _told(self._head["made_by"])}
         for line in lines[1:]:
             fields = self._parsed(line)
             self.seconds += float(fields.pop("cpu_s", 0.0))
