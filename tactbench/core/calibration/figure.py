@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.calibration.acceptance import accepted, fitted
+from tactbench.core.calibration.acceptance import by_fitted
 from tactbench.core.calibration.draw import Draw, output_values, parameter_values
 from tactbench.core.calibration.sensitivity import Sensitivity
 from tactbench.core.spec.calibration import CalibrationSpec, Fixed, LogUniform, Nuisance
@@ -46,7 +46,7 @@ def draw_draws(spec: CalibrationSpec, draws: Sequence[Draw], paths: Sequence[Pat
     """Draw every published number against every nuisance: all draws, the accepted ones, the published value."""
     from matplotlib.figure import Figure
 
-    kept = accepted(draws, fitted(spec), spec.tolerance)
+    kept = by_fitted(spec, draws).draws
     across = [one for one in spec.nuisances if not isinstance(one.prior, Fixed)]
     down = spec.published
     size = (1.9 * max(len(across), 1) + 1.2, 1.9 * len(down) + 1.0)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from tactbench.core.calibration.acceptance import accepted, fitted
+from tactbench.core.calibration.acceptance import by_fitted
 from tactbench.core.calibration.draw import Draw
 from tactbench.core.spec.calibration import CalibrationSpec, Finding
 
@@ -61,7 +61,7 @@ def holds(finding: Finding, outputs: Mapping[str, float]) -> bool | None:
 
 def findings(spec: CalibrationSpec, draws: Sequence[Draw]) -> list[FindingFrequency]:
     """Return every finding's frequency over the finished `draws` and over those accepted by the fitted numbers."""
-    kept = accepted(draws, fitted(spec), spec.tolerance)
+    kept = by_fitted(spec, draws).draws
     return [
         FindingFrequency(
             one.name, one.statement, one.reason, one.source.reference, _over(draws, one), _over(kept, one)

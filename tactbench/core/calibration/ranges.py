@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tactbench.core.calibration.acceptance import accepted, fitted
+from tactbench.core.calibration.acceptance import accept, by_fitted
 from tactbench.core.calibration.draw import Draw, output_values, parameter_values
 from tactbench.core.samples import FloatArray
 from tactbench.core.spec.calibration import CalibrationSpec, Fixed, PublishedNumber
@@ -50,6 +50,8 @@ class Predicted(NamedTuple):
     """Over the draws accepted by the fitted numbers."""
     left_out: Range | None
     """Over the draws accepted by all other published numbers: what those predict for this one."""
+    left_out_reach: float
+    """How far those draws are from the others, in scales."""
 
     @property
     def inside(self) -> bool | None:
@@ -73,7 +75,7 @@ def range_of(values: FloatArray) -> Range | None:
 
 def parameter_ranges(spec: CalibrationSpec, draws: Sequence[Draw]) -> list[ParameterRange]:
     """Return the ranges of every nuisance that is not fixed, over all finished `draws` and over the accepted ones."""
-    kept = accepted(draws, fitted(spec), spec.tolerance)
+    kept = by_fitted(spec, draws).draws
     return [
         ParameterRange(
             one.name, one.path, one.unit,
@@ -85,12 +87,13 @@ def parameter_ranges(spec: CalibrationSpec, draws: Sequence[Draw]) -> list[Param
 
 def predictions(spec: CalibrationSpec, draws: Sequence[Draw]) -> list[Predicted]:
     """Return what the draws predict for every published number."""
-    kept = accepted(draws, fitted(spec), spec.tolerance)
+    kept = by_fitted(spec, draws).draws
     return [_predicted(spec, draws, kept, one) for one in spec.published]
 
 
 def _predicted(spec: CalibrationSpec, draws: Sequence[Draw], kept: Sequence[Draw], one: PublishedNumber) -> Predicted:
-    others = accepted(draws, [other for other in spec.published if other is not one], spec.tolerance)
+    all_others = [other for other in spec.published if other is not one]
+    others = accept(draws, all_others, spec.tolerance, spec.at_least)
     output = spec.output(one.output)
-    before, after, left_out = (range_of(output_values(some, one.output)) for some in (draws, kept, others))
-    return Predicted(one.output, output.title, output.unit, one.value, one.use, before, after, left_out)
+    before, after, left_out = (range_of(output_values(some, one.output)) for some in (draws, kept, others.draws))
+    return Predicted(one.output, output.title, output.unit, one.value, one.use, before, after, left_out, others.reach)

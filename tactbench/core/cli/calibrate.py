@@ -94,14 +94,17 @@ def _write(result: CalibrationResult, told: Summary, folder: Path) -> None:
 
     from tactbench.core.calibration.figure import draw_draws, draw_sensitivity
     from tactbench.core.calibration.result import write_result
-    from tactbench.core.calibration.summary import records
+    from tactbench.core.calibration.summary import acceptance, records
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UnwritableError
     from tactbench.core.matrix.files import replace_file
 
     tables = records(told)
-    about = {"draws": len(told.draws), "failed": told.failed, "accepted": told.n_accepted,
-             "near_all": told.n_all, "tolerance": result.spec.tolerance}  # fmt: skip
+    about = {
+        "draws": len(told.draws), "failed": told.failed, "accepted": told.n_accepted, "near": told.n_near,
+        "reach": told.reach, "near_all": told.n_all, "tolerance": result.spec.tolerance,
+        "acceptance": acceptance(result.spec, told),
+    }  # fmt: skip
     texts = {
         "ranges.json": {**about, "parameters": tables["parameters"], "published": tables["published"]},
         "findings.json": {**about, "findings": tables["findings"]},

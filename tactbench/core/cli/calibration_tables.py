@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def print_calibration(result: CalibrationResult, told: Summary, shape: str) -> None:
     """Print what a calibration says in one of `GRID_FORMATS`."""
-    from tactbench.core.calibration.summary import records
+    from tactbench.core.calibration.summary import acceptance, records
     from tactbench.core.cli.grid import print_grid, print_records
     from tactbench.core.cli.screen import remark
 
@@ -26,13 +26,14 @@ def print_calibration(result: CalibrationResult, told: Summary, shape: str) -> N
     spec = result.spec
     print_grid(
         f"{spec.title} (SIM): published numbers, {len(told.draws)} draws from the prior, {told.n_accepted} accepted",
-        ("number", "use", "published", "prior", "accepted", "inside", "by all others", "inside "),
+        ("number", "use", "published", "prior", "accepted", "inside", "by all others", "inside those", "their reach"),
         [
             {
                 "number": line["title"], "use": line["use"], "published": f"{line['published']:g} {_unit(line)}",
                 "prior": _range(line, "prior"), "accepted": _range(line, "accepted"),
                 "inside": _yes(line["inside"]), "by all others": _range(line, "by_all_others"),
-                "inside ": _yes(line["inside_by_all_others"]),
+                "inside those": _yes(line["inside_by_all_others"]),
+                "their reach": f"{line['by_all_others_reach']:.1f}",
             }
             for line in tables["published"]
         ],
@@ -54,10 +55,7 @@ def print_calibration(result: CalibrationResult, told: Summary, shape: str) -> N
     )  # fmt: skip
     _print_agreement(tables)
     _print_sensitivity(tables["sensitivity"], spec)
-    click.echo(
-        f"Accepted: every fitted number within {spec.tolerance:g} scales of the published one. "
-        f"Near all {len(spec.published)} published numbers at once: {told.n_all} of {len(told.draws)}."
-    )
+    click.echo(acceptance(spec, told))
     if told.failed:
         reasons = sorted({draw.reason for draw in result.draws if draw.status == "failed"})
         remark(f"{told.failed} draws failed: {reasons[0]}" + (" …" if len(reasons) > 1 else ""))

@@ -165,7 +165,9 @@ class CalibrationSpec(Frozen):
     outputs: tuple[Output, ...] = Field(min_length=1)
     published: tuple[PublishedNumber, ...] = Field(min_length=1)
     tolerance: float = Field(gt=0)
-    """A draw is accepted if every fitted number lies within this many scales of the published one."""
+    """A draw is near if every fitted number lies within this many scales of the published one."""
+    at_least: int = Field(default=0, ge=0)
+    """Where fewer draws are near, so many nearest ones are accepted instead; how far they reach is told with them."""
     findings: tuple[Finding, ...] = ()
 
     @model_validator(mode="after")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tactbench.core.calibration.acceptance import accepted, distances, fitted
+from tactbench.core.calibration.acceptance import accept, by_fitted, distances, fitted
 from tactbench.core.calibration.draw import parameter_values
 from tactbench.core.calibration.ranges import parameter_ranges, predictions, range_of
 from tests.core.calibration.toy import TRUTH, draws, procedure
@@ -15,7 +15,7 @@ DRAWS = draws(3000)
 
 def test_a_huge_tolerance_returns_the_prior():
     spec = procedure(tolerance=1e9)
-    assert accepted(DRAWS, fitted(spec), spec.tolerance) == DRAWS
+    assert by_fitted(spec, DRAWS).draws == tuple(DRAWS)
     assert all(one.before == one.after for one in parameter_ranges(spec, DRAWS))
 
 
@@ -31,18 +31,31 @@ def test_the_accepted_range_holds_the_truth_and_narrows_with_the_tolerance():
 
 def test_only_what_is_near_in_every_fitted_number_is_accepted():
     spec = procedure(tolerance=0.5)
-    kept = accepted(DRAWS, fitted(spec), 0.5)
-    assert 0 < len(kept) < len(DRAWS)
-    for draw in kept:
+    found = by_fitted(spec, DRAWS)
+    assert 0 < len(found.draws) == found.near < len(DRAWS)
+    assert found.reach <= 0.5
+    for draw in found.draws:
         for one in fitted(spec):
             assert abs(draw.outputs[one.output] - one.value) <= 0.5 * one.scale
-    assert np.sum(distances(DRAWS, fitted(spec)) <= 0.5) == len(kept)
+    assert np.sum(distances(DRAWS, fitted(spec)) <= 0.5) == found.near
 
 
 def test_a_draw_without_a_fitted_number_is_never_accepted():
     spec = procedure(tolerance=1e9)
     lacking = [type(draw)(draw.number, draw.seed, draw.parameters, {"tall": 1.0}) for draw in DRAWS[:3]]
-    assert accepted(lacking, fitted(spec), spec.tolerance) == []
+    assert accept(lacking, fitted(spec), spec.tolerance, 2) == ((), 0, 0.0)
+
+
+def test_where_too_few_are_near_the_nearest_are_taken_and_say_how_far_they_reach():
+    spec = procedure(tolerance=1e-9, at_least=20)
+    found = by_fitted(spec, DRAWS)
+    away = distances(DRAWS, fitted(spec))
+    assert (len(found.draws), found.near) == (20, 0)
+    assert found.reach == np.sort(away)[19] > 1e-9
+    assert {draw.number for draw in found.draws} == set(np.argsort(away)[:20].tolist())
+    # It is a floor, never a ceiling.
+    wide = procedure(tolerance=1.0, at_least=20)
+    assert len(by_fitted(wide, DRAWS).draws) == by_fitted(procedure(tolerance=1.0), DRAWS).near > 20
 
 
 def test_held_out_numbers_are_predicted_and_play_no_part():
