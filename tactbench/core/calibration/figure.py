@@ -33,7 +33,8 @@ def draw_sensitivity(spec: CalibrationSpec, found: Sequence[Sensitivity], paths:
             axis.plot(line.correlation, place, "o" if apart else "s", color=_ACCEPTED if apart else _PRIOR, ms=6,
                       mfc=_ACCEPTED if apart else "white")  # fmt: skip
         axis.axvline(0, color="black", lw=0.8)
-        axis.set_xlim(-1, 1)
+        axis.set_xlim(-1.05, 1.05)
+        axis.set_xticks([-1, -0.5, 0, 0.5, 1], ["−1", "−½", "0", "½", "1"])
         axis.set_title(_wrapped(spec.output(name).title), fontsize=9)
         axis.set_yticks(range(len(own)), [line.parameter.replace("_", " ") for line in own])
         axis.grid(True, axis="x", alpha=0.3)
@@ -67,8 +68,8 @@ def draw_draws(spec: CalibrationSpec, draws: Sequence[Draw], paths: Sequence[Pat
 
 def _panel(axis: Any, draws: Sequence[Draw], kept: Sequence[Draw], output: str, nuisance: Nuisance) -> None:
     for some, colour, mark, size, label in (
-        (draws, _PRIOR, "o", 5, f"{len(draws)} draws from the prior"),
-        (kept, _ACCEPTED, "^", 14, f"{len(kept)} accepted"),
+        (draws, _PRIOR, "o", 9, f"{len(draws)} draws from the prior"),
+        (kept, _ACCEPTED, "^", 26, f"{len(kept)} accepted"),
     ):
         axis.scatter(
             parameter_values(some, nuisance.name), output_values(some, output), s=size, c=colour, marker=mark, lw=0,
@@ -76,6 +77,10 @@ def _panel(axis: Any, draws: Sequence[Draw], kept: Sequence[Draw], output: str, 
         )  # fmt: skip
     if isinstance(nuisance.prior, LogUniform):
         axis.set_xscale("log")
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_formatter("")
+    if not isinstance(nuisance.prior, Fixed):
+        axis.set_xlim(nuisance.prior.low, nuisance.prior.high)
     axis.tick_params(labelsize=7)
     axis.grid(True, alpha=0.25)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.grid import GRID_FORMATS
+from tactbench.core.cli.calibration_tables import CALIBRATION_FORMATS, print_calibration
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @click.option("--show", is_flag=True, help="Draw nothing: show the calibration in DIR, else the one that came along.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
               metavar="DIR", help="Where DIR/calibration lies; draws that are there already are kept.")  # fmt: skip
-@click.option("--format", "shape", type=click.Choice(GRID_FORMATS), default="table", show_default=True)
+@click.option("--format", "shape", type=click.Choice(CALIBRATION_FORMATS), default="table", show_default=True)
 def command(
     draws: int | None, seed: int | None, jobs: int, config: Path | None, show: bool, out: Path, shape: str
 ) -> None:
@@ -36,7 +36,6 @@ def command(
     one_thread()
     from tactbench.core.calibration.result import load_result
     from tactbench.core.calibration.summary import summary
-    from tactbench.core.cli.calibration_tables import print_calibration
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
 
