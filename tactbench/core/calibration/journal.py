@@ -23,7 +23,7 @@ class Journal:
     spec, seed
         The procedure. A journal of another one is refused: its draws would be mixed in.
     made_by
-        Versions and commit, kept in the first line; others than those of an earlier start are remarked on.
+        Versions and commit, kept in the first line. Where others go on, a line of its own says so.
     """
 
     def __init__(self, path: Path, spec: CalibrationSpec, seed: int, made_by: Mapping[str, Any]) -> None:
@@ -35,7 +35,8 @@ class Journal:
         self.remark = ""
         """Something the reader should know about what was found."""
         self.made_by = dict(made_by)
-        """Who made the draws; if others went on, who did last."""
+        """Who made the draws; where others went on, both."""
+        self._last = self._now = dict(made_by)
         self._head: dict[str, Any] = {
             "procedure": decides_draws(spec),
             "seed": seed,
@@ -60,17 +61,20 @@ class Journal:
                 f"{self.path} holds draws of another procedure or seed.",
                 hint="Give another folder with --out, or remove that file to begin anew.",
             )
-        if head.get("made_by") != self._head["made_by"]:
-            self.remark = f"The first draws were made with {_told(head.get('made_by'))}."
-            self.made_by = {**dict(head.get("made_by") or {}), "continued with": _told(self._head["made_by"])}
+        self.made_by = self._last = dict(head.get("made_by") or {})
         for line in lines[1:]:
             fields = self._parsed(line)
+            if "continued_with" in fields:
+                self._go_on(dict(fields["continued_with"]))
+                continue
             self.seconds += float(fields.pop("cpu_s", 0.0))
             try:
                 draw = Draw(**fields)
             except TypeError as error:
                 raise self._damaged() from error
             self.draws[draw.number] = draw
+        if self._last != self._now:
+            self.remark = f"The draws found were made with {_told(self._last)}."
         if len(whole) + 1 < len(content):
             with self.path.open("r+b") as file:
                 file.truncate(len(whole) + 1)
@@ -78,7 +82,10 @@ class Journal:
     def append(self, draw: Draw, cpu_s: float) -> None:
         """Write one line and have it reach the disk."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        lines = [] if self.path.exists() else [self._head]
+        lines: list[dict[str, Any]] = [] if self.path.exists() else [self._head]
+        if self._last != self._now:
+            lines.append({"continued_with": self._now})
+            self._go_on(self._now)
         fields = {
             "number": draw.number, "seed": draw.seed, "parameters": dict(draw.parameters),
             "outputs": dict(draw.outputs), "status": draw.status, "reason": draw.reason, "cpu_s": round(cpu_s, 3),
@@ -90,6 +97,10 @@ class Journal:
             os.fsync(file.fileno())
         self.draws[draw.number] = draw
         self.seconds += cpu_s
+
+    def _go_on(self, made_by: dict[str, str]) -> None:
+        self._last = made_by
+        self.made_by = {**self.made_by, "continued with": _told(made_by)}
 
     def _parsed(self, line: bytes) -> dict[str, Any]:
         try:

@@ -67,6 +67,8 @@ def test_held_out_numbers_are_predicted_and_play_no_part():
     far = {one.output: one for one in predictions(procedure(tolerance=0.5, published=moved), DRAWS)}
     assert far["both"].after == by_name["both"].after
     assert far["both"].inside is False
+    # Nor does it choose among the draws that predict it from all others: here those are the fitted ones.
+    assert far["both"].left_out == far["both"].after
     # But it decides what "all others" predict for the fitted ones: nothing is near 50.
     assert far["narrow"].left_out is None
     assert far["narrow"].inside_left_out is None

@@ -87,9 +87,15 @@ def test_draws_of_another_procedure_or_seed_are_never_mixed_in(tmp_path):
 def test_other_makers_are_remarked_on(tmp_path):
     path = tmp_path / "a.jsonl"
     _run(path, n=3)
-    _, journal = _run(path, n=4, made_by={"tactbench": "0", "commit": "d"})
+    other = {"tactbench": "0", "commit": "d"}
+    _, looked = _run(path, n=3, made_by=other)
+    assert looked.made_by == MADE_BY  # looking at what is there makes nothing
+    _, journal = _run(path, n=4, made_by=other)
     assert "commit c" in journal.remark
-    assert journal.made_by == {**MADE_BY, "continued with": "tactbench 0, commit d"}
+    for one in (journal, _run(path, n=4)[1]):
+        assert one.made_by == {**MADE_BY, "continued with": "tactbench 0, commit d"}
+    assert "commit d" in _run(path, n=4)[1].remark
+    assert _run(path, n=4, made_by=other)[1].remark == ""
 
 
 def test_a_file_that_is_no_journal_is_refused(tmp_path):
