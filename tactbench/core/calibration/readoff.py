@@ -47,8 +47,9 @@ def read_off(output: Output, result: CellResult, metas: Sequence[RecordingMeta])
     DataError
         If it cannot be read off: a band without rows, fewer predictions than the lag needs.
     """
+    answers = result.sets["test"]
     if isinstance(output.figure, Band):
-        commanded = commanded_n(metas, result.recording, result.row)
+        commanded = commanded_n(metas, answers.recording, answers.row)
         inside = (commanded >= output.figure.low_n) & (commanded < output.figure.high_n)
         if not inside.any():
             raise DataError(
@@ -57,9 +58,9 @@ def read_off(output: Output, result: CellResult, metas: Sequence[RecordingMeta])
                 hint="Widen the band, or thin the rows less.",
             )
         metric = metric_called(result.metric)
-        return metric.of(result.y_true[inside], result.y_pred[inside], len(result.classes))
+        return metric.of(answers.y_true[inside], answers.y_pred[inside], len(result.classes))
     if isinstance(output.figure, Roughness):
-        return roughness(result.y_pred, result.recording, output.figure.lag)
+        return roughness(answers.y_pred, answers.recording, output.figure.lag)
     return result.score
 
 
