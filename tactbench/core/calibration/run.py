@@ -40,9 +40,10 @@ def carry_out_missing(
     numbers = [number for number in range(draws) if number not in journal.draws]
     if numbers:
         told.begin("drawing", len(numbers), alone=jobs == 1)
-        # One folder for all: workers that are ended in the middle cannot tidy up behind themselves.
+        # One folder for all: workers that are ended in the middle cannot tidy up behind themselves, and one may still
+        # be writing when it is emptied; that must not hide the interruption.
         with (
-            tempfile.TemporaryDirectory(prefix="tactbench-draws-") as scratch,
+            tempfile.TemporaryDirectory(prefix="tactbench-draws-", ignore_cleanup_errors=True) as scratch,
             workers(min(jobs, len(numbers))) as crew,
         ):
             missing = [Trial(spec, seed, number, Path(scratch)) for number in numbers]
