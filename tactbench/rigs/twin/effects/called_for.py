@@ -144,14 +144,17 @@ def offset(scene: Scene, sensor: SensorSpec) -> Reason:
     found = [quantity for quantity in (shared, own) if quantity is not None]
     largest = max(found, key=lambda quantity: quantity.value, default=None)
     return _scaled(
-        scene, largest, "offset", "levels move by {} (sd) between recordings; between sessions by nothing more"
+        environment.scale_of_offsets,
+        largest,
+        "offset",
+        "levels move by {} (sd) between recordings; between sessions by nothing more",
     )
 
 
 def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether rest levels rise to a warm value."""
     rise = _largest(scene, sensor, lambda nuisances: nuisances.warm_up)
-    reason = _scaled(scene, rise, "warm-up", "rest levels rise by {} from power-on")
+    reason = _scaled(scene.environment.drift_scale, rise, "warm-up", "rest levels rise by {} from power-on")
     tau = _largest(scene, sensor, lambda nuisances: nuisances.warm_up_tau)
     if not reason.called_for or tau is None or reason.change is None:
         return reason
@@ -162,7 +165,7 @@ def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
 def wander(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether channels drift freely."""
     spread = _largest(scene, sensor, lambda nuisances: nuisances.wander)
-    return _scaled(scene, spread, "free drift", "channels wander by {} (sd)")
+    return _scaled(scene.environment.drift_scale, spread, "free drift", "channels wander by {} (sd)")
 
 
 def rest_spread(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -200,10 +203,9 @@ def force_noise(scene: Scene, sensor: SensorSpec) -> Reason:
     return Reason(True, f"the unfiltered force sensor errs by {noise} (sd)", noise.to("N"), "N")
 
 
-def _scaled(scene: Scene, size: Quantity | None, what: str, text: str) -> Reason:
-    scale = scene.environment.drift_scale
+def _scaled(scale: float, size: Quantity | None, what: str, text: str) -> Reason:
     if size is None or not size.value:
         return Reason(False, f"the spec states no {what} for the observed channels", 0.0)
     if not scale:
-        return Reason(False, "the scene scales drift by 0", 0.0)
+        return Reason(False, f"the scene scales {what} by 0", 0.0)
     return Reason(True, f"{text.format(size)}, scaled by {scale:g}", scale * size.value, size.unit)
