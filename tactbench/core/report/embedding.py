@@ -22,11 +22,11 @@ from tactbench.core.report.material import Material
 from tactbench.core.report.stored import stored
 from tactbench.core.samples import Answers, FloatArray, IntArray
 
-AT_MOST = 1500
-"""Points of an embedding: more take minutes and hide each other."""
+AT_MOST = 1000
+"""Points of an embedding: more take longer and hide each other in a column's width."""
 PERPLEXITY = 30.0
 ITERATIONS = 1000
-_RULE = "every n-th row of the test set, n the smallest that leaves at most 1500"
+_RULE = f"every n-th row of the test set, n the smallest that leaves at most {AT_MOST}"
 
 
 @dataclass(frozen=True)

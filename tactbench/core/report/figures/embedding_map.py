@@ -63,8 +63,8 @@ def draw(group: Group, remark: Remark) -> Sketch:
         bar.outline.set_linewidth(0.4)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(
-        handles, labels, loc="outside lower center", ncols=min(len(labels), 6), title=with_unit(words, unit), markerscale=1.8,
-        handletextpad=0.1, columnspacing=0.8,
+        handles, labels, loc="outside lower center", ncols=min(len(labels), 6), title=with_unit(words, unit),
+        markerscale=1.8, handletextpad=0.1, columnspacing=0.8,
     )  # fmt: skip
     title = f"Test set in two dimensions, by {words} and force"
     return Sketch("embedding", title, _caption(group, found), group, figure)
@@ -92,14 +92,18 @@ def _forces(here: Axes, embedding: Embedding, force_n: FloatArray, low: float, h
 
 def _caption(group: Group, found: list[tuple[Panel, Embedding]]) -> str:
     points = "; ".join(
-        f"{panel.sensor} {len(embedding.rows)} points (every {embedding.every}th of {len(panel.answers['test'])} test "
+        f"{panel.sensor} {len(embedding.rows)} points ({_every(embedding.every)} of {len(panel.answers['test'])} test "
         f"rows), perplexity {embedding.perplexity:g}, divergence left {embedding.divergence:.2f}"
         for panel, embedding in found
     )
     return (
         f"t-SNE of the test set's features as the estimator saw them, one row a sensor; left by "
-        f"{quantity(group.task)}, right by reference force (centred mean over {WINDOW_S:g} s; larger and lighter points "
-        f"are more force). {points}; {ITERATIONS} iterations from the principal components, seed {group.row['seed']}. "
-        f"Near points look alike to the estimator; distances between clusters, their sizes and the axes mean little."
-        f"{marks(group)}"
+        f"{quantity(group.task)}, right by reference force (centred mean over {WINDOW_S:g} s; larger and "
+        f"lighter points are more force). {points}; {ITERATIONS} iterations from the principal components, seed "
+        f"{group.row['seed']}. Near points look alike to the estimator; distances between clusters, their sizes and "
+        f"the axes mean little.{marks(group)}"
     )
+
+
+def _every(step: int) -> str:
+    return "all" if step == 1 else f"one in {step}"

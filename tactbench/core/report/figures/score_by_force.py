@@ -10,14 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.interval import LEVEL, score_interval
+from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.metrics import Metric, metric_called
 from tactbench.core.leaderboard.numbers import interval, score, whole
 from tactbench.core.report.figures.group import Group, Panel, Remark
 from tactbench.core.report.figures.sketch import Sketch, heading, marks, metric_name, sensors
 from tactbench.core.report.figures.style import DASHES, GREY, LINES, MARKERS, cycled, panels
 from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
-from tactbench.core.report.stored import stored
 from tactbench.core.samples import Answers, FloatArray
 
 EDGES_N = (1.5, 3.0)
@@ -76,17 +75,10 @@ def draw(group: Group, remark: Remark) -> Sketch:
 
 
 def banded(group: Group, panel: Panel) -> list[Band]:
-    """Return the score in every band, with its interval; from the result folder if it has been computed before."""
+    """Return the score in every band, with its interval."""
     test, metric, n_classes = panel.answers["test"], metric_called(group.task.metric), len(panel.row["classes"])
-    facts = {
-        "cell": panel.row["key"], "edges_N": list(EDGES_N), "window_s": WINDOW_S, "metric": metric.name, "level": LEVEL,
-    }  # fmt: skip
-
-    def compute() -> dict[str, Any]:
-        within = membership(smoothed_force(test))
-        return {"bands": [_band(metric, test, inside, n_classes, int(panel.row["seed"])) for inside in within]}
-
-    return [Band(*band) for band in stored(group.material.store.folder, "bands", facts, compute)["bands"]]
+    within = membership(smoothed_force(test))
+    return [_band(metric, test, inside, n_classes, int(panel.row["seed"])) for inside in within]
 
 
 def membership(force_n: FloatArray) -> list[npt.NDArray[np.bool_]]:
@@ -95,21 +87,19 @@ def membership(force_n: FloatArray) -> list[npt.NDArray[np.bool_]]:
     return [(force_n >= low) & (force_n < high) for low, high in itertools.pairwise(edges)]
 
 
-def _band(
-    metric: Metric, test: Answers, inside: npt.NDArray[np.bool_], n_classes: int, seed: int
-) -> tuple[float, float, float, int]:
-    """Return score, interval and number of rows of one band.
+def _band(metric: Metric, test: Answers, inside: npt.NDArray[np.bool_], n_classes: int, seed: int) -> Band:
+    """Return the score of one band.
 
     Time is resampled in blocks of the whole recording and only the rows in the band are counted: the rows of a band
     are no stretch of time, and a block of them would join moments that lie apart.
     """
     if not inside.any():
-        return 0.0, 0.0, 0.0, 0
+        return Band(0.0, 0.0, 0.0, 0)
     alone = replace(metric, rows=lambda y, predicted, n: metric.rows(y, predicted, n) * inside[:, None])
     nobody = np.zeros(len(test), dtype=np.int64)  # sessions are not resampled: the test set is one
     found = score_interval(alone, test.y_true, test.y_pred, test.recording, nobody, "session", n_classes, seed)
     value = metric.of(test.y_true[inside], test.y_pred[inside], n_classes)
-    return value, found.low, found.high, int(inside.sum())
+    return Band(value, found.low, found.high, int(inside.sum()))
 
 
 def _baseline(here: Any, group: Group, shown: list[Panel]) -> None:
