@@ -56,7 +56,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
             here.set_aspect("equal", adjustable="datalim")
             for side in here.spines.values():
                 side.set_visible(True)
-    figure.suptitle(heading(group) + " · test set, t-SNE")
+    figure.suptitle(heading(group, "test set, t-SNE"))
     if shade is not None:
         bar = figure.colorbar(shade, ax=axes[:, 1], shrink=0.8, aspect=30, pad=0.02)
         bar.set_label("force [N]")

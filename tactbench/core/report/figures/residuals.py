@@ -39,6 +39,8 @@ def draw(group: Group, remark: Remark) -> Sketch:
         for axis in (here.xaxis, here.yaxis):
             axis.set_major_locator(MaxNLocator(5))
         corner(here, f"{metric_name(group.task)} {score(panel.row['score'], group.task.unit)}{unit}")
+    for here in axes.flat[max(count - columns, 0) : count]:  # nothing stands below them
+        here.tick_params(labelbottom=True)
         here.set_xlabel(with_unit(f"target {quantity(group.task)}", group.task.unit))
     for here in axes[:, 0]:
         here.set_ylabel(with_unit("predicted", group.task.unit))

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+LINE = 64
+"""Letters that fit above a column, wide ones too."""
+
+
 @dataclass(frozen=True)
 class Sketch:
     """What a module of this room returns."""
@@ -34,13 +38,20 @@ class Sketch:
         return re.sub(r"[^a-z0-9]+", "-", "-".join(part for part in parts if part).lower()).strip("-")
 
 
-def heading(group: Group) -> str:
-    """Return what stands above a figure: question, answer, protocol with its marks, SIM."""
+def heading(group: Group, *more: str) -> str:
+    """Return what stands above a figure: question, answer, protocol with its marks, SIM; in lines that fit a column."""
     row = group.row
     parts = [row["task"], answerer(row), row["protocol"] + (" †" if row["dagger"] else "")]
     if row["split"] not in (None, "roles"):
         parts.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
-    return " · ".join([*parts, "SIM" if row["simulated"] else f"rig {row['rig']}"])
+    parts += ["SIM" if row["simulated"] else f"rig {row['rig']}", *more]
+    lines = [parts[0]]
+    for part in parts[1:]:
+        if len(lines[-1]) + len(part) < LINE:
+            lines[-1] += f" · {part}"
+        else:
+            lines.append(part)
+    return "\n".join(lines)
 
 
 def marks(group: Group) -> str:

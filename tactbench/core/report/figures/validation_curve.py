@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 
 Curve = tuple[list[float], list[float]]
 """Values of a parameter, and the score at each."""
+ACROSS = 3
+"""Sensors that fit beside each other."""
 LOG_FROM = 20.0
 """A parameter whose largest value is this many times its smallest stands on a logarithmic axis."""
 
 
 def draw(group: Group, remark: Remark) -> Sketch:
-    """Draw the validation scores: one row a sensor-parameter grid, the chosen candidate ringed.
+    """Draw the validation scores: one panel a sensor and parameter, the chosen candidate ringed.
 
     Raises
     ------
@@ -37,19 +39,25 @@ def draw(group: Group, remark: Remark) -> Sketch:
     if not names:
         raise NotApplicable("no number was searched")
     higher = metric_called(group.task.metric).higher_is_better
-    # Sensors side by side, as in the paper, where one parameter was searched; else a row a parameter.
-    figure, axes = panels(len(names), len(shown), 1.45, sharex="row", sharey=True)
+    # Sensors side by side, a row a parameter; where a column has no room for that, the other way round.
+    stacked = len(shown) > ACROSS
+    if stacked:
+        figure, axes = panels(len(shown), len(names), 1.2, sharex="col", sharey=True)
+    else:
+        figure, axes = panels(len(names), len(shown), 1.45, sharex="row", sharey=True)
     lengths = sorted({int(one["k"]) for panel in shown for one in panel.row["search"]})
     colours = dict(zip(lengths, ordered(len(lengths)), strict=True))
     for down, name in enumerate(names):
         for across, panel in enumerate(shown):
-            here = axes[down, across]
+            here = axes[across, down] if stacked else axes[down, across]
             _curves(here, panel, name, lengths, colours, higher)
-            if down == 0:
+            if stacked or down == 0:
                 here.set_title(panel.sensor)
-            here.set_xlabel(_called(name))
-        axes[down, 0].set_ylabel(with_unit(f"{metric_name(group.task)}", group.task.unit))
-    figure.suptitle(heading(group) + " · validation")
+            if not stacked or across == len(shown) - 1:
+                here.set_xlabel(_called(name))
+    for here in axes[:, 0]:
+        here.set_ylabel(with_unit(metric_name(group.task), group.task.unit))
+    figure.suptitle(heading(group, "validation"))
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=min(len(handles), 4), columnspacing=1.0)
     caption = _caption(group, shown, names)
@@ -106,23 +114,33 @@ def _curves(
     if values[0] > 0 and values[-1] / values[0] >= LOG_FROM:
         here.set_xscale("log")
         here.xaxis.set_major_formatter("{x:g}")
-    if name in chosen and "k" in chosen:
-        own = None if name == "k" else int(chosen["k"])
-        at = dict(zip(*curve(search, name, own, higher), strict=True))
+    rings = set()
+    for fold in dict.fromkeys(str(one["fold"]) for one in search):
+        value, own = (_of_fold(chosen, key, fold) for key in (name, "k"))
+        if value is not None and own is not None:
+            at = dict(zip(*curve(search, name, None if name == "k" else int(own), higher), strict=True))
+            rings.add((value, at[value]))
+    if rings:
         here.plot(
-            [chosen[name]], [at[float(chosen[name])]], "o", markersize=9, markerfacecolor="none",
+            *zip(*sorted(rings), strict=True), linestyle="none", marker="o", markersize=9, markerfacecolor="none",
             markeredgecolor=VERMILLION, markeredgewidth=1.2, label="chosen", clip_on=False,
         )  # fmt: skip
+
+
+def _of_fold(chosen: Mapping[str, float], name: str, fold: str) -> float | None:
+    """Return what one fold chose: the common value where all chose alike."""
+    value = chosen.get(name, chosen.get(f"{name} of fold {fold}"))
+    return None if value is None else float(value)
 
 
 def _caption(group: Group, shown: Sequence[Panel], names: Sequence[str]) -> str:
     told = []
     for panel in shown:
         chosen = panel.row["chosen"]
-        common = {name: value for name, value in chosen.items() if " of fold " not in name}
-        told.append(f"{panel.sensor}: {', '.join(f'{_called(name)} = {value:g}' for name, value in common.items())}")
+        picked = (f"{_called(name)} = {value:g}" for name, value in sorted(chosen.items()))
+        told.append(f"{panel.sensor}: {', '.join(picked)}")
     folds = any(" of fold " in name for panel in shown for name in panel.row["chosen"])
-    means = " Scores are means over folds, which did not all choose alike." if folds else ""
+    means = " Scores are means over folds, which did not all choose alike: a ring each." if folds else ""
     others = " At each value the best over the other parameters is shown." if len(names) > 1 else ""
     low = "higher" if metric_called(group.task.metric).higher_is_better else "lower"
     return (
@@ -134,7 +152,8 @@ def _caption(group: Group, shown: Sequence[Panel], names: Sequence[str]) -> str:
 
 
 def _called(name: str) -> str:
-    return {"k": "k [samples]", "lambda_": "λ", "lambda": "λ", "alpha": "α"}.get(name, name.rstrip("_"))
+    plain, of, fold = name.partition(" of fold ")
+    return {"lambda_": "λ", "alpha": "α"}.get(plain, plain) + of + fold
 
 
 def _number(value: Any) -> bool:
