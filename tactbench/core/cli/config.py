@@ -1,4 +1,4 @@
-"""Where the default matrix and the default calibration lie."""
+"""Where matrices and calibrations lie: the default ones, and matrices that come with tactbench by name."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import tactbench
-from tactbench.core.errors import ConfigError
+from tactbench.core.errors import ConfigError, UnknownNameError
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.yaml_file import load_yaml
+
+_ENDINGS = (".yaml", ".yml")
 
 if TYPE_CHECKING:
     from tactbench.core.spec.calibration import CalibrationSpec
@@ -39,3 +41,30 @@ def _default(name: str, what: str) -> Path:
             return place
     raise ConfigError(name, None, "is not here, and tactbench was installed without it.",
                       hint=f"Give a {what} with --config FILE.")  # fmt: skip
+
+
+def packaged_matrices() -> dict[str, Path]:
+    """Return the matrices that came with tactbench, by name."""
+    package = Path(tactbench.__file__).parent
+    for folder in (package / "matrices", package.parent / "examples" / "matrices"):
+        if folder.is_dir():
+            return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    return {}
+
+
+def matrix_called(given: str) -> MatrixSpec:
+    """Return the matrix in the file `given`, or the packaged one of that name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is neither; the message lists the names.
+    ConfigError
+        If the file is wrong or cannot be read.
+    """
+    packaged = packaged_matrices()
+    if given in packaged and not Path(given).is_file():
+        return load_yaml(packaged[given], MatrixSpec)
+    if Path(given).exists() or given.endswith(_ENDINGS) or len(Path(given).parts) > 1:
+        return load_yaml(Path(given), MatrixSpec)
+    raise UnknownNameError("packaged matrix", given, packaged)

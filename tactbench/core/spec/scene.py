@@ -190,6 +190,8 @@ class Scene(Frozen):
     environment: Environment = Environment()
     session: str = "1"
     """Recordings of one session were made without re-mounting anything."""
+    unit: str = Field(default="1", min_length=1)
+    """Which unit of the sensor: two devices of one type are two units. The spec describes unit 1."""
     starts_after_s: float = Field(default=0.0, ge=0)
     """Seconds from the session's first sample to this recording's first."""
     observe: tuple[ChannelKind, ...] = ("taxel",)
@@ -197,3 +199,8 @@ class Scene(Frozen):
     simulation: Simulation = Simulation()
     labels: dict[str, str | float | int] = Field(default_factory=dict)
     """Facts about the recording that a task may ask for, for example {"cap_radius_mm": 5.0}."""
+
+    @property
+    def first_unit(self) -> bool:
+        """Whether the unit is the one whose rest levels and gain the sensor's spec describes."""
+        return self.unit == "1"

@@ -71,7 +71,7 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
         return Reason(False, f"the load is constant: {scene.profile.end.to('N'):g} N throughout", 0.0)
     slowest = max(term.tau.to("s") for term in terms)
     late = f"{100 * share:.0f} % of the response comes late, by up to {slowest:g} s"
-    bounds = [_behind(nuisances, rate) for nuisances in _observed(scene, sensor)]
+    bounds = [_behind(nuisances, rate, _unit_gain(scene, nuisances)) for nuisances in _observed(scene, sensor)]
     if any(bound is None for bound in bounds):
         return Reason(True, late)
     most = max(bound for bound in bounds if bound is not None)
@@ -88,23 +88,47 @@ def _steepest_n_per_s(scene: Scene) -> float:
     return abs(profile.end.to("N") - profile.start.to("N")) / ramp if ramp > 0 else 0.0
 
 
-def _behind(nuisances: Nuisances, rate: float) -> float | None:
+def _behind(nuisances: Nuisances, rate: float, unit_gain: float = 0.0) -> float | None:
     if not nuisances.creep:
         return 0.0
     if nuisances.largest_slope is None:
         return None
     late_s = sum(term.fraction.to("1") * term.tau.to("s") for term in nuisances.creep)
     # The slope is that of the nominal gain; four standard deviations cover the largest of some hundred channels.
-    gain = 1.0 + 4.0 * nuisances.gain_scatter.to("1")
+    gain = (1.0 + 4.0 * nuisances.gain_scatter.to("1")) * (1.0 + 4.0 * unit_gain)
     return nuisances.largest_slope.to("count/N") * gain * late_s * rate
 
 
 def gain(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether channels of one unit have different gains."""
     scatter = _largest(scene, sensor, lambda nuisances: nuisances.gain_scatter)
-    if scatter is None or not scatter.value:
+    within = 0.0 if scatter is None else scatter.to("1")
+    between = max((_unit_gain(scene, nuisances) for nuisances in _observed(scene, sensor)), default=0.0)
+    if not within and not between:
         return Reason(False, "the spec states no scatter of gain for the observed channels", 0.0)
-    return Reason(True, f"gains scatter by {100 * scatter.to('1'):g} % within a unit")
+    other = f", and unit {scene.unit} by {100 * between:g} % as a whole" if between else ""
+    return Reason(True, f"gains scatter by {100 * within:g} % within a unit{other}")
+
+
+def _unit_gain(scene: Scene, nuisances: Nuisances) -> float:
+    """Return the standard deviation of the gain that a unit's channels share; 0 for the unit of the spec."""
+    return 0.0 if scene.first_unit or nuisances.unit_gain is None else nuisances.unit_gain.to("1")
+
+
+def unit_rest(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether another unit rests at other levels than the spec states."""
+    if scene.first_unit:
+        return Reason(False, "unit 1 is the one that the spec describes", 0.0)
+    found = [
+        stated
+        for nuisances in _observed(scene, sensor)
+        for stated in (nuisances.unit_rest_shared, nuisances.unit_rest_own)
+        if stated is not None and stated.value
+    ]
+    if not found:
+        return Reason(False, "the spec states no spread of rest levels from unit to unit", 0.0)
+    largest = max(found, key=lambda quantity: quantity.value)
+    return Reason(True, f"levels of unit {scene.unit} differ by {largest} (sd)", largest.value, largest.unit)
 
 
 def offset(scene: Scene, sensor: SensorSpec) -> Reason:
