@@ -24,7 +24,13 @@ if TYPE_CHECKING:
 @click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings for --rig replay.")
 @click.option("--protocol", metavar="NAME", help="How recordings become X and y; default: the task's first.")
 @click.option("--split", metavar="NAME", help="What is kept apart: roles, session, in-session, object … shuffled.")
-@click.option("--estimator", "estimators", multiple=True, metavar="NAME", help="What answers; may be repeated.")
+@click.option(
+    "--estimator",
+    "estimators",
+    multiple=True,
+    metavar="NAME",
+    help="What answers; may be repeated. all: every one for this kind of question.",
+)
 @click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="A matrix like benchmarks.yaml.")
 @click.option("--repeats", type=click.IntRange(min=1), metavar="N", help="Repeat everything with N seeds.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")
