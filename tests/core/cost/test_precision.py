@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.cost.figure import draw
-from tactbench.core.cost.front import cheapest_below, diagrams, front, verdict
+from tactbench.core.cost.precision import cheapest_below, diagrams, precise, verdict
+from tactbench.core.cost.precision_figure import draw
 from tactbench.plugin import CostPoint
 
 
@@ -26,7 +26,7 @@ _POSITIVE = st.floats(1e-6, 1e3)
 @given(st.lists(st.tuples(_POSITIVE, _POSITIVE), min_size=1, max_size=20))
 def test_the_front_is_beaten_by_nobody_and_beats_everybody_else(pairs):
     points = [_point(*pair) for pair in pairs]
-    best = front(points)
+    best = precise(points)
     for point in points:
         beaten = any(o.seconds <= point.seconds and o.error <= point.error for o in best)
         assert beaten
