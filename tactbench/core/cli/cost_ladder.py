@@ -43,6 +43,7 @@ def show_ladder(
     from tactbench.core.cli.screen import progress, remark
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import flat_csv, write_ladder
+    from tactbench.core.leaderboard.table import METRIC_NAMES
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import load_registry
 
@@ -59,7 +60,7 @@ def show_ladder(
         click.echo(flat_csv(ladder), nl=False)
     else:
         _print(ladder)
-    paths = write_ladder(ladder, store.folder)
+    paths = write_ladder(ladder, store.folder, METRIC_NAMES.get(ladder.about["metric"], ""))
     remark(f"Files: {', '.join(map(str, paths))}")
 
 
@@ -87,6 +88,7 @@ def _print(ladder: Ladder) -> None:
     from tactbench.core.cli.grid import print_grid
     from tactbench.core.cli.screen import remark
     from tactbench.core.cost.ladder_file import DEFINITIONS
+    from tactbench.core.leaderboard.table import METRIC_NAMES
 
     about = ladder.about
     better = "higher" if about["higher_is_better"] else "lower"
@@ -94,12 +96,17 @@ def _print(ladder: Ladder) -> None:
     dagger = " †" if about["dagger"] else ""
     threads = "1 thread" if about["threads"] == 1 else f"{about['threads']} threads"
     title = (
-        f"{about['sensor']}, {about['task']}: {about['metric'].replace('_', ' ')}, {better} is better · "
+        f"{about['sensor']}, {about['task']}: {METRIC_NAMES.get(about['metric'], about['metric'])}, {better} is better · "
         f"{about['protocol']}{dagger} · split {about['split']}{simulated} · {about['rounds']} rounds, {threads}"
     )
     lines = [_line(row, about["unit"]) for row in ladder.rows]
     styles = ["bold" if row["front_fit"] or row["front_latency"] else "" for row in ladder.rows]
     print_grid(title, _COLUMNS, lines, numeric=_RIGHT, styles=styles)
+    if about["load"] is not None and about["load"] > about["cores"]:
+        remark(
+            f"The machine was busy: {about['load']:.1f} processes wanted its {about['cores']} cores. Others' work is in "
+            "these times, most of all in the 95th percentiles; time on an idle machine before you quote them."
+        )
     for key, text in DEFINITIONS.items():
         remark(f"{key}: {text}.")
 

@@ -77,5 +77,6 @@ def label(axis: Any, points: Sequence[tuple[float, float]], texts: Sequence[str]
         written.remove()
         axis.annotate(
             text, point, xytext=(dx / pixel, dy / pixel), textcoords="offset points", fontsize=8, va="center",
-            ha="center", arrowprops={"arrowstyle": "-", "lw": 0.5, "color": "#888888", "shrinkA": 1, "shrinkB": 3},
+            ha="center", bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.75},
+            arrowprops={"arrowstyle": "-", "lw": 0.5, "color": "#888888", "shrinkA": 1, "shrinkB": 3},
         )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -75,6 +76,7 @@ def climb(
     times = measure(
         candidates, rounds=rounds, budget_s=budget_s, threads=threads, seed=matrix.seed, clock=clock, progress=progress
     )
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     scores = {row["cell"]: row["scores"] for row in outcome.rows}
     for cell, one in candidates.items():
         rows[cell] |= timed(one, times[cell], scores[cell], rounds, budget_s)
@@ -83,7 +85,7 @@ def climb(
     mark_fronts(found, higher_is_better=better)
     fold = next((one.fold for one in candidates.values()), "")
     measured = {"higher_is_better": better, "fold": fold, "rounds": rounds, "budget_s": budget_s, "threads": threads}
-    return Ladder({**_about(outcome), **measured}, found)
+    return Ladder({**_about(outcome), **measured, "load": load, "cores": os.cpu_count()}, found)
 
 
 def _about(outcome: Outcome) -> dict[str, Any]:

@@ -18,11 +18,12 @@ _TRIVIAL = ("#888888", ".")
 _QUARTILES = {"fit_s": ("fit_s_q1", "fit_s_q3"), "latency_ms_p50": ("latency_ms_q1", "latency_ms_q3")}
 
 
-def draw_ladder(ladder: Ladder, paths: Sequence[Path]) -> Any:
-    """Draw the ladder, save it under every one of `paths`, and return the figure.
+def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
+    """Draw the ladder, save it under every one of `paths`, and return the figure; `metric` is the score's name for people.
 
     Upwards is the score with its interval, across the median time with its quartiles, by decades. The line is the
-    front; vertical lines in the second panel are the periods of control loops.
+    front, in steps: between two estimators there is none. Vertical lines in the second panel are the periods of control
+    loops.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -48,22 +49,23 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path]) -> Any:
                 fmt=shape, color=colour, ms=6, lw=0.8, alpha=0.9,
             )  # fmt: skip
         best = sorted((row for row in rows if row[mark]), key=lambda row: float(row[time]))
-        axis.plot([row[time] for row in best], [row["score"] for row in best], color="#555555", lw=1.2, zorder=0)
+        axis.plot([row[time] for row in best], [row["score"] for row in best], color="#555555", lw=1.2, zorder=0,
+                  drawstyle="steps-post")  # fmt: skip
         axis.set_xscale("log")
         axis.set_xlabel(across)
         axis.grid(True, which="major", alpha=0.3)
     for rate in LOOPS_HZ:
         panels[1].axvline(1e3 / rate, color="black", ls="--", lw=0.8, zorder=0)
-        panels[1].annotate(f"{rate} Hz", (1e3 / rate, 1.0), xycoords=("data", "axes fraction"), xytext=(-2, -2),
-                           textcoords="offset points", ha="right", va="top", fontsize=8, rotation=90)  # fmt: skip
+        panels[1].annotate(f"{rate} Hz", (1e3 / rate, 1.0), xycoords=("data", "axes fraction"), xytext=(0, 2),
+                           textcoords="offset points", ha="center", va="bottom", fontsize=8)  # fmt: skip
     if beyond:
-        worse = "below" if about["higher_is_better"] else "above"
+        worse, height, side = ("below", 0.01, "bottom") if about["higher_is_better"] else ("above", 0.99, "top")
         told = ", ".join(f"{row['estimator']} at {row['score']:.3g}" for row in beyond)
-        panels[0].annotate(f"further {worse}: {told}", (0.01, 0.01 if worse == "below" else 0.99), fontsize=8,
-                           xycoords="axes fraction", va="bottom" if worse == "below" else "top", color="#555555")  # fmt: skip
+        panels[0].annotate(f"further {worse}: {told}", (0.01, height), xycoords="axes fraction", va=side, fontsize=8,
+                           color="#555555")  # fmt: skip
     unit = "" if about["unit"] == "1" else f" [{about['unit']}]"
     better = "higher" if about["higher_is_better"] else "lower"
-    panels[0].set_ylabel(f"{about['metric'].replace('_', ' ')}{unit}, 95 % interval; {better} is better")
+    panels[0].set_ylabel(f"{metric or about['metric']}{unit}, 95 % interval; {better} is better")
     simulated = " · SIM" if about["simulated"] else ""
     figure.suptitle(f"{about['sensor']}, {about['task']} · {about['protocol']} · split {about['split']}{simulated}")
     for axis in panels:

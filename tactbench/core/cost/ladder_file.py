@@ -14,6 +14,7 @@ Keys of the JSON file; those that nobody could measure are null:
 ``simulated, dagger``     as in a leaderboard's row: recordings of the twin; test-set statistics were used
 ``fold``              the fold that was timed: the last one
 ``rounds, budget_s, threads``      how it was timed
+``load, cores``       mean number of processes that wanted to run, in the last minute of it, and cores to run on
 ``definitions``       one sentence for each time and verdict
 ``provenance``        versions, machine, commit; times of different ``host`` are never compared
 ``rows``              one for each estimator, the best score first:
@@ -46,8 +47,8 @@ from tactbench.core.matrix.files import replace_file
 VERSION = 1
 
 DEFINITIONS = {
-    "fit_s": "seconds of one fit on the training rows of one fold, with parameters chosen and features ready; median of "
-    "the rounds",
+    "fit_s": "seconds of one fit on the training rows of one fold, with parameters chosen and features ready; median "
+    "of the rounds",
     "batch_s_per_row": "seconds of one predict over all test rows of the fold, divided by their number; median of the "
     "rounds",
     "latency_ms": "milliseconds of predict on a single row whose features are ready, after warm-up; quantiles of the "
@@ -66,8 +67,10 @@ def stem(folder: Path, sensor: str, task: str) -> Path:
     return folder / "cost" / f"{sensor}-{task}"
 
 
-def write_ladder(ladder: Ladder, folder: Path) -> list[Path]:
+def write_ladder(ladder: Ladder, folder: Path, metric: str = "") -> list[Path]:
     """Write a ladder's four files into the result folder, each whole or not at all; return their paths.
+
+    `metric` is the score's name for people, in the figure.
 
     Raises
     ------
@@ -84,7 +87,7 @@ def write_ladder(ladder: Ladder, folder: Path) -> list[Path]:
         text = json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
         replace_file(paths[0], text.encode())
         replace_file(paths[1], flat_csv(ladder).encode())
-        draw_ladder(ladder, paths[2:])
+        draw_ladder(ladder, paths[2:], metric)
     except OSError as error:
         raise UnwritableError(
             f"{place.parent} cannot be written: {error}.", hint="Give another folder with --out."
