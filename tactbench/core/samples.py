@@ -130,3 +130,26 @@ class Fold:
     train: Part
     test: Part
     validation: Part | None = None
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What an estimator said about the rows of one role, beside the truth."""
+
+    y_true: npt.NDArray[Any]
+    """(n,) numbers, or class indices"""
+    y_pred: npt.NDArray[Any]
+    """(n,)"""
+    recording: IntArray
+    """(n,) which recording of the cell the row is from"""
+    row: IntArray
+    """(n,) which row of that recording"""
+    fold: IntArray
+    """(n,) fold in which the row was answered"""
+    time_s: FloatArray
+    """(n,) seconds since the recording's first sample (row index when there is no clock)"""
+    force_n: FloatArray
+    """(n,) reference force as recorded; NaN where there is none"""
+
+    def __len__(self) -> int:
+        return len(self.y_true)

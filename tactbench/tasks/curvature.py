@@ -49,13 +49,17 @@ SPEC = TaskSpec(
     splits=("roles", "session", "shuffled"),
     estimators=("forest",),
     baselines=("chance", "majority"),
-    published={
-        "biotac": Published(
-            score=0.60488, protocol="karl2016", estimator="forest", reference=f"{_PAPER}, section III-B"
+    published=(
+        Published(
+            score=0.60488, protocol="karl2016", sensor="biotac", estimator="forest",
+            title="curvature, macro F1, BioTac", reference=f"{_PAPER}, section III-B",
         ),
-        "icub": Published(score=0.79512, protocol="karl2016", estimator="forest", reference=f"{_PAPER}, section III-B"),
-    },
-)
+        Published(
+            score=0.79512, protocol="karl2016", sensor="icub", estimator="forest",
+            title="curvature, macro F1, iCub", reference=f"{_PAPER}, section III-B",
+        ),
+    ),
+)  # fmt: skip
 
 
 @hookimpl

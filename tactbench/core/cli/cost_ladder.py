@@ -95,8 +95,9 @@ def _print(ladder: Ladder) -> None:
     simulated = f" · SIM ({about['rig']})" if about["simulated"] else ""
     dagger = " †" if about["dagger"] else ""
     threads = "1 thread" if about["threads"] == 1 else f"{about['threads']} threads"
+    metric = METRIC_NAMES.get(about["metric"], about["metric"])
     title = (
-        f"{about['sensor']}, {about['task']}: {METRIC_NAMES.get(about['metric'], about['metric'])}, {better} is better · "
+        f"{about['sensor']}, {about['task']}: {metric}, {better} is better · "
         f"{about['protocol']}{dagger} · split {about['split']}{simulated} · {about['rounds']} rounds, {threads}"
     )
     lines = [_line(row, about["unit"]) for row in ladder.rows]
@@ -104,8 +105,8 @@ def _print(ladder: Ladder) -> None:
     print_grid(title, _COLUMNS, lines, numeric=_RIGHT, styles=styles)
     if about["load"] is not None and about["load"] > about["cores"]:
         remark(
-            f"The machine was busy: {about['load']:.1f} processes wanted its {about['cores']} cores. Others' work is in "
-            "these times, most of all in the 95th percentiles; time on an idle machine before you quote them."
+            f"The machine was busy: {about['load']:.1f} processes wanted its {about['cores']} cores. Others' work is "
+            "in these times, most of all in the 95th percentiles; time on an idle machine before you quote them."
         )
     for key, text in DEFINITIONS.items():
         remark(f"{key}: {text}.")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tactbench.core.cost.candidates import Candidate, candidate
+from tactbench.core.cost.contestants import Contestant, contestant
 from tactbench.core.cost.ladder_rows import Record, by_score, mark_fronts, opening, stopped, timed
 from tactbench.core.cost.rounds import measure
 from tactbench.core.evaluation.dataset import load_dataset
@@ -61,29 +61,29 @@ def climb(
     done = [row for row in outcome.rows if row["status"] == "done"]
     data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None
     rows: dict[str, Record] = {}
-    candidates: dict[str, Candidate] = {}
+    contestants: dict[str, Contestant] = {}
     for row in outcome.rows:
         descriptor = registry.estimators[row["estimator"]]
         rows[row["cell"]] = opening(row, descriptor)
         if row["status"] != "done" or data is None:
             continue
         try:
-            candidates[row["cell"]] = candidate(
+            contestants[row["cell"]] = contestant(
                 task, descriptor, row["params"], row["protocol"], row["split"], data, seed=matrix.seed, threads=threads
             )
         except Exception as error:
             rows[row["cell"]] |= stopped(error)
     times = measure(
-        candidates, rounds=rounds, budget_s=budget_s, threads=threads, seed=matrix.seed, clock=clock, progress=progress
+        contestants, rounds=rounds, budget_s=budget_s, threads=threads, seed=matrix.seed, clock=clock, progress=progress
     )
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     scores = {row["cell"]: row["scores"] for row in outcome.rows}
-    for cell, one in candidates.items():
+    for cell, one in contestants.items():
         rows[cell] |= timed(one, times[cell], scores[cell], rounds, budget_s)
     better = metric_called(task.metric).higher_is_better
     found = by_score(list(rows.values()), higher_is_better=better)
     mark_fronts(found, higher_is_better=better)
-    fold = next((one.fold for one in candidates.values()), "")
+    fold = next((one.fold for one in contestants.values()), "")
     measured = {"higher_is_better": better, "fold": fold, "rounds": rounds, "budget_s": budget_s, "threads": threads}
     return Ladder({**_about(outcome), **measured, "load": load, "cores": os.cpu_count()}, found)
 

@@ -19,11 +19,11 @@ _QUARTILES = {"fit_s": ("fit_s_q1", "fit_s_q3"), "latency_ms_p50": ("latency_ms_
 
 
 def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
-    """Draw the ladder, save it under every one of `paths`, and return the figure; `metric` is the score's name for people.
+    """Draw the ladder, save it under every one of `paths`, and return the figure.
 
-    Upwards is the score with its interval, across the median time with its quartiles, by decades. The line is the
-    front, in steps: between two estimators there is none. Vertical lines in the second panel are the periods of control
-    loops.
+    `metric` is the score's name for people. Upwards is the score with its interval, across the median time with its
+    quartiles, by decades. The line is the front, in steps: between two estimators there is none. Vertical lines in the
+    second panel are the periods of control loops.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

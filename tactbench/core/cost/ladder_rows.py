@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.cost.candidates import Candidate
+from tactbench.core.cost.contestants import Contestant
 from tactbench.core.cost.front import front
 from tactbench.core.cost.rounds import Timing
 from tactbench.core.errors import NotApplicable, TactbenchError
@@ -58,7 +58,7 @@ def stopped(error: Exception) -> Record:
     return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": said}
 
 
-def timed(one: Candidate, timing: Timing, scores: Mapping[str, float], rounds: int, budget_s: float) -> Record:
+def timed(one: Contestant, timing: Timing, scores: Mapping[str, float], rounds: int, budget_s: float) -> Record:
     """Return what changes in a row by having been timed; `scores` are those of the cell, by fold among others."""
     if timing.trouble is not None:
         return stopped(timing.trouble)
@@ -99,7 +99,7 @@ def _cut_short(timing: Timing, rounds: int, budget_s: float) -> list[str]:
     ]
 
 
-def _other_answers(one: Candidate, timing: Timing, scores: Mapping[str, float]) -> list[str]:
+def _other_answers(one: Contestant, timing: Timing, scores: Mapping[str, float]) -> list[str]:
     """Return a note if the model that was timed is not the one whose score stands beside its times."""
     stored = scores.get(f"fold {one.fold}")
     if timing.answers is None or stored is None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.cost.candidates import Candidate
+from tactbench.core.cost.contestants import Contestant
 from tactbench.core.evaluation.fitting import answers, fit
 from tactbench.core.evaluation.timing import single_row_latency_s
 from tactbench.core.matrix.progress import Progress
@@ -46,7 +46,7 @@ class Timing:
 
 
 def measure(
-    candidates: Mapping[str, Candidate],
+    contestants: Mapping[str, Contestant],
     *,
     rounds: int,
     budget_s: float,
@@ -55,7 +55,7 @@ def measure(
     clock: Callable[[], float],
     progress: Progress,
 ) -> Mapping[str, Timing]:
-    """Time every candidate in every round, in an order drawn anew each round.
+    """Time every contestant in every round, in an order drawn anew each round.
 
     Parameters
     ----------
@@ -71,19 +71,19 @@ def measure(
     Returns
     -------
     mapping
-        Under the keys of `candidates`. What an estimator raises ends its own timing only.
+        Under the keys of `contestants`. What an estimator raises ends its own timing only.
     """
-    found = {key: Timing() for key in candidates}
+    found = {key: Timing() for key in contestants}
     rng = np.random.default_rng(seed)
-    for one in candidates.values():
+    for one in contestants.values():
         progress.working(f"warm-up of {one.name}")
         _warm_up(one)
     limits = importlib.import_module("threadpoolctl").threadpool_limits(limits=threads)
-    progress.begin("timing", rounds * len(candidates))
+    progress.begin("timing", rounds * len(contestants))
     with limits, _what_is_there_kept():
         for number in range(rounds):
-            for key in rng.permutation(sorted(candidates)).tolist():
-                one, timing = candidates[key], found[key]
+            for key in rng.permutation(sorted(contestants)).tolist():
+                one, timing = contestants[key], found[key]
                 progress.working(f"{one.name}, round {number + 1}")
                 if timing.trouble is None:
                     try:
@@ -94,7 +94,7 @@ def measure(
     return found
 
 
-def _turn(one: Candidate, timing: Timing, budget_s: float, clock: Callable[[], float]) -> None:
+def _turn(one: Contestant, timing: Timing, budget_s: float, clock: Callable[[], float]) -> None:
     with _no_garbage_collection():
         if timing._model is None or max(timing.fit_s) <= budget_s:
             timing._model = None  # two forests at once would be one too many for some machines
@@ -105,13 +105,13 @@ def _turn(one: Candidate, timing: Timing, budget_s: float, clock: Callable[[], f
         timing.latency_s.extend(single_row_latency_s(timing._model, one.X_test, clock))
 
 
-def _fit(one: Candidate, timing: Timing) -> None:
+def _fit(one: Contestant, timing: Timing) -> None:
     model = one.build()
     fit(model, one.X_train, one.y_train, one.name, Counter())
     timing._model = model
 
 
-def _answer(one: Candidate, timing: Timing) -> None:
+def _answer(one: Contestant, timing: Timing) -> None:
     assert timing._model is not None
     timing.answers = answers(timing._model, one.X_test, one.name, one.n_classes)
 
@@ -125,7 +125,7 @@ def _median_s(work: Callable[[], None], clock: Callable[[], float]) -> float:
     return float(np.median(spent))
 
 
-def _warm_up(one: Candidate) -> None:
+def _warm_up(one: Contestant) -> None:
     places = np.linspace(0, len(one.X_train) - 1, min(WARM_UP_ROWS, len(one.X_train))).astype(int)
     with warnings.catch_warnings(), suppress(Exception):  # what is wrong with it shows when it is timed
         warnings.simplefilter("ignore")

@@ -6,7 +6,7 @@ import importlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +33,9 @@ from tactbench.core.evaluation.splits import (
 from tactbench.core.evaluation.timing import peak_rss_mb, single_row_latency_s
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import load_object
-from tactbench.core.samples import Fold, IntArray
+from tactbench.core.samples import Answers, Fold, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
 
 
@@ -72,25 +73,21 @@ class CellResult:
     latency_n: int
     threads: int
     peak_rss_mb: float | None
-    y_true: npt.NDArray[Any]
-    y_pred: npt.NDArray[Any]
-    recording: IntArray
-    row: IntArray
-    fold: IntArray
+    search: tuple[Mapping[str, Any], ...]
+    """every candidate that was compared on validation data: its parameters, k, score and fold"""
+    sets: Mapping[Role, Answers]
+    """answers by role: test always; validation, and for regression train, where the split has one fold"""
 
 
 @dataclass
-class _Answers:
+class _Sum:
     """What the folds add up to."""
 
-    y_true: list[npt.NDArray[Any]]
-    y_pred: list[npt.NDArray[Any]]
-    recording: list[IntArray]
-    row: list[IntArray]
-    fold: list[IntArray]
-    scores: dict[str, float]
-    chosen: list[Choice]
-    names: list[str]
+    sets: dict[Role, list[Answers]] = field(default_factory=dict)
+    scores: dict[str, float] = field(default_factory=dict)
+    chosen: list[Choice] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    folds: int = 0
     search_s: float = 0.0
     fit_s: float = 0.0
     predict_s: float = 0.0
@@ -150,15 +147,16 @@ def evaluate(
     assert_disjoint(assignments)
     build = _builder(estimator, params, task, seed, threads)
     counts: Counter[str] = Counter(data.counts)
-    answers = _Answers([], [], [], [], [], {}, [], [])
+    total = _Sum()
     with _thread_limit(threads):
         for number, assignment in enumerate(assignments):
             say(f"{estimator.name}: {assignment.name}")
-            _fold(answers, number, assignment, estimator, params, build, data, rules, metric, counts, clock)
-        if answers.model is None:
+            alone = len(assignments) == 1
+            _fold(total, number, assignment, estimator, params, build, data, rules, metric, counts, clock, alone)
+        if total.model is None:
             raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
-        latency = 1e3 * single_row_latency_s(answers.model, features_of(answers.test, estimator), clock)
-    return _result(task, rules, metric, chosen_split, data, answers, counts, latency, seed, threads)
+        latency = 1e3 * single_row_latency_s(total.model, features_of(total.test, estimator), clock)
+    return _result(task, rules, metric, chosen_split, data, total, counts, latency, seed, threads)
 
 
 def _builder(
@@ -189,7 +187,7 @@ def _thread_limit(threads: int) -> AbstractContextManager[Any]:
 
 
 def _fold(
-    answers: _Answers,
+    total: _Sum,
     number: int,
     assignment: Assignment,
     estimator: EstimatorDescriptor,
@@ -200,36 +198,57 @@ def _fold(
     metric: Metric,
     counts: Counter[str],
     clock: Callable[[], float],
+    alone: bool,
 ) -> None:
     began = clock()
     choice = select(estimator, params, build, data, rules, assignment, metric, counts)
-    answers.search_s += clock() - began
+    total.search_s += clock() - began
     fold = _prepared(assignment, data, rules, choice.k if choice else estimator.window_grid[0], counts)
     _worth_answering(fold, data)
     X_train, X_test = features_of(fold.train, estimator), features_of(fold.test, estimator)
     model = build(choice.params if choice else {})
     began = clock()
     fit(model, X_train, fold.train.y, estimator.name, counts)
-    answers.fit_s += clock() - began
-    began = clock()
-    predicted = answers_of(model, X_test, estimator.name, len(data.classes))
-    answers.predict_s += clock() - began
+    total.fit_s += clock() - began
     n_classes = len(data.classes)
-    answers.scores[f"fold {fold.name}"] = metric.of(fold.test.y, predicted, n_classes)
-    if choice:
-        answers.chosen.append(choice)
-        answers.names.append(fold.name)
-        answers.scores["validation"] = choice.score
-    elif fold.validation is not None and len(fold.validation):
+    began = clock()
+    predicted = answers_of(model, X_test, estimator.name, n_classes)
+    total.predict_s += clock() - began
+    total.scores[f"fold {fold.name}"] = metric.of(fold.test.y, predicted, n_classes)
+    _add(total, "test", fold.test, predicted, number, data)
+    if alone and not n_classes:
+        fitted = answers_of(model, X_train, estimator.name, n_classes)
+        _add(total, "train", fold.train, fitted, number, data)
+    if fold.validation is not None and len(fold.validation):
         on_validation = answers_of(model, features_of(fold.validation, estimator), estimator.name, n_classes)
-        answers.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
-    answers.y_true.append(fold.test.y)
-    answers.y_pred.append(predicted)
-    answers.recording.append(fold.test.recording)
-    answers.row.append(fold.test.row)
-    answers.fold.append(np.full(len(fold.test), number, dtype=np.int64))
-    answers.n_train += len(fold.train)
-    answers.model, answers.test = model, fold.test
+        total.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
+        if alone:
+            _add(total, "validation", fold.validation, on_validation, number, data)
+    if choice:
+        total.chosen.append(choice)
+        total.names.append(fold.name)
+        total.scores["validation"] = choice.score
+    total.n_train += len(fold.train)
+    total.folds += 1
+    total.model, total.test = model, fold.test
+
+
+def _add(total: _Sum, role: Role, asked: Part, given: npt.NDArray[Any], number: int, data: Dataset) -> None:
+    """Keep what was answered, with time and reference force beside it."""
+    force = np.full(len(asked), np.nan)
+    for place in np.unique(asked.recording):
+        table = data.tables[place]
+        if table.force is not None:
+            mine = asked.recording == place
+            force[mine] = table.force[np.searchsorted(table.row, asked.row[mine])]
+    fold = np.full(len(asked), number, dtype=np.int64)
+    answered = Answers(asked.y, given, asked.recording, asked.row, fold, asked.time_s, force)
+    total.sets.setdefault(role, []).append(answered)
+
+
+def _joined(folds: Sequence[Answers]) -> Answers:
+    names = [column.name for column in fields(Answers)]
+    return Answers(**{name: np.concatenate([getattr(one, name) for one in folds]) for name in names})
 
 
 def _prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
@@ -266,15 +285,15 @@ def _result(
     metric: Metric,
     split: str,
     data: Dataset,
-    answers: _Answers,
+    total: _Sum,
     counts: Counter[str],
     latency_ms: npt.NDArray[np.float64],
     seed: int,
     threads: int,
 ) -> CellResult:
-    y, predicted = np.concatenate(answers.y_true), np.concatenate(answers.y_pred)
-    recording, row = np.concatenate(answers.recording), np.concatenate(answers.row)
-    fold = np.concatenate(answers.fold)
+    sets = {role: _joined(folds) for role, folds in total.sets.items()}
+    tested = sets["test"]
+    y, predicted, recording, row = tested.y_true, tested.y_pred, tested.recording, tested.row
     n_classes = len(data.classes)
     cluster, cluster_name = replicates(data, task, split, y, recording, row)
     score = metric.of(y, predicted, n_classes)
@@ -284,7 +303,7 @@ def _result(
             hint="Choose another --split.",
         )
     interval = score_interval(metric, y, predicted, recording, cluster, cluster_name, n_classes, seed)
-    scores = dict(answers.scores)
+    scores = dict(total.scores)
     for other in METRICS.values():
         if other.kind == task.kind and other is not metric:
             scores[other.name] = other.of(y, predicted, n_classes)
@@ -307,29 +326,26 @@ def _result(
         confusion=table,
         classes=data.classes,
         split=split,
-        folds=len(answers.y_true),
+        folds=total.folds,
         n_recordings=len(data.tables),
         n_sessions=len({meta.session for meta in data.metas}),
-        n_train=answers.n_train,
+        n_train=total.n_train,
         n_test=len(y),
         counts=dict(counts),
-        chosen=_chosen(answers.chosen, answers.names),
+        chosen=_chosen(total.chosen, total.names),
         dagger=rules.uses_test_statistics,
         stamps=(SHUFFLED_STAMP,) if split == "shuffled" else (),
-        search_s=answers.search_s,
-        fit_s=answers.fit_s,
-        predict_s=answers.predict_s,
+        search_s=total.search_s,
+        fit_s=total.fit_s,
+        predict_s=total.predict_s,
         batch_rows=len(y),
         latency_ms_p50=float(np.quantile(latency_ms, 0.5)),
         latency_ms_p95=float(np.quantile(latency_ms, 0.95)),
         latency_n=len(latency_ms),
         threads=threads,
         peak_rss_mb=peak_rss_mb(),
-        y_true=y,
-        y_pred=predicted,
-        recording=recording,
-        row=row,
-        fold=fold,
+        search=_search(total.chosen, total.names),
+        sets=sets,
     )
 
 
@@ -346,3 +362,12 @@ def _chosen(choices: Sequence[Choice], folds: Sequence[str]) -> dict[str, float]
         else:
             chosen |= {f"{name} of fold {fold}": float(value) for fold, value in zip(folds, values, strict=True)}
     return chosen
+
+
+def _search(choices: Sequence[Choice], folds: Sequence[str]) -> tuple[Mapping[str, Any], ...]:
+    """Return every candidate of every fold as one flat mapping."""
+    return tuple(
+        {**candidate.params, "k": candidate.k, "score": candidate.score, "fold": fold}
+        for choice, fold in zip(choices, folds, strict=True)
+        for candidate in choice.compared
+    )

@@ -50,6 +50,8 @@ class Dataset:
     """Class labels in order of their index; empty for regression"""
     counts: Mapping[str, int] = field(default_factory=dict)
     """What was left out, and why"""
+    paths: tuple[Path, ...] = ()
+    """The files of the tables"""
 
     @property
     def metas(self) -> tuple[RecordingMeta, ...]:
@@ -69,12 +71,14 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
     """
     counts: Counter[str] = Counter()
     read: list[tuple[RecordingMeta, _Raw]] = []
+    used: list[Path] = []
     for path in recordings:
         with open_recording(path) as recording:
             if recording.meta.excluded:
                 counts[f"recordings left out ({recording.meta.excluded})"] += 1
                 continue
             read.append((recording.meta, _read(recording, task, counts)))
+            used.append(path)
     if not read:
         raise DataError("No recording is left to evaluate.", hint="See what was left out with `tactbench inspect`.")
     _same_features([(meta, raw.features) for meta, raw in read])
@@ -90,7 +94,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
         counts[f"of {sum(len(table.row) for table in tables)} rows have no {_wanted(task)} and were left out"] = (
             unlabelled
         )
-    return Dataset(tables, read[0][1].features, classes, dict(counts))
+    return Dataset(tables, read[0][1].features, classes, dict(counts), tuple(used))
 
 
 @dataclass

@@ -26,12 +26,20 @@ Build = Callable[[Mapping[str, Any]], Estimator]
 
 
 @dataclass(frozen=True)
-class Choice:
-    """What was chosen, and how well it did on the validation data."""
+class Candidate:
+    """Parameters and window that were tried, and how well they did on the validation data."""
 
     params: dict[str, Any]
     k: int
     score: float
+
+
+@dataclass(frozen=True)
+class Choice(Candidate):
+    """The candidate that was chosen, and those that it was compared with."""
+
+    compared: tuple[Candidate, ...] = ()
+    """all candidates in the order in which they were tried, the chosen one among them"""
 
 
 def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
@@ -81,16 +89,15 @@ def select(
     pairs = _pairs(data, protocol, assignment, max(descriptor.window_grid))
     n_classes = len(data.classes)
     told: Counter[str] = Counter() if counts is None else counts
-    best: Choice | None = None
+    tried: list[Candidate] = []
     sign = 1.0 if metric.higher_is_better else -1.0
     for k in descriptor.window_grid:
         filtered = [(part(a, scale_a, k), part(b, scale_b, k)) for a, scale_a, b, scale_b in pairs]
         for values in itertools.product(*grid.values()):
             params = {**given, **dict(zip(grid, values, strict=True))}
-            score = _score(descriptor, build, params, filtered, metric, n_classes, told)
-            if best is None or sign * score > sign * best.score:
-                best = Choice(params, k, score)
-    return best
+            tried.append(Candidate(params, k, _score(descriptor, build, params, filtered, metric, n_classes, told)))
+    best = max(tried, key=lambda candidate: sign * candidate.score)  # of equals the first
+    return Choice(best.params, best.k, best.score, tuple(tried))
 
 
 def _pairs(

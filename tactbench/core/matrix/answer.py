@@ -6,7 +6,6 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from tactbench.core.errors import NotApplicable, TactbenchError
 from tactbench.core.evaluation.cell import CellResult, evaluate
@@ -14,11 +13,13 @@ from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.samples import Answers
 from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
 
-Answer = tuple[Row, Mapping[str, Any]]
-"""A row, and the arrays that go into its shard."""
+Answer = tuple[Row, Mapping[Role, Answers]]
+"""A row, and the answers that go into its shard, by role."""
 
 
 def answer(
@@ -53,21 +54,14 @@ def answer(
     metas = [material.metas[place] for place in range(len(material.metas))]
     row.update(_told_by(metas))
     row.update(_scored(result))
+    row.update(_published(cell, task, result.split))
+    row["recordings"] = [str(path) for path in material.paths]
     row["status"] = "done"
-    arrays = {
-        "y_true": result.y_true,
-        "y_pred": result.y_pred,
-        "recording": result.recording,
-        "row": result.row,
-        "fold": result.fold,
-    }
-    return row, arrays
+    return row, dict(result.sets)
 
 
 def opening(cell: Cell, task: TaskSpec) -> Row:
     """Return a row with what is known before anything is computed; every key of the format is there."""
-    published = task.published.get(cell.sensor)
-    beside = published and (published.protocol, published.estimator) == (cell.protocol, cell.estimator)
     return {
         "cell": cell.name,
         "sensor": cell.sensor,
@@ -90,8 +84,7 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "ci_high": None,
         "ci_method": "",
         "baseline": None,
-        "published": published.score if published and beside else None,
-        "published_reference": published.reference if published and beside else "",
+        **_published(cell, task, cell.split),
         "n_recordings": None,
         "n_sessions": None,
         "n_train": None,
@@ -114,10 +107,22 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "plan": [],
         "counts": {},
         "chosen": {},
+        "search": [],
+        "recordings": [],
         "scores": {},
         "confusion": None,
         "classes": [],
     }
+
+
+def _published(cell: Cell, task: TaskSpec, split: str | None) -> Row:
+    """Return the published figure that the cell may stand beside: with an estimator's defaults only."""
+    found = None if cell.params else task.published_for(cell.sensor, cell.protocol, cell.estimator, split)
+    if found is None or (found.estimator is None and cell.baseline):
+        return {"published": None, "published_reference": "", "published_remark": ""}
+    own = "" if found.estimator else "another model than ours"
+    remark = "; ".join(part for part in (own, found.remark) if part)
+    return {"published": found.score, "published_reference": found.reference, "published_remark": remark}
 
 
 def failed(row: Row, error: BaseException) -> Row:
@@ -163,6 +168,7 @@ def _scored(result: CellResult) -> Row:
         "stamps": list(result.stamps),
         "counts": dict(result.counts),
         "chosen": dict(result.chosen),
+        "search": [dict(candidate) for candidate in result.search],
         "scores": dict(result.scores),
         "confusion": None if result.confusion is None else result.confusion.tolist(),
         "classes": list(result.classes),

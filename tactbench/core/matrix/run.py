@@ -57,13 +57,15 @@ def run_matrix(
     recordings: Path | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Carry out `matrix` and write the files of a run: ``run.json`` and ``scores.json``.
+    """Carry out `matrix` and write the files of a run: ``run.json``, ``scores.json`` and ``unfinished.json``.
 
     The parameters are those of `carry_out`.
     """
     outcome = carry_out(matrix, store, jobs=jobs, recordings=recordings, progress=progress)
     store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
     store.write("scores.json", scores_text(outcome.rows))
+    unfinished = [row for row in outcome.rows if row["status"] != "done"]
+    store.write("unfinished.json", json.dumps(unfinished, indent=1, sort_keys=True) + "\n")
     return outcome
 
 
@@ -103,7 +105,7 @@ def carry_out(
     with workers(jobs) as crew:
         rows, computed = _evaluate(cells, material, troubles, crew, jobs, registry, sources, store, told)
     sources.save()
-    _fill_baselines(rows)
+    fill_baselines(rows)
     provenance = gather()
     provenance["jobs"] = jobs
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
@@ -221,13 +223,20 @@ def _evaluate(
         told.begin("evaluating", len(waiting), alone=jobs == 1)
         work: Callable[[Job], Any] = solve if jobs > 1 else (lambda job: solve(job, told.working))
         for (cell, _, trouble), outcome in crew.each(work, waiting):
-            row, arrays = outcome if not isinstance(outcome, BaseException) else solve((cell, (), outcome))
+            row, sets = outcome if not isinstance(outcome, BaseException) else solve((cell, (), outcome))
             row["key"] = keys.get(cell.name, "")
+            row["recordings"] = [_beside(path, store.folder) for path in row["recordings"]]
             if row["status"] == "done" and trouble is None:
-                store.keep(row["key"], row, arrays)
+                store.keep(row["key"], row, sets)
             rows[cell.name] = row
             told.advance(cell.name)
     return [rows[cell.name] for cell in cells], len(waiting)
+
+
+def _beside(path: str, folder: Path) -> str:
+    """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
+    inside = Path(path).is_relative_to(folder)
+    return str(Path(path).relative_to(folder)) if inside else str(Path(path).resolve())
 
 
 class _Digests(dict[Path, str]):
@@ -240,7 +249,7 @@ class _Digests(dict[Path, str]):
         return self[path]
 
 
-def _fill_baselines(rows: Sequence[Row]) -> None:
+def fill_baselines(rows: Sequence[Row]) -> None:
     """Write the score of the first baseline of each group beside every row of the group."""
     by_group: dict[tuple[Any, ...], float] = {}
     for row in rows:

@@ -4,8 +4,9 @@
 
     OUT/
       recordings/SENSOR/SCENE-KEY.h5     what the rig recorded
-      cells/KEY.h5                       one finished cell: row, predictions
+      cells/KEY.h5                       one finished cell: row, and a group of answers for each role
       index.jsonl                        the rows of all shards, one a line
+      unfinished.json                    the rows of the last run that did not end well, with their reasons
       scores.json                        what a seed decides in the last run: compare it byte by byte
       leaderboard.md, .csv, .json        the last run's table
       run.json                           who ran it, with what
@@ -15,16 +16,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tactbench.core.errors import UsageError
 from tactbench.core.matrix.files import replace_file
+from tactbench.core.samples import Answers
+from tactbench.core.spec.scene import Role
 
 Row = dict[str, Any]
-SHARD_VERSION = 1
+SHARD_VERSION = 2
+_ANSWER_COLUMNS = tuple(column.name for column in fields(Answers))
 
 
 class Store:
@@ -72,7 +75,33 @@ class Store:
             self._rows[key] = row
         return dict(self._rows[key])
 
-    def keep(self, key: str, row: Row, arrays: Mapping[str, Any]) -> None:
+    def rows(self) -> list[Row]:
+        """Return the rows of all finished cells, the latest of each name, then the unfinished ones of the last run."""
+        latest: dict[str, Row] = {}
+        for key, row in _read_index(self.folder / "index.jsonl").items():
+            if (self.folder / "cells" / f"{key}.h5").exists():
+                latest[row["cell"]] = row
+        try:
+            unfinished = json.loads((self.folder / "unfinished.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            unfinished = []
+        return [*latest.values(), *(row for row in unfinished if row["cell"] not in latest)]
+
+    def answers(self, key: str) -> dict[str, Answers]:
+        """Return what a finished cell answered, by role; nothing for a cell that is not there or cannot be read."""
+        import h5py
+
+        try:
+            with h5py.File(self.folder / "cells" / f"{key}.h5", "r") as file:
+                return {
+                    role: Answers(**{name: group[name][()] for name in _ANSWER_COLUMNS})
+                    for role, group in file.items()
+                    if isinstance(group, h5py.Group)
+                }
+        except (OSError, KeyError):
+            return {}
+
+    def keep(self, key: str, row: Row, sets: Mapping[Role, Answers]) -> None:
         """Write a finished cell: aside, synced, renamed; then its line in the index."""
         import h5py
 
@@ -83,8 +112,11 @@ class Store:
                 file.attrs["format"] = "tactbench-cell"
                 file.attrs["format_version"] = SHARD_VERSION
                 file.attrs["row"] = json.dumps(row, sort_keys=True)
-                for name, values in arrays.items():
-                    file.create_dataset(name, data=np.asarray(values), compression="gzip", shuffle=True)
+                for role, answers in sets.items():
+                    group = file.create_group(role)
+                    for name in _ANSWER_COLUMNS:
+                        values = getattr(answers, name)
+                        group.create_dataset(name, data=values, compression="gzip", shuffle=True)
                 file.flush()
             aside.replace(shard)
         except BaseException:

@@ -37,13 +37,22 @@ class LabelTarget(Frozen):
 
 
 class Published(Frozen):
-    """A figure somebody has published for this task."""
+    """A figure somebody has published for this task. It stands beside rows it is comparable with, and no others."""
 
     score: float
+    reference: str
     protocol: str
     """Only rows under this protocol stand beside it."""
-    estimator: str
-    reference: str
+    sensor: str | None = None
+    """None: of any sensor."""
+    estimator: str | None = None
+    """None: by a model of their own that is none of ours; `remark` says which."""
+    split: str | None = None
+    """None: whichever split the protocol has."""
+    title: str = ""
+    """What it is, in a few words, for a reproduction table."""
+    remark: str = ""
+    """What must be known to compare with it."""
 
 
 class TaskSpec(Frozen):
@@ -71,5 +80,16 @@ class TaskSpec(Frozen):
     """What answers when nobody asks for another."""
     baselines: tuple[str, ...]
     """Trivial answers that stand in every table; the first is the `baseline` column."""
-    published: dict[str, Published] = Field(default_factory=dict)
-    """By name of sensor."""
+    published: tuple[Published, ...] = ()
+
+    def published_for(self, sensor: str, protocol: str, estimator: str, split: str | None) -> Published | None:
+        """Return the published figure that a result may stand beside, or None; the one for this sensor first."""
+        fitting = [
+            one
+            for one in self.published
+            if one.protocol == protocol
+            and one.sensor in (None, sensor)
+            and one.estimator in (None, estimator)
+            and (one.split is None or split is None or one.split == split)
+        ]
+        return min(fitting, key=lambda one: (one.sensor is None, one.estimator is None), default=None)

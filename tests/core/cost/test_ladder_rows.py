@@ -5,7 +5,7 @@ import pytest
 from tactbench.core.cost.ladder_rows import by_score, mark_fronts, stopped, timed
 from tactbench.core.cost.rounds import Timing
 from tactbench.core.errors import NotApplicable
-from tests.core.cost.test_rounds import Hours, candidate
+from tests.core.cost.test_rounds import Hours, contestant
 
 
 def row(name, score, fit_s, latency, *, baseline=False, status="done"):
@@ -48,12 +48,12 @@ def test_the_best_score_comes_first_and_no_score_last():
 )
 def test_a_loop_is_kept_by_its_95th_percentile(usual_ms, rare_ms, rare, hundred, thousand):
     latency = [usual_ms / 1e3] * (100 - rare) + [rare_ms / 1e3] * rare
-    found = timed(candidate(Hours(), "a"), Timing([1.0], [1.0], latency), {}, 1, 20.0)
+    found = timed(contestant(Hours(), "a"), Timing([1.0], [1.0], latency), {}, 1, 20.0)
     assert (found["loop_100_hz"], found["loop_1000_hz"]) == (hundred, thousand)
 
 
 def test_quartiles_and_rows_are_those_of_the_times():
-    found = timed(candidate(Hours(), "a"), Timing([5.0, 1.0, 3.0, 2.0, 4.0], [2.0], [0.004]), {}, 5, 20.0)
+    found = timed(contestant(Hours(), "a"), Timing([5.0, 1.0, 3.0, 2.0, 4.0], [2.0], [0.004]), {}, 5, 20.0)
     assert (found["fit_s_q1"], found["fit_s"], found["fit_s_q3"]) == (2.0, 3.0, 4.0)
     assert found["batch_s_per_row"] == 2.0 / 1000
     assert found["latency_ms_p50"] == 4.0

@@ -120,8 +120,8 @@ def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tm
         for seed, threads in ((0, 1), (0, 2), (0, 2), (1, 1))
     ]  # fmt: skip
     first, second, third, other = results
-    assert np.array_equal(first.y_pred, second.y_pred)
-    assert np.array_equal(second.y_pred, third.y_pred)
+    assert np.array_equal(first.sets["test"].y_pred, second.sets["test"].y_pred)
+    assert np.array_equal(second.sets["test"].y_pred, third.sets["test"].y_pred)
     assert (first.score, first.ci_low, first.ci_high) == (second.score, second.ci_low, second.ci_high)
     assert other.score != first.score
 

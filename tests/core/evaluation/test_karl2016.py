@@ -148,7 +148,7 @@ def test_hyper_parameters_are_chosen_on_validation_and_never_see_the_test_set(tm
 
 def test_the_score_is_that_of_the_test_set_and_carries_a_dagger(tmp_path):
     result = run(three(tmp_path, lambda seed: ramp(seed, label_noise=0.5)))
-    residual = result.y_pred - result.y_true
+    residual = result.sets["test"].y_pred - result.sets["test"].y_true
     assert result.score == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)
     assert result.ci_low < result.score < result.ci_high
     assert result.dagger
@@ -166,7 +166,7 @@ def test_curvature_rows_are_raw_and_classes_are_in_order(tmp_path):
     result = run(paths, "forest", label_task("cap"), params={"n_estimators": 10})
     assert result.classes == (5.0, 7.5, 40.0)
     assert result.confusion.shape == (3, 3)
-    assert result.confusion.sum() == result.n_test == len(result.y_true)
+    assert result.confusion.sum() == result.n_test == len(result.sets["test"].y_true)
     assert result.score > 0.5
 
 

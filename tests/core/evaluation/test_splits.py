@@ -125,9 +125,9 @@ def test_a_shuffled_split_is_stamped_and_never_the_default(tmp_path):
 def test_an_official_test_set_is_touched_by_split_roles_only(tmp_path):
     paths = [grasps(tmp_path, "train", seed=1), grasps(tmp_path, "test", seed=2)]
     by_object = run(paths, "object", label_task())
-    assert set(by_object.recording.tolist()) == {0}
+    assert set(by_object.sets["test"].recording.tolist()) == {0}
     by_roles = run(paths, "roles", label_task())
-    assert set(by_roles.recording.tolist()) == {1}
+    assert set(by_roles.sets["test"].recording.tolist()) == {1}
 
 
 def test_a_split_that_cannot_be_served_is_refused_with_those_that_can(tmp_path):
@@ -220,7 +220,7 @@ def test_collinear_and_dead_taxels_have_finite_answers(tmp_path):
     paths = [record(tmp_path / f"{name}.h5", *made(place), session=name) for place, name in enumerate("ab")]
     for estimator in ("lasso", "ridge", "forest"):
         result = run(paths, estimator=estimator, params={}) if estimator != "forest" else run(paths)
-        assert np.isfinite(result.y_pred).all()
+        assert np.isfinite(result.sets["test"].y_pred).all()
         assert result.score < 1.0
 
 

@@ -25,7 +25,7 @@ from tactbench.core.spec.task import TaskSpec
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Contestant:
     """An estimator with its parameters chosen, and the training and test rows of one fold."""
 
     name: str
@@ -42,7 +42,7 @@ class Candidate:
     """The recordings that the training rows are from."""
 
 
-def candidate(
+def contestant(
     task: TaskSpec,
     descriptor: EstimatorDescriptor,
     params: Mapping[str, Any],
@@ -52,7 +52,7 @@ def candidate(
     *,
     seed: int,
     threads: int,
-) -> Candidate:
+) -> Contestant:
     """Prepare `descriptor` as a cell does, for the last fold: the one whose model a cell's latency is taken from.
 
     Parameters
@@ -82,7 +82,7 @@ def candidate(
     scale_train, scale_test = scales(rules, kept, others)
     train, test = part(kept, scale_train, k), part(others, scale_test, k)
     chosen = choice.params if choice else {}
-    return Candidate(
+    return Contestant(
         name=descriptor.name,
         build=lambda: build(**chosen),
         fold=assignment.name,

@@ -1,0 +1,49 @@
+"""What a report is made of: finished cells, what they answered, and the recordings behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactbench.core.matrix.run import fill_baselines
+from tactbench.core.matrix.store import Row, Store
+from tactbench.core.samples import Answers
+
+if TYPE_CHECKING:
+    from tactbench.core.plugins.registry import Registry
+
+
+@dataclass(frozen=True)
+class Material:
+    """A result folder, opened for reading.
+
+    Parameters
+    ----------
+    store
+        The folder.
+    registry
+        Where specs of sensors and tasks are looked up.
+    rows
+        One a cell, the latest of each name.
+    """
+
+    store: Store
+    registry: Registry
+    rows: tuple[Row, ...]
+
+    def answers(self, row: Mapping[str, Any]) -> dict[str, Answers]:
+        """Return what a cell answered, by role; empty if it did not finish."""
+        return self.store.answers(str(row["key"]))
+
+    def recordings(self, row: Mapping[str, Any]) -> list[Path]:
+        """Return the files of a cell's recordings, in the order that ``Answers.recording`` counts."""
+        return [self.store.folder / path for path in row["recordings"]]
+
+
+def open_material(store: Store, registry: Registry) -> Material:
+    """Return what `store` holds, baselines beside every row."""
+    rows = store.rows()
+    fill_baselines(rows)
+    return Material(store, registry, tuple(rows))
