@@ -7,8 +7,9 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from tactbench.core.matrix.plan import plan_cells
+from tactbench.core.plugins.registry import Owned
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
-from tactbench.plugin import NotApplicable, load_object, load_registry
+from tactbench.plugin import NotApplicable, TaskDescriptor, load_object, load_registry
 
 REGISTRY = load_registry()
 ESTIMATORS = REGISTRY.estimators
@@ -124,6 +125,16 @@ def test_all_is_every_estimator_of_the_kind_with_the_tasks_baselines_where_they_
         assert {cell.estimator for cell in cells} == {e.name for e in ESTIMATORS if spec.kind in e.kinds}
         assert [cell.estimator for cell in cells if cell.baseline] == list(spec.baselines)
         assert len({cell.name for cell in cells}) == len(cells)
+
+
+def test_all_leaves_the_first_baseline_of_the_task_first():
+    """The first one is the `baseline` column, whatever others are installed and however they are called."""
+    registry = load_registry()
+    spec = registry.tasks["force"].spec.model_copy(update={"name": "backwards", "baselines": ("time-index",)})
+    registry.tasks.add(Owned(TaskDescriptor(spec=spec), "made", "made", "1"))
+    choice = TaskChoice(name="backwards", estimators=(EstimatorChoice(name="all"),))
+    cells = plan_cells(MatrixSpec(tasks=(choice,)), ("biotac",), registry)
+    assert [cell.estimator for cell in cells if cell.baseline] == ["time-index", "mean"]
 
 
 def test_all_beside_a_name_with_parameters_keeps_both():

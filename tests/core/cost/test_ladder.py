@@ -28,7 +28,7 @@ def presses(folder, sessions=3, n=120):
     folder.mkdir()
     for number in range(sessions):
         force = np.linspace(0.0, 5.0, n) + rng.normal(0.0, 0.1, n)
-        X = force[:, None] * np.array([40.0, -25.0, 10.0]) + rng.normal(0.0, 3.0, (n, 3)) + 100.0
+        X = force[:, None] * np.array([40.0, -25.0, 10.0]) + rng.normal(0.0, 60.0, (n, 3)) + 100.0
         record(folder / f"press-{number}.h5", X, force, session=str(number),
                provenance={"acquisition_s": 1.25} if number < 2 else {})  # fmt: skip
     return folder
@@ -62,7 +62,7 @@ def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data
     assert ladder.about["fold"] == "2"
     assert ladder.about["split"] == "session"
     by_name = {row["estimator"]: row for row in ladder.rows}
-    assert by_name["ridge"]["chosen"]
+    assert max(value for key, value in by_name["ridge"]["chosen"].items() if key.startswith("k")) > 0
     assert by_name["mean"]["is_baseline"]
     assert by_name["knn"]["n_features"] == 3
     assert by_name["time-index"]["n_features"] == 1
@@ -110,18 +110,20 @@ def test_what_is_no_ladder_is_left_out_and_what_cannot_be_written_is_said(ladder
         write_ladder(ladder, tmp_path / "file")
 
 
-def test_labels_of_the_figure_can_be_read_and_a_far_baseline_does_not_squeeze_it(ladder, tmp_path):
+def test_labels_of_the_figure_can_be_read(ladder, tmp_path):
     figure = draw_ladder(ladder, [tmp_path / "a.png"])
     renderer = figure.canvas.get_renderer()
     names = {row["estimator"] for row in ladder.rows}
     for axis in figure.axes:
-        boxes = [
-            Box(*Text.get_window_extent(text, renderer).extents) for text in axis.texts if text.get_text() in names
-        ]
-        assert len(boxes) >= len(QUICK) - 1
+        texts = [text for text in axis.texts if text.get_text() in names]
+        boxes = [Box(*Text.get_window_extent(text, renderer).extents) for text in texts]
+        assert {text.get_text() for text in texts} == names
         assert not [(a, b) for a in range(len(boxes)) for b in range(a) if boxes[a].shared(boxes[b]) > 0]
-    worst = max(row["score"] for row in ladder.rows if not row["is_baseline"])
-    mean = next(row["score"] for row in ladder.rows if row["estimator"] == "mean")
-    assert mean > 3 * worst
-    assert figure.axes[0].get_ylim()[1] < mean
-    assert any("mean at" in text.get_text() for text in figure.axes[0].texts)
+
+
+def test_a_far_baseline_is_told_of_and_does_not_squeeze_the_figure(ladder, tmp_path):
+    far = [{**row, "score": 90.0, "ci_low": 80.0, "ci_high": 99.0} if row["estimator"] == "mean" else row
+           for row in ladder.rows]  # fmt: skip
+    figure = draw_ladder(ladder._replace(rows=far), [tmp_path / "a.png"])
+    assert figure.axes[0].get_ylim()[1] < 10.0
+    assert any(text.get_text() == "further above: mean at 90" for text in figure.axes[0].texts)

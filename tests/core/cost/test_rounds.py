@@ -129,6 +129,21 @@ def test_a_short_fit_is_repeated_so_that_one_interruption_is_not_all_that_is_mea
     assert fits == 4, "the interruption itself used up the time for repeats"
 
 
+def test_what_a_library_does_once_is_no_part_of_a_fit():
+    clock = Hours()
+    imports = iter([300.0])
+
+    class Late(Worker):
+        def fit(self, X, y):
+            self.clock.now += next(imports, 0.0)
+            super().fit(X, y)
+
+    one = contestant(clock, "a")
+    late = Contestant(**{**one.__dict__, "build": lambda: Late(clock, "a", 1.0, 1.0, 1.0)})
+    assert run(clock, late)["a"].fit_s == [1.0] * 5
+    assert clock.now > 300.0
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 def test_numerical_libraries_keep_to_the_threads_that_are_stated(threads):
     clock, seen = Hours(), []
