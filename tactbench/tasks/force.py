@@ -12,6 +12,7 @@ from tactbench.plugin import (
     TaskSpec,
     hookimpl,
 )
+from tactbench.tasks.surfaces import at_places, few_shots, on_units
 
 TACTBENCH_API = 1
 
@@ -27,6 +28,8 @@ SCENES = tuple(
     for order, role in enumerate(("train", "validation", "test"))
 )
 
+_FLAT = (None,)
+
 SPEC = TaskSpec(
     name="force",
     title="Normal force",
@@ -36,8 +39,12 @@ SPEC = TaskSpec(
     metric="rmse",
     unit="N",
     scenes=SCENES,
-    protocols=("karl2016", "deployable"),
-    splits=("roles", "session", "in-session", "shuffled"),
+    campaigns={"placement": at_places(_FLAT), "unit": on_units(_FLAT), **few_shots(_FLAT)},
+    protocols=("karl2016", "karl2016-training-scale", "deployable"),
+    splits=(
+        *("roles", "session", "press", "in-session", "placement", "unit"),
+        *("few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "shuffled"),
+    ),
     estimators=("lasso",),
     baselines=("mean", "time-index"),
     published=(
@@ -53,6 +60,13 @@ SPEC = TaskSpec(
             score=0.6875, protocol="karl2016", estimator="time-index",
             title="force, RMSE of the time index", reference=_PAPER,
             remark="the paper does not say of which sensor's recordings; offered as a lower bound",
+        ),
+        Published(
+            score=0.27, protocol="deployable", sensor="eflesh", split="in-session",
+            title="normal force, RMSE, eFlesh", reference="Pattabiraman et al. 2025, arXiv 2506.09994",
+            remark="a small network; the last fifth of one session's rows, as in the authors' published training code, "
+            "which gives rows without a load-cell sample the nearest one and scales by all rows, tested ones too; "
+            "which session the figure is of is not stated",
         ),
     ),
 )  # fmt: skip

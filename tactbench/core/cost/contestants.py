@@ -73,7 +73,8 @@ def contestant(
         return made
 
     build()
-    assignment = make_splits(data, split, seed, gap=max(descriptor.window_grid))[-1]
+    gap, own = max(descriptor.window_grid), split in task.campaigns
+    assignment = make_splits(data, split, seed, gap=gap, one_by_one=own)[-1]
     choice = select(descriptor, params, lambda chosen: build(**chosen), data, rules, assignment, metric)
     k = choice.k if choice else descriptor.window_grid[0]
     counts: Counter[str] = Counter()

@@ -10,8 +10,10 @@ from typing import Any, NamedTuple
 from tactbench.core.cost.contestants import Contestant, contestant
 from tactbench.core.cost.ladder_rows import Record, by_score, mark_fronts, opening, stopped, timed
 from tactbench.core.cost.rounds import measure
+from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import metric_called
+from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import Outcome, carry_out
 from tactbench.core.matrix.store import Store
@@ -51,11 +53,20 @@ def climb(
     recordings
         Folder for rigs that replay.
 
+    Raises
+    ------
+    UsageError
+        If something is asked for that is not there, or more than one protocol or split.
+
     Returns
     -------
     Ladder
         A row for every estimator, also for those that were skipped or failed; the best score first.
     """
+    asked = {(cell.protocol, cell.split) for cell in plan_cells(matrix, matrix.sensors, registry)}
+    if len(asked) > 1:
+        several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in asked))
+        raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
     outcome = carry_out(matrix, store, recordings=recordings, progress=progress)
     task = registry.tasks[matrix.tasks[0].name].spec
     done = [row for row in outcome.rows if row["status"] == "done"]

@@ -182,6 +182,7 @@ def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, 
     constant = {
         "session": meta.session,
         "recording": meta.name,
+        **({"unit": meta.scene.unit} if meta.scene is not None else {}),
         **{key: str(value) for key, value in meta.labels.items()},
     }
     if meta.trial:
@@ -221,4 +222,6 @@ def _table(meta: RecordingMeta, raw: _Raw, classes: tuple[Any, ...]) -> Table:
 
 
 def _wanted(task: TaskSpec) -> str:
-    return task.target.name if isinstance(task.target, LabelTarget) else f"{task.target.kind} sample"
+    if isinstance(task.target, LabelTarget):
+        return task.target.name
+    return f"{task.target.kind} sample" + (f" called {task.target.name!r}" if task.target.name else "")

@@ -18,6 +18,9 @@ from tactbench.core.spec.scene import Role, Scene
 RELEVANT = ("numpy", "scipy", "scikit-learn")
 """Distributions whose version may change a number."""
 
+_TOLD_OTHERWISE = {"published", "title", "question", "scenes", "campaigns"}
+"""Of a task: what changes no number, and what its recordings say themselves, by their content."""
+
 
 def recording_key(
     sensor: str, rig: str, scene: Scene, role: Role, seed: int, registry: Registry, sources: SourceDigests
@@ -46,7 +49,7 @@ def cell_key(cell: Cell, data: Sequence[str], registry: Registry, sources: Sourc
     return _digest(
         {
             "sensor": cell.sensor,
-            "task": task.descriptor.model_dump(mode="json", exclude={"spec": {"published", "title", "question"}}),
+            "task": task.descriptor.model_dump(mode="json", exclude={"spec": _TOLD_OTHERWISE}),
             "protocol": cell.protocol,
             "split": cell.split,
             "estimator": estimator.descriptor.model_dump(mode="json", exclude={"title"}),

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, PROTOCOLS, protocol_called
+from tactbench.core.evaluation.splits import shots
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.task import TaskSpec
+
+FEW_SHOT = "few-shot"
+"""Asks for all of a task's splits `few-shot-N`."""
 
 
 @dataclass(frozen=True)
@@ -60,15 +66,16 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
     for repeat in range(1, matrix.repeats + 1):
         for choice in matrix.tasks:
             task = registry.tasks[choice.name].spec
-            protocol = _protocol(task, choice)
+            ways = _ways(task, choice)
+            answers = _estimators(task, choice, registry)
             for sensor in sensors:
-                for answer in _estimators(task, choice, registry):
+                for (protocol, split), answer in product(ways, answers):
                     cell = Cell(
                         sensor=sensor,
                         task=task.name,
                         rig=matrix.rig,
                         protocol=protocol,
-                        split=choice.split,
+                        split=split,
                         estimator=answer.name,
                         params=tuple(sorted(answer.params.items())),
                         baseline=registry.estimators[answer.name].baseline,
@@ -78,17 +85,55 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                     )
                     if cell not in cells:
                         cells.append(cell)
-    return cells
+    return with_probes(cells, registry) if matrix.probe else cells
 
 
-def _protocol(task: TaskSpec, choice: TaskChoice) -> str:
-    if choice.protocol is None:
-        protocol = task.protocols[0]
-    elif choice.protocol in task.protocols:
-        protocol = choice.protocol
-    else:
-        raise UnknownNameError(f"protocol of task {task.name!r}", choice.protocol, task.protocols)
-    return protocol
+def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
+    """Return `cells` and, after them, those that show what their recordings give away.
+
+    For every answer, and for its task's first baseline: the same under `deployable` with kept apart what the cell keeps
+    apart, under `first-frame`, and with rows shuffled. A split in time keeps no recordings apart and is not probed.
+    """
+    every = list(cells)
+    for cell in cells:
+        rules = protocol_called(cell.protocol)
+        trivial = registry.tasks[cell.task].spec.baselines[0]
+        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != trivial):
+            continue
+        split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
+        honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
+        added = (honest, replace(honest, protocol=FIRST_FRAME.name), replace(honest, split="shuffled"))
+        every += [one for one in added if one not in every]
+    return every
+
+
+def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
+    """Return every protocol asked for with every split asked for.
+
+    Where several are asked for, a pair that does not go together becomes a row that says so; a single one is refused.
+    """
+    for name in choice.protocol:
+        if name not in task.protocols and not (name in PROTOCOLS and PROTOCOLS[name].probe):
+            raise UnknownNameError(f"protocol of task {task.name!r}", name, task.protocols)
+    splits: list[str | None] = list(dict.fromkeys(split for name in choice.split for split in _expanded(task, name)))
+    ways = list(product(choice.protocol or task.protocols[:1], splits or [None]))
+    if all(not serves(protocol, split) for protocol, split in ways):
+        protocol, split = ways[0]
+        raise UsageError(
+            f"Protocol {protocol!r} splits by roles only; {split!r} was asked for.",
+            hint=f"Give --protocol with another of: {', '.join(task.protocols)}.",
+        )
+    return ways
+
+
+def serves(protocol: str, split: str | None) -> bool:
+    """Return whether a protocol goes together with a split."""
+    return split in (None, "roles") or not protocol_called(protocol).roles_only
+
+
+def _expanded(task: TaskSpec, split: str) -> tuple[str, ...]:
+    few = tuple(name for name in task.splits if shots(name))
+    return few if split == FEW_SHOT and few else (split,)
 
 
 def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[EstimatorChoice]:

@@ -12,7 +12,7 @@ from typing import Any, cast
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.matrix.execution import InProcess, Job, Workers, installed, prepare, record, rig_of, solve, workers
 from tactbench.core.matrix.keys import cell_key
-from tactbench.core.matrix.material import Order, on_the_shelf, orders_for, sensors_on, serving
+from tactbench.core.matrix.material import Need, Order, need_of, on_the_shelf, orders_for, sensors_on, serving
 from tactbench.core.matrix.plan import Cell, plan_cells
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.provenance import gather
@@ -114,13 +114,13 @@ def carry_out(
 
 @dataclass
 class _Material:
-    orders: dict[tuple[str, str, int], list[Order]]
-    shelf: dict[tuple[str, str, int], list[Path]]
+    orders: dict[Need, list[Order]]
+    shelf: dict[Need, list[Path]]
     made: dict[Path, str] = field(default_factory=dict)
     """Content digests of the recordings made now."""
 
     def paths(self, cell: Cell) -> list[Path]:
-        wanted = (cell.sensor, cell.task, cell.seed)
+        wanted = need_of(cell)
         return self.shelf.get(wanted) or [order.path for order in self.orders.get(wanted, ())]
 
 
@@ -132,8 +132,8 @@ def _material(
         found = on_the_shelf(cast(Shelf, rig))
         cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
         shelf = {
-            (cell.sensor, cell.task, cell.seed): serving(registry.tasks[cell.task].spec, found[cell.sensor])
-            for cell in cells
+            wanted: serving(registry.tasks[wanted[1]].spec, wanted[2], found[wanted[0]])
+            for wanted in dict.fromkeys(need_of(cell) for cell in cells)
         }
         return cells, _Material({}, shelf)
     if not matrix.sensors:
