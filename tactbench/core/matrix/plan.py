@@ -97,9 +97,13 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     every = list(cells)
     for cell in cells:
         rules = protocol_called(cell.protocol)
-        trivial = registry.tasks[cell.task].spec.baselines[0]
-        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != trivial):
+        task = registry.tasks[cell.task].spec
+        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != task.baselines[0]):
             continue
+        if rules.roles_only and task.splits[:1] == ("roles",):
+            same = replace(cell, protocol=DEPLOYABLE.name, split=None)
+            if same in cells:
+                continue  # asked for already, and probed as such
         split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
         honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
         added = (honest, replace(honest, protocol=FIRST_FRAME.name), replace(honest, split="shuffled"))
