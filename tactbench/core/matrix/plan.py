@@ -138,7 +138,13 @@ def _expanded(task: TaskSpec, split: str) -> tuple[str, ...]:
 
 def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[EstimatorChoice]:
     asked = list(choice.estimators) or [EstimatorChoice(name=name) for name in task.estimators]
-    asked += [EstimatorChoice(name=name) for name in task.baselines]
+    whole = any(answer.name == "all" for answer in asked)
+    fit = [other for other in registry.estimators if task.kind in other.kinds] if whole else []
+    asked = [answer for answer in asked if answer.name != "all"]
+    asked += [EstimatorChoice(name=other.name) for other in fit if not other.baseline]
+    # The task's own baselines come before any other: the first of them is the `baseline` column.
+    trivial = [*task.baselines, *(other.name for other in fit if other.baseline)]
+    asked += [EstimatorChoice(name=name) for name in dict.fromkeys(trivial)]
     for answer in asked:
         descriptor = registry.estimators[answer.name]
         if task.kind not in descriptor.kinds:

@@ -16,7 +16,8 @@ ROOT = Path(__file__).parents[3]
 @pytest.mark.parametrize("name", sorted(packaged_matrices()))
 def test_every_packaged_matrix_can_be_planned(name):
     matrix = matrix_called(name)
-    assert len(plan_cells(matrix, matrix.sensors, load_registry())) > 10
+    cells = plan_cells(matrix, matrix.sensors or ["any"], load_registry())
+    assert {cell.task for cell in cells if not cell.baseline} == {choice.name for choice in matrix.tasks}
 
 
 def test_the_packaged_matrices_are_those_of_the_examples_and_travel_in_the_wheel():
