@@ -36,7 +36,13 @@ if TYPE_CHECKING:
     metavar="NAME",
     help="What is kept apart: roles, session, placement, unit, few-shot, object …; may be repeated.",
 )
-@click.option("--estimator", "estimators", multiple=True, metavar="NAME", help="What answers; may be repeated.")
+@click.option(
+    "--estimator",
+    "estimators",
+    multiple=True,
+    metavar="NAME",
+    help="What answers; may be repeated. all: every one for this kind of question.",
+)
 @click.option("--config", metavar="FILE", help="A matrix like benchmarks.yaml, or the name of a packaged one.")
 @click.option("--repeats", type=click.IntRange(min=1), metavar="N", help="Repeat everything with N seeds.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")

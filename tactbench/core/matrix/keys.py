@@ -57,7 +57,7 @@ def cell_key(cell: Cell, data: Sequence[str], registry: Registry, sources: Sourc
             "seed": cell.seed,
             "data": list(data),
             "source": _sources([task.module, estimator.module, estimator.descriptor.where], sources),
-            "versions": versions(),
+            "versions": versions(estimator.descriptor.distributions),
         }
     )
 
@@ -67,11 +67,11 @@ def _sources(modules: Sequence[str], sources: SourceDigests) -> Mapping[str, str
     return {package: sources.package(package) for package in packages}
 
 
-@lru_cache(maxsize=1)
-def versions() -> dict[str, str]:
-    """Return the versions that may change a number, Python's included."""
+@lru_cache(maxsize=8)
+def versions(more: tuple[str, ...] = ()) -> dict[str, str]:
+    """Return the versions that may change a number: Python's, those of `RELEVANT` and of the distributions `more`."""
     found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    for name in RELEVANT:
+    for name in (*RELEVANT, *more):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

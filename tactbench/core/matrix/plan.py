@@ -97,9 +97,13 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     every = list(cells)
     for cell in cells:
         rules = protocol_called(cell.protocol)
-        trivial = registry.tasks[cell.task].spec.baselines[0]
-        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != trivial):
+        task = registry.tasks[cell.task].spec
+        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != task.baselines[0]):
             continue
+        if rules.roles_only and task.splits[:1] == ("roles",):
+            same = replace(cell, protocol=DEPLOYABLE.name, split=None)
+            if same in cells:
+                continue  # asked for already, and probed as such
         split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
         honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
         added = (honest, replace(honest, protocol=FIRST_FRAME.name), replace(honest, split="shuffled"))
@@ -138,7 +142,13 @@ def _expanded(task: TaskSpec, split: str) -> tuple[str, ...]:
 
 def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[EstimatorChoice]:
     asked = list(choice.estimators) or [EstimatorChoice(name=name) for name in task.estimators]
-    asked += [EstimatorChoice(name=name) for name in task.baselines]
+    whole = any(answer.name == "all" for answer in asked)
+    fit = [other for other in registry.estimators if task.kind in other.kinds] if whole else []
+    asked = [answer for answer in asked if answer.name != "all"]
+    asked += [EstimatorChoice(name=other.name) for other in fit if not other.baseline]
+    # The task's own baselines come before any other: the first of them is the `baseline` column.
+    trivial = [*task.baselines, *(other.name for other in fit if other.baseline)]
+    asked += [EstimatorChoice(name=name) for name in dict.fromkeys(trivial)]
     for answer in asked:
         descriptor = registry.estimators[answer.name]
         if task.kind not in descriptor.kinds:

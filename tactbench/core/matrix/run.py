@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -40,6 +40,8 @@ class Outcome:
     """Cells computed now; the others were found finished."""
     recorded: int
     """Recordings made now."""
+    recordings: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
+    """The files each cell was answered from, by its name."""
 
     @property
     def failures(self) -> list[Row]:
@@ -55,7 +57,27 @@ def run_matrix(
     recordings: Path | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Run `matrix`, reusing what `store` already has.
+    """Carry out `matrix` and write the files of a run: ``run.json``, ``scores.json`` and ``unfinished.json``.
+
+    The parameters are those of `carry_out`.
+    """
+    outcome = carry_out(matrix, store, jobs=jobs, recordings=recordings, progress=progress)
+    store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
+    store.write("scores.json", scores_text(outcome.rows))
+    unfinished = [row for row in outcome.rows if row["status"] != "done"]
+    store.write("unfinished.json", json.dumps(unfinished, indent=1, sort_keys=True) + "\n")
+    return outcome
+
+
+def carry_out(
+    matrix: MatrixSpec,
+    store: Store,
+    *,
+    jobs: int = 1,
+    recordings: Path | None = None,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Acquire and answer `matrix`, reusing what `store` already has; the files of the last run stay as they are.
 
     Parameters
     ----------
@@ -86,11 +108,8 @@ def run_matrix(
     fill_baselines(rows)
     provenance = gather()
     provenance["jobs"] = jobs
-    store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
-    store.write("scores.json", scores_text(rows))
-    unfinished = [row for row in rows if row["status"] != "done"]
-    store.write("unfinished.json", json.dumps(unfinished, indent=1, sort_keys=True) + "\n")
-    return Outcome(tuple(rows), provenance, computed, len(material.made))
+    used = {cell.name: tuple(material.paths(cell)) for cell in cells}
+    return Outcome(tuple(rows), provenance, computed, len(material.made), used)
 
 
 @dataclass

@@ -79,6 +79,8 @@ class EstimatorDescriptor(Frozen):
     """`time`: X is the time index alone. `nothing`: X is a column of zeros."""
     baseline: bool = False
     """A trivial answer, shown under the results."""
+    distributions: tuple[str, ...] = ()
+    """Distributions beyond tactbench's own that compute its answers: a cell's key covers their versions."""
 
 
 class EffectDescriptor(Frozen):
