@@ -56,7 +56,10 @@ def test_the_table_states_what_its_times_mean(shell):
         (("cost", "--sensor", "icub", "--task", "force", "--estimator", "laso"), "Did you mean 'lasso'"),
         (("cost", "--sensor", "icub", "--task", "force", "--estimator", "logistic"), "classification"),
         (("cost", "--sensor", "icub", "--task", "force", "--protocol", "karl2015"), "Did you mean 'karl2016'"),
-        (("cost", "--sensor", "icub", "--task", "curvature", "--split", "few-shot"), "one split, not"),
+        (
+            ("cost", "--sensor", "icub", "--task", "curvature", "--protocol", "deployable", "--split", "few-shot"),
+            "one split, not",
+        ),
         (("cost", "--twin", "--task", "force"), "Leave out --task"),
     ],
 )
