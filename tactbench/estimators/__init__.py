@@ -25,7 +25,7 @@ def tactbench_estimators() -> list[EstimatorDescriptor]:
         ),
         EstimatorDescriptor(
             name="time-index", title="Linear regression on the time index (the paper's lower bound)", kinds=REGRESSION,
-            looks_at="time", baseline=True, where="tactbench.estimators.linear:least_squares",
+            looks_at="time", baseline=True, linear=True, where="tactbench.estimators.linear:least_squares",
         ),
         EstimatorDescriptor(
             name="majority", title="Most frequent class of the training labels", kinds=CLASSIFICATION,
@@ -36,19 +36,19 @@ def tactbench_estimators() -> list[EstimatorDescriptor]:
             where="tactbench.estimators.trivial:chance",
         ),
         EstimatorDescriptor(
-            name="lasso", title="Lasso on a mean-filtered window", kinds=REGRESSION, params={"lambda_": 0.2},
-            grid={"lambda_": LAMBDAS}, window_grid=WINDOWS, where="tactbench.estimators.linear:lasso",
+            name="lasso", title="Lasso on a mean-filtered window", kinds=REGRESSION, linear=True,
+            params={"lambda_": 0.2}, grid={"lambda_": LAMBDAS}, window_grid=WINDOWS, where="tactbench.estimators.linear:lasso",
         ),
         EstimatorDescriptor(
-            name="ridge", title="Ridge regression on a mean-filtered window", kinds=REGRESSION, params={"alpha": 1.0},
-            grid={"alpha": (0.01, 1.0, 100.0)}, window_grid=WINDOWS, where="tactbench.estimators.linear:ridge",
+            name="ridge", title="Ridge regression on a mean-filtered window", kinds=REGRESSION, linear=True,
+            params={"alpha": 1.0}, grid={"alpha": (0.01, 1.0, 100.0)}, window_grid=WINDOWS, where="tactbench.estimators.linear:ridge",
         ),
         EstimatorDescriptor(
-            name="logistic", title="Logistic regression", kinds=CLASSIFICATION, params={"C": 1.0},
+            name="logistic", title="Logistic regression", kinds=CLASSIFICATION, linear=True, params={"C": 1.0},
             where="tactbench.estimators.linear:logistic",
         ),
         EstimatorDescriptor(
-            name="forest", title="Random forest", kinds=BOTH, where="tactbench.estimators.forest:forest",
+            name="forest", title="Random forest", kinds=BOTH, linear=False, where="tactbench.estimators.forest:forest",
             params={"n_estimators": 500, "max_depth": None, "min_samples_leaf": 1},
         ),
     ]  # fmt: skip

@@ -22,6 +22,7 @@ VERBS = {
     "import": ("import_", "Turn foreign tables into recordings, as a mapping file says."),
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),
     "cost": ("cost", "Show what accuracy costs in time."),
+    "report": ("report", "Make one page of all results, with figures and the published numbers beside ours."),
     "leaderboard": ("leaderboard", "Show the last run's table again, in any format."),
 }
 

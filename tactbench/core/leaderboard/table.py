@@ -44,6 +44,8 @@ class Line:
     cells: tuple[str, ...]
     kind: str
     """result, baseline, or failed"""
+    cell: str = ""
+    """Name of the cell."""
 
 
 @dataclass(frozen=True)
@@ -99,12 +101,12 @@ def _lines(members: Sequence[Row]) -> Iterable[Line]:
         (row for row in done if row["is_baseline"]), key=lambda row: (row["sensor"], sign * row["score"])
     )
     for row in results:
-        yield Line(_cells(row, str(ranked[row["cell"]])), "result")
+        yield Line(_cells(row, str(ranked[row["cell"]])), "result", row["cell"])
     for row in baselines:
-        yield Line(_cells(row, "base"), "baseline")
+        yield Line(_cells(row, "base"), "baseline", row["cell"])
     for row in members:
         if row["status"] != "done":
-            yield Line(_empty(row), "failed")
+            yield Line(_empty(row), "failed", row["cell"])
 
 
 def _cells(row: Row, rank: str) -> tuple[str, ...]:

@@ -79,6 +79,8 @@ class EstimatorDescriptor(Frozen):
     """`time`: X is the time index alone. `nothing`: X is a column of zeros."""
     baseline: bool = False
     """A trivial answer, shown under the results."""
+    linear: bool | None = None
+    """Whether answers are linear in the features (for classes: their boundaries are); None: its author does not say."""
 
 
 class EffectDescriptor(Frozen):
