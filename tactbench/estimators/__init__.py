@@ -37,11 +37,13 @@ def tactbench_estimators() -> list[EstimatorDescriptor]:
         ),
         EstimatorDescriptor(
             name="lasso", title="Lasso on a mean-filtered window", kinds=REGRESSION, linear=True,
-            params={"lambda_": 0.2}, grid={"lambda_": LAMBDAS}, window_grid=WINDOWS, where="tactbench.estimators.linear:lasso",
+            params={"lambda_": 0.2}, grid={"lambda_": LAMBDAS}, window_grid=WINDOWS,
+            where="tactbench.estimators.linear:lasso",
         ),
         EstimatorDescriptor(
             name="ridge", title="Ridge regression on a mean-filtered window", kinds=REGRESSION, linear=True,
-            params={"alpha": 1.0}, grid={"alpha": (0.01, 1.0, 100.0)}, window_grid=WINDOWS, where="tactbench.estimators.linear:ridge",
+            params={"alpha": 1.0}, grid={"alpha": (0.01, 1.0, 100.0)}, window_grid=WINDOWS,
+            where="tactbench.estimators.linear:ridge",
         ),
         EstimatorDescriptor(
             name="logistic", title="Logistic regression", kinds=CLASSIFICATION, linear=True, params={"C": 1.0},

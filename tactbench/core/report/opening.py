@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from typing import Any
 
+from tactbench.core.matrix.keys import RELEVANT
 from tactbench.core.report.plain import Entry, PlainTable, plain
 from tactbench.core.report.section import Section, Subject
 
@@ -23,6 +24,8 @@ def opening(subject: Subject) -> Section:
         f"{len(subject.rows)} cells: {told}. Seed: {seeds}.",
     ]
     facts = _facts(subject)
+    if facts:
+        said.append(_made_by(facts))
     tables = [_table("Made with and on (the last run)", facts, _FACTS)] if facts else []
     versions = facts.get("distributions")
     if isinstance(versions, dict):
@@ -43,6 +46,20 @@ def _facts(subject: Subject) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return facts if isinstance(facts, dict) else {}
+
+
+def _made_by(facts: dict[str, Any]) -> str:
+    """Return in one sentence what ran, on what."""
+    installed = facts.get("distributions")
+    versions = [f"Python {facts.get('python', '?')}"]
+    if isinstance(installed, dict):
+        versions += [f"{name} {installed[name]}" for name in RELEVANT if name in installed]
+    commit = f" (commit {facts['commit']})" if facts.get("commit") else ""
+    host = ", ".join(str(facts[name]) for name in ("cpu", "platform") if facts.get(name))
+    return (
+        f"Last run with tactbench {facts.get('tactbench', '?')}{commit}, {', '.join(versions)}; on {host}, "
+        f"{facts.get('cores', '?')} cores, {facts.get('jobs', '?')} at work. Times are of that host."
+    )
 
 
 def _table(title: str, facts: dict[str, Any], names: Any) -> PlainTable:

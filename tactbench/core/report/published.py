@@ -27,13 +27,17 @@ def published_section(subject: Subject) -> Section:
 def published_table(subject: Subject) -> PlainTable:
     """Return the reproduction table of all tasks that are installed."""
     lines = reproduce(subject.material.registry, subject.rows, subject.calibrated)
-    notes = dict.fromkeys(f"{line.title}: {line.remark}." for line in lines if line.remark)
+    titles: dict[str, list[str]] = {}
+    for line in lines:
+        if line.remark:
+            titles.setdefault(line.remark, []).append(line.title)
+    notes = [f"{', '.join(dict.fromkeys(whose))}: {remark}." for remark, whose in titles.items()]
     return plain(
         "Reproduction",
         COLUMNS,
         [_entries(line, subject) for line in lines],
         numeric=NUMERIC,
-        notes=tuple(notes),
+        notes=notes,
         kinds=[line.verdict.replace(" ", "-") for line in lines],
     )
 
