@@ -116,7 +116,7 @@ def _cells(row: Row, rank: str) -> tuple[str, ...]:
     return (
         rank,
         row["sensor"] + (" SIM" if row["simulated"] else ""),
-        _estimator(row),
+        answer_name(row),
         score(row["score"], unit) + marks,
         interval(row["ci_low"], row["ci_high"], unit),
         score(row["published"], unit) if row["published"] is not None else "–",
@@ -133,10 +133,11 @@ def _cells(row: Row, rank: str) -> tuple[str, ...]:
 
 def _empty(row: Row) -> tuple[str, ...]:
     sensor = row["sensor"] + (" SIM" if row["simulated"] else "")
-    return ("", sensor, _estimator(row), row["status"].upper(), *("–" for _ in COLUMNS[4:]))
+    return ("", sensor, answer_name(row), row["status"].upper(), *("–" for _ in COLUMNS[4:]))
 
 
-def _estimator(row: Row) -> str:
+def answer_name(row: Row) -> str:
+    """Return the estimator's name, with the parameters that are not its defaults."""
     options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
     return f"{row['estimator']} ({options})" if options else str(row["estimator"])
 

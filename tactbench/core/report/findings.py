@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from tactbench.core.report.calibrated import Share
 from tactbench.core.report.linearity import contrasts
-from tactbench.core.report.plain import Entry, PlainTable, plain
+from tactbench.core.report.plain import ABSENT, Entry, PlainTable, plain
 from tactbench.core.report.section import Section, Subject
 
 
@@ -30,16 +31,25 @@ def _frequencies(subject: Subject) -> PlainTable | None:
     lines = [
         (
             Entry(one.statement),
-            Entry(f"{one.share:.0%}", one.share),
-            Entry(f"{one.low:.0%} … {one.high:.0%}", one.low),
-            Entry(f"{one.draws}", one.draws),
+            _told(one.accepted),
+            _told(one.prior),
             Entry(one.reference),
-            Entry(one.remark),
+            Entry(one.reason),
         )
         for one in subject.calibrated.findings
     ]
-    columns = ("finding", "comes out", "95 % interval", "draws", "stated by", "remark")
-    return plain("Findings, and how often they come out", columns, lines, numeric=columns[1:4])
+    return plain(
+        "Findings: share of the draws in which they come out, with its 95 % interval",
+        ("finding", "accepted draws", "all draws", "stated by", "what is asked of a draw"),
+        lines,
+        numeric=("accepted draws", "all draws"),
+    )
+
+
+def _told(one: Share | None) -> Entry:
+    if one is None:
+        return Entry(ABSENT)
+    return Entry(f"{one.share:.0%} ({one.low:.0%} … {one.high:.0%}) of {one.draws}", one.share)
 
 
 def _linear(subject: Subject) -> PlainTable | None:

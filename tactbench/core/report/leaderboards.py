@@ -1,73 +1,64 @@
-"""One draw: a value for every nuisance and, once it has been carried out, a number for every output."""
+"""The leaderboards: every block of the table as a table that can be sorted."""
 
 from __future__ import annotations
 
-import hashlib
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Mapping
+from typing import Any
 
-import numpy as np
-import numpy.typing as npt
+from tactbench.core.leaderboard.table import NUMERIC, Block, Line, build_table
+from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, number, plain
+from tactbench.core.report.section import Section, Subject
 
-from tactbench.core.samples import FloatArray
-from tactbench.core.spec.calibration import CalibrationSpec, Fixed, LogUniform, Prior
+Row = Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class Draw:
-    """One draw that has been carried out, or could not be."""
-
-    number: int
-    seed: int
-    """Of all its recordings and estimators."""
-    parameters: Mapping[str, float]
-    """By nuisance, in the unit of its prior."""
-    outputs: Mapping[str, float]
-    """By output; those read off the first draws only are missing elsewhere."""
-    status: Literal["done", "failed"] = "done"
-    reason: str = ""
-    """Why it failed."""
+def _per_row(row: Row) -> object:
+    return row["predict_s"] / row["batch_rows"] if row["batch_rows"] else None
 
 
-def parameters_of(spec: CalibrationSpec, seed: int, number: int) -> tuple[int, dict[str, float]]:
-    """Return the recordings' seed of draw `number` and its value of every nuisance.
-
-    Each nuisance has a stream of its own, named after it: a draw is the same alone, among any others and in any order,
-    and one nuisance more or fewer leaves the other values as they are.
-    """
-    values = {
-        nuisance.name: sample(nuisance.prior, _generator(seed, number, nuisance.name)) for nuisance in spec.nuisances
-    }
-    return int(_generator(seed, number, "recordings and estimators").integers(2**31)), values
-
-
-def sample(prior: Prior, rng: np.random.Generator) -> float:
-    """Return one number from a prior."""
-    if isinstance(prior, Fixed):
-        return prior.value
-    if isinstance(prior, LogUniform):
-        return min(max(math.exp(rng.uniform(math.log(prior.low), math.log(prior.high))), prior.low), prior.high)
-    return float(rng.uniform(prior.low, prior.high))
+# What a column is sorted by: the text has units of its own line by line.
+VALUES: dict[str, Callable[[Row], object]] = {
+    "score": lambda row: row["score"],
+    "95 % interval": lambda row: row["ci_low"],
+    "published": lambda row: row["published"],
+    "baseline": lambda row: row["baseline"],
+    "n test": lambda row: row["n_test"],
+    "sessions": lambda row: row["n_sessions"],
+    "sim": lambda row: row["sim_s"],
+    "fit": lambda row: row["fit_s"],
+    "latency p50": lambda row: row["latency_ms_p50"],
+    "p95": lambda row: row["latency_ms_p95"],
+    "batch/row": _per_row,
+}
 
 
-def parameter_values(draws: Sequence[Draw], name: str) -> FloatArray:
-    """Return (n,) values of one nuisance."""
-    return np.array([draw.parameters[name] for draw in draws], dtype=np.float64)
+def leaderboards_section(subject: Subject) -> Section:
+    """Return the section of leaderboards, failed and skipped cells with their reasons."""
+    table = build_table(subject.rows)
+    rows = {row["cell"]: row for row in subject.rows}
+    tables = tuple(_table(block, table.columns, rows, subject.anchors) for block in table.blocks)
+    said = ("Click a heading to sort by it; click it again to turn the order round.",)
+    return Section("leaderboards", "Leaderboards", said=said, tables=tables, notes=table.notes)
 
 
-def output_values(draws: Sequence[Draw], name: str) -> FloatArray:
-    """Return (n,) values of one output; NaN where a draw has none."""
-    return np.array([draw.outputs.get(name, math.nan) for draw in draws], dtype=np.float64)
+def _table(
+    block: Block, columns: tuple[str, ...], rows: Mapping[str, Row], anchors: Mapping[str, str]
+) -> PlainTable:  # fmt: skip
+    lines = []
+    for line in block.lines:
+        row, anchor = rows[line.cell], anchors[line.cell]
+        reason = "" if row["status"] == "done" else str(row["reason"])
+        lines.append([*_entries(line, columns, row, anchor), Entry(reason)])
+    kinds = [line.kind for line in block.lines]
+    return plain(block.title, (*columns, "reason"), lines, numeric=NUMERIC, kinds=kinds)
 
 
-def finished(draws: Sequence[Draw]) -> list[Draw]:
-    """Return the draws that were carried out, in order of their number."""
-    return sorted((draw for draw in draws if draw.status == "done"), key=lambda draw: draw.number)
-
-
-def _generator(seed: int, number: int, name: str) -> np.random.Generator:
-    digest = hashlib.blake2b(name.encode(), digest_size=16).digest()
-    words: npt.NDArray[np.uint32] = np.frombuffer(digest, dtype="<u4")
-    return np.random.default_rng(np.random.SeedSequence([seed, number, *(int(word) for word in words)]))
+def _entries(line: Line, columns: tuple[str, ...], row: Row, anchor: str) -> list[Entry]:
+    entries = []
+    for name, text in zip(columns, line.cells, strict=True):
+        if name not in NUMERIC or text in ("", ABSENT):
+            entries.append(Entry(text))
+        else:
+            value = finite(VALUES[name](row)) if name in VALUES else number(text)
+            entries.append(Entry(text, value, anchor))
+    return entries

@@ -20,7 +20,8 @@ from tactbench.core.report.published import published_table
 from tactbench.core.report.reproduction import records, reproduce
 from tactbench.core.report.section import Subject
 
-Drawer = Callable[[Material, Path, Progress], Sequence[Drawn]]
+Drawer = Callable[[Material, Path, Progress, Callable[[str], None]], Sequence[Drawn]]
+"""Told the material, the folder for figures, where progress goes and what to call with each figure it leaves out."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def make_report(
     Parameters
     ----------
     draw
-        Called with the material, the folder for figures and `progress`; None: the page has no figures.
+        Draws the figures; None: the page has none.
     calibrated
         What a calibration has found, if there was one.
 
@@ -70,8 +71,9 @@ def make_report(
     material = Material(material.store, material.registry, readable)
     try:
         (out / "figures").mkdir(parents=True, exist_ok=True)
-        drawn, trouble = _drawn(material, out / "figures", progress, draw)
-        subject = Subject(material, drawn, calibrated, trouble)
+        undrawn: list[str] = []
+        drawn, trouble = _drawn(material, out / "figures", progress, draw, undrawn.append)
+        subject = Subject(material, drawn, calibrated, (*undrawn, *trouble))
         page = make_page(subject)
         # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
         replace_file(out / "index.html", page.html.encode("utf-8", "replace"))
@@ -81,25 +83,24 @@ def make_report(
             hint="Give another folder with --out.",
         ) from error
     rows_left_out = [f"{name}: its row is of another version; run it again" for name in foreign]
-    figures = [f"Figures: {trouble}"] if trouble else []
     return Report(
         page=out / "index.html",
         reproduction=published_table(subject),
         records=records(reproduce(material.registry, readable, calibrated)),
         missing=(*page.missing, *rows_left_out),
-        broken=(*page.broken, *figures),
+        broken=(*page.broken, *trouble),
     )
 
 
 def _drawn(
-    material: Material, folder: Path, progress: Progress, draw: Drawer | None
-) -> tuple[Sequence[Drawn], str]:  # fmt: skip
-    """Return the figures, or why there are none: a figure that fails does not take the tables with it."""
+    material: Material, folder: Path, progress: Progress, draw: Drawer | None, remark: Callable[[str], None]
+) -> tuple[Sequence[Drawn], tuple[str, ...]]:
+    """Return the figures, and why there are none: drawing that fails does not take the tables with it."""
     if draw is None:
-        return (), ""
+        return (), ()
     try:
-        return draw(material, folder, progress), ""
+        return draw(material, folder, progress, remark), ()
     except OSError:
         raise
     except Exception as error:
-        return (), f"The figures could not be drawn: {type(error).__name__}: {error}"
+        return (), (f"The figures could not be drawn: {type(error).__name__}: {error}",)

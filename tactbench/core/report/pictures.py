@@ -8,10 +8,8 @@ from tactbench.core.report.section import Picture, Section, Subject
 def pictures_section(subject: Subject) -> Section:
     """Return the section of figures: those that were drawn for this page."""
     if not subject.drawn:
-        why = (
-            subject.trouble or "None was drawn from these results: `tactbench run` makes what the paper's figures show."
-        )
-        return Section("figures", "Figures", missing=(why,))
+        none = "None was drawn from these results: `tactbench run` makes what the paper's figures show."
+        return Section("figures", "Figures", missing=subject.undrawn or (none,))
     by_key = {row["key"]: row["cell"] for row in subject.rows if row["key"]}
     pictures = tuple(
         Picture(
@@ -23,5 +21,4 @@ def pictures_section(subject: Subject) -> Section:
         for one in subject.drawn
     )
     said = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",)
-    missing = (subject.trouble,) if subject.trouble else ()
-    return Section("figures", "Figures", said=said, pictures=pictures, missing=missing)
+    return Section("figures", "Figures", said=said, pictures=pictures, missing=subject.undrawn)

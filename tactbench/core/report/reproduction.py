@@ -113,7 +113,7 @@ def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> 
     if not inside:
         edge = predicted.low if published < predicted.low else predicted.high
         told += f" by {score(abs(published - edge), unit)}{_suffix(unit)}"
-    if predicted.asks:
+    elif predicted.asks:
         asked = ", ".join(f"{name} {low:.3g} … {high:.3g}" for name, (low, high) in sorted(predicted.asks.items()))
         told += f" and asks for {asked}"
     return told
@@ -122,9 +122,7 @@ def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> 
 def _line(task: TaskSpec, published: Published, row: Row, calibrated: Calibrated | None) -> Reproduction:
     predicted = None
     if calibrated is not None:
-        predicted = calibrated.range_for(
-            task.name, row["sensor"], row["estimator"], row["protocol"], published.score
-        )  # fmt: skip
+        predicted = calibrated.range_for(task.name, row["sensor"], published.score)
     word, sentence = verdict(row, published.score, predicted)
     return Reproduction(
         title=_title(task, published, row["sensor"]),

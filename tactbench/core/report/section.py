@@ -9,12 +9,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from tactbench.core.leaderboard.table import answer_name
 from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.material import Material
 from tactbench.core.report.plain import PlainTable
 
 Row = Mapping[str, Any]
+_DESCRIBED = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "seed")
 
 
 @dataclass(frozen=True)
@@ -24,8 +26,8 @@ class Subject:
     material: Material
     drawn: Sequence[Drawn] = ()
     calibrated: Calibrated | None = None
-    trouble: str = ""
-    """Why there are no figures, if they should be there."""
+    undrawn: tuple[str, ...] = ()
+    """Why figures are missing, a sentence each."""
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -48,6 +50,22 @@ class Subject:
                 anchor, count = f"{stem}-{count}", count + 1
             found[row["cell"]] = anchor
         return found
+
+    def anchor_of(self, facts: Mapping[str, Any]) -> str:
+        """Return the anchor of the one cell that `facts` describe: by name, by key, or by what was asked of whom.
+
+        Empty if no cell fits, or several do. Other keys do not matter; an estimator may come with its parameters in
+        brackets.
+        """
+        asked = {name: facts[name] for name in _DESCRIBED if facts.get(name) is not None}
+        cells = [row for row in self.rows if facts.get("cell") == row["cell"] or (facts.get("key") or 0) == row["key"]]
+        if not cells and {"sensor", "task", "estimator"} <= set(asked):
+            name = asked.pop("estimator")
+            alike = [row for row in self.rows if all(row[one] == value for one, value in asked.items())]
+            cells = [row for row in alike if name == answer_name(row)] or [
+                row for row in alike if name == row["estimator"]
+            ]
+        return self.anchors[cells[0]["cell"]] if len(cells) == 1 else ""
 
 
 @dataclass(frozen=True)

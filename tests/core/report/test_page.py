@@ -3,6 +3,7 @@
 import itertools
 import json
 import re
+import shutil
 import time
 
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from tactbench.core.leaderboard.table import NUMERIC
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.calibrated import Calibrated, FindingFrequency
+from tactbench.core.report.calibrated import Calibrated, Finding, Share
 from tactbench.core.report.costs import read_table
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.leaderboards import VALUES
@@ -31,11 +32,11 @@ def material(results):
 
 @pytest.fixture
 def subject(material, tmp_path):
-    return Subject(material, draw_one(material, tmp_path, None))
+    return Subject(material, draw_one(material, tmp_path))
 
 
 def test_the_same_results_give_the_same_bytes(subject, results, tmp_path):
-    again = Subject(open_material(Store(results), load_registry()), draw_one(subject.material, tmp_path, None))
+    again = Subject(open_material(Store(results), load_registry()), draw_one(subject.material, tmp_path))
     assert make_page(subject).html.encode() == make_page(again).html.encode()
 
 
@@ -132,32 +133,63 @@ def test_a_section_that_cannot_be_made_takes_no_other_with_it(material, tmp_path
 
 
 def test_findings_of_a_calibration_and_linear_against_non_linear(material):
-    finding = FindingFrequency("icub-better", "The iCub is better at curvature.", 0.84, 0.78, 0.89, 200, "section IV")
+    often = Share(0.84, 0.78, 0.89, 200)
+    finding = Finding("The iCub is better at curvature.", Share(0.5, 0.4, 0.6, 400), often, "section IV", "by .05")
     text = Reader(make_page(Subject(material, calibrated=Calibrated(findings=(finding,)))).html).text
-    assert "The iCub is better at curvature. 84% 78% … 89% 200 section IV" in text
+    assert "The iCub is better at curvature. 84% (78% … 89%) of 200 50% (40% … 60%) of 400 section IV by .05" in text
     assert re.search(r"icub SIM, force, karl2016, roles lasso 0\.\d{4} \(.*?\) forest 0\.\d{4}", text)
 
 
 def test_cost_files_are_shown_whatever_their_keys(material, tmp_path):
-    row = material.rows[0]
-    held = {
-        "title": "Cost of force",
-        "reference": "five runs",
-        "points": [{"key": row["key"], "fit_s": 0.25, "front": True}],
-    }
-    path = tmp_path / "icub-force.json"
-    path.write_text(json.dumps(held))
-    table = read_table(path, Subject(material))
-    assert (table.title, table.columns, table.notes) == (
-        "Cost of force",
-        ("key", "fit_s", "front"),
-        ("reference: five runs",),
-    )
-    assert table.lines[0][1].value == 0.25
-    assert table.lines[0][1].anchor == Subject(material).anchors[row["cell"]]
-    path.write_text('{"points": "none"}')
-    with pytest.raises(ValueError, match="tactbench cost"):
-        read_table(path, Subject(material))
+    subject, path = Subject(material), tmp_path / "icub-force.json"
+    lasso, forest = (row for row in material.rows if row["task"] == "force" and not row["is_baseline"])
+    asked = {name: lasso[name] for name in ("sensor", "task", "rig", "protocol", "split", "seed")}
+    rows = [
+        {"estimator": "lasso", "fit_s": 0.25, "fit_s_q1": 0.2, "front": True, "loop": None, "status": "done", "of": {}},
+        {
+            "estimator": "forest",
+            "fit_s": 1.5,
+            "fit_s_q1": 1.2,
+            "front": False,
+            "loop": [1, 2],
+            "status": "done",
+            "of": {},
+        },
+    ]
+    path.write_text(json.dumps({"title": "force", **asked, "definitions": {"fit_s": "one fit"}, "rows": rows}))
+    table = read_table(path, subject)
+    assert (table.title, table.columns) == ("Cost: force", ("estimator", "fit_s", "front", "loop"))
+    assert [line[1].value for line in table.lines] == [0.25, 1.5]
+    assert [line[2].text for line in table.lines] == ["yes", "no"]
+    assert [line[1].anchor for line in table.lines] == [subject.anchors[row["cell"]] for row in (lasso, forest)]
+    assert table.notes[0].startswith("Of all lines: title force, sensor icub, task force")
+    assert table.notes[0].endswith("status done.")
+    assert table.notes[1] == "fit_s: one fit."
+
+
+@pytest.mark.parametrize("text", ['{"points": "none"}', "[]", "not json", "[1, 2]"])
+def test_a_damaged_cost_file_is_named_and_takes_nothing_with_it(results, tmp_path, text):
+    shutil.copytree(results, tmp_path / "copy", ignore=shutil.ignore_patterns("recordings"))
+    (tmp_path / "copy" / "cost").mkdir()
+    (tmp_path / "copy" / "cost" / "broken.json").write_text(text)
+    page = make_page(Subject(open_material(Store(tmp_path / "copy"), load_registry())))
+    assert page.broken == ()
+    assert "cost/broken.json cannot be shown" in page.html
+
+
+def test_a_number_leads_to_the_one_cell_that_it_can_be_from_or_to_none(material):
+    subject = Subject(material)
+    forest = next(row for row in material.rows if row["params"] and row["task"] == "force")
+    told = {"sensor": "icub", "task": "force", "estimator": "forest"}
+    assert subject.anchor_of({"cell": forest["cell"]}) == subject.anchors[forest["cell"]]
+    assert subject.anchor_of({"key": forest["key"]}) == subject.anchors[forest["cell"]]
+    assert subject.anchor_of(told) == subject.anchors[forest["cell"]]
+    assert subject.anchor_of({**told, "estimator": "forest (max_depth=6, n_estimators=3)"}) != ""
+    assert subject.anchor_of({**told, "protocol": "deployable"}) == ""
+    assert subject.anchor_of({"sensor": "icub"}) == ""
+    assert subject.anchor_of({"key": None}) == ""
+    twice = Subject(Material(material.store, material.registry, (forest, {**forest, "cell": "another"})))
+    assert twice.anchor_of(told) == ""
 
 
 def test_a_hundred_cells_take_less_than_a_second(material):

@@ -19,7 +19,7 @@ def force_row(sensor="icub", estimator="lasso", score=0.68, **more):
 
 
 def predicted(low, high, **more):
-    return PredictiveRange("force", "icub", "lasso", "karl2016", 0.7659, low, high, 0.9, "held out", **more)
+    return PredictiveRange("force", "icub", 0.7659, low, high, 0.9, "held out", **more)
 
 
 @pytest.mark.parametrize("published", [0.58, 0.68, 0.78])
@@ -57,6 +57,8 @@ def test_a_calibration_says_whether_it_reaches_the_number_and_what_it_asks_for()
     assert "the published lies outside the calibrated range (held out) by 0.0500 N" in missing
     below = verdict(force_row(), 0.4, predicted(0.6, 0.85))[1]
     assert "by 0.2000 N" in below
+    # What leads to a range that does not reach the number is no explanation of it.
+    assert "asks" not in verdict(force_row(), 0.9, predicted(0.6, 0.85, asks={"drift_scale": (2.0, 3.5)}))[1]
 
 
 def test_only_a_simulated_row_asks_for_a_calibration():
