@@ -82,12 +82,13 @@ def make_report(
             f"The report cannot be written to {out}: {error.strerror or error}.",
             hint="Give another folder with --out.",
         ) from error
+    lacking = tuple(one for one in page.missing if not any(told in one for told in trouble))
     rows_left_out = [f"{name}: its row is of another version; run it again" for name in foreign]
     return Report(
         page=out / "index.html",
         reproduction=published_table(subject),
         records=records(reproduce(material.registry, readable, calibrated)),
-        missing=(*page.missing, *rows_left_out),
+        missing=(*lacking, *rows_left_out),
         broken=(*page.broken, *trouble),
     )
 
