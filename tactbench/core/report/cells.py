@@ -52,7 +52,7 @@ def cells_section(subject: Subject) -> Section:
 
 def _details(row: Row, anchors: Mapping[str, str]) -> Details:
     single = {name for name, value in row.items() if not isinstance(value, Mapping | list | tuple)} - set(_APART)
-    grouped = {name for names in _GROUPS.values() for name in names}
+    grouped = {name for names in _GROUPS.values() for name in names} | set(_TITLES)
     groups = {**_GROUPS, "Also": tuple(sorted(single - grouped))}
     tables = [_pairs(title, ((name, row[name]) for name in names if name in single)) for title, names in groups.items()]
     lists = []

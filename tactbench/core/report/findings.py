@@ -70,9 +70,9 @@ def _linear(subject: Subject) -> PlainTable | None:
         return None
     return plain(
         "Linear against non-linear",
-        ("question", "linear", "its score", "non-linear", "score of it", "comparison"),
+        ("question", "linear", "score", "non-linear", "score", "comparison"),
         lines,
-        numeric=("its score", "score of it"),
+        numeric=("score",),
         notes=(
             "The best of each kind by its score on the test set: of many that are equally good, the best of more looks "
             "better. Whether an answer is linear is for its estimator to say.",
