@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 @click.option("--repeats", type=click.IntRange(min=1), metavar="N", help="Repeat everything with N seeds.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
+@click.option("--probe", is_flag=True, help="Also ask what the recordings give away: first frame alone, shuffled rows.")
 @simulation_options
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
@@ -41,6 +42,7 @@ def command(
     jobs: int,
     out: Path,
     shape: str,
+    probe: bool,
     recordings: Path | None,
     effects: str | None,
     rung: str | None,
@@ -59,6 +61,8 @@ def command(
 
     matrix = _matrix(**asked, replaying=recordings is not None)
     simulation = simulation_of(load_registry(), matrix.rig, effects=effects, rung=rung, tolerance=tolerance)
+    if probe:
+        matrix = matrix.model_copy(update={"probe": True})
     if simulation is not None:
         matrix = matrix.model_copy(update={"simulation": simulation})
     folder = recordings or (Path(matrix.recordings) if matrix.recordings else None)
@@ -147,7 +151,7 @@ def _suggest(row: Mapping[str, Any]) -> None:
         }
     else:
         tries = {
-            "tactbench run … --split shuffled": "what a leaking split would have claimed",
+            "tactbench run … --probe": "what the recordings give away: first frame alone, shuffled rows",
             "tactbench run … --estimator forest": "another answer (see tactbench list estimators)",
             "tactbench inspect FILE": "what is in a recording, and whether it is healthy",
         }

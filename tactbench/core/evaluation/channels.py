@@ -89,12 +89,16 @@ Found = tuple[str, int, ChannelSpec]
 
 
 def channels_for(recording: Recording, target: ChannelTarget) -> list[Found]:
-    """Return the channels that could be meant; of several the one called ``normal`` or ``fz`` alone."""
+    """Return the channels that could be meant; of several the one called ``normal`` or ``fz`` alone.
+
+    One called ``shear`` must be asked for by name: it is a force, but not the one that presses.
+    """
     found = [
         (name, place, channel)
         for name in recording.stream_names
         for place, channel in enumerate(recording.stream(name).spec.channels)
-        if channel.kind == target.kind and target.name in (None, channel.name)
+        if channel.kind == target.kind
+        and (channel.name == target.name or (target.name is None and channel.name != "shear"))
     ]
     plain = [one for one in found if one[2].name in ("normal", "fz")]
     return plain if len(found) > 1 and len(plain) == 1 else found

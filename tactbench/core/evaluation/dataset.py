@@ -221,4 +221,6 @@ def _table(meta: RecordingMeta, raw: _Raw, classes: tuple[Any, ...]) -> Table:
 
 
 def _wanted(task: TaskSpec) -> str:
-    return task.target.name if isinstance(task.target, LabelTarget) else f"{task.target.kind} sample"
+    if isinstance(task.target, LabelTarget):
+        return task.target.name
+    return f"{task.target.kind} sample" + (f" called {task.target.name!r}" if task.target.name else "")

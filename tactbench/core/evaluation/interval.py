@@ -73,7 +73,10 @@ def score_interval(
             times[:, one] = rng.multinomial(len(one), np.full(len(one), 1 / len(one)), size=RESAMPLES)
         scores = metric.score(times @ sums, n_classes)
         tail = _widened_tail(len(names) - len(strata), min(len(one) for one in strata))
-        return _percentiles(scores, f"bootstrap over {len(names)} {cluster_name}s", tail)
+        plural = cluster_name + ("es" if cluster_name.endswith("s") else "s")
+        return _percentiles(scores, f"bootstrap over {len(names)} {plural}", tail)
+    if len(np.unique(recording)) == len(recording):
+        return _of_too_few(metric, rows, n_classes)
     total = np.zeros((RESAMPLES, rows.shape[1]))
     lengths = []
     for one in np.unique(recording):
@@ -86,6 +89,17 @@ def score_interval(
     many = f"{len(lengths)} recording" + ("s" if len(lengths) > 1 else "")
     method = f"block bootstrap in time within {many} (blocks of {spread} rows): spread between sessions is not in it"
     return _percentiles(metric.score(total, n_classes), method)
+
+
+def _of_too_few(metric: Metric, rows: FloatArray, n_classes: int) -> Interval:
+    """Return what a few rows, each a recording of its own, cannot exclude: there is no time to resample in them."""
+    method = f"none: {len(rows)} recordings of one row each are too few to resample; the range of what is possible"
+    if metric.kind == "classification":
+        return Interval(0.0, 1.0, method)
+    each = metric.score(rows, n_classes)
+    if not np.isfinite(each).all():  # R² of one row is undefined
+        each = metric.score(rows.sum(axis=0), n_classes)
+    return Interval(float(each.min()), float(each.max()), method)
 
 
 def enough(y: npt.NDArray[Any], cluster: npt.NDArray[Any], n_classes: int) -> bool:

@@ -29,6 +29,10 @@ class ProtocolSpec(Frozen):
     """Only recordings with the roles train, validation and test can be used."""
     uses_test_statistics: bool = False
     """Rows carry a dagger."""
+    first_row_only: bool = False
+    """Keep the first row of every recording and nothing else; see `first_frame`."""
+    probe: bool = False
+    """Asks what recordings give away, not what a sensor can do: allowed for every task, whether it lists it or not."""
 
 
 KARL2016 = ProtocolSpec(
@@ -55,7 +59,17 @@ DEPLOYABLE = ProtocolSpec(
 )
 """What a sensor in use can do: no statistic of the test set, causal windows, no row dropped by its label."""
 
-PROTOCOLS = {protocol.name: protocol for protocol in (KARL2016, DEPLOYABLE)}
+FIRST_FRAME = ProtocolSpec(
+    name="first-frame",
+    title="The first row of each recording alone, everything else as deployable",
+    scaled_by="training set",
+    window_over="consecutive samples",
+    first_row_only=True,
+    probe=True,
+)
+"""What does the reading before anything happened already tell? The hold is not dropped: it is what is asked about."""
+
+PROTOCOLS = {protocol.name: protocol for protocol in (KARL2016, DEPLOYABLE, FIRST_FRAME)}
 
 
 def protocol_called(name: str) -> ProtocolSpec:

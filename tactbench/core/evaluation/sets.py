@@ -79,11 +79,12 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     DataError
         If no row is left.
     """
-    chosen = [mask & _after_start(table, protocol, counts) for table, mask in zip(data.tables, masks, strict=True)]
+    chosen = [mask & _asked_for(table, protocol) for table, mask in zip(data.tables, masks, strict=True)]
     sizes = [int(mask.sum()) for mask in chosen]
-    early = sum(int(mask.sum()) for mask in masks) - sum(sizes)
-    if early:
-        counts[f"{what} rows before the press begins"] += early
+    others = sum(int(mask.sum()) for mask in masks) - sum(sizes)
+    if others:
+        which = "after the first of a recording" if protocol.first_row_only else "before the press begins"
+        counts[f"{what} rows {which}"] += others
     if sum(sizes) == 0:
         raise DataError(f"The {what} set has no rows.", hint="Check roles, sessions and the length of the recordings.")
     tables = data.tables
@@ -116,7 +117,10 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     )
 
 
-def _after_start(table: Table, protocol: ProtocolSpec, counts: Counter[str]) -> Mask:
+def _asked_for(table: Table, protocol: ProtocolSpec) -> Mask:
+    """Return (n,) which rows the protocol looks at, by their place in the recording."""
+    if protocol.first_row_only:
+        return np.asarray(np.arange(len(table.row)) == 0)
     started: Mask = table.row >= protocol.discard_samples
     if protocol.discard_hold and table.meta.scene is not None:
         started = started & (table.time_s >= table.meta.scene.profile.hold.to("s"))

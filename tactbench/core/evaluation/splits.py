@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.first_frame import require_first_rows
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.spec.task import TaskSpec
 
@@ -47,6 +48,13 @@ def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: s
     NotApplicable
         If the protocol or every split of the task lacks what it needs.
     """
+    split = _chosen(task, protocol, data, asked)
+    if protocol.first_row_only:
+        require_first_rows(task, data, split)
+    return split
+
+
+def _chosen(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: str | None) -> str:
     if protocol.roles_only:
         if asked not in (None, "roles"):
             raise UsageError(

@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from tactbench.core.leaderboard import probe
 from tactbench.core.leaderboard.table import NUMERIC, Table, build_table
 
 Row = Mapping[str, Any]
@@ -69,6 +70,12 @@ def to_markdown(rows: Sequence[Row]) -> str:
         parts += ["| " + " | ".join(_md(cell) for cell in line.cells) + " |" for line in block.lines]
         parts.append("")
     parts += [f"- {_md(note)}" for note in table.notes]
+    probed = probe.build_probe(rows)
+    if probed is not None:
+        parts += ["", f"### {_md(probed.title)}\n", "| " + " | ".join(probed.columns) + " |"]
+        parts.append("|" + "|".join("---:" if name in probe.NUMERIC else "---" for name in probed.columns) + "|")
+        parts += ["| " + " | ".join(_md(cell) for cell in line) + " |" for line in probed.lines]
+        parts += ["", *(f"- {_md(note)}" for note in probed.notes)]
     return "\n".join(parts) + "\n"
 
 
@@ -83,6 +90,15 @@ def to_latex(rows: Sequence[Row]) -> str:
         parts += [" & ".join(_tex(cell) for cell in line.cells) + r" \\" for line in block.lines]
         parts += [r"\bottomrule", r"\end{tabular}"]
         parts += [rf"\par\footnotesize {_tex(note)}" for note in _notes_of(table, block.title)]
+        parts += [r"\end{table}", ""]
+    probed = probe.build_probe(rows)
+    if probed is not None:
+        alignment = "".join("r" if name in probe.NUMERIC else "l" for name in probed.columns)
+        parts += [r"\begin{table}", rf"\caption{{{_tex(probed.title)}}}", rf"\begin{{tabular}}{{{alignment}}}"]
+        parts += [r"\toprule", " & ".join(_tex(name) for name in probed.columns) + r" \\", r"\midrule"]
+        parts += [" & ".join(_tex(cell) for cell in line) + r" \\" for line in probed.lines]
+        parts += [r"\bottomrule", r"\end{tabular}"]
+        parts += [rf"\par\footnotesize {_tex(note)}" for note in probed.notes]
         parts += [r"\end{table}", ""]
     return "\n".join(parts) + "\n"
 

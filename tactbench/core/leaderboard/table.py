@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.numbers import duration, interval, score, whole
 
@@ -157,6 +158,12 @@ def _notes(rows: Sequence[Row]) -> list[str]:
         for row in rows
         if row["simulated"]
     )
+    notes += _distinct(
+        f"published for {row['sensor']}/{row['task']}: {score(row['published'], row['unit'])} "
+        f"({row['published_reference']}): {row['published_remark']}."
+        for row in rows
+        if row["published"] is not None and row.get("published_remark")
+    )
     for row in rows:
         if row["chosen"]:
             picked = ", ".join(f"{key.rstrip('_')} = {value:g}" for key, value in sorted(row["chosen"].items()))
@@ -171,13 +178,25 @@ def _notes(rows: Sequence[Row]) -> list[str]:
     notes += _distinct(
         f"{row['task']}: interval by {row['ci_method']}." for row in rows if row["ci_method"] and not row["is_baseline"]
     )
-    notes += [f"{_who(row)} {row['status']}: {row['reason']}" for row in rows if row["status"] != "done"]
+    notes += _distinct(
+        # What makes no sense to probe makes none with any estimator.
+        f"{row['sensor']}/{row['task']}/{row['protocol'] if _is_probe(row) else row['estimator']} {row['status']}: "
+        f"{row['reason']}"
+        for row in rows
+        if row["status"] != "done"
+    )
     return notes
+
+
+def _is_probe(row: Row) -> bool:
+    return row["protocol"] in PROTOCOLS and PROTOCOLS[row["protocol"]].probe
 
 
 def _no_better(row: Row) -> bool:
     if row["status"] != "done" or row["is_baseline"] or row["baseline"] is None:
         return False
+    if _is_probe(row):
+        return False  # no better than trivial is what a probe should be
     lower = row["metric"] in LOWER_IS_BETTER
     return bool(row["ci_high"] >= row["baseline"] if lower else row["ci_low"] <= row["baseline"])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from tactbench.core.leaderboard import probe
 from tactbench.core.leaderboard.table import NUMERIC, Block, build_table
 
 if TYPE_CHECKING:
@@ -41,6 +42,28 @@ def show(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
         names = ", ".join(name for name in table.columns if name in left_out)
         notes.append(f"This terminal is too narrow for: {names}. They are in the files.")
     for note in notes:
+        console.print(Padding(Text(note, style="dim"), (0, 0, 0, 1), expand=False))
+    _show_probe(rows, console)
+
+
+def _show_probe(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
+    """Print what the recordings give away, if it was asked."""
+    from rich import box
+    from rich.padding import Padding
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    table = probe.build_probe(rows)
+    if table is None:
+        return
+    console.print(Text(f"\n{table.title}", style="bold"))
+    grid = RichTable(box=box.SIMPLE_HEAD)
+    for name in table.columns:
+        grid.add_column(Text(name), justify="right" if name in probe.NUMERIC else "left", overflow="fold")
+    for line in table.lines:
+        grid.add_row(*(Text(cell) for cell in line), style="yellow" if line[-1].startswith("LEAK") else "")
+    console.print(grid)
+    for note in table.notes:
         console.print(Padding(Text(note, style="dim"), (0, 0, 0, 1), expand=False))
 
 

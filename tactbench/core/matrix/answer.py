@@ -116,9 +116,9 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
 
 
 def _published(cell: Cell, task: TaskSpec, split: str | None) -> Row:
-    """Return the published figure that the cell may stand beside: with an estimator's defaults only."""
-    found = None if cell.params else task.published_for(cell.sensor, cell.protocol, cell.estimator, split)
-    if found is None or (found.estimator is None and cell.baseline):
+    """Return the published figure that the cell may stand beside: one of ours with its defaults only."""
+    found = task.published_for(cell.sensor, cell.protocol, cell.estimator, split)
+    if found is None or (cell.baseline if found.estimator is None else cell.params):
         return {"published": None, "published_reference": "", "published_remark": ""}
     own = "" if found.estimator else "another model than ours"
     remark = "; ".join(part for part in (own, found.remark) if part)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, PROTOCOLS, protocol_called
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.task import TaskSpec
@@ -78,13 +79,32 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                     )
                     if cell not in cells:
                         cells.append(cell)
-    return cells
+    return with_probes(cells, registry) if matrix.probe else cells
+
+
+def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
+    """Return `cells` and, after them, those that show what their recordings give away.
+
+    For every answer, and for its task's first baseline: the same under `deployable` with kept apart what the cell keeps
+    apart, under `first-frame`, and with rows shuffled. A split in time keeps no recordings apart and is not probed.
+    """
+    every = list(cells)
+    for cell in cells:
+        rules = protocol_called(cell.protocol)
+        trivial = registry.tasks[cell.task].spec.baselines[0]
+        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != trivial):
+            continue
+        split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
+        honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
+        added = (honest, replace(honest, protocol=FIRST_FRAME.name), replace(honest, split="shuffled"))
+        every += [one for one in added if one not in every]
+    return every
 
 
 def _protocol(task: TaskSpec, choice: TaskChoice) -> str:
     if choice.protocol is None:
         protocol = task.protocols[0]
-    elif choice.protocol in task.protocols:
+    elif choice.protocol in task.protocols or (choice.protocol in PROTOCOLS and PROTOCOLS[choice.protocol].probe):
         protocol = choice.protocol
     else:
         raise UnknownNameError(f"protocol of task {task.name!r}", choice.protocol, task.protocols)

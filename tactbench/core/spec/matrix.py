@@ -43,7 +43,9 @@ class MatrixSpec(Frozen):
     """How often everything is repeated, each time with another seed."""
     rig: str = "twin"
     recordings: str | None = None
-    """Folder of recordings for rigs that replay; relative to the file."""
+    """Folder of recordings for rigs that replay; relative to where tactbench is run."""
+    probe: bool = False
+    """Also run the cells that show what recordings give away; see docs/real-recordings.md."""
     simulation: Simulation = Simulation()
     """How a simulated rig is asked to carry out every scene."""
     sensors: tuple[str, ...] = ()

@@ -84,7 +84,7 @@ def test_eflesh_raw_and_baselined_differ_by_a_constant_in_each_press(imported):
 def test_eflesh_shear(imported):
     report = imported("eflesh-shear")
     (one,) = report.recordings
-    assert (one.rows, one.missing) == (7200, {"fz": 3475})
+    assert (one.rows, one.missing) == (7200, {"shear": 3475})
     with open_recording(one.path) as recording:
         assert recording.read("magnetometers").data.shape == (7200, 30)
         assert np.nanmax(recording.read("load_cell").data) == pytest.approx(17.9, abs=0.05)

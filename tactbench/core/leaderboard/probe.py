@@ -1,0 +1,162 @@
+"""What recordings give away: a score beside that of shuffled rows, of the first frame alone and of a trivial answer."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
+from tactbench.core.leaderboard.numbers import interval, score
+from tactbench.core.leaderboard.table import LOWER_IS_BETTER
+
+Row = Mapping[str, Any]
+
+LEAK_SHARE = 0.5
+"""Share of the skill (score beyond the trivial answer's) from which on the first frame's is called a leak: what came
+before the contact then explains as much as all that the contact adds."""
+TAIL = 0.025
+"""Probability that guessing does as well, below which the first frame is said to tell something: the tail of the
+leaderboard's 95 % intervals."""
+FEWEST = 5
+"""Recordings from which on an error of first frames has an interval."""
+COLUMNS = (
+    "sensor", "task", "estimator", "split", "repeat", "score", "95 % interval", "shuffled", "first frame alone",
+    "trivial", "verdict",
+)  # fmt: skip
+NUMERIC = frozenset({"repeat", "score", "95 % interval", "shuffled", "first frame alone", "trivial"})
+
+
+@dataclass(frozen=True)
+class ProbeTable:
+    """Plain text, ready to be shown."""
+
+    title: str
+    columns: tuple[str, ...]
+    lines: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...]
+
+
+def build_probe(rows: Sequence[Row]) -> ProbeTable | None:
+    """Put each finished answer under `deployable` beside its probes; None if nothing was probed."""
+    lines: list[tuple[str, ...]] = []
+    skipped: list[str] = []
+    for row in rows:
+        if row["is_baseline"] or row["status"] != "done" or row["protocol"] != DEPLOYABLE.name:
+            continue
+        if row["split"] in ("shuffled", "in-session"):
+            continue  # neither keeps recordings or groups apart: there is nothing to compare with
+        first = _partner(row, rows, protocol=FIRST_FRAME.name, split=row["split"])
+        shuffled = _partner(row, rows, protocol=DEPLOYABLE.name, split="shuffled")
+        if first is None and shuffled is None:
+            continue
+        lines.append(_line(row, shuffled, first))
+        if first is not None and first["status"] == "skipped":
+            skipped.append(f"{row['sensor']}/{row['task']}: {first['reason']}")
+    if not lines:
+        return None
+    used = [place for place in range(len(COLUMNS)) if any(line[place] for line in lines)]
+    return ProbeTable(
+        title="Probe · does the score come from the contact?",
+        columns=tuple(COLUMNS[place] for place in used),
+        lines=tuple(tuple(line[place] for place in used) for line in lines),
+        notes=(
+            f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer). "
+            "Optimistic: shuffled rows score beyond the interval of the split. See docs/real-recordings.md.",
+            *dict.fromkeys(skipped),
+        ),
+    )
+
+
+def _partner(row: Row, rows: Sequence[Row], *, protocol: str, split: str) -> Row | None:
+    """Return the same answer under another protocol or split. A cell that was never begun may not know its split."""
+    same = ("sensor", "task", "rig", "estimator", "params", "repeat")
+    for other in rows:
+        splits = (split,) if other["status"] == "done" else (split, None)
+        if other["protocol"] == protocol and other["split"] in splits and all(other[key] == row[key] for key in same):
+            return other
+    return None
+
+
+def _line(row: Row, shuffled: Row | None, first: Row | None) -> tuple[str, ...]:
+    unit = row["unit"]
+    options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
+    return (
+        row["sensor"] + (" SIM" if row["simulated"] else ""),
+        row["task"],
+        f"{row['estimator']} ({options})" if options else row["estimator"],
+        row["split"],
+        str(row["repeat"]) if row["repeats"] > 1 else "",
+        score(row["score"], unit),
+        interval(row["ci_low"], row["ci_high"], unit),
+        _shown(shuffled),
+        _shown(first),
+        score(row["baseline"], unit),
+        "; ".join([*_about_first(row, first), *_about_shuffled(row, shuffled)]) or "no leak shown",
+    )
+
+
+def _shown(row: Row | None) -> str:
+    if row is None:
+        return "–"
+    return score(row["score"], row["unit"]) if row["status"] == "done" else str(row["status"])
+
+
+def _about_first(row: Row, first: Row | None) -> list[str]:
+    """Return what the first frame says of the score, or nothing."""
+    trivial = row["baseline"]
+    if first is None or first["status"] != "done" or trivial is None:
+        return []
+    beyond = _beyond_guessing(first, trivial)
+    if beyond is None:
+        return [f"{first['n_test']} recordings are too few to say what the first frame tells"]
+    if not beyond:
+        return []
+    unit = row["unit"]
+    suffix = "" if unit == "1" else f" {unit}"
+    told = f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix}"
+    leak = _skill(first["score"], trivial, row) >= LEAK_SHARE * _skill(row["score"], trivial, row)
+    return [f"LEAK: {told}" if leak else f"{told}: a part of the answer is known before"]
+
+
+def _beyond_guessing(first: Row, trivial: float) -> bool | None:
+    """Tell whether the first frame answers better than a guess; None if there are too few recordings to tell.
+
+    Classes: the exact binomial tail of so many right answers, each recording being one answer and the commonest class
+    the guess. Numbers: the interval lies beyond the trivial score.
+    """
+    if first["confusion"] is not None:
+        table = np.asarray(first["confusion"])
+        n, right = int(table.sum()), int(np.trace(table))
+        guess = float(table.sum(axis=1).max()) / n
+        if guess == 1.0 or right == 0:
+            return False
+        return float(importlib.import_module("scipy.special").bdtrc(right - 1, n, guess)) <= TAIL
+    if first["n_test"] < FEWEST:
+        return None
+    worst = first["ci_high"] if _lower_is_better(first) else first["ci_low"]
+    return _skill(worst, trivial, first) > 0
+
+
+def _about_shuffled(row: Row, shuffled: Row | None) -> list[str]:
+    """Return by how much shuffled rows flatter the score, if by more than its interval."""
+    if shuffled is None or shuffled["status"] != "done":
+        return []
+    best = row["ci_low"] if _lower_is_better(row) else row["ci_high"]
+    if _skill(shuffled["score"], best, row) <= 0:
+        return []
+    suffix = "" if row["unit"] == "1" else f" {row['unit']}"
+    said = f"optimistic by {score(abs(shuffled['score'] - row['score']), row['unit'])}{suffix} when shuffled"
+    return [said if shuffled["n_test"] == row["n_test"] else f"{said} (tested on other rows)"]
+
+
+def _skill(value: float, trivial: float, row: Row) -> float:
+    """Return how much better than `trivial` a score is."""
+    return trivial - value if _lower_is_better(row) else value - trivial
+
+
+def _lower_is_better(row: Row) -> bool:
+    return row["metric"] in LOWER_IS_BETTER

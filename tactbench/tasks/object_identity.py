@@ -1,0 +1,29 @@
+"""Which object a hand has closed on, from taxels, one answer a frame."""
+
+from __future__ import annotations
+
+from tactbench.plugin import LabelTarget, TaskDescriptor, TaskSpec, hookimpl
+
+TACTBENCH_API = 1
+
+SPEC = TaskSpec(
+    name="object-identity",
+    title="Identity of the object",
+    question="Which object has the hand closed on?",
+    kind="classification",
+    target=LabelTarget(name="object"),
+    metric="accuracy",
+    protocols=("deployable",),
+    # Frames of one grasp are near copies: grasps are kept whole. By `trial`, the n-th grasp of every object is held out
+    # at once, so that every fold tests every object, and what the objects' n-th grasps shared is on one side only. By
+    # `recording`, each grasp for itself: for recordings whose grasps are not numbered.
+    splits=("trial", "recording", "shuffled"),
+    estimators=("forest",),
+    baselines=("majority", "chance"),
+)
+
+
+@hookimpl
+def tactbench_tasks() -> list[TaskDescriptor]:
+    """Offer the task."""
+    return [TaskDescriptor(spec=SPEC)]

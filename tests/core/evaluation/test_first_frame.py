@@ -1,0 +1,94 @@
+"""What the first row of a recording tells, asked of recordings that give their answer away and of some that do not."""
+
+import time
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import NotApplicable
+from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.plugins.registry import load_registry
+from tests.core.evaluation.made import force_task, label_task, record
+
+REGISTRY = load_registry()
+TASK = label_task("object", splits=("recording", "shuffled"))
+
+
+def grasps(folder, *, offset, each=12, n=20, seed=3):
+    """Three objects, `each` recordings of each: contact from row 5 on, and offsets before it that name the object."""
+    rng = np.random.default_rng(seed)
+    paths = []
+    for number in range(3 * each):
+        X = rng.normal(0.0, 0.1, (n, 3))
+        X += offset * np.eye(3)[number % 3]
+        X[5:] += 5.0 * np.eye(3)[number % 3]
+        paths.append(record(folder / f"g{number:02d}.h5", X, labels={"object": f"o{number % 3}"}, trial=str(number)))
+    return paths
+
+
+def run(paths, protocol="first-frame", split=None, task=TASK):
+    return evaluate(
+        task,
+        REGISTRY.estimators["forest"],
+        {"n_estimators": 10},
+        protocol,
+        split,
+        paths,
+        seed=1,
+        clock=time.perf_counter,
+    )
+
+
+def test_offsets_before_contact_name_the_object_and_contact_alone_does_not(tmp_path_factory):
+    told = run(grasps(tmp_path_factory.mktemp("told"), offset=3.0))
+    silent = grasps(tmp_path_factory.mktemp("silent"), offset=0.0)
+    assert told.score > 0.95
+    # 36 first rows of noise, three classes: the standard error of guessing is 0.08; three of them.
+    assert run(silent).score < 1 / 3 + 0.24
+    assert run(silent, "deployable").score > 0.7, "contact, from row 5 of 20 on, does tell"
+
+
+def test_one_row_a_recording_is_tested_and_the_others_are_counted(tmp_path):
+    result = run(grasps(tmp_path, offset=3.0))
+    assert result.n_test == 36
+    assert sorted(result.sets["test"].recording.tolist()) == list(range(36))
+    assert set(result.sets["test"].row.tolist()) == {0}
+    assert result.counts["test rows after the first of a recording"] == 36 * 19
+    assert result.split == run(sorted(tmp_path.glob("*.h5")), "deployable").split == "recording"
+
+
+def test_a_first_row_that_is_missing_is_replaced_by_the_first_there_is(tmp_path):
+    rng = np.random.default_rng(0)
+    for number in range(12):
+        quality = np.zeros((6, 2), dtype=np.uint8)
+        quality[0, 0] = 1
+        record(tmp_path / f"g{number}.h5", rng.normal(size=(6, 2)), quality=quality, labels={"object": number % 2})
+    result = run(sorted(tmp_path.glob("*.h5")))
+    assert set(result.sets["test"].row.tolist()) == {1}
+
+
+def test_an_answer_that_changes_within_a_recording_is_skipped_with_the_reason(tmp_path):
+    rng = np.random.default_rng(0)
+    paths = [record(tmp_path / f"s{place}.h5", rng.normal(size=(30, 3)), rng.normal(size=30), session=str(place))
+             for place in range(3)]  # fmt: skip
+    with pytest.raises(NotApplicable, match="changes within recording 's0'"):
+        run(paths, task=force_task())
+
+
+def test_single_readings_are_skipped_with_the_reason(tmp_path):
+    rng = np.random.default_rng(0)
+    paths = [record(tmp_path / f"g{place}.h5", rng.normal(size=(1, 3)), labels={"object": place % 2})
+             for place in range(8)]  # fmt: skip
+    with pytest.raises(NotApplicable, match="one reading"):
+        run(paths)
+
+
+def test_a_split_that_cuts_recordings_in_time_is_skipped_with_the_reason(tmp_path):
+    with pytest.raises(NotApplicable, match="'in-session' tests the end"):
+        run(grasps(tmp_path, offset=3.0), split="in-session")
+
+
+def test_too_few_first_rows_have_no_interval_and_say_so(tmp_path):
+    few = run(grasps(tmp_path, offset=3.0, each=2), split="recording")
+    assert (few.ci_low, few.ci_high) == (0.0, 1.0)
+    assert few.ci_method.startswith("none: 6 recordings of one row each are too few")

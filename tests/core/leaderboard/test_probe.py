@@ -1,0 +1,136 @@
+"""Verdicts of the probe, each seen to go both ways."""
+
+import io
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from tactbench.core.leaderboard.formats import to_latex, to_markdown
+from tactbench.core.leaderboard.probe import build_probe
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.terminal import show
+from tests.core.leaderboard.rows import row
+
+
+def classed(score, protocol="deployable", split="recording", **more):
+    """A row of a task with four classes, by accuracy; the trivial answer has 0.25."""
+    n, right = 40, round(40 * score)
+    confusion = np.zeros((4, 4), dtype=int)
+    for place in range(n):
+        confusion[place % 4, place % 4 if place < right else (place + 1) % 4] += 1
+    return row(
+        score=score, metric="accuracy", unit="1", baseline=0.25, protocol=protocol, split=split, n_test=n,
+        confusion=confusion.tolist(), ci_low=score - 0.03, ci_high=score + 0.03, **more,
+    )  # fmt: skip
+
+
+def erring(score, protocol="deployable", split="session", **more):
+    """A row of a regression in newtons; the trivial answer errs by 10 N."""
+    more = {"ci_low": score - 0.2, "ci_high": score + 0.2, "n_test": 20} | more
+    return row(score=score, metric="rmse", unit="N", baseline=10.0, protocol=protocol, split=split, **more)
+
+
+def verdict(*rows):
+    table = build_probe(rows)
+    (line,) = table.lines
+    return dict(zip(table.columns, line, strict=True))["verdict"]
+
+
+@pytest.mark.parametrize(
+    ("first", "says"),
+    [
+        (0.90, "LEAK: the first frame alone scores 0.900 of 0.950"),
+        # Half of the skill of 0.7 over the trivial 0.25, on either side.
+        (0.625, "LEAK: the first frame alone scores 0.625 of 0.950"),
+        (0.575, "the first frame alone scores 0.575 of 0.950: a part of the answer is known before"),
+        # Of 40 guesses of four, 16 or more are right in 2.6 % of the cases, 17 or more in 1.2 %: the line is 2.5 %.
+        (0.425, "the first frame alone scores 0.425 of 0.950: a part of the answer is known before"),
+        (0.40, "no leak shown"),
+        (0.25, "no leak shown"),
+    ],
+)
+def test_the_first_frame_of_classes(first, says):
+    assert verdict(classed(0.95), classed(first, "first-frame")) == says
+
+
+@pytest.mark.parametrize(
+    ("first", "more", "says"),
+    [
+        (2.0, {}, "LEAK: the first frame alone scores 2.0000 of 1.0000 N"),
+        (5.6, {}, "the first frame alone scores 5.6000 of 1.0000 N: a part of the answer is known before"),
+        (9.9, {"ci_low": 9.0, "ci_high": 10.5}, "no leak shown"),
+        (12.0, {}, "no leak shown"),
+        (2.0, {"n_test": 4}, "4 recordings are too few to say what the first frame tells"),
+    ],
+)
+def test_the_first_frame_of_numbers(first, more, says):
+    assert verdict(erring(1.0), erring(first, "first-frame", **more)) == says
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ([classed(0.88), classed(0.94, split="shuffled")], "optimistic by 0.060 when shuffled"),
+        ([classed(0.88), classed(0.90, split="shuffled")], "no leak shown"),
+        ([classed(0.88), classed(0.70, split="shuffled")], "no leak shown"),
+        ([erring(1.0), erring(0.5, split="shuffled")], "optimistic by 0.5000 N when shuffled"),
+        (
+            [erring(1.0, split="roles"), erring(0.5, split="shuffled", n_test=99)],
+            "optimistic by 0.5000 N when shuffled (tested on other rows)",
+        ),
+        ([erring(1.0), erring(0.9, split="shuffled")], "no leak shown"),
+        ([erring(1.0), erring(1.5, split="shuffled")], "no leak shown"),
+    ],
+)
+def test_shuffled_rows_against_the_interval(rows, says):
+    assert verdict(*rows) == says
+
+
+def test_both_verdicts_stand_side_by_side():
+    said = verdict(classed(0.88), classed(0.86, "first-frame"), classed(0.99, split="shuffled"))
+    assert said == "LEAK: the first frame alone scores 0.860 of 0.880; optimistic by 0.110 when shuffled"
+
+
+def test_each_split_has_the_first_frame_of_its_own():
+    table = build_probe([
+        classed(0.95), classed(0.93, split="trial"), classed(0.30, "first-frame"),
+        classed(0.90, "first-frame", split="trial"), classed(0.95, split="shuffled"),
+    ])  # fmt: skip
+    verdicts = {line[table.columns.index("split")]: line[-1] for line in table.lines}
+    assert verdicts["recording"] == "no leak shown"
+    assert verdicts["trial"].startswith("LEAK")
+
+
+def test_other_sensors_estimators_and_repeats_are_no_partners():
+    for other in ({"sensor": "b"}, {"estimator": "ridge"}, {"repeat": 2}, {"params": {"n_estimators": 5}}):
+        assert build_probe([classed(0.95), classed(0.90, "first-frame") | other]) is None
+
+
+def test_nothing_is_shown_where_nothing_was_probed():
+    assert build_probe([classed(0.9), classed(0.2, is_baseline=True)]) is None
+    assert build_probe([erring(1.0, split="in-session"), erring(0.5, split="shuffled")]) is None
+    assert "Probe" not in to_markdown([classed(0.9)])
+
+
+def test_a_probe_that_makes_no_sense_says_why():
+    skipped = classed(0.0, "first-frame", split=None, status="skipped", reason="Each is one reading.") | {"score": None}
+    table = build_probe([classed(0.9), skipped])
+    assert table.lines[0][table.columns.index("first frame alone")] == "skipped"
+    assert table.notes[-1] == "a/question: Each is one reading."
+
+
+def test_a_first_frame_that_tells_nothing_is_not_held_against_the_sensor():
+    notes = build_table([classed(0.2, "first-frame"), classed(0.2)]).notes
+    assert sum("no better than the trivial baseline" in note for note in notes) == 1
+
+
+def test_simulated_rows_say_so_and_every_text_format_has_the_table():
+    rows = [classed(0.95), classed(0.90, "first-frame")]
+    out = io.StringIO()
+    show(rows, Console(file=out, width=200))
+    for text in (out.getvalue(), to_markdown(rows), to_latex(rows)):
+        assert "does the score come from the contact?" in text
+        assert "LEAK: the first frame alone scores 0.900 of 0.950" in text
+        assert "a SIM" in text
+    assert "50\\% or more" in to_latex(rows)
