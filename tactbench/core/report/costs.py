@@ -1,9 +1,9 @@
-"""What accuracy costs in time: what `tactbench cost` has written, and the tables of other rooms."""
+"""What accuracy costs in time: what `tactbench cost` has written."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,6 @@ from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
 from tactbench.core.report.section import Picture, Section, Subject
 
 FOLDER = "cost"
-
-TABLES: tuple[Callable[[Subject], Sequence[PlainTable]], ...] = ()
-"""Tables beside those of `tactbench cost`: comparisons of protocols and splits, probes. None of them: an empty list."""
 
 
 def costs_section(subject: Subject) -> Section:
@@ -33,8 +30,6 @@ def costs_section(subject: Subject) -> Section:
             caption = f"The numbers of the table {table.title!r}, as `tactbench cost` has drawn them."
             pictures.append(Picture(table.title, caption, drawing.read_bytes()))
     missing = () if tables else (_command(subject),)
-    for others in TABLES:
-        tables += others(subject)
     return Section(
         "cost",
         "What accuracy costs in time",

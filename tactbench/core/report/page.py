@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import tactbench
 from tactbench.core.report.cells import cells_section
+from tactbench.core.report.compared import compared_section
 from tactbench.core.report.costs import costs_section
 from tactbench.core.report.findings import findings_section
 from tactbench.core.report.leaderboards import leaderboards_section
@@ -33,6 +34,7 @@ SECTIONS: tuple[tuple[str, str, Maker], ...] = (
     ("findings", "Findings", findings_section),
     ("figures", "Figures", pictures_section),
     ("leaderboards", "Leaderboards", leaderboards_section),
+    ("compared", "The same questions asked otherwise", compared_section),
     ("cost", "What accuracy costs in time", costs_section),
     ("cells", "Every cell", cells_section),
 )

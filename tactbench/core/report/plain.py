@@ -8,7 +8,8 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 ABSENT = "–"
-_NUMBER = re.compile(r"([-+−]?[\d\u202f]+(?:\.\d+)?(?:[eE][-+]?\d+)?)(?: %)?(?: ?[†‡*])*")
+_DIGITS = r"[-+−]?[\d\u202f]+(?:\.\d+)?(?:[eE][-+]?\d+)?"
+_NUMBER = re.compile(rf"({_DIGITS})(?: … {_DIGITS})?(?: %)?(?: ?[†‡*])*")
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def plain(
 
 
 def number(text: str) -> float | None:
-    """Return the number that `text` is, thin spaces and marks aside, or None."""
+    """Return the number that `text` is, thin spaces and marks aside, or None; of an interval its lower end."""
     found = _NUMBER.fullmatch(text.strip())
     return float(found[1].replace("\u202f", "").replace("−", "-")) if found and any(map(str.isdigit, text)) else None
 

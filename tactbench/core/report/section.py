@@ -58,7 +58,8 @@ class Subject:
         brackets.
         """
         asked = {name: facts[name] for name in _DESCRIBED if facts.get(name) is not None}
-        cells = [row for row in self.rows if facts.get("cell") == row["cell"] or (facts.get("key") or 0) == row["key"]]
+        named, key = facts.get("cell"), facts.get("key") or None
+        cells = [row for row in self.rows if named == row["cell"] or (key and key == row.get("key"))]
         if not cells and {"sensor", "task", "estimator"} <= set(asked):
             name = asked.pop("estimator")
             alike = [row for row in self.rows if all(row[one] == value for one, value in asked.items())]

@@ -62,7 +62,17 @@ def test_nothing_is_fetched_from_anywhere(subject):
 def test_every_section_is_in_the_contents_in_order(subject):
     html = make_page(subject).html
     named = re.findall(r'<section id="([^"]+)"', html)
-    assert named == ["about", "reproduction", "sensors", "findings", "figures", "leaderboards", "cost", "cells"]
+    assert named == [
+        "about",
+        "reproduction",
+        "sensors",
+        "findings",
+        "figures",
+        "leaderboards",
+        "compared",
+        "cost",
+        "cells",
+    ]
     assert re.findall(r'<li><a href="#([^"]+)"', html)[: len(named)] == named
 
 

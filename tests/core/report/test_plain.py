@@ -4,12 +4,20 @@ from tactbench.core.report.plain import Entry, finite, markdown, number, plain
 
 
 def test_a_bare_number_is_read_with_its_marks():
-    read = {"0.6795 †": 0.6795, "4\u202f395": 4395, "−3": -3, "-1e-3": -1e-3, "62 %": 62, "0.5 † ‡": 0.5}
+    read = {
+        "0.6795 †": 0.6795,
+        "4\u202f395": 4395,
+        "−3": -3,
+        "-1e-3": -1e-3,
+        "62 %": 62,
+        "0.5 † ‡": 0.5,
+        "0.4 … 0.6": 0.4,
+    }
     assert {text: number(text) for text in read} == read
 
 
 def test_text_with_a_unit_is_no_number_since_another_line_may_have_another_unit():
-    assert [number(text) for text in ("10.2 ms", "4 s", "–", "", "1 … 2", "base", "\u202f")] == [None] * 7
+    assert [number(text) for text in ("10.2 ms", "4 s", "–", "", "1 ms … 2 s", "base", "\u202f")] == [None] * 7
 
 
 def test_what_is_not_finite_cannot_be_sorted():
