@@ -78,7 +78,9 @@ def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
     case.says(hardships=", ".join(one.__name__ for one in hardships))
     for one in hardships:
         one(case, recordings)
-    case.right = "answer" if kind == "regression" and HARMLESS.issuperset(hardships) else "either"
+    # A probe refuses what changes within a recording, as a force does.
+    answerable = kind == "regression" and HARMLESS.issuperset(hardships) and not PROTOCOLS[protocol].probe
+    case.right = "answer" if answerable else "either"
     estimator = load_registry().estimators[name]
     with tempfile.TemporaryDirectory() as folder:
         paths = [_written(made, Path(folder) / f"r{place}.h5") for place, made in enumerate(recordings)]

@@ -41,7 +41,17 @@ from tactbench.core.spec.rig import (
     SensorDescriptor,
     TaskDescriptor,
 )
-from tactbench.core.spec.scene import Environment, ForceRamp, Indenter, Placement, Scene, Simulation, Slide, Surface
+from tactbench.core.spec.scene import (
+    Environment,
+    ForceRamp,
+    Indenter,
+    Placement,
+    Role,
+    Scene,
+    Simulation,
+    Slide,
+    Surface,
+)
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
@@ -99,6 +109,7 @@ __all__ = [
     "RigContext",
     "RigDescriptor",
     "RigError",
+    "Role",
     "Scalar",
     "Scene",
     "SensorDescriptor",

@@ -1,4 +1,4 @@
-"""The estimators tactbench brings: descriptors here, code in the modules they name."""
+"""The estimators tactbench brings: descriptors here, code in the modules they name, reasons in docs/estimators.md."""
 
 from __future__ import annotations
 
@@ -14,10 +14,17 @@ BOTH = ("regression", "classification")
 WINDOWS = (0, 5, 10, 20, 40)
 LAMBDAS = (0.01, 0.05, 0.1, 0.2, 0.3, 0.5)
 
+TREES = (500, 100, 50, 10)
+"""Forests of the ladder, and how many trees they have; the first is the paper's, and goes without a number."""
+
 
 @hookimpl
 def tactbench_estimators() -> list[EstimatorDescriptor]:
     """Offer the estimators."""
+    return [*_trivial(), *_linear(), *_curved(), *_forests()]
+
+
+def _trivial() -> list[EstimatorDescriptor]:
     return [
         EstimatorDescriptor(
             name="mean", title="Mean of the training labels", kinds=REGRESSION, looks_at="nothing", baseline=True,
@@ -35,6 +42,15 @@ def tactbench_estimators() -> list[EstimatorDescriptor]:
             name="chance", title="A class drawn uniformly", kinds=CLASSIFICATION, looks_at="nothing", baseline=True,
             where="tactbench.estimators.trivial:chance",
         ),
+    ]  # fmt: skip
+
+
+def _linear() -> list[EstimatorDescriptor]:
+    return [
+        EstimatorDescriptor(
+            name="ols", title="Ordinary least squares on one sample", kinds=REGRESSION, linear=True,
+            where="tactbench.estimators.linear:least_squares",
+        ),
         EstimatorDescriptor(
             name="lasso", title="Lasso on a mean-filtered window", kinds=REGRESSION, linear=True,
             params={"lambda_": 0.2}, grid={"lambda_": LAMBDAS}, window_grid=WINDOWS,
@@ -50,7 +66,49 @@ def tactbench_estimators() -> list[EstimatorDescriptor]:
             where="tactbench.estimators.linear:logistic",
         ),
         EstimatorDescriptor(
-            name="forest", title="Random forest", kinds=BOTH, linear=False, where="tactbench.estimators.forest:forest",
-            params={"n_estimators": 500, "max_depth": None, "min_samples_leaf": 1},
+            name="lda", title="Linear discriminant analysis", kinds=CLASSIFICATION, linear=True,
+            where="tactbench.estimators.linear:discriminant",
         ),
     ]  # fmt: skip
+
+
+def _curved() -> list[EstimatorDescriptor]:
+    return [
+        EstimatorDescriptor(
+            name="knn", title="k nearest neighbours", kinds=BOTH, linear=False, params={"n_neighbors": 15},
+            where="tactbench.estimators.neighbours:neighbours",
+        ),
+        EstimatorDescriptor(
+            name="svm", title="Support vectors, Gaussian kernel, on every n-th row from 30 000 rows up", kinds=BOTH,
+            linear=False, params={"C": 1.0, "gamma": "scale", "rows": 30_000},
+            where="tactbench.estimators.kernel:support_vectors",
+        ),
+        EstimatorDescriptor(
+            name="boosting", title="Gradient boosting on histograms", kinds=BOTH, linear=False,
+            params={"max_iter": 100, "learning_rate": 0.1, "max_leaf_nodes": 31},
+            where="tactbench.estimators.boosting:boosting",
+        ),
+        EstimatorDescriptor(
+            name="mlp", title="Neural network with one hidden layer", kinds=BOTH, linear=False,
+            params={"hidden": 64, "alpha": 1e-4, "max_iter": 200}, where="tactbench.estimators.neural:perceptron",
+        ),
+    ]  # fmt: skip
+
+
+def _forests() -> list[EstimatorDescriptor]:
+    found = []
+    for trees in TREES:
+        number = "" if trees == TREES[0] else f"-{trees}"
+        params = {"n_estimators": trees, "max_depth": None, "min_samples_leaf": 1}
+        found += [
+            EstimatorDescriptor(
+                name=f"forest{number}", title=f"Random forest of {trees} trees", kinds=BOTH, linear=False,
+                params=params, where="tactbench.estimators.forest:forest",
+            ),
+            EstimatorDescriptor(
+                name=f"forest-fast{number}", title=f"Random forest of {trees} trees by oneDAL (extra: fast)",
+                kinds=BOTH, linear=False, params=params, where="tactbench.estimators.fast_forest:fast_forest",
+                distributions=("scikit-learn-intelex", "daal"),
+            ),
+        ]  # fmt: skip
+    return found

@@ -36,3 +36,10 @@ def logistic(*, kind: str, seed: int, threads: int, C: float) -> Any:
     from sklearn.linear_model import LogisticRegression
 
     return LogisticRegression(C=C, max_iter=2000)
+
+
+def discriminant(*, kind: str, seed: int, threads: int) -> Any:
+    """Return linear discriminant analysis (Fisher 1936): Gaussian classes with one covariance, nothing to set."""
+    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+
+    return LinearDiscriminantAnalysis()

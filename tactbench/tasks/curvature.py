@@ -2,40 +2,12 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import (
-    Indenter,
-    LabelTarget,
-    PlannedScene,
-    Published,
-    Scene,
-    TaskDescriptor,
-    TaskSpec,
-    hookimpl,
-    sourced,
-)
+from tactbench.plugin import LabelTarget, Published, TaskDescriptor, TaskSpec, hookimpl
+from tactbench.tasks.surfaces import RADII_MM, at_places, few_shots, on_units, papers_caps
 
 TACTBENCH_API = 1
 
 _PAPER = "Karl et al. 2016"
-RADII_MM = (5.0, 7.5, 10.0, 20.0, 40.0)
-"""Radii of the caps; source: the paper's figure of curved objects."""
-
-# Every cap once in each of the three sessions, the caps one after the other: a minute of recording and a minute to
-# exchange the cap.
-SCENES = tuple(
-    PlannedScene(
-        role=role,
-        scene=Scene(
-            name=f"cap-{radius:g}mm-{role}",
-            indenter=Indenter(radius=sourced(radius, "mm", f"{_PAPER}, figure of curved objects")),
-            session=role,
-            starts_after_s=120.0 * (len(RADII_MM) * session + place),
-            labels={"cap_radius_mm": radius},
-        ),
-    )
-    for session, role in enumerate(("train", "validation", "test"))
-    for place, radius in enumerate(RADII_MM)
-)
 
 SPEC = TaskSpec(
     name="curvature",
@@ -44,9 +16,13 @@ SPEC = TaskSpec(
     kind="classification",
     target=LabelTarget(name="cap_radius_mm", unit="mm"),
     metric="macro_f1",
-    scenes=SCENES,
-    protocols=("karl2016", "deployable"),
-    splits=("roles", "session", "shuffled"),
+    scenes=papers_caps(),
+    campaigns={"placement": at_places(RADII_MM), "unit": on_units(RADII_MM), **few_shots(RADII_MM)},
+    protocols=("karl2016", "karl2016-training-scale", "deployable"),
+    splits=(
+        *("roles", "session", "placement", "unit"),
+        *("few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "shuffled"),
+    ),
     estimators=("forest",),
     baselines=("chance", "majority"),
     published=(

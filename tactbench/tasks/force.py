@@ -12,6 +12,7 @@ from tactbench.plugin import (
     TaskSpec,
     hookimpl,
 )
+from tactbench.tasks.surfaces import at_places, few_shots, on_units
 
 TACTBENCH_API = 1
 
@@ -27,6 +28,8 @@ SCENES = tuple(
     for order, role in enumerate(("train", "validation", "test"))
 )
 
+_FLAT = (None,)
+
 SPEC = TaskSpec(
     name="force",
     title="Normal force",
@@ -36,8 +39,12 @@ SPEC = TaskSpec(
     metric="rmse",
     unit="N",
     scenes=SCENES,
-    protocols=("karl2016", "deployable"),
-    splits=("roles", "session", "press", "in-session", "shuffled"),
+    campaigns={"placement": at_places(_FLAT), "unit": on_units(_FLAT), **few_shots(_FLAT)},
+    protocols=("karl2016", "karl2016-training-scale", "deployable"),
+    splits=(
+        *("roles", "session", "press", "in-session", "placement", "unit"),
+        *("few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "shuffled"),
+    ),
     estimators=("lasso",),
     baselines=("mean", "time-index"),
     published=(

@@ -22,6 +22,7 @@ VERBS = {
     "import": ("import_", "Turn foreign tables into recordings, as a mapping file says."),
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),
     "cost": ("cost", "Show what accuracy costs in time."),
+    "calibrate": ("calibrate", "Draw what no source states, and hold simulations against published numbers."),
     "report": ("report", "Make one page of all results, with figures and the published numbers beside ours."),
     "leaderboard": ("leaderboard", "Show the last run's table again, in any format."),
 }
@@ -96,7 +97,11 @@ def _exit_code(arguments: list[str] | None) -> int:
 
 def _interrupted(arguments: list[str] | None) -> int:
     verb = (sys.argv[1:] if arguments is None else arguments)[:1]
-    kept = "What was finished is kept; the same command goes on from there." if verb == ["run"] else "Nothing is kept."
+    kept = (
+        "What was finished is kept; the same command goes on from there."
+        if verb in (["run"], ["calibrate"])
+        else "Nothing is kept."
+    )
     click.echo(f"Interrupted. {kept}", err=True)
     return 130
 

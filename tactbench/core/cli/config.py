@@ -1,13 +1,19 @@
-"""Where the default matrix lies."""
+"""Where matrices and calibrations lie: the default ones, and matrices that come with tactbench by name."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tactbench
-from tactbench.core.errors import ConfigError
+from tactbench.core.errors import ConfigError, UnknownNameError
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.yaml_file import load_yaml
+
+_ENDINGS = (".yaml", ".yml")
+
+if TYPE_CHECKING:
+    from tactbench.core.spec.calibration import CalibrationSpec
 
 
 def default_matrix() -> MatrixSpec:
@@ -18,10 +24,47 @@ def default_matrix() -> MatrixSpec:
     ConfigError
         If the file is wrong, or the installation has lost it.
     """
+    return load_yaml(_default("benchmarks.yaml", "matrix"), MatrixSpec)
+
+
+def default_calibration() -> CalibrationSpec:
+    """Return ``calibration.yaml`` of this folder, else the one that came with tactbench; raises ConfigError."""
+    from tactbench.core.spec.calibration import CalibrationSpec
+
+    return load_yaml(_default("calibration.yaml", "procedure"), CalibrationSpec)
+
+
+def _default(name: str, what: str) -> Path:
     package = Path(tactbench.__file__).parent
-    places = (Path("benchmarks.yaml"), package / "benchmarks.yaml", package.parent / "benchmarks.yaml")
-    for place in places:
+    for place in (Path(name), package / name, package.parent / name):
         if place.is_file():
-            return load_yaml(place, MatrixSpec)
-    raise ConfigError("benchmarks.yaml", None, "is not here, and tactbench was installed without it.",
-                      hint="Give a matrix with --config FILE.")  # fmt: skip
+            return place
+    raise ConfigError(name, None, "is not here, and tactbench was installed without it.",
+                      hint=f"Give a {what} with --config FILE.")  # fmt: skip
+
+
+def packaged_matrices() -> dict[str, Path]:
+    """Return the matrices that came with tactbench, by name."""
+    package = Path(tactbench.__file__).parent
+    for folder in (package / "matrices", package.parent / "examples" / "matrices"):
+        if folder.is_dir():
+            return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    return {}
+
+
+def matrix_called(given: str) -> MatrixSpec:
+    """Return the matrix in the file `given`, or the packaged one of that name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is neither; the message lists the names.
+    ConfigError
+        If the file is wrong or cannot be read.
+    """
+    packaged = packaged_matrices()
+    if given in packaged and not Path(given).is_file():
+        return load_yaml(packaged[given], MatrixSpec)
+    if Path(given).exists() or given.endswith(_ENDINGS) or len(Path(given).parts) > 1:
+        return load_yaml(Path(given), MatrixSpec)
+    raise UnknownNameError("packaged matrix", given, packaged)

@@ -2,124 +2,58 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from tactbench.core.cli.threads import one_thread
-
-if TYPE_CHECKING:
-    from tactbench.core.plugins.cost import CostPoint, CostStudy
-
-_COLUMNS = ("", "way", "time", "rms", "worst", "unit", "noise / 3", "front")
+from tactbench.core.cli.threads import keep_threads
 
 
 @click.command(name="cost")
-@click.option("--twin", is_flag=True, help="Of the simulated rig: error against seconds per recording.")
-@click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="For which sensor; default: the matrix's.")
-@click.option("--rig", metavar="NAME", help="Which simulated rig; default: the first.")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results") / "cost", show_default=True,
-              metavar="DIR", help="Where CSV, JSON and figures are put.")  # fmt: skip
+@click.option("--twin", is_flag=True, help="Of the simulated rig instead: error against seconds per recording.")
+@click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Of which sensor; with --twin also several.")
+@click.option("--task", metavar="NAME", help="Which question the estimators answer.")
+@click.option("--estimator", "estimators", multiple=True, metavar="NAME",
+              help="What answers; may be repeated. Default: every one for this kind of question.")  # fmt: skip
+@click.option("--rig", metavar="NAME", help="What carries out the scenes: twin (default), replay …")
+@click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings for --rig replay.")
+@click.option("--protocol", metavar="NAME", help="How recordings become X and y; default: the task's first.")
+@click.option("--split", metavar="NAME", help="What is kept apart; default: the task's first that fits.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")
+@click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
+              help="How often everything is timed, turn and turn about.")  # fmt: skip
+@click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
+              help="Threads that estimators and BLAS may use while they are timed.")  # fmt: skip
+@click.option("--budget", type=click.FloatRange(min=0), default=20.0, show_default=True, metavar="SECONDS",
+              help="What took longer once is not timed again in later rounds; its row says so.")  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Result folder, as of `run`; files go into its folder cost. Default: tactbench-results. "
+                   "With --twin: the folder of the files themselves; default: tactbench-results/cost.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(("table", "json", "csv")), default="table", show_default=True)
-def command(twin: bool, sensors: tuple[str, ...], rig: str | None, out: Path, shape: str) -> None:
-    """Measure what accuracy costs in time, and draw it."""
-    one_thread()
-    from tactbench.core.cli.config import default_matrix
-    from tactbench.core.cli.screen import progress
-    from tactbench.core.cli.twin import simulated_rig
+def command(
+    twin: bool, sensors: tuple[str, ...], task: str | None, rig: str | None, out: Path | None, shape: str, threads: int,
+    **asked: Any,
+) -> None:  # fmt: skip
+    """Measure what accuracy costs in time, and draw it.
+
+    Of estimators: score against fit time and latency, for one sensor and task. Of the simulated rig: --twin.
+    """
+    keep_threads(1 if twin else threads)
     from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.registry import load_object, load_registry
 
-    if not twin:
-        raise UsageError("Say what the cost is asked of.", hint="Today that is the simulated rig: --twin.")
-    registry = load_registry()
-    name = simulated_rig(registry, rig)
-    where = registry.rigs[name].work_precision
-    if where is None:
-        raise UsageError(f"The rig {name!r} does not say what its accuracy costs.", hint="Choose another with --rig.")
-    asked = [registry.sensors[sensor] for sensor in sensors or default_matrix().sensors]
-    points: list[CostPoint] = []
-    study: CostStudy | None = None
-    with progress() as told:
-        for sensor in asked:
-            study = load_object(where)(sensor)
-            told.begin(sensor.name, study.total)
-            for job in study.jobs:
-                told.working(job.label)
-                points += job.run()
-                told.advance(job.label)
-    if study is None or not points:
-        raise UsageError("There is nothing to measure.", hint="Name a sensor that can be simulated with --sensor.")
-    _show(points, study, shape)
-    _write(points, study, out)
+    if twin:
+        from tactbench.core.cli.cost_twin import show_twin
 
-
-def _show(points: list[CostPoint], study: CostStudy, shape: str) -> None:
-    from tactbench.core.cli.grid import print_grid, print_records
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.cost.front import diagrams, front, verdict
-
-    if shape != "table":
-        print_records([record(point) for point in points], shape)
+        if task is not None:
+            raise UsageError("--twin asks no task of anybody.", hint="Leave out --task, or --twin.")
+        show_twin(sensors, rig, out or Path("tactbench-results") / "cost", shape)
         return
-    for (subject, observable), group in diagrams(points).items():
-        best = front(group)
-        lines = [_line(point, point in best) for point in group]
-        styles = ["bold" if point.default else "" for point in group]
-        print_grid(f"{subject}, {observable}: {study.title}", _COLUMNS, lines, styles=styles,
-                   numeric=("time", "rms", "worst", "noise / 3"))  # fmt: skip
-        click.echo(verdict(group))
-    remark(study.reference)
+    if len(sensors) != 1 or task is None:
+        raise UsageError(
+            "Say what the cost is asked of.",
+            hint="Of estimators: --sensor NAME --task NAME, one of each. Of the simulated rig: --twin.",
+        )
+    from tactbench.core.cli.cost_ladder import show_ladder
 
-
-def _line(point: CostPoint, on_front: bool) -> dict[str, str]:
-    return {
-        "": "default" if point.default else "",
-        "way": point.label,
-        "time": f"{1e3 * point.seconds:.1f} ms",
-        "rms": f"{point.error:.3g}",
-        "worst": f"{point.worst:.3g}",
-        "unit": point.unit,
-        "noise / 3": f"{point.floor / 3:.3g}" if math.isfinite(point.floor) else "",
-        "front": "*" if on_front else "",
-    }
-
-
-def record(point: CostPoint) -> dict[str, Any]:
-    """Return a point as one flat record; settings last, under their own names."""
-    return {
-        "sensor": point.subject,
-        "observable": point.observable,
-        "way": point.label,
-        "seconds": point.seconds,
-        "error_rms": point.error,
-        "error_worst": point.worst,
-        "unit": point.unit,
-        "noise": point.floor if math.isfinite(point.floor) else None,
-        "default": point.default,
-        **point.settings,
-    }
-
-
-def _write(points: list[CostPoint], study: CostStudy, folder: Path) -> None:
-    import json
-
-    from tactbench.core.cli.grid import csv_text
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.cost.figure import draw
-    from tactbench.core.errors import UnwritableError
-    from tactbench.core.matrix.files import replace_file
-
-    records = [record(point) for point in points]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        replace_file(folder / "twin.csv", csv_text(records).encode())
-        replace_file(folder / "twin.json", (json.dumps(records, indent=1, ensure_ascii=False) + "\n").encode())
-        draw(points, study.title, [folder / "twin.png", folder / "twin.pdf"])
-    except OSError as error:
-        raise UnwritableError(
-            f"{folder} cannot be written: {error}.", hint="Give another folder with --out."
-        ) from error
-    remark(f"Files: {folder}/twin.csv, .json, .png, .pdf")
+    show_ladder(sensors[0], task, rig=rig, threads=threads, out=out or Path("tactbench-results"), shape=shape, **asked)

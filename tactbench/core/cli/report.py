@@ -62,14 +62,24 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shown: str, shap
     ctx.exit(1 if made.broken else 0)
 
 
-def _drawer() -> Drawer | None:
+def _drawer() -> Drawer:
     """Return what draws the paper's figures."""
-    return None
+    from tactbench.core.report.figures import draw_figures
+
+    return draw_figures
 
 
 def _calibrated(folder: Path) -> Calibrated | None:
-    """Return what the calibration of these results has found."""
-    return None
+    """Return what the calibration of these results has found; one that is damaged is told of and left out."""
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.errors import FormatError
+    from tactbench.core.report.calibrated import load_calibrated
+
+    try:
+        return load_calibrated(folder)
+    except FormatError as error:
+        remark(f"Failed: {error}")
+        return None
 
 
 def _print(made: Report, shape: str) -> None:

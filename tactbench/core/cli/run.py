@@ -22,10 +22,28 @@ if TYPE_CHECKING:
 @click.option("--task", "tasks", multiple=True, metavar="NAME", help="Question to ask; may be repeated.")
 @click.option("--rig", metavar="NAME", help="What carries out the scenes: twin (default), replay …")
 @click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings for --rig replay.")
-@click.option("--protocol", metavar="NAME", help="How recordings become X and y; default: the task's first.")
-@click.option("--split", metavar="NAME", help="What is kept apart: roles, session, in-session, object … shuffled.")
-@click.option("--estimator", "estimators", multiple=True, metavar="NAME", help="What answers; may be repeated.")
-@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="A matrix like benchmarks.yaml.")
+@click.option(
+    "--protocol",
+    "protocols",
+    multiple=True,
+    metavar="NAME",
+    help="How recordings become X and y; may be repeated. Default: the task's first.",
+)
+@click.option(
+    "--split",
+    "splits",
+    multiple=True,
+    metavar="NAME",
+    help="What is kept apart: roles, session, placement, unit, few-shot, object …; may be repeated.",
+)
+@click.option(
+    "--estimator",
+    "estimators",
+    multiple=True,
+    metavar="NAME",
+    help="What answers; may be repeated. all: every one for this kind of question.",
+)
+@click.option("--config", metavar="FILE", help="A matrix like benchmarks.yaml, or the name of a packaged one.")
 @click.option("--repeats", type=click.IntRange(min=1), metavar="N", help="Repeat everything with N seeds.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
@@ -70,6 +88,8 @@ def command(
     with progress() as told:
         outcome = run_matrix(matrix, store, jobs=jobs, recordings=folder, progress=told)
     print_rows(outcome.rows, shape)
+    if shape == "table":
+        _side_by_side(outcome)
     _farewell(outcome, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
 
@@ -79,20 +99,19 @@ def _matrix(
     sensors: tuple[str, ...],
     tasks: tuple[str, ...],
     rig: str | None,
-    protocol: str | None,
-    split: str | None,
+    protocols: tuple[str, ...],
+    splits: tuple[str, ...],
     estimators: tuple[str, ...],
-    config: Path | None,
+    config: str | None,
     repeats: int | None,
     seed: int | None,
     replaying: bool,
 ) -> MatrixSpec:
     """Return the matrix file with the command line's choices laid over it."""
-    from tactbench.core.cli.config import default_matrix
-    from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
-    from tactbench.core.spec.yaml_file import load_yaml
+    from tactbench.core.cli.config import default_matrix, matrix_called
+    from tactbench.core.spec.matrix import EstimatorChoice, TaskChoice
 
-    matrix = load_yaml(config, MatrixSpec) if config else default_matrix()
+    matrix = matrix_called(config) if config else default_matrix()
     change: dict[str, Any] = {}
     if rig or replaying:
         change["rig"] = rig or "replay"
@@ -106,19 +125,30 @@ def _matrix(
         change["seed"] = seed
     chosen = list(matrix.tasks)
     if tasks:
-        known = {choice.name: choice for choice in matrix.tasks}
-        chosen = [known.get(name, TaskChoice(name=name)) for name in dict.fromkeys(tasks)]
+        chosen = []
+        for name in dict.fromkeys(tasks):
+            chosen += [choice for choice in matrix.tasks if choice.name == name] or [TaskChoice(name=name)]
     over: dict[str, Any] = {}
-    if protocol:
-        over["protocol"] = protocol
+    if protocols:
+        over["protocol"] = tuple(dict.fromkeys(protocols))
     elif change.get("rig", matrix.rig) != matrix.rig:
-        over["protocol"] = "deployable"  # the paper's protocol needs the paper's three roles
-    if split:
-        over["split"] = split
+        over["protocol"] = ("deployable",)  # the paper's protocol needs the paper's three roles
+    if splits:
+        over["split"] = tuple(dict.fromkeys(splits))
     if estimators:
         over["estimators"] = tuple(EstimatorChoice(name=name) for name in dict.fromkeys(estimators))
     change["tasks"] = tuple(choice.model_copy(update=over) for choice in chosen)
     return matrix.model_copy(update=change)
+
+
+def _side_by_side(outcome: Outcome) -> None:
+    """Print what was asked under several protocols or splits once more, side by side."""
+    from tactbench.core.cli.comparisons import print_comparisons
+    from tactbench.core.leaderboard.comparison import compare
+
+    for by in ("protocol", "split"):
+        if compare(outcome.rows, by):
+            print_comparisons(outcome.rows, by, "table")
 
 
 def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:

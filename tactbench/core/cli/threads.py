@@ -10,5 +10,10 @@ def one_thread() -> None:
 
     Several threads would also sum in another order on another machine. Whoever sets these variables means it.
     """
+    keep_threads(1)
+
+
+def keep_threads(number: int) -> None:
+    """Keep numerical libraries at `number` threads; before any of them is imported."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
+        os.environ.setdefault(name, str(number))

@@ -143,7 +143,8 @@ def evaluate(
     rules = protocol_called(protocol)
     metric = metric_called(task.metric)
     chosen_split = choose_split(task, rules, data, split)
-    assignments = make_splits(data, chosen_split, seed, gap=max(estimator.window_grid))
+    own = chosen_split in task.campaigns
+    assignments = make_splits(data, chosen_split, seed, gap=max(estimator.window_grid), one_by_one=own)
     assert_disjoint(assignments)
     build = _builder(estimator, params, task, seed, threads)
     counts: Counter[str] = Counter(data.counts)

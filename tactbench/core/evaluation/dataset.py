@@ -182,6 +182,7 @@ def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, 
     constant = {
         "session": meta.session,
         "recording": meta.name,
+        **({"unit": meta.scene.unit} if meta.scene is not None else {}),
         **{key: str(value) for key, value in meta.labels.items()},
     }
     if meta.trial:

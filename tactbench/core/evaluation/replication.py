@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.interval import enough
-from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS
+from tactbench.core.evaluation.splits import SPLITS_WITHOUT_GROUPS, shots
 from tactbench.core.samples import IntArray
 from tactbench.core.spec.task import TaskSpec
 
@@ -28,8 +28,8 @@ def replicates(
     y, recording, row
         (n,) truth, recording and row in it of every test row.
     """
-    first = "session" if split in SPLITS_WITHOUT_GROUPS else split
-    named = [name for name in task.splits if name not in (*SPLITS_WITHOUT_GROUPS, first)]
+    first = "session" if split in SPLITS_WITHOUT_GROUPS or shots(split) else split
+    named = [name for name in task.splits if name not in (*SPLITS_WITHOUT_GROUPS, first) and not shots(name)]
     units = [(_unit(data, name, recording, row), name) for name in dict.fromkeys([first, *named, "recording"])]
     there = [(codes, name) for codes, name in units if codes is not None]
     for codes, name in there:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,10 @@ FOLDS = 5
 TRAIN_SHARE = 0.8
 """First part, in time, that an in-session split trains on."""
 SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
-"""Splits whose unit of replication is the session."""
+"""Splits whose unit of replication is the session; few-shot-N is another."""
+MOST_ONE_BY_ONE = 12
+"""Up to so many groups of a task's own campaign are left out one by one; more are dealt into folds."""
+_FEW_SHOT = re.compile(r"few-shot-([1-9][0-9]*)")
 SHUFFLED_STAMP = "leaks: split shuffled puts neighbouring rows of one recording or object on both sides."
 
 
@@ -46,7 +50,7 @@ def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: s
     UsageError
         If the split asked for cannot be served; the message says which can.
     NotApplicable
-        If the protocol or every split of the task lacks what it needs.
+        If the protocol does not go with the split asked for, or it or every split of the task lacks what it needs.
     """
     split = _chosen(task, protocol, data, asked)
     if protocol.first_row_only:
@@ -57,7 +61,7 @@ def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: s
 def _chosen(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: str | None) -> str:
     if protocol.roles_only:
         if asked not in (None, "roles"):
-            raise UsageError(
+            raise NotApplicable(
                 f"Protocol {protocol.name!r} splits by roles only; {asked!r} was asked for.",
                 hint="Use --protocol deployable for other splits.",
             )
@@ -71,6 +75,7 @@ def _chosen(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: str | 
     if asked is not None:
         if not _can(asked, data):
             names = {name for table in data.tables for name in table.groups} | {"roles", "in-session", "shuffled"}
+            names |= {name for name in task.splits if shots(name)}
             able = sorted(name for name in names if _can(name, data))
             raise UsageError(f"These recordings cannot be split by {asked!r}.", hint=f"They can by: {', '.join(able)}.")
         return asked
@@ -88,17 +93,39 @@ def _can(name: str, data: Dataset) -> bool:
         return {"train", "test"} <= {meta.role for meta in data.metas}
     if name in ("in-session", "shuffled"):
         return True
+    number = shots(name)
+    if number is not None:
+        return len(training_sessions(data)) >= number and any(meta.role == "test" for meta in data.metas)
     tables = [data.tables[place] for place in _open_to_folds(data)]
     if any(name not in table.groups for table in tables):
         return False  # rows of no known group could be related to either side
     return len({value for table in tables for value in np.unique(table.groups[name][table.labelled])}) >= 2
 
 
-def make_splits(data: Dataset, split: str, seed: int, gap: int = 0) -> list[Assignment]:
+def shots(split: str) -> int | None:
+    """Return how many training sessions a split named `few-shot-N` has; None if it is another."""
+    found = _FEW_SHOT.fullmatch(split)
+    return int(found[1]) if found else None
+
+
+def training_sessions(data: Dataset) -> list[str]:
+    """Return the sessions to train on, those first that few shots take first.
+
+    Sessions with recordings of role train and none of role test, in order of their names, numbers read as numbers.
+    """
+    tested = {meta.session for meta in data.metas if meta.role == "test"}
+    found = {meta.session for meta in data.metas if meta.role == "train"} - tested
+    return sorted(found, key=lambda name: [(part.isdigit(), int(part) if part.isdigit() else 0, part)
+                                           for part in re.split(r"([0-9]+)", name)])  # fmt: skip
+
+
+def make_splits(data: Dataset, split: str, seed: int, gap: int = 0, *, one_by_one: bool = False) -> list[Assignment]:
     """Return the folds of `split`.
 
     Parameters
     ----------
+    one_by_one
+        Leave each group out alone, rather than dealing groups into folds, if there are no more than `MOST_ONE_BY_ONE`.
     gap
         Rows left out between training and test where a recording is cut in time: the longest window that may be chosen.
 
@@ -114,6 +141,11 @@ def make_splits(data: Dataset, split: str, seed: int, gap: int = 0) -> list[Assi
         return list(_shuffled(data, seed))
     if split == "session":
         return list(_leave_one_out(data, "session"))
+    number = shots(split)
+    if number is not None:
+        return [_few(data, split, number)]
+    if one_by_one and len(_values(data, split)) <= MOST_ONE_BY_ONE:
+        return [_told(fold, data) for fold in _leave_one_out(data, split)]
     return list(_grouped(data, split))
 
 
@@ -153,10 +185,32 @@ def _in_session(data: Dataset, gap: int) -> Iterator[Assignment]:
             yield Assignment(session, tuple(train), tuple(test), groups="session")
 
 
+def _few(data: Dataset, split: str, number: int) -> Assignment:
+    """Train on the first `number` training sessions, test on all of role test; nothing else is looked at."""
+    first = set(training_sessions(data)[:number])
+    train = tuple(np.full(len(table.row), table.meta.session in first) for table in data.tables)
+    test = tuple(np.full(len(table.row), table.meta.role == "test") for table in data.tables)
+    return Assignment(split, train, test)
+
+
 def _leave_one_out(data: Dataset, group: str) -> Iterator[Assignment]:
     names = _values(data, group)
     for name in names:
-        yield _held_out(data, group, {name}, name)
+        yield _held_out(data, group, {name}, name if group == "session" else f"{group} {name}")
+
+
+def _told(fold: Assignment, data: Dataset) -> Assignment:
+    """Say in the name of a fold that tests one single number whether training had any on both sides of it."""
+    if data.classes:
+        return fold
+    train, test = (
+        np.concatenate([table.y[mask & table.labelled] for table, mask in zip(data.tables, masks, strict=True)])
+        for masks in (fold.train, fold.test)
+    )
+    if not len(train) or not len(test) or np.ptp(test) > 0:
+        return fold
+    between = train.min() < test[0] < train.max()
+    return replace(fold, name=f"{fold.name}, {'interpolated' if between else 'extrapolated'}")
 
 
 def _grouped(data: Dataset, group: str) -> Iterator[Assignment]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 
 def score(value: float | None, unit: str) -> str:
-    """Return a score: four decimals for numbers with a unit, three for shares."""
+    """Return a score: three decimals for shares; four for numbers with a unit, two from ten on."""
     if value is None:
         return "–"
-    return f"{value:.3f}" if unit == "1" else f"{value:.4f}"
+    if unit == "1":
+        return f"{value:.3f}"
+    return f"{value:.4f}" if abs(value) < 10 else f"{value:.2f}"
 
 
 def interval(low: float | None, high: float | None, unit: str) -> str:

@@ -150,7 +150,8 @@ def _about_shuffled(row: Row, shuffled: Row | None) -> list[str]:
         return []
     suffix = "" if row["unit"] == "1" else f" {row['unit']}"
     said = f"optimistic by {score(abs(shuffled['score'] - row['score']), row['unit'])}{suffix} when shuffled"
-    return [said if shuffled["n_test"] == row["n_test"] else f"{said} (tested on other rows)"]
+    same = shuffled["n_test"] == row["n_test"] and set(shuffled["recordings"]) == set(row["recordings"])
+    return [said if same else f"{said} (tested on other rows)"]
 
 
 def _skill(value: float, trivial: float, row: Row) -> float:

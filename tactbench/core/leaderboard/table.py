@@ -27,8 +27,9 @@ METRIC_NAMES = {
 }
 
 DAGGER = (
-    "† test-set statistics were used: the protocol scales each set, the test set too, by its own mean and deviation. "
-    "A deployed sensor cannot; protocol `deployable` shows what it can."
+    "† test-set statistics were used: the protocol drops test rows by the test set's own mean and deviation, and "
+    "`karl2016` scales each set, the test set too, by its own. A deployed sensor cannot; protocol `deployable` shows "
+    "what it can."
 )
 
 COLUMNS = (

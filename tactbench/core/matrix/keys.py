@@ -18,6 +18,9 @@ from tactbench.core.spec.scene import Role, Scene
 RELEVANT = ("numpy", "scipy", "scikit-learn")
 """Distributions whose version may change a number."""
 
+_TOLD_OTHERWISE = {"published", "title", "question", "scenes", "campaigns"}
+"""Of a task: what changes no number, and what its recordings say themselves, by their content."""
+
 
 def recording_key(
     sensor: str, rig: str, scene: Scene, role: Role, seed: int, registry: Registry, sources: SourceDigests
@@ -46,7 +49,7 @@ def cell_key(cell: Cell, data: Sequence[str], registry: Registry, sources: Sourc
     return _digest(
         {
             "sensor": cell.sensor,
-            "task": task.descriptor.model_dump(mode="json", exclude={"spec": {"published", "title", "question"}}),
+            "task": task.descriptor.model_dump(mode="json", exclude={"spec": _TOLD_OTHERWISE}),
             "protocol": cell.protocol,
             "split": cell.split,
             "estimator": estimator.descriptor.model_dump(mode="json", exclude={"title", "linear"}),
@@ -54,7 +57,7 @@ def cell_key(cell: Cell, data: Sequence[str], registry: Registry, sources: Sourc
             "seed": cell.seed,
             "data": list(data),
             "source": _sources([task.module, estimator.module, estimator.descriptor.where], sources),
-            "versions": versions(),
+            "versions": versions(estimator.descriptor.distributions),
         }
     )
 
@@ -64,11 +67,11 @@ def _sources(modules: Sequence[str], sources: SourceDigests) -> Mapping[str, str
     return {package: sources.package(package) for package in packages}
 
 
-@lru_cache(maxsize=1)
-def versions() -> dict[str, str]:
-    """Return the versions that may change a number, Python's included."""
+@lru_cache(maxsize=8)
+def versions(more: tuple[str, ...] = ()) -> dict[str, str]:
+    """Return the versions that may change a number: Python's, those of `RELEVANT` and of the distributions `more`."""
     found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    for name in RELEVANT:
+    for name in (*RELEVANT, *more):
         try:
             found[name] = version(name)
         except PackageNotFoundError:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tactbench.core.errors import MissingRecordingError, UnknownNameError
 from tactbench.core.matrix.keys import recording_key
-from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan import Cell, serves
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.interfaces import Shelf
@@ -16,6 +16,14 @@ from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.scene import Role, Scene, Simulation
 from tactbench.core.spec.task import TaskSpec
+
+Need = tuple[str, str, str | None, int]
+"""Sensor, task, split and seed: what decides which recordings a cell needs."""
+
+
+def need_of(cell: Cell) -> Need:
+    """Return what recordings a cell needs; those of a split that its protocol cannot serve are never made."""
+    return cell.sensor, cell.task, cell.split if serves(cell.protocol, cell.split) else None, cell.seed
 
 
 @dataclass(frozen=True)
@@ -32,18 +40,18 @@ class Order:
 
 def orders_for(
     cells: Iterable[Cell], registry: Registry, sources: SourceDigests, store: Store, simulation: Simulation
-) -> dict[tuple[str, str, int], list[Order]]:
-    """Return the recordings needed, by (sensor, task, seed), in the task's order, carried out as `simulation` asks.
+) -> dict[Need, list[Order]]:
+    """Return the recordings needed, in the campaign's order, carried out as `simulation` asks.
 
-    Two tasks that ask for the same scene share the recording.
+    Tasks and campaigns that ask for the same scene in the same role share the recording.
     """
-    orders: dict[tuple[str, str, int], list[Order]] = {}
+    orders: dict[Need, list[Order]] = {}
     for cell in cells:
-        wanted = (cell.sensor, cell.task, cell.seed)
+        wanted = need_of(cell)
         if wanted in orders:
             continue
         orders[wanted] = []
-        for planned in registry.tasks[cell.task].spec.scenes:
+        for planned in registry.tasks[cell.task].spec.scenes_for(wanted[2]):
             scene = planned.scene
             if simulation != Simulation():
                 scene = scene.model_copy(update={"simulation": simulation})
@@ -75,11 +83,11 @@ def sensors_on(shelf: Mapping[str, Mapping[Path, RecordingMeta]], asked: Iterabl
     return names or sorted(shelf)
 
 
-def serving(task: TaskSpec, recordings: Mapping[Path, RecordingMeta]) -> list[Path]:
-    """Return the recordings of a shelf that belong to `task`.
+def serving(task: TaskSpec, split: str | None, recordings: Mapping[Path, RecordingMeta]) -> list[Path]:
+    """Return the recordings of a shelf that belong to `task` under `split`.
 
-    A recording of a scene that some task planned serves the tasks that plan a scene of this name; a recording whose
+    A recording of a scene that some task planned serves the campaigns that plan a scene of this name; a recording whose
     scene nobody planned (an imported table) may serve any task.
     """
-    names = {planned.scene.name for planned in task.scenes}
+    names = {planned.scene.name for planned in task.scenes_for(split)}
     return [path for path, meta in recordings.items() if meta.scene is None or not names or meta.scene.name in names]

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, PROTOCOLS, protocol_called
+from tactbench.core.evaluation.splits import shots
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.task import TaskSpec
+
+FEW_SHOT = "few-shot"
+"""Asks for all of a task's splits `few-shot-N`."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +66,16 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
     for repeat in range(1, matrix.repeats + 1):
         for choice in matrix.tasks:
             task = registry.tasks[choice.name].spec
-            protocol = _protocol(task, choice)
+            ways = _ways(task, choice)
+            answers = _estimators(task, choice, registry)
             for sensor in sensors:
-                for answer in _estimators(task, choice, registry):
+                for (protocol, split), answer in product(ways, answers):
                     cell = Cell(
                         sensor=sensor,
                         task=task.name,
                         rig=matrix.rig,
                         protocol=protocol,
-                        split=choice.split,
+                        split=split,
                         estimator=answer.name,
                         params=tuple(sorted(answer.params.items())),
                         baseline=registry.estimators[answer.name].baseline,
@@ -91,9 +97,13 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     every = list(cells)
     for cell in cells:
         rules = protocol_called(cell.protocol)
-        trivial = registry.tasks[cell.task].spec.baselines[0]
-        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != trivial):
+        task = registry.tasks[cell.task].spec
+        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != task.baselines[0]):
             continue
+        if rules.roles_only and task.splits[:1] == ("roles",):
+            same = replace(cell, protocol=DEPLOYABLE.name, split=None)
+            if same in cells:
+                continue  # asked for already, and probed as such
         split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
         honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
         added = (honest, replace(honest, protocol=FIRST_FRAME.name), replace(honest, split="shuffled"))
@@ -101,19 +111,44 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     return every
 
 
-def _protocol(task: TaskSpec, choice: TaskChoice) -> str:
-    if choice.protocol is None:
-        protocol = task.protocols[0]
-    elif choice.protocol in task.protocols or (choice.protocol in PROTOCOLS and PROTOCOLS[choice.protocol].probe):
-        protocol = choice.protocol
-    else:
-        raise UnknownNameError(f"protocol of task {task.name!r}", choice.protocol, task.protocols)
-    return protocol
+def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
+    """Return every protocol asked for with every split asked for.
+
+    Where several are asked for, a pair that does not go together becomes a row that says so; a single one is refused.
+    """
+    for name in choice.protocol:
+        if name not in task.protocols and not (name in PROTOCOLS and PROTOCOLS[name].probe):
+            raise UnknownNameError(f"protocol of task {task.name!r}", name, task.protocols)
+    splits: list[str | None] = list(dict.fromkeys(split for name in choice.split for split in _expanded(task, name)))
+    ways = list(product(choice.protocol or task.protocols[:1], splits or [None]))
+    if all(not serves(protocol, split) for protocol, split in ways):
+        protocol, split = ways[0]
+        raise UsageError(
+            f"Protocol {protocol!r} splits by roles only; {split!r} was asked for.",
+            hint=f"Give --protocol with another of: {', '.join(task.protocols)}.",
+        )
+    return ways
+
+
+def serves(protocol: str, split: str | None) -> bool:
+    """Return whether a protocol goes together with a split."""
+    return split in (None, "roles") or not protocol_called(protocol).roles_only
+
+
+def _expanded(task: TaskSpec, split: str) -> tuple[str, ...]:
+    few = tuple(name for name in task.splits if shots(name))
+    return few if split == FEW_SHOT and few else (split,)
 
 
 def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[EstimatorChoice]:
     asked = list(choice.estimators) or [EstimatorChoice(name=name) for name in task.estimators]
-    asked += [EstimatorChoice(name=name) for name in task.baselines]
+    whole = any(answer.name == "all" for answer in asked)
+    fit = [other for other in registry.estimators if task.kind in other.kinds] if whole else []
+    asked = [answer for answer in asked if answer.name != "all"]
+    asked += [EstimatorChoice(name=other.name) for other in fit if not other.baseline]
+    # The task's own baselines come before any other: the first of them is the `baseline` column.
+    trivial = [*task.baselines, *(other.name for other in fit if other.baseline)]
+    asked += [EstimatorChoice(name=name) for name in dict.fromkeys(trivial)]
     for answer in asked:
         descriptor = registry.estimators[answer.name]
         if task.kind not in descriptor.kinds:

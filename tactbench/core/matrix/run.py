@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -12,7 +12,7 @@ from typing import Any, cast
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.matrix.execution import InProcess, Job, Workers, installed, prepare, record, rig_of, solve, workers
 from tactbench.core.matrix.keys import cell_key
-from tactbench.core.matrix.material import Order, on_the_shelf, orders_for, sensors_on, serving
+from tactbench.core.matrix.material import Need, Order, need_of, on_the_shelf, orders_for, sensors_on, serving
 from tactbench.core.matrix.plan import Cell, plan_cells
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.provenance import gather
@@ -40,6 +40,8 @@ class Outcome:
     """Cells computed now; the others were found finished."""
     recorded: int
     """Recordings made now."""
+    recordings: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
+    """The files each cell was answered from, by its name."""
 
     @property
     def failures(self) -> list[Row]:
@@ -55,7 +57,27 @@ def run_matrix(
     recordings: Path | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Run `matrix`, reusing what `store` already has.
+    """Carry out `matrix` and write the files of a run: ``run.json``, ``scores.json`` and ``unfinished.json``.
+
+    The parameters are those of `carry_out`.
+    """
+    outcome = carry_out(matrix, store, jobs=jobs, recordings=recordings, progress=progress)
+    store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
+    store.write("scores.json", scores_text(outcome.rows))
+    unfinished = [row for row in outcome.rows if row["status"] != "done"]
+    store.write("unfinished.json", json.dumps(unfinished, indent=1, sort_keys=True) + "\n")
+    return outcome
+
+
+def carry_out(
+    matrix: MatrixSpec,
+    store: Store,
+    *,
+    jobs: int = 1,
+    recordings: Path | None = None,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Acquire and answer `matrix`, reusing what `store` already has; the files of the last run stay as they are.
 
     Parameters
     ----------
@@ -86,22 +108,19 @@ def run_matrix(
     fill_baselines(rows)
     provenance = gather()
     provenance["jobs"] = jobs
-    store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
-    store.write("scores.json", scores_text(rows))
-    unfinished = [row for row in rows if row["status"] != "done"]
-    store.write("unfinished.json", json.dumps(unfinished, indent=1, sort_keys=True) + "\n")
-    return Outcome(tuple(rows), provenance, computed, len(material.made))
+    used = {cell.name: tuple(material.paths(cell)) for cell in cells}
+    return Outcome(tuple(rows), provenance, computed, len(material.made), used)
 
 
 @dataclass
 class _Material:
-    orders: dict[tuple[str, str, int], list[Order]]
-    shelf: dict[tuple[str, str, int], list[Path]]
+    orders: dict[Need, list[Order]]
+    shelf: dict[Need, list[Path]]
     made: dict[Path, str] = field(default_factory=dict)
     """Content digests of the recordings made now."""
 
     def paths(self, cell: Cell) -> list[Path]:
-        wanted = (cell.sensor, cell.task, cell.seed)
+        wanted = need_of(cell)
         return self.shelf.get(wanted) or [order.path for order in self.orders.get(wanted, ())]
 
 
@@ -113,8 +132,8 @@ def _material(
         found = on_the_shelf(cast(Shelf, rig))
         cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
         shelf = {
-            (cell.sensor, cell.task, cell.seed): serving(registry.tasks[cell.task].spec, found[cell.sensor])
-            for cell in cells
+            wanted: serving(registry.tasks[wanted[1]].spec, wanted[2], found[wanted[0]])
+            for wanted in dict.fromkeys(need_of(cell) for cell in cells)
         }
         return cells, _Material({}, shelf)
     if not matrix.sensors:

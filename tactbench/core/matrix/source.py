@@ -15,7 +15,7 @@ from pathlib import Path
 from tactbench.core.matrix.files import replace_file
 
 # Rooms of tactbench that show results but do not make them: a new colour in a table recomputes nothing.
-_DISPLAY = ("core/cli", "core/leaderboard", "core/conformance", "testing.py", "__main__.py")
+_DISPLAY = ("core/cli", "core/cost", "core/leaderboard", "core/conformance", "testing.py", "__main__.py")
 
 
 class SourceDigests:

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, NamedTuple
+
+from tactbench.core.calibration.ranges import LEVEL
+from tactbench.core.calibration.result import load_result
+from tactbench.core.calibration.summary import acceptance, records, summary
+from tactbench.core.calibration.tables import text_tables
+from tactbench.core.report.plain import PlainTable, plain
 
 NARROWER = 0.8
 """A nuisance is asked for if the accepted draws leave less than this share of its prior's range; a range of few draws
@@ -63,11 +70,36 @@ class Calibrated:
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
     """Whose calibration it is, how many draws, which were accepted."""
+    tables: tuple[PlainTable, ...] = ()
+    """What else the calibration says, as it says it."""
 
     def range_for(self, task: str, sensor: str, published: float) -> PredictiveRange | None:
         """Return the range of a published number as one sensor's row stands beside it, or None."""
         found = (one for one in self.ranges if (one.task, one.sensor, one.published) == (task, sensor, published))
         return next(found, None)
+
+
+def load_calibrated(results: Path) -> Calibrated | None:
+    """Return the calibration of a result folder, else the one that came with tactbench, else None.
+
+    Raises
+    ------
+    FormatError
+        If its files are there but damaged.
+    """
+    result = load_result(results)
+    if result is None:
+        return None
+    told = summary(result)
+    notes = (f"Read off {result.shown}.", acceptance(result.spec, told))
+    found = calibrated_from(result.spec.model_dump(mode="json"), records(told), notes, LEVEL)
+    tables = tuple(
+        plain(one.title, one.columns, [[row.get(name, "") for name in one.columns] for row in one.rows],
+              numeric=one.numeric, notes=one.below)
+        for one in text_tables(result, told)
+        if one.columns[0] != "finding"  # those stand in a table of their own, with who states them
+    )  # fmt: skip
+    return replace(found, tables=tables)
 
 
 def calibrated_from(

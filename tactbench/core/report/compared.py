@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
+from tactbench.core.leaderboard.comparison import AXES, compare
 from tactbench.core.leaderboard.probe import NUMERIC, build_probe
-from tactbench.core.report.plain import Entry, PlainTable, number, plain
+from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, number, plain
 from tactbench.core.report.section import Section, Subject
 
 
@@ -38,7 +39,23 @@ def probe_tables(subject: Subject) -> list[PlainTable]:
     return [plain(table.title, table.columns, lines, numeric=NUMERIC, notes=table.notes)]
 
 
-TABLES: tuple[Callable[[Subject], Sequence[PlainTable]], ...] = (probe_tables,)
+def comparison_tables(subject: Subject) -> list[PlainTable]:
+    """Return protocols, splits and folds side by side, each score leading to the cell it is from."""
+    found = []
+    for table in (table for by in AXES for table in compare(subject.rows, by)):
+        records = iter(table.records)
+        lines = []
+        for names, told in ((line[:2], line[2:]) for line in table.lines):
+            entries = [Entry(name) for name in names]
+            for text in told:
+                record = next(records) if text != ABSENT else {}
+                entries.append(Entry(text, finite(record.get("score")), subject.anchor_of(record)))
+            lines.append(entries)
+        found.append(plain(table.title, table.columns, lines, numeric=table.columns[2:], notes=table.notes))
+    return found
+
+
+TABLES: tuple[Callable[[Subject], Sequence[PlainTable]], ...] = (comparison_tables, probe_tables)
 """Called one after the other; one that has nothing to show returns an empty list."""
 
 

@@ -19,6 +19,8 @@ def findings_section(subject: Subject) -> Section:
             "No task was answered both linearly and otherwise: add `--estimator` to `tactbench run`, twice; "
             "`tactbench list estimators` has them."
         )
+    if subject.calibrated is not None:
+        tables += subject.calibrated.tables
     if not tables:
         return Section("findings", "Findings", missing=tuple(lacks))
     notes = subject.calibrated.notes if subject.calibrated else ()

@@ -15,6 +15,17 @@ def _by_name(given: Any) -> Any:
     return {"name": given} if isinstance(given, str) else given
 
 
+def _names(given: Any) -> Any:
+    """Read a bare word as a list of one, and nothing as none."""
+    if given is None:
+        return ()
+    return (given,) if isinstance(given, str) else given
+
+
+Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
+"""A name, or a list of names."""
+
+
 class EstimatorChoice(Frozen):
     """An estimator, with parameters other than its defaults."""
 
@@ -26,10 +37,11 @@ class TaskChoice(Frozen):
     """A task, and how it is to be answered."""
 
     name: str
-    protocol: str | None = None
-    """None: the task's first."""
-    split: str | None = None
-    """None: the first of the task's splits that the recordings can serve."""
+    protocol: Names = ()
+    """One or several, each giving cells of its own; none: the task's first."""
+    split: Names = ()
+    """One or several, each giving cells of its own; none: the first of the task's splits that the recordings can serve.
+    `few-shot` stands for all of the task's splits `few-shot-N`."""
     estimators: tuple[Annotated[EstimatorChoice, BeforeValidator(_by_name)], ...] = ()
     """Empty: the task's own. Its baselines are always run."""
 

@@ -32,7 +32,9 @@ class Placement(Frozen):
     """Axial offset [length]."""
     s: Quantity = assumed(0.0, "mm", "nominal contact point of the mount")
     """Offset along the arc [length]."""
-    scatter: Quantity = assumed(0.1, "mm", "repeatability of exchanging a cap; no source states it")
+    scatter: Quantity = assumed(
+        0.1, "mm", "repeatability of exchanging a cap; no source states it: docs/calibration.md draws it from a prior"
+    )
     """Standard deviation of both offsets from recording to recording [length]."""
     tilt_x: Quantity = assumed(0.0, "rad", "the indenter's axis is the press axis")
     """Slope of the indenter along the finger [angle]; positive: it stands further off towards the tip."""
@@ -61,12 +63,16 @@ class ForceRamp(Frozen):
 class Environment(Frozen):
     """What surrounds the contact, and how far the assumed nuisances are scaled."""
 
-    since_power_on: Quantity = assumed(600.0, "s", "ten minutes: not yet quite warm; the paper does not say")
+    since_power_on: Quantity = assumed(
+        600.0, "s", "ten minutes: not yet quite warm; the paper does not say: docs/calibration.md draws it from a prior"
+    )
     """Time from switching the sensor on to the first sample of the session [time]."""
     noise_scale: float = Field(default=1.0, ge=0)
-    """Factor on white noise of the sensor."""
+    """Factor on white noise of the sensor; docs/calibration.md says which factors the paper's figures allow."""
     drift_scale: float = Field(default=1.0, ge=0)
-    """Factor on offsets, wander and warm-up."""
+    """Factor on wander and warm-up, and on offsets unless they have their own."""
+    offset_scale: float | None = Field(default=None, ge=0)
+    """Factor on the offsets between recordings of a session; None: that of drift."""
     session_offset_scale: float = Field(default=0.0, ge=0)
     """Factor on the offsets between sessions; 0: the sessions follow each other on one warm set-up, as in the paper."""
     force_noise: Quantity = sourced(
@@ -80,6 +86,11 @@ class Environment(Frozen):
     indenter_temperature: Quantity | None = None
     """Temperature of the indenter [degC]; None: as warm as what it touches, so that no heat flows. Nobody states it:
     a cap that lies in the room has that of the room."""
+
+    @property
+    def scale_of_offsets(self) -> float:
+        """The factor on the offsets between recordings [1]."""
+        return self.drift_scale if self.offset_scale is None else self.offset_scale
 
 
 class Surface(Frozen):
@@ -179,6 +190,8 @@ class Scene(Frozen):
     environment: Environment = Environment()
     session: str = "1"
     """Recordings of one session were made without re-mounting anything."""
+    unit: str = Field(default="1", min_length=1)
+    """Which unit of the sensor: two devices of one type are two units. The spec describes unit 1."""
     starts_after_s: float = Field(default=0.0, ge=0)
     """Seconds from the session's first sample to this recording's first."""
     observe: tuple[ChannelKind, ...] = ("taxel",)
@@ -186,3 +199,8 @@ class Scene(Frozen):
     simulation: Simulation = Simulation()
     labels: dict[str, str | float | int] = Field(default_factory=dict)
     """Facts about the recording that a task may ask for, for example {"cap_radius_mm": 5.0}."""
+
+    @property
+    def first_unit(self) -> bool:
+        """Whether the unit is the one whose rest levels and gain the sensor's spec describes."""
+        return self.unit == "1"

@@ -116,6 +116,12 @@ class Nuisances(Frozen):
     step: Quantity
     """Step of the converter."""
     creep: tuple[Creep, ...] = ()
+    unit_gain: Quantity | None = None
+    """Standard deviation of a gain that all channels of a unit share, from unit to unit [1]; None: not stated, 0."""
+    unit_rest_shared: Quantity | None = None
+    """Standard deviation by which the rest level of all channels of another unit differs from the spec's."""
+    unit_rest_own: Quantity | None = None
+    """The same for each channel's own."""
     largest_slope: Quantity | None = None
     """Largest change of a reading with load [unit / force]; bounds what a slow effect on the load can do. None: not
     known, and then no effect on the load is ever left out."""

@@ -72,10 +72,14 @@ class TaskSpec(Frozen):
     """Unit of the primary metric."""
     scenes: tuple[PlannedScene, ...] = ()
     """What a rig should record; empty: only recordings made elsewhere can answer."""
+    campaigns: dict[str, tuple[PlannedScene, ...]] = Field(default_factory=dict)
+    """By name of a split: what a rig should record for it instead of `scenes`. Groups that such a split keeps apart are
+    left out one by one. Scenes of one name are one scene, in every campaign."""
     protocols: tuple[str, ...]
     """Allowed protocols, the default first."""
     splits: tuple[str, ...] = ()
-    """Splits that make sense for `deployable`, the default first: roles, session, in-session, or a group's name."""
+    """Splits that make sense for `deployable`, the default first: roles, session, in-session, few-shot-N, or a group's
+    name."""
     estimators: tuple[str, ...]
     """What answers when nobody asks for another."""
     baselines: tuple[str, ...]
@@ -93,3 +97,7 @@ class TaskSpec(Frozen):
             and (one.split is None or split is None or one.split == split)
         ]
         return min(fitting, key=lambda one: (one.sensor is None, one.estimator is None), default=None)
+
+    def scenes_for(self, split: str | None) -> tuple[PlannedScene, ...]:
+        """Return what a rig should record to answer under `split`; None is the default split."""
+        return self.scenes if split is None else self.campaigns.get(split, self.scenes)

@@ -71,6 +71,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
             groups=("heat",),
         ),
         _effect("rest-spread", "Scatter of rest levels", "effects.rest_spread:apply", (), ("disturbance",)),
+        _effect("unit-rest", "Rest levels of another unit", "effects.unit_rest:apply", (), ("disturbance",)),
         _effect("offset", "Offsets", "effects.offset:apply", (), ("disturbance",), groups=_DRIFT),
         _effect("warm-up", "Shared warm-up", "effects.warm_up:apply", (), ("disturbance",), groups=_DRIFT),
         _effect("wander", "Free drift", "effects.wander:apply", (), ("disturbance",), groups=_DRIFT),

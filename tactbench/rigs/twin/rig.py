@@ -182,9 +182,11 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
 
 
 def _stated(scene: Scene) -> dict[str, Scalar]:
-    """Return what the scene states of drive, slide, recorded force and temperatures beyond the default."""
+    """Return what the scene states of offsets, drive, slide, recorded force and temperatures beyond the default."""
     environment, drive = scene.environment, scene.drive
     stated: dict[str, Scalar] = {}
+    if environment.offset_scale is not None:
+        stated["offset_scale"] = environment.offset_scale
     if environment.indenter_temperature is not None:
         stated["indenter_degc"] = environment.indenter_temperature.to("degC")
         stated["ambient_degc"] = environment.ambient.to("degC")

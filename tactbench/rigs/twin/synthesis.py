@@ -163,8 +163,9 @@ class Synthesis:
         return self.sensor.spec.nuisances.get(kind)
 
     def of_unit(self, *what: str) -> np.random.Generator:
-        """Return the generator of what belongs to this sensor unit: the same in every recording of a seed."""
-        return draws.generator(self.seed, self.sensor.name, "unit", *what)
+        """Return the generator of what belongs to this sensor unit: the same in every recording of it under a seed."""
+        scope = "unit" if self.scene.first_unit else f"unit {self.scene.unit}"
+        return draws.generator(self.seed, self.sensor.name, scope, *what)
 
     def of_session(self, *what: str) -> np.random.Generator:
         """Return the generator of what the recordings of a session share."""

@@ -51,6 +51,13 @@ TAXEL = Nuisances(
     ),
     step=_STEP,
     creep=_CREEP,
+    unit_gain=assumed(
+        0.1, "1", "not identifiable, no source presses two units with a known force; twice the scatter within one"
+    ),
+    unit_rest_shared=measured(158.0, "count", "RG: sd of the medians of three BioTac SP, 3020, 2989, 2733"),
+    unit_rest_own=measured(
+        125.0, "count", "RG: two BioTac SP differ by sd 87, the third by 163 after a shift; the middle"
+    ),
     largest_slope=derived(200.0, "count/N", f"{_SLOPE}: 192"),
 )
 

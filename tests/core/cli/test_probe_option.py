@@ -41,9 +41,8 @@ def test_from_foreign_tables_to_the_probe_without_a_script(shell, shared_data):
     for name in ("eflesh-normal", "eflesh-normal-raw"):
         mapping = ROOT / "examples" / "mappings" / f"{name}.yaml"
         shell("import", str(mapping), "--root", str(shared_data / "eflesh"), "--out", f"recordings/eflesh/{name}")
-    matrix = ROOT / "examples" / "matrices" / "real-eflesh.yaml"
     # The forest of the matrix takes a minute; how a matrix is run does not depend on what answers.
-    done = shell("run", "--config", str(matrix), "--probe", "--estimator", "ridge", "--format", "json")
+    done = shell("run", "--config", "real-eflesh", "--probe", "--estimator", "ridge", "--format", "json")
     rows = [row for row in json.loads(done.stdout) if row["estimator"] == "ridge"]
     by_split = {(row["sensor"], row["split"]): row for row in rows if row["protocol"] == "deployable"}
     assert {split for _, split in by_split} == {"session", "press", "in-session", "shuffled"}

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.cell import evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
@@ -172,7 +172,7 @@ def test_curvature_rows_are_raw_and_classes_are_in_order(tmp_path):
 
 def test_it_needs_the_three_roles_and_no_other_split(tmp_path):
     paths = three(tmp_path, ramp)
-    with pytest.raises(UsageError, match="by roles only"):
+    with pytest.raises(NotApplicable, match="by roles only"):
         run(paths, split="session")
     with pytest.raises(NotApplicable, match="deployable"):
         run(paths[:2])

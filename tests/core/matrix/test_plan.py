@@ -1,6 +1,7 @@
 import pytest
 
 from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.matrix.material import need_of
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
@@ -46,3 +47,34 @@ def test_a_wrong_name_is_answered_with_the_nearest(registry, choice, says):
 def test_an_estimator_for_another_kind_of_question_is_refused(registry):
     with pytest.raises(UsageError, match="classification"):
         plan(registry, TaskChoice(name="curvature", estimators=(EstimatorChoice(name="lasso"),)))
+
+
+def ways(cells):
+    return [(cell.protocol, cell.split) for cell in cells if not cell.baseline]
+
+
+def test_several_protocols_and_splits_give_cells_for_every_pair(registry):
+    protocols, splits = ("karl2016", "karl2016-training-scale", "deployable"), ("roles", "unit")
+    cells = plan(registry, TaskChoice(name="force", protocol=protocols, split=splits))
+    assert ways(cells) == [(protocol, split) for protocol in protocols for split in splits]
+    assert len({cell.name for cell in cells}) == len(cells)
+    # Every pair has its baselines beside it.
+    assert len(cells) == 3 * len(ways(cells))
+
+
+def test_one_name_is_a_list_of_one_and_none_is_the_tasks_own(registry):
+    assert TaskChoice(name="force", protocol="deployable").protocol == ("deployable",)
+    assert ways(plan(registry, TaskChoice(name="force", protocol=None, split=None))) == [("karl2016", None)]
+
+
+def test_few_shot_stands_for_all_of_a_tasks_few_shot_splits(registry):
+    cells = plan(registry, TaskChoice(name="force", protocol="deployable", split=("few-shot", "few-shot-5", "unit")))
+    assert [split for _, split in ways(cells)] == ["few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "unit"]
+
+
+def test_a_pair_that_does_not_go_together_is_refused_alone_and_planned_among_others(registry):
+    with pytest.raises(UsageError, match="deployable"):
+        plan(registry, TaskChoice(name="force", protocol="karl2016", split="unit"))
+    both = plan(registry, TaskChoice(name="force", protocol=("karl2016", "deployable"), split="unit"))
+    assert ways(both) == [("karl2016", "unit"), ("deployable", "unit")]
+    assert {need_of(cell)[2] for cell in both if cell.protocol == "karl2016"} == {None}, "nothing is recorded for it"

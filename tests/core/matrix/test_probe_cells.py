@@ -37,6 +37,12 @@ def test_three_more_ways_after_those_asked_for(registry):
     assert len({cell.name for cell in probed}) == len(probed)
 
 
+def test_what_is_asked_under_both_protocols_is_probed_once(registry):
+    assert ways(plan(registry, protocol=["karl2016", "deployable"])) == [
+        ("karl2016", None), ("deployable", None), ("first-frame", None), ("deployable", "shuffled"),
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("split", "expected"),
     [

@@ -71,7 +71,7 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
         return Reason(False, f"the load is constant: {scene.profile.end.to('N'):g} N throughout", 0.0)
     slowest = max(term.tau.to("s") for term in terms)
     late = f"{100 * share:.0f} % of the response comes late, by up to {slowest:g} s"
-    bounds = [_behind(nuisances, rate) for nuisances in _observed(scene, sensor)]
+    bounds = [_behind(nuisances, rate, _unit_gain(scene, nuisances)) for nuisances in _observed(scene, sensor)]
     if any(bound is None for bound in bounds):
         return Reason(True, late)
     most = max(bound for bound in bounds if bound is not None)
@@ -88,23 +88,47 @@ def _steepest_n_per_s(scene: Scene) -> float:
     return abs(profile.end.to("N") - profile.start.to("N")) / ramp if ramp > 0 else 0.0
 
 
-def _behind(nuisances: Nuisances, rate: float) -> float | None:
+def _behind(nuisances: Nuisances, rate: float, unit_gain: float = 0.0) -> float | None:
     if not nuisances.creep:
         return 0.0
     if nuisances.largest_slope is None:
         return None
     late_s = sum(term.fraction.to("1") * term.tau.to("s") for term in nuisances.creep)
     # The slope is that of the nominal gain; four standard deviations cover the largest of some hundred channels.
-    gain = 1.0 + 4.0 * nuisances.gain_scatter.to("1")
+    gain = (1.0 + 4.0 * nuisances.gain_scatter.to("1")) * (1.0 + 4.0 * unit_gain)
     return nuisances.largest_slope.to("count/N") * gain * late_s * rate
 
 
 def gain(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether channels of one unit have different gains."""
     scatter = _largest(scene, sensor, lambda nuisances: nuisances.gain_scatter)
-    if scatter is None or not scatter.value:
+    within = 0.0 if scatter is None else scatter.to("1")
+    between = max((_unit_gain(scene, nuisances) for nuisances in _observed(scene, sensor)), default=0.0)
+    if not within and not between:
         return Reason(False, "the spec states no scatter of gain for the observed channels", 0.0)
-    return Reason(True, f"gains scatter by {100 * scatter.to('1'):g} % within a unit")
+    other = f", and unit {scene.unit} by {100 * between:g} % as a whole" if between else ""
+    return Reason(True, f"gains scatter by {100 * within:g} % within a unit{other}")
+
+
+def _unit_gain(scene: Scene, nuisances: Nuisances) -> float:
+    """Return the standard deviation of the gain that a unit's channels share; 0 for the unit of the spec."""
+    return 0.0 if scene.first_unit or nuisances.unit_gain is None else nuisances.unit_gain.to("1")
+
+
+def unit_rest(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether another unit rests at other levels than the spec states."""
+    if scene.first_unit:
+        return Reason(False, "unit 1 is the one that the spec describes", 0.0)
+    found = [
+        stated
+        for nuisances in _observed(scene, sensor)
+        for stated in (nuisances.unit_rest_shared, nuisances.unit_rest_own)
+        if stated is not None and stated.value
+    ]
+    if not found:
+        return Reason(False, "the spec states no spread of rest levels from unit to unit", 0.0)
+    largest = max(found, key=lambda quantity: quantity.value)
+    return Reason(True, f"levels of unit {scene.unit} differ by {largest} (sd)", largest.value, largest.unit)
 
 
 def offset(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -120,14 +144,17 @@ def offset(scene: Scene, sensor: SensorSpec) -> Reason:
     found = [quantity for quantity in (shared, own) if quantity is not None]
     largest = max(found, key=lambda quantity: quantity.value, default=None)
     return _scaled(
-        scene, largest, "offset", "levels move by {} (sd) between recordings; between sessions by nothing more"
+        environment.scale_of_offsets,
+        largest,
+        "offset",
+        "levels move by {} (sd) between recordings; between sessions by nothing more",
     )
 
 
 def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether rest levels rise to a warm value."""
     rise = _largest(scene, sensor, lambda nuisances: nuisances.warm_up)
-    reason = _scaled(scene, rise, "warm-up", "rest levels rise by {} from power-on")
+    reason = _scaled(scene.environment.drift_scale, rise, "warm-up", "rest levels rise by {} from power-on")
     tau = _largest(scene, sensor, lambda nuisances: nuisances.warm_up_tau)
     if not reason.called_for or tau is None or reason.change is None:
         return reason
@@ -138,7 +165,7 @@ def warm_up(scene: Scene, sensor: SensorSpec) -> Reason:
 def wander(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether channels drift freely."""
     spread = _largest(scene, sensor, lambda nuisances: nuisances.wander)
-    return _scaled(scene, spread, "free drift", "channels wander by {} (sd)")
+    return _scaled(scene.environment.drift_scale, spread, "free drift", "channels wander by {} (sd)")
 
 
 def rest_spread(scene: Scene, sensor: SensorSpec) -> Reason:
@@ -176,10 +203,9 @@ def force_noise(scene: Scene, sensor: SensorSpec) -> Reason:
     return Reason(True, f"the unfiltered force sensor errs by {noise} (sd)", noise.to("N"), "N")
 
 
-def _scaled(scene: Scene, size: Quantity | None, what: str, text: str) -> Reason:
-    scale = scene.environment.drift_scale
+def _scaled(scale: float, size: Quantity | None, what: str, text: str) -> Reason:
     if size is None or not size.value:
         return Reason(False, f"the spec states no {what} for the observed channels", 0.0)
     if not scale:
-        return Reason(False, "the scene scales drift by 0", 0.0)
+        return Reason(False, f"the scene scales {what} by 0", 0.0)
     return Reason(True, f"{text.format(size)}, scaled by {scale:g}", scale * size.value, size.unit)

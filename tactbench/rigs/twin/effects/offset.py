@@ -16,6 +16,6 @@ def apply(run: Synthesis) -> None:
             shared = nuisances.offset_shared.value * float(run.of_recording("offset", "shared", kind).standard_normal())
             own = run.of_every_channel(track, kind, run.of_recording("offset", "own", kind))
             session = run.of_every_channel(track, kind, run.of_session("offset", kind))
-            track.readings[:, columns] += environment.drift_scale * (shared + nuisances.offset_own.value * own)
+            track.readings[:, columns] += environment.scale_of_offsets * (shared + nuisances.offset_own.value * own)
             scale = environment.session_offset_scale * nuisances.offset_session.value
             track.readings[:, columns] += scale * session

@@ -65,6 +65,17 @@ def test_own_offsets_change_with_the_recording_and_session_offsets_do_not(sensor
     assert np.std(other_session - a) > 2 * np.std(a - b)
 
 
+@pytest.mark.parametrize(("drift", "own", "factor"), [(2.0, None, 2.0), (0.0, 3.0, 3.0), (5.0, 0.0, 0.0)])
+def test_a_stated_scale_of_offsets_takes_over_from_that_of_drift(sensors, drift, own, factor):
+    plain, scaled = _run(sensors["biotac"]), _run(sensors["biotac"])
+    plain.scene = plain.scene.model_copy(update={"environment": Environment()})
+    scaled.scene = scaled.scene.model_copy(update={"environment": Environment(drift_scale=drift, offset_scale=own)})
+    for run in (plain, scaled):
+        offset.apply(run)
+    assert np.abs(plain.tracks[0].readings).max() > 1
+    np.testing.assert_allclose(scaled.tracks[0].readings, factor * plain.tracks[0].readings, rtol=1e-13)
+
+
 def test_offsets_move_all_samples_of_a_channel_alike(sensors):
     readings = _after(offset, sensors["biotac"]).tracks[0].readings
     np.testing.assert_array_equal(readings, np.tile(readings[0], (200, 1)))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from tactbench.core.cost.front import diagrams, front
+from tactbench.core.cost.precision import diagrams, precise
 from tactbench.core.plugins.cost import CostPoint
 
 # Okabe and Ito's colours, told apart by people with any colour vision; shapes say the same again.
@@ -38,7 +38,7 @@ def draw(points: Sequence[CostPoint], title: str, paths: Sequence[Path]) -> None
             colour, shape = marks[family]
             axis.loglog([p.seconds for p in own], [max(p.error, 1e-12) for p in own], shape, color=colour, ms=6,
                         label=family, ls="none")  # fmt: skip
-        best = front(group)
+        best = precise(group)
         axis.plot([p.seconds for p in best], [max(p.error, 1e-12) for p in best], color="#555555", lw=1, zorder=0)
         for point in group:
             if point.default:

@@ -1,0 +1,107 @@
+"""What the extra [fast] brings: forests of oneDAL against those of scikit-learn, and what tactbench's own layer costs.
+
+Three forests of the paper's 500 trees on the very arrays that a cell of the curvature task is answered with, turn and
+turn about, one thread: `forest` as tactbench builds it, the same RandomForestClassifier without any of tactbench's
+code around it, and `forest-fast`. Each round fits and asks single rows; the order changes from round to round. F1 is
+measured once for each of several seeds of the forests. Needs the extra: pip install 'tactbench[fast]'.
+
+Usage: python benchmarks/fast_forest.py [ROUNDS [SENSOR]]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from sklearn.ensemble import RandomForestClassifier
+
+from tactbench.core.cost.contestants import Contestant, contestant
+from tactbench.core.cost.rounds import measure
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.matrix.progress import Silence
+from tactbench.core.matrix.run import carry_out
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+
+TASK, PROTOCOL, TREES, SEEDS = "curvature", "karl2016", 500, (1, 2, 3, 4, 5)
+GOAL_LATENCY, GOAL_F1 = 5.0, 0.01
+"""Stated before measuring: at least so many times quicker for one row, and no further apart in macro F1."""
+
+
+def arrays(sensor: str, folder: Path) -> Contestant:
+    """Return the plain forest with the arrays of its cell."""
+    registry = load_registry()
+    choice = TaskChoice(name=TASK, protocol=PROTOCOL, estimators=(EstimatorChoice(name="majority"),))
+    outcome = carry_out(MatrixSpec(sensors=(sensor,), tasks=(choice,)), Store(folder))
+    spec = registry.tasks[TASK].spec
+    data = load_dataset(spec, outcome.recordings[outcome.rows[0]["cell"]])
+    return contestant(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1, threads=1)
+
+
+def of_seed(one: Contestant, name: str, seed: int) -> Contestant:
+    """Return another forest on the same arrays."""
+    if name == "scikit-learn alone":
+        return dataclasses.replace(
+            one, name=name, build=lambda: RandomForestClassifier(TREES, random_state=seed, n_jobs=1)
+        )
+    descriptor = load_registry().estimators[name]
+    make = load_object(descriptor.where)
+    return dataclasses.replace(
+        one, name=name, build=lambda: make(kind="classification", seed=seed, threads=1, **descriptor.params)
+    )
+
+
+def f1(one: Contestant) -> float:
+    """Return the macro F1 on the test rows."""
+    model = one.build()
+    model.fit(one.X_train, one.y_train)
+    return one.metric.of(one.y_test, model.predict(one.X_test), one.n_classes)
+
+
+def main() -> None:
+    """Measure, and print the table and whether the goals are met."""
+    rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 5
+    sensor = sys.argv[2] if len(sys.argv) > 2 else "icub"
+    names = ("forest", "scikit-learn alone", "forest-fast")
+    with tempfile.TemporaryDirectory() as folder:
+        plain = arrays(sensor, Path(folder))
+    field = {name: of_seed(plain, name, 1) for name in names}
+    times = measure(field, rounds=rounds, budget_s=float("inf"), threads=1, seed=1, clock=time.perf_counter,
+                    progress=Silence())  # fmt: skip
+    for name, timing in times.items():
+        if timing.trouble is not None:
+            raise SystemExit(f"{name}: {timing.trouble}")
+    scores = {name: [f1(of_seed(plain, name, seed)) for seed in SEEDS] for name in names}
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    print(f"{sensor}, {TASK}, {PROTOCOL}: {len(plain.X_train)} training rows of {plain.X_train.shape[1]} features, "
+          f"{TREES} trees, one thread, {rounds} rounds, load {load:.1f} on {os.cpu_count()} cores")  # fmt: skip
+    print(f"{'':<20}{'fit, s':>22}{'one row, ms: p50':>18}{'p95':>9}{'all rows, µs/row':>18}   macro F1 of seeds")
+    for name in names:
+        timing = times[name]
+        latency = sorted(1e3 * value for value in timing.latency_s)
+        batch = 1e6 * statistics.median(timing.batch_s) / len(plain.X_test)
+        fit = f"{statistics.median(timing.fit_s):.2f} [{min(timing.fit_s):.2f}, {max(timing.fit_s):.2f}]"
+        print(f"{name:<20}{fit:>22}{statistics.median(latency):>18.3f}{latency[int(0.95 * len(latency))]:>9.3f}"
+              f"{batch:>18.1f}   {statistics.mean(scores[name]):.4f} "
+              f"[{min(scores[name]):.4f}, {max(scores[name]):.4f}]")  # fmt: skip
+    middle = {name: statistics.median(times[name].latency_s) for name in names}
+    fits = {name: statistics.median(times[name].fit_s) for name in names}
+    quicker = middle["forest"] / middle["forest-fast"]
+    apart = max(abs(a - b) for a, b in zip(scores["forest"], scores["forest-fast"], strict=True))
+    print(f"latency, forest / forest-fast: {quicker:.1f} (goal: at least {GOAL_LATENCY:g}: "
+          f"{'met' if quicker >= GOAL_LATENCY else 'MISSED'})")  # fmt: skip
+    print(f"fit, forest / forest-fast: {fits['forest'] / fits['forest-fast']:.2f}")
+    print(f"latency, forest / scikit-learn alone: {middle['forest'] / middle['scikit-learn alone']:.3f}; "
+          f"fit: {fits['forest'] / fits['scikit-learn alone']:.3f}")  # fmt: skip
+    print(f"largest difference of F1, seed by seed: {apart:.4f} (goal: at most {GOAL_F1:g}: "
+          f"{'met' if apart <= GOAL_F1 else 'MISSED'})")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

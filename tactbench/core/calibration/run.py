@@ -1,0 +1,58 @@
+"""Carrying out the draws that are still missing."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from tactbench.core.calibration.draw import Draw
+from tactbench.core.calibration.journal import Journal
+from tactbench.core.calibration.trial import Trial, carry_out
+from tactbench.core.errors import TactbenchError
+from tactbench.core.matrix.execution import workers
+from tactbench.core.matrix.keys import versions
+from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.provenance import gather
+from tactbench.core.spec.calibration import CalibrationSpec
+
+Work = Callable[[Trial], tuple[Draw, float]]
+
+
+def made_by() -> dict[str, str]:
+    """Return the versions that may change a number, and the commit."""
+    facts = gather()
+    return {"tactbench": str(facts["tactbench"]), "commit": str(facts["commit"]), **versions()}
+
+
+def carry_out_missing(
+    spec: CalibrationSpec, seed: int, draws: int, journal: Journal, *, jobs: int, told: Progress, work: Work = carry_out
+) -> list[Draw]:
+    """Carry out draws 0 … `draws` - 1 that `journal` does not hold; return all of them in order.
+
+    Each is written down as it ends, so that an interruption loses those that are under way and nothing else.
+
+    Raises
+    ------
+    TactbenchError
+        If a process was ended from outside; what was finished is kept.
+    """
+    numbers = [number for number in range(draws) if number not in journal.draws]
+    if numbers:
+        told.begin("drawing", len(numbers), alone=jobs == 1)
+        # One folder for all: workers that are ended in the middle cannot tidy up behind themselves, and one may still
+        # be writing when it is emptied; that must not hide the interruption.
+        with (
+            tempfile.TemporaryDirectory(prefix="tactbench-draws-", ignore_cleanup_errors=True) as scratch,
+            workers(min(jobs, len(numbers))) as crew,
+        ):
+            missing = [Trial(spec, seed, number, Path(scratch)) for number in numbers]
+            for trial, outcome in crew.each(work, missing):
+                if isinstance(outcome, BaseException):
+                    raise TactbenchError(
+                        f"The process of draw {trial.number} was ended: {outcome}",
+                        hint="What was finished is kept; give the same command again, with fewer --jobs.",
+                    ) from outcome
+                journal.append(*outcome)
+                told.advance(f"draw {trial.number}: {outcome[0].status}, {outcome[1]:.1f} s")
+    return [journal.draws[number] for number in range(draws)]

@@ -1,0 +1,161 @@
+"""What a calibration says as tables of text, for a terminal, a document or a page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tactbench.core.calibration.result import CalibrationResult
+from tactbench.core.calibration.summary import Summary, acceptance, records
+from tactbench.core.spec.calibration import CalibrationSpec
+
+Line = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A title, columns, rows of text by column, and sentences below."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[Mapping[str, str], ...]
+    numeric: tuple[str, ...] = ()
+    """Columns aligned to the right."""
+    below: tuple[str, ...] = ()
+
+
+def text_tables(result: CalibrationResult, told: Summary) -> list[TextTable]:
+    """Return every table that has a row."""
+    lines = records(told)
+    tables = (
+        _published(result.spec, told, lines["published"]),
+        _nuisances(lines["parameters"]),
+        _findings(lines["findings"]),
+        _sensitivity(result.spec, lines["sensitivity"]),
+        _agreement(result.spec, lines["agreement"], lines["same_verdict"]),
+    )
+    return [table for table in tables if table.rows]
+
+
+def markdown(result: CalibrationResult, told: Summary) -> str:
+    """Return the tables as Markdown, headings and who made the draws included."""
+    makers = ", ".join(f"{name} {value}" for name, value in result.made_by.items())
+    failed = f", {told.failed} of them failed" if told.failed else ""
+    out = [
+        f"## {result.spec.title}",
+        f"SIM. {len(result.draws)} draws with seed {result.seed}{failed}; {result.cpu_s / 60:.0f} minutes of processor "
+        f"time; {makers}.",
+    ]
+    for table in text_tables(result, told):
+        out += [f"### {table.title}", _grid(table), *table.below]
+    return "\n\n".join(out) + "\n"
+
+
+def _grid(table: TextTable) -> str:
+    rule = ["---:" if column in table.numeric else "---" for column in table.columns]
+    rows = [[row.get(column, "") for column in table.columns] for row in table.rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (list(table.columns), rule, *rows))
+
+
+def _published(spec: CalibrationSpec, told: Summary, lines: Sequence[Line]) -> TextTable:
+    return TextTable(
+        f"Published numbers: {len(told.draws)} draws from the prior, {told.n_accepted} accepted",
+        ("number", "use", "published", "prior", "accepted", "inside", "by all others", "inside those", "their reach"),
+        tuple(
+            {
+                "number": line["title"], "use": line["use"], "published": f"{line['published']:g}{_unit(line)}",
+                "prior": _range(line, "prior"), "accepted": _range(line, "accepted"), "inside": _yes(line["inside"]),
+                "by all others": _range(line, "by_all_others"), "inside those": _yes(line["inside_by_all_others"]),
+                "their reach": f"{line['by_all_others_reach']:.1f}",
+            }
+            for line in lines
+        ),
+        below=(acceptance(spec, told),),
+    )  # fmt: skip
+
+
+def _nuisances(lines: Sequence[Line]) -> TextTable:
+    return TextTable(
+        "Nuisances: median and middle 80 %",
+        ("nuisance", "where", "unit", "prior", "accepted"),
+        tuple(
+            {"nuisance": line["name"], "where": line["path"], "unit": line["unit"], "prior": _range(line, "prior"),
+             "accepted": _range(line, "accepted")}
+            for line in lines
+        ),
+    )  # fmt: skip
+
+
+def _findings(lines: Sequence[Line]) -> TextTable:
+    return TextTable(
+        "Findings: share of the draws in which they come out, with Wilson's 95 %",
+        ("finding", "prior", "accepted"),
+        tuple(
+            {"finding": line["statement"], "prior": _share(line, "prior"), "accepted": _share(line, "accepted")}
+            for line in lines
+        ),
+    )
+
+
+def _sensitivity(spec: CalibrationSpec, lines: Sequence[Line]) -> TextTable:
+    names = tuple(dict.fromkeys(line["parameter"] for line in lines))
+    cells = {
+        (line["output"], line["parameter"]): f"{line['correlation']:+.2f}"
+        + ("*" if line["low"] > 0 or line["high"] < 0 else "")
+        for line in lines
+    }
+    return TextTable(
+        "Partial rank correlations; *: the 95 % interval leaves out 0",
+        ("number", *names),
+        tuple(
+            {"number": spec.output(one.output).title, **{name: cells.get((one.output, name), "") for name in names}}
+            for one in spec.published
+            if names
+        ),
+        numeric=names,
+    )
+
+
+def _agreement(spec: CalibrationSpec, lines: Sequence[Line], verdicts: Sequence[Line]) -> TextTable:
+    statements = {finding.name: finding.statement for finding in spec.findings}
+    return TextTable(
+        "Cheap answers beside the dear ones they stand for",
+        ("cheap", "dear", "draws", "rank correlation", "mean difference", "largest"),
+        tuple(
+            {"cheap": spec.output(line["output"]).title, "dear": spec.output(line["dear"]).title,
+             "draws": str(line["n"]), "rank correlation": _number(line["rank_correlation"]),
+             "mean difference": _number(line["mean_difference"]), "largest": _number(line["largest_difference"])}
+            for line in lines
+        ),
+        numeric=("draws", "rank correlation", "mean difference", "largest"),
+        below=tuple(
+            f"Cheap and dear answer alike in {_share(line, 'alike')}: {statements[line['finding']]}."
+            for line in verdicts
+        ),
+    )  # fmt: skip
+
+
+def _range(line: Line, name: str) -> str:
+    if line[f"{name}_median"] is None:
+        return "too few"
+    return f"{line[f'{name}_median']:.3g} ({line[f'{name}_low']:.3g} … {line[f'{name}_high']:.3g})"
+
+
+def _share(line: Line, name: str) -> str:
+    if line[f"{name}_share"] is None:
+        return "no draw"
+    low, high = line[f"{name}_low"], line[f"{name}_high"]
+    return f"{line[f'{name}_share']:.0%} ({low:.0%} … {high:.0%}) of {line[f'{name}_n']}"
+
+
+def _unit(line: Line) -> str:
+    return "" if line["unit"] == "1" else f" {line['unit']}"
+
+
+def _yes(value: bool | None) -> str:
+    return "–" if value is None else "yes" if value else "no"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"

@@ -1,0 +1,122 @@
+"""``tactbench calibrate``: what the simulated rig cannot know, drawn and held against published numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tactbench.core.cli.calibration_tables import CALIBRATION_FORMATS, print_calibration
+from tactbench.core.cli.threads import one_thread
+
+if TYPE_CHECKING:
+    from tactbench.core.calibration.result import CalibrationResult
+    from tactbench.core.calibration.summary import Summary
+    from tactbench.core.spec.calibration import CalibrationSpec
+
+
+@click.command(name="calibrate")
+@click.option("--draws", type=click.IntRange(min=1), metavar="N", help="How many draws; default: the file's.")
+@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of all draws; default: the file's.")
+@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
+@click.option("--config", type=click.Path(path_type=Path), metavar="FILE", help="A procedure like calibration.yaml.")
+@click.option("--show", is_flag=True, help="Draw nothing: show the calibration in DIR, else the one that came along.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
+              metavar="DIR", help="Where DIR/calibration lies; draws that are there already are kept.")  # fmt: skip
+@click.option("--format", "shape", type=click.Choice(CALIBRATION_FORMATS), default="table", show_default=True)
+def command(
+    draws: int | None, seed: int | None, jobs: int, config: Path | None, show: bool, out: Path, shape: str
+) -> None:
+    """Draw what no source states, simulate, and keep the draws that come near published numbers.
+
+    Prints which ranges those leave, what they predict for numbers that were held out, and how often each finding of
+    the publication comes out. Interrupted, the same command goes on from there.
+    """
+    one_thread()
+    from tactbench.core.calibration.result import load_result
+    from tactbench.core.calibration.summary import summary
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.errors import UsageError
+
+    if show:
+        if draws is not None or seed is not None or config is not None:
+            raise UsageError(
+                "--show draws nothing.", hint="Leave out --draws, --seed and --config, or leave out --show."
+            )
+        found = load_result(out)
+        if found is None:
+            raise UsageError(f"There is no calibration in {out}, and none came along.", hint="Leave out --show.")
+        remark(f"Shown: {found.shown}.")
+        print_calibration(found, summary(found), shape)
+        return
+    result = _drawn(_procedure(config), draws, seed, jobs, out)
+    told = summary(result)
+    print_calibration(result, told, shape)
+    _write(result, told, out / "calibration")
+
+
+def _procedure(config: Path | None) -> CalibrationSpec:
+    from tactbench.core.cli.config import default_calibration
+    from tactbench.core.spec.calibration import CalibrationSpec
+    from tactbench.core.spec.yaml_file import load_yaml
+
+    return load_yaml(config, CalibrationSpec) if config else default_calibration()
+
+
+def _drawn(spec: CalibrationSpec, draws: int | None, seed: int | None, jobs: int, out: Path) -> CalibrationResult:
+    from tactbench.core.calibration.journal import Journal
+    from tactbench.core.calibration.result import CalibrationResult
+    from tactbench.core.calibration.run import carry_out_missing, made_by
+    from tactbench.core.calibration.trial import checked
+    from tactbench.core.cli.screen import progress, remark
+    from tactbench.core.errors import UnwritableError
+
+    checked(spec)
+    wanted, chosen = draws or spec.draws, spec.seed if seed is None else seed
+    makers = made_by()
+    journal = Journal(out / "calibration" / "draws.jsonl", spec, chosen, makers)
+    if journal.remark:
+        remark(journal.remark)
+    if journal.draws:
+        remark(f"{sum(number < wanted for number in journal.draws)} of {wanted} draws were found finished.")
+    try:
+        with progress() as told:
+            done = carry_out_missing(spec, chosen, wanted, journal, jobs=jobs, told=told)
+    except OSError as error:
+        raise UnwritableError(f"{journal.path} cannot be written: {error}.", hint="Give another --out.") from error
+    return CalibrationResult(spec, chosen, tuple(done), journal.made_by, journal.seconds)
+
+
+def _write(result: CalibrationResult, told: Summary, folder: Path) -> None:
+    import json
+
+    from tactbench.core.calibration.figure import draw_draws, draw_sensitivity
+    from tactbench.core.calibration.result import write_result
+    from tactbench.core.calibration.summary import acceptance, records
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.errors import UnwritableError
+    from tactbench.core.matrix.files import replace_file
+
+    tables = records(told)
+    about = {
+        "draws": len(told.draws), "failed": told.failed, "accepted": told.n_accepted, "near": told.n_near,
+        "reach": told.reach, "near_all": told.n_all, "tolerance": result.spec.tolerance,
+        "acceptance": acceptance(result.spec, told),
+    }  # fmt: skip
+    texts = {
+        "ranges.json": {**about, "parameters": tables["parameters"], "published": tables["published"]},
+        "findings.json": {**about, "findings": tables["findings"]},
+        "sensitivity.json": {**about, "sensitivity": tables["sensitivity"], "agreement": tables["agreement"],
+                             "same_verdict": tables["same_verdict"]},
+    }  # fmt: skip
+    try:
+        write_result(result, folder)
+        for name, content in texts.items():
+            replace_file(folder / name, (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode())
+        draw_sensitivity(result.spec, told.sensitivities, [folder / "sensitivity.png", folder / "sensitivity.pdf"])
+        draw_draws(result.spec, told.draws, [folder / "draws.png", folder / "draws.pdf"])
+    except OSError as error:
+        raise UnwritableError(f"{folder} cannot be written: {error}.", hint="Give another --out.") from error
+    remark(f"Files: {folder}/draws.jsonl, draws.csv, run.json, ranges.json, findings.json, sensitivity.json, "
+           "draws.png, .pdf, sensitivity.png, .pdf")  # fmt: skip

@@ -1,0 +1,97 @@
+"""What is to be timed: an estimator, and the very arrays its cell was answered with."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.metrics import Metric, metric_called
+from tactbench.core.evaluation.protocols import protocol_called
+from tactbench.core.evaluation.selection import features_of, scales, select
+from tactbench.core.evaluation.sets import keep, part
+from tactbench.core.evaluation.splits import make_splits
+from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.plugins.registry import load_object
+from tactbench.core.samples import FloatArray
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.task import TaskSpec
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """An estimator with its parameters chosen, and the training and test rows of one fold."""
+
+    name: str
+    build: Callable[[], Estimator]
+    """Returns a fresh estimator; its imports are done."""
+    fold: str
+    X_train: FloatArray
+    y_train: npt.NDArray[Any]
+    X_test: FloatArray
+    y_test: npt.NDArray[Any]
+    n_classes: int
+    metric: Metric
+    trained_on: tuple[RecordingMeta, ...]
+    """The recordings that the training rows are from."""
+
+
+def contestant(
+    task: TaskSpec,
+    descriptor: EstimatorDescriptor,
+    params: Mapping[str, Any],
+    protocol: str,
+    split: str,
+    data: Dataset,
+    *,
+    seed: int,
+    threads: int,
+) -> Contestant:
+    """Prepare `descriptor` as a cell does, for the last fold: the one whose model a cell's latency is taken from.
+
+    Parameters
+    ----------
+    params
+        Those other than the estimator's defaults; they are not searched. Others are chosen anew on the validation
+        data, which is not timed here: the cell's row has it.
+    split
+        One of those that the recordings can serve, as the cell's row names it.
+    threads
+        What the estimator is told it may use.
+    """
+    rules, metric = protocol_called(protocol), metric_called(task.metric)
+    make = load_object(descriptor.where)
+
+    def build(**chosen: Any) -> Estimator:
+        made: Estimator = make(kind=task.kind, seed=seed, threads=threads, **{**descriptor.params, **params, **chosen})
+        return made
+
+    build()
+    gap, own = max(descriptor.window_grid), split in task.campaigns
+    assignment = make_splits(data, split, seed, gap=gap, one_by_one=own)[-1]
+    choice = select(descriptor, params, lambda chosen: build(**chosen), data, rules, assignment, metric)
+    k = choice.k if choice else descriptor.window_grid[0]
+    counts: Counter[str] = Counter()
+    kept = keep(data, rules, assignment.train, "training", counts)
+    others = keep(data, rules, assignment.test, "test", counts)
+    scale_train, scale_test = scales(rules, kept, others)
+    train, test = part(kept, scale_train, k), part(others, scale_test, k)
+    chosen = choice.params if choice else {}
+    return Contestant(
+        name=descriptor.name,
+        build=lambda: build(**chosen),
+        fold=assignment.name,
+        X_train=features_of(train, descriptor),
+        y_train=train.y,
+        X_test=features_of(test, descriptor),
+        y_test=test.y,
+        n_classes=len(data.classes),
+        metric=metric,
+        trained_on=tuple(data.metas[place] for place in np.unique(train.recording)),
+    )

@@ -1,0 +1,109 @@
+"""What the accuracy of one sensor in one task costs in time, estimator by estimator, as a table of plain data."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tactbench.core.cost.contestants import Contestant, contestant
+from tactbench.core.cost.ladder_rows import Record, by_score, mark_fronts, opening, stopped, timed
+from tactbench.core.cost.rounds import measure
+from tactbench.core.errors import UsageError
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.metrics import metric_called
+from tactbench.core.matrix.plan import plan_cells
+from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.run import Outcome, carry_out
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.matrix import MatrixSpec
+
+
+class Ladder(NamedTuple):
+    """The table, and what holds for all of it; keys as in `tactbench.core.cost.ladder_file`."""
+
+    about: dict[str, Any]
+    rows: list[Record]
+
+
+def climb(
+    matrix: MatrixSpec,
+    registry: Registry,
+    store: Store,
+    *,
+    rounds: int,
+    budget_s: float,
+    threads: int,
+    clock: Callable[[], float],
+    progress: Progress,
+    recordings: Path | None = None,
+) -> Ladder:
+    """Score the estimators of `matrix` and time them.
+
+    Parameters
+    ----------
+    matrix
+        One sensor, one task, one repeat.
+    store
+        Cells that are in it are not scored again; timing is always done anew.
+    rounds, budget_s, threads, clock
+        As in `tactbench.core.cost.rounds.measure`.
+    recordings
+        Folder for rigs that replay.
+
+    Raises
+    ------
+    UsageError
+        If something is asked for that is not there, or more than one protocol or split.
+
+    Returns
+    -------
+    Ladder
+        A row for every estimator, also for those that were skipped or failed; the best score first.
+    """
+    asked = {(cell.protocol, cell.split) for cell in plan_cells(matrix, matrix.sensors, registry)}
+    if len(asked) > 1:
+        several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in asked))
+        raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
+    outcome = carry_out(matrix, store, recordings=recordings, progress=progress)
+    task = registry.tasks[matrix.tasks[0].name].spec
+    done = [row for row in outcome.rows if row["status"] == "done"]
+    data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None
+    rows: dict[str, Record] = {}
+    contestants: dict[str, Contestant] = {}
+    for row in outcome.rows:
+        descriptor = registry.estimators[row["estimator"]]
+        rows[row["cell"]] = opening(row, descriptor)
+        if row["status"] != "done" or data is None:
+            continue
+        try:
+            contestants[row["cell"]] = contestant(
+                task, descriptor, row["params"], row["protocol"], row["split"], data, seed=matrix.seed, threads=threads
+            )
+        except Exception as error:
+            rows[row["cell"]] |= stopped(error)
+    times = measure(
+        contestants, rounds=rounds, budget_s=budget_s, threads=threads, seed=matrix.seed, clock=clock, progress=progress
+    )
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+    scores = {row["cell"]: row["scores"] for row in outcome.rows}
+    for cell, one in contestants.items():
+        rows[cell] |= timed(one, times[cell], scores[cell], rounds, budget_s)
+    better = metric_called(task.metric).higher_is_better
+    found = by_score(list(rows.values()), higher_is_better=better)
+    mark_fronts(found, higher_is_better=better)
+    fold = next((one.fold for one in contestants.values()), "")
+    measured = {"higher_is_better": better, "fold": fold, "rounds": rounds, "budget_s": budget_s, "threads": threads}
+    return Ladder({**_about(outcome), **measured, "load": load, "cores": os.cpu_count()}, found)
+
+
+def _about(outcome: Outcome) -> dict[str, Any]:
+    """Return what the cells have in common."""
+    first = next((row for row in outcome.rows if row["status"] == "done"), outcome.rows[0])
+    keys = ("sensor", "task", "rig", "protocol", "split", "seed", "metric", "unit", "simulated", "dagger")
+    return {
+        **{key: first[key] for key in keys},
+        "provenance": {key: value for key, value in outcome.provenance.items() if key != "jobs"},
+    }

@@ -1,0 +1,140 @@
+"""The rows of the table of estimators: what was answered, what it took, and who is on a front.
+
+The keys of a row are documented in `tactbench.core.cost.ladder_file`, which writes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tactbench.core.cost.contestants import Contestant
+from tactbench.core.cost.front import front
+from tactbench.core.cost.rounds import Timing
+from tactbench.core.errors import NotApplicable, TactbenchError
+from tactbench.core.matrix.store import Row
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.rig import EstimatorDescriptor
+
+Record = dict[str, Any]
+
+LOOPS_HZ = (100, 1000)
+"""Rates of control loops the verdict is about (assumed): how often taxels are read in the paper, and how often joint
+torques are commonly closed."""
+
+SAME_SCORE = 1e-9
+"""Largest relative difference of scores that still is the same answer: rounding of sums in another order."""
+
+_MEASURED = (
+    "n_train", "n_test", "n_features", "fit_s", "fit_s_q1", "fit_s_q3", "fits", "batch_s_per_row",
+    "batch_s_per_row_q1", "batch_s_per_row_q3", "batches", "latency_ms_p50", "latency_ms_p95", "latency_ms_q1",
+    "latency_ms_q3", "latency_n", "data_s", "data_kind",
+)  # fmt: skip
+
+
+def opening(row: Row, descriptor: EstimatorDescriptor) -> Record:
+    """Return what a cell's row says of an estimator; what is still to be measured is None."""
+    return {
+        "estimator": row["estimator"],
+        "title": descriptor.title,
+        "family": descriptor.where.partition(":")[0].rpartition(".")[2],
+        "is_baseline": row["is_baseline"],
+        "params": {**descriptor.params, **row["params"]},
+        "chosen": row["chosen"],
+        **{key: row[key] for key in ("status", "reason", "score", "ci_low", "ci_high", "ci_method", "search_s")},
+        **dict.fromkeys(_MEASURED),
+        **{f"loop_{rate}_hz": None for rate in LOOPS_HZ},
+        "front_fit": False,
+        "front_latency": False,
+        "notes": [],
+    }
+
+
+def stopped(error: Exception) -> Record:
+    """Return what changes in a row whose estimator could not be timed: it was skipped, or failed, and why."""
+    said = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": said}
+
+
+def timed(one: Contestant, timing: Timing, scores: Mapping[str, float], rounds: int, budget_s: float) -> Record:
+    """Return what changes in a row by having been timed; `scores` are those of the cell, by fold among others."""
+    if timing.trouble is not None:
+        return stopped(timing.trouble)
+    fit_q1, fit, fit_q3 = _quartiles(timing.fit_s)
+    batch_q1, batch, batch_q3 = (value / len(one.X_test) for value in _quartiles(timing.batch_s))
+    latency = 1e3 * np.array(timing.latency_s)
+    p95 = float(np.quantile(latency, 0.95))
+    kind, spent = _acquisition(one.trained_on)
+    return {
+        "n_train": len(one.X_train),
+        "n_test": len(one.X_test),
+        "n_features": one.X_train.shape[1],
+        "fit_s": fit,
+        "fit_s_q1": fit_q1,
+        "fit_s_q3": fit_q3,
+        "fits": len(timing.fit_s),
+        "batch_s_per_row": batch,
+        "batch_s_per_row_q1": batch_q1,
+        "batch_s_per_row_q3": batch_q3,
+        "batches": len(timing.batch_s),
+        "latency_ms_p50": float(np.quantile(latency, 0.5)),
+        "latency_ms_p95": p95,
+        "latency_ms_q1": float(np.quantile(latency, 0.25)),
+        "latency_ms_q3": float(np.quantile(latency, 0.75)),
+        "latency_n": len(latency),
+        "data_s": spent,
+        "data_kind": kind,
+        **{f"loop_{rate}_hz": p95 < 1e3 / rate for rate in LOOPS_HZ},
+        "notes": [*_cut_short(timing, rounds, budget_s), *_other_answers(one, timing, scores)],
+    }
+
+
+def _cut_short(timing: Timing, rounds: int, budget_s: float) -> list[str]:
+    return [
+        f"{what} in {len(times)} of {rounds} rounds: one took more than {budget_s:g} s"
+        for what, times in (("fitted", timing.fit_s), ("all test rows answered", timing.batch_s))
+        if len(times) < rounds
+    ]
+
+
+def _other_answers(one: Contestant, timing: Timing, scores: Mapping[str, float]) -> list[str]:
+    """Return a note if the model that was timed is not the one whose score stands beside its times."""
+    stored = scores.get(f"fold {one.fold}")
+    if timing.answers is None or stored is None:
+        return []
+    score = one.metric.of(one.y_test, timing.answers, one.n_classes)
+    if abs(score - stored) <= SAME_SCORE * abs(stored):
+        return []
+    return [f"the timed model scores {score:.6g} on fold {one.fold}, the cell's {stored:.6g}"]
+
+
+def _quartiles(times: Sequence[float]) -> tuple[float, float, float]:
+    low, middle, high = np.quantile(times, (0.25, 0.5, 0.75))
+    return float(low), float(middle), float(high)
+
+
+def _acquisition(metas: Sequence[RecordingMeta]) -> tuple[str | None, float | None]:
+    """Return how the recordings were come by, and the seconds that took; None where any of them does not say."""
+    for kind, key in (("simulated", "sim_s"), ("acquired", "acquisition_s")):
+        spent = [float(meta.provenance[key]) for meta in metas if key in meta.provenance]
+        if spent and len(spent) == len(metas):
+            return kind, sum(spent)
+    return None, None
+
+
+def mark_fronts(rows: Sequence[Record], *, higher_is_better: bool) -> None:
+    """Mark who is beaten by nobody. Trivial answers compete with nobody: they do not look at the sensor."""
+    sign = -1.0 if higher_is_better else 1.0
+    able = [row for row in rows if row["status"] == "done" and not row["is_baseline"]]
+    for mark, time in (("front_fit", "fit_s"), ("front_latency", "latency_ms_p50")):
+        for row in front(able, seconds=lambda row, key=time: row[key], error=lambda row: sign * row["score"]):  # type: ignore[misc]
+            row[mark] = True
+
+
+def by_score(rows: Sequence[Record], *, higher_is_better: bool) -> list[Record]:
+    """Return the rows, the best score first; those without one last, in the order given."""
+    sign = -1.0 if higher_is_better else 1.0
+    scored = [row for row in rows if row["score"] is not None]
+    return sorted(scored, key=lambda row: float(sign * row["score"])) + [row for row in rows if row["score"] is None]

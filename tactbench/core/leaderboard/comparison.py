@@ -1,0 +1,218 @@
+"""The same question asked in several ways, side by side: protocols, splits, or the folds of one split.
+
+Plain data: a terminal, a page or a program renders the same :class:`Comparison`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tactbench.core.leaderboard.numbers import interval, score
+from tactbench.core.leaderboard.table import METRIC_NAMES
+
+Row = Mapping[str, Any]
+
+AXES = ("protocol", "split", "fold")
+"""What may stand side by side."""
+_FEW_SHOT = re.compile(r"few-shot-([0-9]+)")
+_NOTE = (
+    "Differences are against the first column; intervals are those of each score alone, and two that overlap may still "
+    "differ."
+)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One table: a line for each sensor and estimator, a column for each way of asking."""
+
+    title: str
+    columns: tuple[str, ...]
+    """`sensor`, `estimator`, then the ways"""
+    lines: tuple[tuple[str, ...], ...]
+    """one string a column; a cell's second line is its interval"""
+    notes: tuple[str, ...]
+    records: tuple[dict[str, Any], ...]
+    """the same as numbers, one record for each cell of the table; all have the same keys"""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A score against the number of training sessions."""
+
+    sensor: str
+    task: str
+    estimator: str
+    metric: str
+    unit: str
+    simulated: bool
+    baseline: float | None
+    points: tuple[tuple[int, float, float, float], ...]
+    """(training sessions, score, low, high), in order of the sessions"""
+
+
+def compare(rows: Iterable[Row], by: str) -> list[Comparison]:
+    """Return a table for each task (and whatever else must not be mixed) that was asked in several ways.
+
+    Parameters
+    ----------
+    rows
+        Rows of a leaderboard.
+    by
+        One of `AXES`.
+    """
+    groups: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        if by == "fold":
+            groups.setdefault((*_key(row), row["protocol"], row["split"]), []).append(row)
+        else:
+            groups.setdefault((*_key(row), row["split" if by == "protocol" else "protocol"]), []).append(row)
+    found = []
+    for members in groups.values():
+        shown = _worth_showing(members)
+        ways = _folds(shown) if by == "fold" else list(dict.fromkeys(str(row[by]) for row in shown))
+        if len(ways) > 1:
+            found.append(_comparison(shown, by, ways))
+    return found
+
+
+def few_shot_curves(rows: Iterable[Row]) -> list[Curve]:
+    """Return a curve for each sensor, task, estimator and protocol that has answered several few-shot splits."""
+    groups: dict[tuple[Any, ...], list[tuple[int, Row]]] = {}
+    for row in rows:
+        number = _FEW_SHOT.fullmatch(str(row["split"]))
+        if number and row["status"] == "done":
+            key = (*_key(row), row["protocol"], row["sensor"], _answer(row))
+            groups.setdefault(key, []).append((int(number[1]), row))
+    curves = []
+    for members in groups.values():
+        points = sorted((n, row["score"], row["ci_low"], row["ci_high"]) for n, row in members)
+        first = members[0][1]
+        if len(points) > 1:
+            curves.append(
+                Curve(
+                    sensor=first["sensor"],
+                    task=first["task"],
+                    estimator=_answer(first),
+                    metric=first["metric"],
+                    unit=first["unit"],
+                    simulated=first["simulated"],
+                    baseline=max(members, key=lambda member: member[0])[1]["baseline"],
+                    points=tuple(points),
+                )
+            )
+    return curves
+
+
+def _key(row: Row) -> tuple[Any, ...]:
+    return row["task"], "sim" if row["simulated"] else row["rig"], row["repeat"]
+
+
+def _answer(row: Row) -> str:
+    options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
+    return f"{row['estimator']} ({options})" if options else str(row["estimator"])
+
+
+def _worth_showing(members: Sequence[Row]) -> list[Row]:
+    """Return the results, and of the baselines each sensor's first."""
+    first: dict[str, str] = {}
+    for row in members:
+        if row["is_baseline"]:
+            first.setdefault(row["sensor"], row["estimator"])
+    kept = [row for row in members if not row["is_baseline"] or first[row["sensor"]] == row["estimator"]]
+    return sorted(kept, key=lambda row: row["is_baseline"])
+
+
+def _folds(members: Sequence[Row]) -> list[str]:
+    """Return the names of the folds, those that begin with a number in its order."""
+    names = dict.fromkeys(_fold(key, row) for row in members for key in row["scores"] if key.startswith("fold "))
+    return sorted(names, key=_numbers_first)
+
+
+def _fold(key: str, row: Row) -> str:
+    return key.removeprefix("fold ").removeprefix(f"{row['split']} ")
+
+
+def _numbers_first(name: str) -> tuple[bool, float]:
+    number = re.match(r"[-+]?[0-9.]+", name)
+    try:
+        return (False, float(number[0])) if number else (True, 0.0)
+    except ValueError:
+        return True, 0.0
+
+
+def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> Comparison:
+    lines: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
+    for row in members:
+        cells = lines.setdefault((row["sensor"] + (" SIM" if row["simulated"] else ""), _answer(row)), {})
+        if by == "fold":
+            cells |= {way: _record(row, by, way, value) for way, value in _scores_of_folds(row)}
+        else:
+            cells[str(row[by])] = _record(row, by, str(row[by]), row["score"])
+    for cells in lines.values():
+        start = cells.get(ways[0], {}).get("score")
+        for way, record in cells.items():
+            if way != ways[0] and by != "fold" and start is not None and record["score"] is not None:
+                record["difference"] = record["score"] - start
+    first = members[0]
+    return Comparison(
+        title=_title(first, by),
+        columns=("sensor", "estimator", *ways),
+        lines=tuple(
+            (*names, *(_text(cells.get(way), first["unit"]) for way in ways)) for names, cells in lines.items()
+        ),
+        notes=() if by == "fold" else (_NOTE,),
+        records=tuple(cells[way] for cells in lines.values() for way in ways if way in cells),
+    )
+
+
+def _scores_of_folds(row: Row) -> Iterable[tuple[str, float]]:
+    return ((_fold(key, row), value) for key, value in row["scores"].items() if key.startswith("fold "))
+
+
+def _record(row: Row, by: str, way: str, value: float | None) -> dict[str, Any]:
+    whole = by != "fold"
+    return {
+        "task": row["task"],
+        "sensor": row["sensor"],
+        "estimator": _answer(row),
+        "simulated": row["simulated"],
+        "is_baseline": row["is_baseline"],
+        "protocol": row["protocol"],
+        "split": row["split"],
+        "repeat": row["repeat"],
+        "compared": by,
+        "way": way,
+        "status": row["status"],
+        "metric": row["metric"],
+        "unit": row["unit"],
+        "score": value,
+        "ci_low": row["ci_low"] if whole else None,
+        "ci_high": row["ci_high"] if whole else None,
+        "difference": None,
+    }
+
+
+def _title(row: Row, by: str) -> str:
+    unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
+    parts = [str(row["task"]), f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}"]
+    if by != "protocol":
+        parts.append(row["protocol"])
+    if by != "split" and row["split"]:
+        parts.append(f"split {row['split']}")
+    parts.append("SIM (twin)" if row["simulated"] else f"rig {row['rig']}")
+    return " · ".join([*parts, f"by {by}"])
+
+
+def _text(record: Mapping[str, Any] | None, unit: str) -> str:
+    if record is None:
+        return "–"
+    if record["score"] is None:
+        return str(record["status"]).upper()
+    value = score(record["score"], unit)
+    if record["difference"] is not None:
+        sign = "+" if record["difference"] >= 0 else "−"
+        value += f" ({sign}{score(abs(record['difference']), unit)})"
+    return value if record["ci_low"] is None else f"{value}\n{interval(record['ci_low'], record['ci_high'], unit)}"

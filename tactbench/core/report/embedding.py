@@ -1,0 +1,127 @@
+"""A test set in two dimensions: t-SNE of the features an estimator saw, computed once and stored."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tactbench.core.errors import DataError, NotApplicable
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.protocols import protocol_called
+from tactbench.core.evaluation.selection import features_of, scales
+from tactbench.core.evaluation.sets import keep, part
+from tactbench.core.evaluation.splits import make_splits
+from tactbench.core.matrix.keys import versions
+from tactbench.core.report.material import Material
+from tactbench.core.report.stored import stored
+from tactbench.core.samples import Answers, FloatArray, IntArray
+
+AT_MOST = 1000
+"""Points of an embedding: more take longer and hide each other in a column's width."""
+PERPLEXITY = 30.0
+ITERATIONS = 1000
+_RULE = f"every n-th row of the test set, n the smallest that leaves at most {AT_MOST}"
+
+
+@dataclass(frozen=True)
+class Embedding:
+    """Points in the plane, and the test rows they stand for."""
+
+    xy: FloatArray
+    """(points, 2), in no unit"""
+    rows: IntArray
+    """(points,) places in the test set's answers"""
+    every: int
+    perplexity: float
+    divergence: float
+    """Kullback-Leibler divergence that is left, nats"""
+
+
+def embed(material: Material, row: Mapping[str, Any], test: Answers) -> Embedding:
+    """Return the t-SNE of a cell's test set [1]_, from the result folder if it has been computed before.
+
+    Parameters
+    ----------
+    material
+        Where the recordings and the stored embeddings are.
+    row
+        The cell.
+    test
+        What it answered on the test set.
+
+    Raises
+    ------
+    NotApplicable
+        If the test set is in several folds, each with features of its own, or too small.
+    DataError
+        If the recordings are not those the cell was answered from.
+
+    Notes
+    -----
+    The stored numbers go by the cell's key, which covers the content of the recordings, task, protocol, split, seed,
+    sources and versions; by the rule, the perplexity and the number of iterations. Computed on one thread, since the
+    order of summation decides the last bits and t-SNE is chaotic.
+
+    References
+    ----------
+    .. [1] van der Maaten and Hinton 2008, Visualizing data using t-SNE.
+    """
+    if np.ptp(test.fold):
+        raise NotApplicable(f"split {row['split']!r} has a test set a fold, and no two are scaled alike")
+    rows = every_nth(len(test))
+    perplexity = min(PERPLEXITY, (len(rows) - 1) / 3)
+    if perplexity < 1:
+        raise NotApplicable(f"{len(rows)} test rows have no neighbourhoods")
+    facts = {
+        "cell": row["key"], "rule": _RULE, "points": len(rows), "perplexity": perplexity, "iterations": ITERATIONS,
+        "versions": versions(),
+    }  # fmt: skip
+
+    def compute() -> dict[str, Any]:
+        X = _features(material, row, test)[rows]
+        xy, divergence = _tsne(X, perplexity, int(row["seed"]))
+        return {"xy": xy.tolist(), "divergence": divergence}
+
+    numbers = stored(material.store.folder, "embeddings", facts, compute)
+    every = int(rows[1] - rows[0])
+    return Embedding(np.array(numbers["xy"], dtype=np.float64), rows, every, perplexity, numbers["divergence"])
+
+
+def every_nth(n: int) -> IntArray:
+    """Return every m-th of `n` places, m the smallest that leaves at most :data:`AT_MOST`."""
+    return np.arange(0, n, max(1, math.ceil(n / AT_MOST)), dtype=np.int64)
+
+
+def _features(material: Material, row: Mapping[str, Any], test: Answers) -> FloatArray:
+    """Return (n, features) of the test set as the estimator saw them: kept, scaled and filtered by the protocol."""
+    task = material.registry.tasks[row["task"]].spec
+    estimator = material.registry.estimators[row["estimator"]]
+    data = load_dataset(task, material.recordings(row))
+    rules = protocol_called(row["protocol"])
+    (assignment,) = make_splits(data, row["split"], row["seed"], gap=max(estimator.window_grid))
+    ignored: Counter[str] = Counter()
+    kept = keep(data, rules, assignment.test, "test", ignored)
+    scale = scales(rules, keep(data, rules, assignment.train, "training", ignored), kept)[1]
+    asked = part(kept, scale, int(row["chosen"].get("k", estimator.window_grid[0])))
+    if not (np.array_equal(asked.recording, test.recording) and np.array_equal(asked.row, test.row)):
+        raise DataError(
+            f"The recordings of {row['cell']} give other test rows than were answered.", hint="Run it again."
+        )
+    return features_of(asked, estimator)
+
+
+def _tsne(X: FloatArray, perplexity: float, seed: int) -> tuple[FloatArray, float]:
+    manifold = importlib.import_module("sklearn.manifold")
+    threads = importlib.import_module("threadpoolctl")
+    model = manifold.TSNE(
+        perplexity=perplexity, max_iter=ITERATIONS, init="pca", learning_rate="auto", random_state=seed, n_jobs=1
+    )
+    with threads.threadpool_limits(limits=1):
+        xy = model.fit_transform(X)
+    return np.asarray(xy, dtype=np.float64), float(model.kl_divergence_)

@@ -1,0 +1,84 @@
+"""Draws every figure that a result folder can serve; one that cannot be made stops no other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tactbench.core.errors import TactbenchError, UsageError
+from tactbench.core.matrix.progress import Progress, Silence
+from tactbench.core.report.drawn import Drawn
+from tactbench.core.report.figures import (
+    confusion,
+    embedding_map,
+    prediction_against_time,
+    residuals,
+    score_by_force,
+    validation_curve,
+)
+from tactbench.core.report.figures.group import Group, Remark, groups
+from tactbench.core.report.figures.saving import save
+from tactbench.core.report.figures.sketch import Sketch
+from tactbench.core.report.figures.style import styled
+from tactbench.core.report.material import Material
+
+Draw = Callable[[Group, Remark], Sketch]
+"""A group of cells to a figure; raises NotApplicable where it does not apply, and tells of panels it leaves out."""
+
+FIGURES: dict[str, tuple[Draw, ...]] = {
+    "regression": (prediction_against_time.draw, residuals.draw, validation_curve.draw),
+    "classification": (confusion.draw, score_by_force.draw, embedding_map.draw, validation_curve.draw),
+}
+"""By kind of task, in the order of a report."""
+
+
+def draw_figures(
+    material: Material, folder: Path, progress: Progress | None = None, remark: Remark | None = None
+) -> list[Drawn]:
+    """Draw and save every figure that the results can serve, as PDF and PNG.
+
+    Parameters
+    ----------
+    material
+        The results.
+    folder
+        Where the files go; made if it is not there. Nothing else is written into it.
+    progress
+        Told what is being drawn.
+    remark
+        Told what is left out, and why: a sentence each.
+
+    Returns
+    -------
+    list of Drawn
+        In the order of a report: by group of comparable cells, as the cells come.
+
+    Raises
+    ------
+    UsageError
+        If `folder` cannot be made.
+    """
+    told = progress or Silence()
+    say: Remark = remark or (lambda _: None)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"The folder {folder} cannot be made: {error.strerror}.", hint="Give another one.") from error
+    work = [(group, draw) for group in groups(material, say) for draw in FIGURES[group.task.kind]]
+    drawn: list[Drawn] = []
+    if not work:
+        return drawn
+    told.begin("drawing", len(work))
+    with styled():
+        for group, draw in work:
+            what = f"{draw.__module__.rpartition('.')[2].replace('_', ' ')} of {group.task.name}"
+            told.working(what)
+            try:
+                sketch = draw(group, say)
+                drawn.append(save(sketch, folder))
+            except TactbenchError as error:
+                say(f"No {what} under {group.row['protocol']}: {error}")
+            except Exception as error:
+                say(f"No {what} under {group.row['protocol']}: {type(error).__name__}: {error}")
+            told.advance(what)
+    return drawn

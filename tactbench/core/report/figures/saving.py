@@ -1,0 +1,40 @@
+"""A figure as PDF and PNG, the same bytes every time."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.matrix.files import replace_file
+from tactbench.core.report.drawn import Drawn
+from tactbench.core.report.figures.sketch import Sketch
+
+PNG_DPI = 150
+RASTER_DPI = 300
+"""Of dense clouds of points inside a PDF."""
+_WITHOUT_DATES: dict[str, dict[str, Any]] = {
+    "pdf": {"CreationDate": None, "Creator": "tactbench", "Producer": None},
+    "png": {"Software": None},
+}
+"""Nor with the version of what drew them: files differ only where figures do."""
+
+
+def save(sketch: Sketch, folder: Path) -> Drawn:
+    """Write both files, each whole, and return what was drawn.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written.
+    """
+    contents = {}
+    for ending, dpi in (("png", PNG_DPI), ("pdf", RASTER_DPI)):
+        content = io.BytesIO()
+        sketch.figure.savefig(content, format=ending, dpi=dpi, metadata=_WITHOUT_DATES[ending])
+        contents[ending] = content.getvalue()
+        sketch.figure.set_layout_engine("none")  # the first drawing has put everything in its place
+    for ending, content_ in contents.items():
+        replace_file(folder / f"{sketch.name}.{ending}", content_)
+    png, pdf = (folder / f"{sketch.name}.{ending}" for ending in ("png", "pdf"))
+    return Drawn(sketch.name, sketch.title, sketch.caption, png, pdf, sketch.group.keys)

@@ -1,0 +1,91 @@
+"""A figure before it is saved, and the words that every figure of a group shares."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tactbench.core.leaderboard.table import METRIC_NAMES
+from tactbench.core.report.figures.group import Group, answerer
+from tactbench.core.spec.task import LabelTarget, TaskSpec
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+LINE = 64
+"""Letters that fit above a column, wide ones too."""
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """What a module of this room returns."""
+
+    kind: str
+    """Short name of the kind of figure."""
+    title: str
+    caption: str
+    group: Group
+    figure: Figure
+
+    @property
+    def name(self) -> str:
+        """Short and unique among the figures of a folder, whatever else is in it."""
+        row = self.group.row
+        rig = "" if row["simulated"] else row["rig"]
+        parts = (self.kind, row["task"], row["protocol"], row["split"], answerer(row), rig)
+        return re.sub(r"[^a-z0-9]+", "-", "-".join(part for part in parts if part).lower()).strip("-")
+
+
+def heading(group: Group, *more: str) -> str:
+    """Return what stands above a figure: question, answer, protocol with its marks, SIM; in lines that fit a column."""
+    row = group.row
+    parts = [row["task"], answerer(row), row["protocol"] + (" †" if row["dagger"] else "")]
+    if row["split"] not in (None, "roles"):
+        parts.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
+    parts += ["SIM" if row["simulated"] else f"rig {row['rig']}", *more]
+    lines = [parts[0]]
+    for part in parts[1:]:
+        if len(lines[-1]) + len(part) < LINE:
+            lines[-1] += f" · {part}"
+        else:
+            lines.append(part)
+    return "\n".join(lines)
+
+
+def marks(group: Group) -> str:
+    """Return what the marks in the heading mean, and which repeat is shown."""
+    row = group.row
+    said = [""]
+    if row["simulated"]:
+        said.append("SIM: simulated, no hardware was touched.")
+    if row["dagger"]:
+        said.append("†: each set, the test set too, is scaled by its own mean and deviation.")
+    said += [f"‡: {stamp}" for stamp in row["stamps"]]
+    if row["repeats"] > 1:
+        said.append(f"Repeat {row['repeat']} of {row['repeats']}.")
+    return " ".join(said)
+
+
+def quantity(task: TaskSpec) -> str:
+    """Return what a task asks for, in words."""
+    target = task.target
+    if isinstance(target, LabelTarget):
+        return target.name.removesuffix(f"_{target.unit}").replace("_", " ")
+    return (target.name if target.name and len(target.name) > 2 else target.kind).replace("_", " ")
+
+
+def with_unit(words: str, unit: str) -> str:
+    """Return the label of an axis."""
+    return words if unit == "1" else f"{words} [{unit}]"
+
+
+def metric_name(task: TaskSpec) -> str:
+    """Return a metric as the tables call it."""
+    return METRIC_NAMES.get(task.metric, task.metric)
+
+
+def sensors(group: Group) -> str:
+    """Return the sensors in the order of the panels."""
+    return ", ".join(panel.sensor for panel in group.panels)

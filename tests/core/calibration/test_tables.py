@@ -1,0 +1,48 @@
+"""Tables and figures of a calibration: everything that is known is there, and nothing that is not."""
+
+import numpy as np
+import pytest
+
+from tactbench.core.calibration.draw import finished
+from tactbench.core.calibration.figure import draw_draws, draw_sensitivity
+from tactbench.core.calibration.result import CalibrationResult
+from tactbench.core.calibration.sensitivity import sensitivities
+from tactbench.core.calibration.summary import summary
+from tactbench.core.calibration.tables import markdown, text_tables
+from tests.core.calibration.toy import draws, procedure
+
+
+def _result(n, **more):
+    return CalibrationResult(procedure(**more), 5, tuple(draws(n)), {"commit": "c"}, 90.0)
+
+
+def test_the_document_has_every_table_and_who_made_the_draws():
+    result = _result(60, at_least=20)
+    told = summary(result)
+    said = markdown(result, told)
+    assert said.startswith("## Toy\n\nSIM. 60 draws with seed 5; 2 minutes of processor time; commit c.")
+    for table in text_tables(result, told):
+        assert f"### {table.title}" in said
+    for words in ("| narrow | fitted | 0.740818 |", "| both | held out |", "placement.scatter", "tall exceeds both"):
+        assert words in said
+    assert f"{told.n_near} of 60 draws lie within 1 scales of every fitted number" in said
+    assert "the 20 nearest are accepted" in said
+
+
+def test_too_few_draws_are_said_to_be_too_few():
+    result = _result(4)
+    said = markdown(result, summary(result))
+    assert "| too few |" in said
+    assert "Partial rank correlations" not in said
+
+
+@pytest.mark.parametrize("n", [3, 60])
+def test_figures_are_drawn_of_many_draws_and_of_few(tmp_path, n):
+    result = _result(n)
+    some = finished(result.draws)
+    found = sensitivities(result.spec, some, np.random.default_rng(0))
+    paths = [tmp_path / "a.png", tmp_path / "a.pdf", tmp_path / "b.png", tmp_path / "b.pdf"]
+    draw_sensitivity(result.spec, found, paths[:2])
+    draw_draws(result.spec, some, paths[2:])
+    for path in paths:
+        assert path.stat().st_size > 1000

@@ -1,0 +1,121 @@
+"""``tactbench calibrate`` as a person meets it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.core.cli.test_screens import assert_one_clear_screen
+
+PROCEDURE = """
+title: Small
+seed: 3
+draws: 14
+rig: twin
+protocol: karl2016
+nuisances:
+  - {name: force_noise, path: environment.force_noise, unit: N, reason: r, source: assumed,
+     prior: {kind: uniform, low: 0.2, high: 1.0}}
+  - {name: noise, path: environment.noise_scale, sensors: [icub], reason: r, source: assumed,
+     prior: {kind: log-uniform, low: 0.1, high: 10}}
+outputs:
+  - {name: ramp, title: Time index, sensor: icub, task: force, unit: N, estimator: {name: time-index}}
+  - {name: ridge, title: Ridge, sensor: icub, task: force, unit: N, estimator: {name: ridge}}
+published:
+  - {output: ramp, value: 0.6, scale: 0.15, scale_reason: s, use: fitted, source: {tag: assumed, reference: x}}
+  - {output: ridge, value: 0.6, scale: 0.15, scale_reason: s, use: held out, source: {tag: assumed, reference: x}}
+tolerance: 2
+findings:
+  - {name: bound, statement: Time is the bound, reason: r, source: {tag: assumed, reference: x},
+     all_of: [{above: ridge, below: ramp, margin: -0.01}]}
+"""
+CALIBRATE = ("calibrate", "--config", "small.yaml", "--format", "json")
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory):
+    from tests.conftest import Shell
+
+    shell = Shell(tmp_path_factory.mktemp("calibrate"))
+    (shell.folder / "small.yaml").write_text(PROCEDURE)
+    return shell, shell(*CALIBRATE, "--out", "whole", "--jobs", "2")
+
+
+def test_tables_on_stdout_progress_on_stderr(calibrated):
+    _, done = calibrated
+    lines = json.loads(done.stdout)
+    assert {line["table"] for line in lines} == {"parameters", "published", "findings", "sensitivity"}
+    ramp = next(line for line in lines if line.get("output") == "ramp" and line["table"] == "published")
+    # Accepted means within two scales of the published .6: what is fitted lies there, and the noise drawn is the RMSE.
+    assert 0.3 <= ramp["accepted_low"] <= ramp["accepted_high"] <= 0.9
+    noise = next(line for line in lines if line["name"] == "force_noise")
+    assert noise["accepted_median"] == pytest.approx(ramp["accepted_median"], rel=0.05)
+    assert "drawing" in done.stderr
+
+
+def test_the_files_of_a_calibration(calibrated):
+    shell, _ = calibrated
+    folder = shell.folder / "whole" / "calibration"
+    assert {path.name for path in folder.iterdir()} == {
+        *("draws.jsonl", "draws.csv", "run.json", "ranges.json", "findings.json", "sensitivity.json"),
+        *("draws.png", "draws.pdf", "sensitivity.png", "sensitivity.pdf"),
+    }
+    assert json.loads((folder / "ranges.json").read_text())["draws"] == 14
+    assert len((folder / "draws.csv").read_text().splitlines()) == 15
+    assert json.loads((folder / "run.json").read_text())["made_by"]["numpy"]
+
+
+def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
+    shell, _ = calibrated
+    env = {**os.environ, "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}
+    journal = shell.folder / "cut" / "calibration" / "draws.jsonl"
+    running = subprocess.Popen(
+        [sys.executable, "-m", "tactbench", *CALIBRATE, "--out", "cut", "--jobs", "2"],
+        cwd=shell.folder, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    waited = time.monotonic()
+    while not (journal.is_file() and journal.read_text().count("\n") >= 3) and time.monotonic() - waited < 60:
+        assert running.poll() is None
+        os.sched_yield()
+    running.send_signal(signal.SIGINT)
+    _, said = running.communicate(timeout=60)
+    assert running.returncode == 130, said
+    assert "goes on from there" in said
+    kept = journal.read_text().count("\n") - 1
+    assert 2 <= kept < 14
+    rest = shell(*CALIBRATE, "--out", "cut")
+    assert f"{kept} of 14 draws were found finished" in rest.stderr
+    whole = shell.folder / "whole" / "calibration"
+    for name in ("draws.csv", "ranges.json", "findings.json", "sensitivity.json"):
+        assert (journal.parent / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_what_is_there_is_shown_again_as_a_table(calibrated):
+    shell, _ = calibrated
+    shown = shell("calibrate", "--show", "--out", "whole")
+    assert "the calibration in whole/calibration" in shown.stderr
+    for text in ("Small (SIM)", "held out", "Time is the bound", "Partial rank correlations", "14 draws"):
+        assert text in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--show", "--draws", "3"), "--show draws nothing"),
+        (("--config", "missing.yaml"), "cannot be read"),
+        (("--config", "small.yaml", "--out", "whole", "--seed", "4"), "another procedure or seed"),
+    ],
+)
+def test_wrong_words_are_answered_with_the_next_step(calibrated, arguments, says):
+    shell, _ = calibrated
+    assert_one_clear_screen(shell("calibrate", *arguments, code=2), says)
+
+
+def test_a_misspelt_procedure_is_answered_with_its_line(calibrated):
+    shell, _ = calibrated
+    (shell.folder / "wrong.yaml").write_text(PROCEDURE.replace("below: ramp", "below: rampe"))
+    assert_one_clear_screen(shell("calibrate", "--config", "wrong.yaml", code=2), "did you mean 'ramp'")

@@ -1,0 +1,64 @@
+"""``cost --sensor S --task T`` as a person meets it."""
+
+import csv
+import io
+import json
+
+import pytest
+
+from tests.core.cli.test_screens import assert_one_clear_screen
+from tests.core.cost.test_ladder import presses
+
+ASKED = ("cost", "--sensor", "made", "--task", "force", "--recordings", "shelf", "--rounds", "2", "--split", "session")
+CLUMSY = tuple(word for name in ("breaks", "tires", "lacks", "wavers", "ols") for word in ("--estimator", name))
+
+
+def test_whoever_breaks_costs_its_own_row_only(shell):
+    presses(shell.folder / "shelf")
+    done = shell(*ASKED, *CLUMSY, "--format", "json", plugins=("clumsy",))
+    rows = {row["estimator"]: row for row in json.loads(done.stdout)}
+    assert rows["ols"]["status"] == "done"
+    assert rows["ols"]["front_fit"]
+    assert (rows["breaks"]["status"], rows["breaks"]["score"]) == ("failed", None)
+    assert "out of breath" in rows["breaks"]["reason"]
+    assert (rows["lacks"]["status"], rows["lacks"]["reason"]) == ("skipped", "needs a licence that nobody has")
+    assert rows["tires"]["status"] == "failed"
+    assert "the timed model scores" in rows["wavers"]["notes"][0]
+    assert json.loads((shell.folder / "tactbench-results/cost/made-force.json").read_text())["rows"]
+    assert "timing: " in done.stderr
+    again = shell(*ASKED, "--estimator", "ols", "--rounds", "1", "--format", "csv")
+    listed = list(csv.DictReader(io.StringIO(again.stdout)))
+    assert {row["estimator"] for row in listed} == {"ols", "mean", "time-index"}
+    assert all(float(row["latency_ms_p95"]) > 0 for row in listed)
+
+
+def test_the_table_states_what_its_times_mean(shell):
+    presses(shell.folder / "shelf")
+    done = shell(*ASKED, "--estimator", "ols", "--estimator", "knn", "--out", "there")
+    assert "made, force: RMSE, lower is better · deployable · split session · 2 rounds, 1 thread" in done.stdout
+    (line,) = [line for line in done.stdout.splitlines() if line.strip().startswith("ols")]
+    assert "fit, latency" in line
+    assert "yes" in line
+    assert "mean (trivial)" in done.stdout
+    assert "p95 at batch 1 is below the loop's period" in done.stderr
+    assert all(
+        (shell.folder / "there" / "cost" / f"made-force.{end}").exists() for end in ("json", "csv", "png", "pdf")
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("cost", "--sensor", "icub"), "--task NAME"),
+        (("cost", "--task", "force"), "--sensor NAME"),
+        (("cost", "--sensor", "icub", "--sensor", "biotac", "--task", "force"), "one of each"),
+        (("cost", "--sensor", "icub", "--task", "forse"), "Did you mean 'force'"),
+        (("cost", "--sensor", "icub", "--task", "force", "--estimator", "laso"), "Did you mean 'lasso'"),
+        (("cost", "--sensor", "icub", "--task", "force", "--estimator", "logistic"), "classification"),
+        (("cost", "--sensor", "icub", "--task", "force", "--protocol", "karl2015"), "Did you mean 'karl2016'"),
+        (("cost", "--sensor", "icub", "--task", "curvature", "--split", "few-shot"), "one split, not"),
+        (("cost", "--twin", "--task", "force"), "Leave out --task"),
+    ],
+)
+def test_wrong_words_are_answered_with_the_next_step(shell, arguments, says):
+    assert_one_clear_screen(shell(*arguments, code=2), says)

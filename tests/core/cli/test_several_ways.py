@@ -1,0 +1,79 @@
+"""Several protocols and splits at once, and matrices by name, as a person asks for them."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tactbench.core.cli.config import matrix_called, packaged_matrices
+from tactbench.core.errors import ConfigError, UnknownNameError
+from tactbench.core.matrix.plan import plan_cells
+from tactbench.plugin import load_registry
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.mark.parametrize("name", sorted(packaged_matrices()))
+def test_every_packaged_matrix_can_be_planned(name):
+    matrix = matrix_called(name)
+    cells = plan_cells(matrix, matrix.sensors or ["any"], load_registry())
+    assert {cell.task for cell in cells if not cell.baseline} == {choice.name for choice in matrix.tasks}
+
+
+def test_the_packaged_matrices_are_those_of_the_examples_and_travel_in_the_wheel():
+    assert {"beyond", "protocols"} <= set(packaged_matrices())
+    assert '"examples/matrices" = "tactbench/matrices"' in (ROOT / "pyproject.toml").read_text()
+
+
+def test_a_file_is_taken_before_a_name_and_a_missing_one_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "beyond").write_text("version: 1\nsensors: [icub]\ntasks: [force]\n")
+    assert matrix_called("beyond").sensors == ("icub",)
+    with pytest.raises(UnknownNameError, match=r"beyond.*protocols"):
+        matrix_called("beyound")
+    with pytest.raises(ConfigError, match=r"nowhere\.yaml"):
+        matrix_called("nowhere.yaml")
+
+
+def test_protocols_and_splits_side_by_side(shell):
+    asked = ("run", "--sensor", "icub", "--task", "force", "--estimator", "lasso", "--out", "out")
+    asked += ("--protocol", "karl2016", "--protocol", "deployable", "--split", "roles", "--split", "unit")
+    done = shell(*asked)
+    assert "by protocol" in done.stdout
+    assert "by split" in done.stdout
+    rows = json.loads((shell.folder / "out" / "leaderboard.json").read_text())
+    by_way = {(row["protocol"], row["split"]): row for row in rows if row["estimator"] == "lasso"}
+    assert {way: row["status"] for way, row in by_way.items()} == {
+        ("karl2016", "roles"): "done", ("karl2016", "unit"): "skipped",
+        ("deployable", "roles"): "done", ("deployable", "unit"): "done",
+    }  # fmt: skip
+    assert "by roles only" in by_way["karl2016", "unit"]["reason"]
+    unit = by_way["deployable", "unit"]
+    assert sum(key.startswith("fold unit") for key in unit["scores"]) == 5
+    assert "5 units" in unit["ci_method"]
+    assert any("assumed" in remark for remark in unit["remarks"])
+    assert not by_way["deployable", "roles"]["remarks"]
+    assert len(list((shell.folder / "out" / "recordings" / "icub").glob("*.h5"))) == 3 + 5
+
+    records = json.loads(shell("leaderboard", "out", "--compare", "split", "--format", "json").stdout)
+    (found,) = [r for r in records if r["estimator"] == "lasso" and r["difference"] is not None]
+    assert found["difference"] == unit["score"] - by_way["deployable", "roles"]["score"]
+    refused = shell("leaderboard", "out", "--compare", "split", "--format", "latex", code=2)
+    assert "md" in refused.stderr
+
+    replayed = shell("run", "--rig", "replay", "--recordings", "out/recordings", "--task", "force", "--split", "unit",
+                     "--format", "json", "--out", "again")  # fmt: skip
+    again = [row for row in json.loads(replayed.stdout) if row["estimator"] == "lasso"]
+    assert [row["score"] for row in again] == [unit["score"]]
+
+
+def test_a_protocol_that_cannot_keep_a_split_is_refused_before_anything_is_recorded(shell):
+    done = shell("run", "--sensor", "icub", "--task", "force", "--protocol", "karl2016", "--split", "unit", code=2)
+    assert "by roles only" in done.stderr
+    assert not list(shell.folder.rglob("*.h5"))
+
+
+def test_an_unknown_matrix_lists_what_there_is(shell):
+    done = shell("run", "--config", "beyong", code=2)
+    assert "beyond" in done.stderr
+    assert "protocols" in done.stderr

@@ -1,0 +1,129 @@
+"""The ladder of real recordings: what is timed is what is scored, and its files say the same."""
+
+import csv
+import json
+import time
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from tactbench.core.cost.labels import Box
+from tactbench.core.cost.ladder import climb
+from tactbench.core.cost.ladder_figure import draw_ladder
+from tactbench.core.cost.ladder_file import read_ladders, write_ladder
+from tactbench.core.errors import UnwritableError
+from tactbench.core.matrix.progress import Silence
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tests.core.evaluation.made import record
+
+QUICK = ("ols", "ridge", "knn", "svm", "forest-10", "mean")
+
+
+def presses(folder, sessions=3, n=120):
+    """Recordings of a force on three taxels, one a session."""
+    rng = np.random.default_rng(4)
+    folder.mkdir()
+    for number in range(sessions):
+        force = np.linspace(0.0, 5.0, n) + rng.normal(0.0, 0.1, n)
+        X = force[:, None] * np.array([40.0, -25.0, 10.0]) + rng.normal(0.0, 60.0, (n, 3)) + 100.0
+        record(folder / f"press-{number}.h5", X, force, session=str(number),
+               provenance={"acquisition_s": 1.25} if number < 2 else {})  # fmt: skip
+    return folder
+
+
+def climbed(folder, store, *estimators, rounds=2, split=None):
+    choice = TaskChoice(name="force", protocol="deployable", split=split,
+                        estimators=tuple(EstimatorChoice(name=name) for name in estimators))  # fmt: skip
+    matrix = MatrixSpec(rig="replay", sensors=("made",), tasks=(choice,))
+    return climb(matrix, load_registry(), store, rounds=rounds, budget_s=20.0, threads=1, clock=time.perf_counter,
+                 progress=Silence(), recordings=folder)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def ladder(tmp_path_factory):
+    root = tmp_path_factory.mktemp("ladder")
+    return climbed(presses(root / "shelf"), Store(root / "out"), *QUICK, split="session")
+
+
+def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data(ladder):
+    assert {row["estimator"] for row in ladder.rows} == {*QUICK, "time-index"}
+    for row in ladder.rows:
+        assert row["status"] == "done", row["reason"]
+        assert row["notes"] == [], row["estimator"]
+        assert row["ci_low"] <= row["score"] <= row["ci_high"]
+        assert row["fit_s_q1"] <= row["fit_s"] <= row["fit_s_q3"]
+        assert 0 < row["latency_ms_q1"] <= row["latency_ms_p50"] <= row["latency_ms_q3"] <= row["latency_ms_p95"]
+        assert (row["fits"], row["batches"]) == (2, 2)
+        assert (row["n_train"], row["n_test"]) == (240, 120)
+        assert row["latency_n"] >= 40
+    assert ladder.about["fold"] == "2"
+    assert ladder.about["split"] == "session"
+    by_name = {row["estimator"]: row for row in ladder.rows}
+    assert max(value for key, value in by_name["ridge"]["chosen"].items() if key.startswith("k")) > 0
+    assert by_name["mean"]["is_baseline"]
+    assert by_name["knn"]["n_features"] == 3
+    assert by_name["time-index"]["n_features"] == 1
+
+
+def test_the_recordings_cost_what_those_of_the_training_rows_did(ladder):
+    # The last fold is tested on the third session, whose recording does not say; it is trained on the other two.
+    assert {(row["data_s"], row["data_kind"]) for row in ladder.rows} == {(2.5, "acquired")}
+
+
+def test_scores_come_from_the_store_and_times_do_not(tmp_path):
+    store, folder = Store(tmp_path / "out"), presses(tmp_path / "shelf")
+    first, again = (climbed(folder, store, "ols", rounds=1, split="session") for _ in range(2))
+    assert [row["score"] for row in first.rows] == [row["score"] for row in again.rows]
+    assert [row["search_s"] for row in first.rows] == [row["search_s"] for row in again.rows]
+    assert [row["latency_ms_p50"] for row in first.rows] != [row["latency_ms_p50"] for row in again.rows]
+    assert not (store.folder / "scores.json").exists(), "the files of the last run are not this verb's"
+
+
+def test_the_files_say_what_the_table_says(ladder, tmp_path):
+    paths = write_ladder(ladder, tmp_path)
+    assert [path.name for path in paths] == [f"made-force.{ending}" for ending in ("json", "csv", "png", "pdf")]
+    (found,) = read_ladders(tmp_path)
+    assert found["rows"] == json.loads(json.dumps(ladder.rows))
+    assert found["metric"] == "rmse"
+    assert found["provenance"]["host"]
+    with paths[1].open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["estimator"] for row in rows] == [row["estimator"] for row in ladder.rows]
+    assert [float(row["fit_s"]) for row in rows] == [row["fit_s"] for row in ladder.rows]
+    assert paths[2].read_bytes()[:4] == b"\x89PNG"
+    assert paths[3].read_bytes()[:4] == b"%PDF"
+
+
+def test_what_is_no_ladder_is_left_out_and_what_cannot_be_written_is_said(ladder, tmp_path):
+    assert list(read_ladders(tmp_path)) == []
+    (tmp_path / "cost").mkdir()
+    (tmp_path / "cost" / "twin.json").write_text("[]")
+    (tmp_path / "cost" / "torn.json").write_text('{"version": 1, "rows"')
+    (tmp_path / "cost" / "later.json").write_text('{"version": 2, "rows": []}')
+    write_ladder(ladder, tmp_path)
+    assert [found["task"] for found in read_ladders(tmp_path)] == ["force"]
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UnwritableError, match="--out"):
+        write_ladder(ladder, tmp_path / "file")
+
+
+def test_labels_of_the_figure_can_be_read(ladder, tmp_path):
+    figure = draw_ladder(ladder, [tmp_path / "a.png"])
+    renderer = figure.canvas.get_renderer()
+    names = {row["estimator"] for row in ladder.rows}
+    for axis in figure.axes:
+        texts = [text for text in axis.texts if text.get_text() in names]
+        boxes = [Box(*Text.get_window_extent(text, renderer).extents) for text in texts]
+        assert {text.get_text() for text in texts} == names
+        assert not [(a, b) for a in range(len(boxes)) for b in range(a) if boxes[a].shared(boxes[b]) > 0]
+
+
+def test_a_far_baseline_is_told_of_and_does_not_squeeze_the_figure(ladder, tmp_path):
+    far = [{**row, "score": 90.0, "ci_low": 80.0, "ci_high": 99.0} if row["estimator"] == "mean" else row
+           for row in ladder.rows]  # fmt: skip
+    figure = draw_ladder(ladder._replace(rows=far), [tmp_path / "a.png"])
+    assert figure.axes[0].get_ylim()[1] < 10.0
+    assert any(text.get_text() == "further above: mean at 90" for text in figure.axes[0].texts)

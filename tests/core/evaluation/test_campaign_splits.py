@@ -1,0 +1,139 @@
+"""Whatever a campaign records, no group that its split keeps apart is on both sides."""
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import NotApplicable
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.protocols import DEPLOYABLE, KARL2016, PROTOCOLS
+from tactbench.core.evaluation.selection import scales
+from tactbench.core.evaluation.sets import Kept
+from tactbench.core.evaluation.splits import choose_split, inner_splits, make_splits, shots, training_sessions
+from tactbench.plugin import load_registry
+
+from .made import force_task, record
+
+TASKS = {task.spec.name: task.spec for task in load_registry().tasks}
+CAMPAIGNS = [(name, split) for name, task in TASKS.items() for split in task.campaigns]
+ROWS = 10
+
+
+def recorded(folder, planned):
+    """Write what a rig would record of these scenes, in few rows: labels, sessions and roles are what counts."""
+    rng = np.random.default_rng(0)
+    for item in planned:
+        path = folder / f"{item.scene.name}.h5"
+        if not path.exists():
+            record(path, rng.normal(size=(ROWS, 2)), np.linspace(0, 5, ROWS), scene=item.scene, role=item.role,
+                   session=item.scene.session, labels=item.scene.labels)  # fmt: skip
+        yield path
+
+
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory):
+    return {name: tmp_path_factory.mktemp(name) for name in TASKS}
+
+
+def loaded(shelf, name, split):
+    return load_dataset(TASKS[name], list(recorded(shelf[name], TASKS[name].campaigns[split])))
+
+
+def values(data, group, masks):
+    return {
+        value for table, mask in zip(data.tables, masks, strict=True) for value in table.groups[group][mask].tolist()
+    }
+
+
+@pytest.mark.parametrize(("name", "split"), CAMPAIGNS)
+def test_no_group_of_the_test_rows_is_in_training_nor_where_parameters_are_chosen(shelf, name, split):
+    data = loaded(shelf, name, split)
+    assert choose_split(TASKS[name], DEPLOYABLE, data, split) == split
+    group = "session" if shots(split) else split
+    folds = make_splits(data, split, 0, one_by_one=True)
+    tested = []
+    for fold in folds:
+        test = values(data, group, fold.test)
+        assert test
+        assert not test & values(data, group, fold.train)
+        tested += sorted(test)
+        for learn, check in inner_splits(data, fold):
+            assert not test & (values(data, group, learn) | values(data, group, check))
+            for inner, outer in zip(learn, fold.train, strict=True):
+                assert not (inner & ~outer).any(), "only training rows are looked at to choose"
+    assert len(tested) == len(set(tested)), "every group is tested once"
+    if not shots(split):
+        assert len(folds) == len(tested), "each group is left out alone"
+        assert set(tested) == values(data, group, [np.ones(len(table.row), dtype=bool) for table in data.tables])
+
+
+@pytest.mark.parametrize("name", [name for name, task in TASKS.items() if "few-shot-10" in task.campaigns])
+def test_few_shots_train_on_nested_sets_and_test_on_the_same(shelf, name):
+    sets = {}
+    for number in (1, 2, 5, 10):
+        data = loaded(shelf, name, f"few-shot-{number}")
+        (fold,) = make_splits(data, f"few-shot-{number}", 0)
+        sets[number] = values(data, "recording", fold.train), values(data, "recording", fold.test)
+    assert all(sets[a][0] < sets[b][0] for a, b in ((1, 2), (2, 5), (5, 10)))
+    assert len({frozenset(test) for _, test in sets.values()}) == 1
+    assert len(sets[10][0]) == 10 * len(sets[1][0])
+
+
+def test_of_more_sessions_than_asked_for_the_first_train(shelf):
+    data = loaded(shelf, "force", "few-shot-10")
+    for number in (1, 2, 5, 10):
+        (fold,) = make_splits(data, f"few-shot-{number}", 0)
+        assert values(data, "session", fold.train) == {f"session-{place}" for place in range(1, number + 1)}
+
+
+def test_sessions_are_taken_in_order_of_their_numbers(tmp_path):
+    X = np.zeros((ROWS, 2)) + np.arange(ROWS)[:, None]
+    names = ("day-10", "day-9", "day-2", "both", "last")
+    roles = ("train", "train", "train", "train", "test")
+    paths = [record(tmp_path / f"{name}.h5", X, np.arange(ROWS), session=name, role=role)
+             for name, role in zip(names, roles, strict=True)]  # fmt: skip
+    paths.append(record(tmp_path / "again.h5", X, np.arange(ROWS), session="both", role="test"))
+    data = load_dataset(force_task(), paths)
+    assert training_sessions(data) == ["day-2", "day-9", "day-10"], "a session with a test recording never trains"
+
+
+def test_more_shots_than_sessions_are_refused(tmp_path):
+    from tactbench.core.errors import UsageError
+
+    X = np.zeros((ROWS, 2)) + np.arange(ROWS)[:, None]
+    paths = [record(tmp_path / f"{role}.h5", X, np.arange(ROWS), session=role, role=role) for role in ("train", "test")]
+    data = load_dataset(force_task(), paths)
+    task = force_task(splits=("few-shot-1", "few-shot-2"))
+    assert choose_split(task, DEPLOYABLE, data, "few-shot-1") == "few-shot-1"
+    with pytest.raises(UsageError, match="few-shot-1"):
+        choose_split(task, DEPLOYABLE, data, "few-shot-2")
+
+
+def test_a_fold_says_whether_its_radius_lies_between_those_of_training(shelf):
+    folds = make_splits(loaded(shelf, "inverse-radius", "cap_radius_mm"), "cap_radius_mm", 0, one_by_one=True)
+    told = {fold.name.removeprefix("cap_radius_mm ").split(", ")[0]: fold.name.split(", ")[1] for fold in folds}
+    assert told == {
+        "5.0": "extrapolated", "flat": "extrapolated",
+        **dict.fromkeys(("7.5", "10.0", "20.0", "40.0"), "interpolated"),
+    }  # fmt: skip
+
+
+def test_folds_that_test_many_numbers_say_nothing(shelf):
+    folds = make_splits(loaded(shelf, "force", "placement"), "placement", 0, one_by_one=True)
+    assert not any("polated" in fold.name for fold in folds)
+
+
+def test_the_third_protocol_is_the_papers_in_everything_but_the_scale():
+    third = PROTOCOLS["karl2016-training-scale"]
+    changed = {name for name in type(third).model_fields if getattr(third, name) != getattr(KARL2016, name)}
+    assert changed == {"name", "title", "scaled_by"}
+    some = [
+        Kept(X=np.array([[0.0], [width]]), **dict.fromkeys(("y", "labelled", "time_s", "recording", "row", "cluster",
+                                                            "segment"), np.zeros(2)))
+        for width in (1.0, 2.0)
+    ]  # fmt: skip
+    assert scales(KARL2016, *some)[1].deviation == 2 * scales(third, *some)[1].deviation
+
+
+def test_a_protocol_of_roles_skips_another_split_and_says_so(shelf):
+    with pytest.raises(NotApplicable, match="by roles only"):
+        choose_split(TASKS["force"], KARL2016, loaded(shelf, "force", "unit"), "unit")
