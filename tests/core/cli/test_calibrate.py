@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -77,16 +76,15 @@ def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
         [sys.executable, "-m", "tactbench", *CALIBRATE, "--out", "cut", "--jobs", "2"],
         cwd=shell.folder, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    waited = time.monotonic()
-    while not (journal.is_file() and journal.read_text().count("\n") >= 3) and time.monotonic() - waited < 60:
-        assert running.poll() is None
-        os.sched_yield()
+    # Its progress tells when the first draws are down: no clock and no busy waiting.
+    first = next(line for line in running.stderr if "/14" in line)
+    assert "done" in first
     running.send_signal(signal.SIGINT)
     _, said = running.communicate(timeout=60)
     assert running.returncode == 130, said
     assert "goes on from there" in said
     kept = journal.read_text().count("\n") - 1
-    assert 2 <= kept < 14
+    assert 1 <= kept < 14
     rest = shell(*CALIBRATE, "--out", "cut")
     assert f"{kept} of 14 draws were found finished" in rest.stderr
     whole = shell.folder / "whole" / "calibration"

@@ -62,7 +62,7 @@ def test_protocols_and_splits_side_by_side(shell):
     assert "md" in refused.stderr
 
     replayed = shell("run", "--rig", "replay", "--recordings", "out/recordings", "--task", "force", "--split", "unit",
-                     "--format", "json", "--out", "again")  # fmt: skip
+                     "--estimator", "lasso", "--format", "json", "--out", "again")  # fmt: skip
     again = [row for row in json.loads(replayed.stdout) if row["estimator"] == "lasso"]
     assert [row["score"] for row in again] == [unit["score"]]
 
