@@ -32,7 +32,7 @@ def _trivial() -> list[EstimatorDescriptor]:
         ),
         EstimatorDescriptor(
             name="time-index", title="Linear regression on the time index (the paper's lower bound)", kinds=REGRESSION,
-            looks_at="time", baseline=True, where="tactbench.estimators.linear:least_squares",
+            looks_at="time", baseline=True, linear=True, where="tactbench.estimators.linear:least_squares",
         ),
         EstimatorDescriptor(
             name="majority", title="Most frequent class of the training labels", kinds=CLASSIFICATION,
@@ -48,23 +48,25 @@ def _trivial() -> list[EstimatorDescriptor]:
 def _linear() -> list[EstimatorDescriptor]:
     return [
         EstimatorDescriptor(
-            name="ols", title="Ordinary least squares on one sample", kinds=REGRESSION,
+            name="ols", title="Ordinary least squares on one sample", kinds=REGRESSION, linear=True,
             where="tactbench.estimators.linear:least_squares",
         ),
         EstimatorDescriptor(
-            name="lasso", title="Lasso on a mean-filtered window", kinds=REGRESSION, params={"lambda_": 0.2},
-            grid={"lambda_": LAMBDAS}, window_grid=WINDOWS, where="tactbench.estimators.linear:lasso",
+            name="lasso", title="Lasso on a mean-filtered window", kinds=REGRESSION, linear=True,
+            params={"lambda_": 0.2}, grid={"lambda_": LAMBDAS}, window_grid=WINDOWS,
+            where="tactbench.estimators.linear:lasso",
         ),
         EstimatorDescriptor(
-            name="ridge", title="Ridge regression on a mean-filtered window", kinds=REGRESSION, params={"alpha": 1.0},
-            grid={"alpha": (0.01, 1.0, 100.0)}, window_grid=WINDOWS, where="tactbench.estimators.linear:ridge",
+            name="ridge", title="Ridge regression on a mean-filtered window", kinds=REGRESSION, linear=True,
+            params={"alpha": 1.0}, grid={"alpha": (0.01, 1.0, 100.0)}, window_grid=WINDOWS,
+            where="tactbench.estimators.linear:ridge",
         ),
         EstimatorDescriptor(
-            name="logistic", title="Logistic regression", kinds=CLASSIFICATION, params={"C": 1.0},
+            name="logistic", title="Logistic regression", kinds=CLASSIFICATION, linear=True, params={"C": 1.0},
             where="tactbench.estimators.linear:logistic",
         ),
         EstimatorDescriptor(
-            name="lda", title="Linear discriminant analysis", kinds=CLASSIFICATION,
+            name="lda", title="Linear discriminant analysis", kinds=CLASSIFICATION, linear=True,
             where="tactbench.estimators.linear:discriminant",
         ),
     ]  # fmt: skip
@@ -73,20 +75,21 @@ def _linear() -> list[EstimatorDescriptor]:
 def _curved() -> list[EstimatorDescriptor]:
     return [
         EstimatorDescriptor(
-            name="knn", title="k nearest neighbours", kinds=BOTH, params={"n_neighbors": 15},
+            name="knn", title="k nearest neighbours", kinds=BOTH, linear=False, params={"n_neighbors": 15},
             where="tactbench.estimators.neighbours:neighbours",
         ),
         EstimatorDescriptor(
             name="svm", title="Support vectors, Gaussian kernel, on every n-th row from 30 000 rows up", kinds=BOTH,
-            params={"C": 1.0, "gamma": "scale", "rows": 30_000}, where="tactbench.estimators.kernel:support_vectors",
+            linear=False, params={"C": 1.0, "gamma": "scale", "rows": 30_000},
+            where="tactbench.estimators.kernel:support_vectors",
         ),
         EstimatorDescriptor(
-            name="boosting", title="Gradient boosting on histograms", kinds=BOTH,
+            name="boosting", title="Gradient boosting on histograms", kinds=BOTH, linear=False,
             params={"max_iter": 100, "learning_rate": 0.1, "max_leaf_nodes": 31},
             where="tactbench.estimators.boosting:boosting",
         ),
         EstimatorDescriptor(
-            name="mlp", title="Neural network with one hidden layer", kinds=BOTH,
+            name="mlp", title="Neural network with one hidden layer", kinds=BOTH, linear=False,
             params={"hidden": 64, "alpha": 1e-4, "max_iter": 200}, where="tactbench.estimators.neural:perceptron",
         ),
     ]  # fmt: skip
@@ -99,12 +102,12 @@ def _forests() -> list[EstimatorDescriptor]:
         params = {"n_estimators": trees, "max_depth": None, "min_samples_leaf": 1}
         found += [
             EstimatorDescriptor(
-                name=f"forest{number}", title=f"Random forest of {trees} trees", kinds=BOTH, params=params,
-                where="tactbench.estimators.forest:forest",
+                name=f"forest{number}", title=f"Random forest of {trees} trees", kinds=BOTH, linear=False,
+                params=params, where="tactbench.estimators.forest:forest",
             ),
             EstimatorDescriptor(
                 name=f"forest-fast{number}", title=f"Random forest of {trees} trees by oneDAL (extra: fast)",
-                kinds=BOTH, params=params, where="tactbench.estimators.fast_forest:fast_forest",
+                kinds=BOTH, linear=False, params=params, where="tactbench.estimators.fast_forest:fast_forest",
                 distributions=("scikit-learn-intelex", "daal"),
             ),
         ]  # fmt: skip

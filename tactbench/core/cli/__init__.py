@@ -23,6 +23,7 @@ VERBS = {
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),
     "cost": ("cost", "Show what accuracy costs in time."),
     "calibrate": ("calibrate", "Draw what no source states, and hold simulations against published numbers."),
+    "report": ("report", "Make one page of all results, with figures and the published numbers beside ours."),
     "leaderboard": ("leaderboard", "Show the last run's table again, in any format."),
 }
 

@@ -46,6 +46,8 @@ class Line:
     cells: tuple[str, ...]
     kind: str
     """result, baseline, or failed"""
+    cell: str = ""
+    """Name of the cell."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +103,12 @@ def _lines(members: Sequence[Row]) -> Iterable[Line]:
         (row for row in done if row["is_baseline"]), key=lambda row: (row["sensor"], sign * row["score"])
     )
     for row in results:
-        yield Line(_cells(row, str(ranked[row["cell"]])), "result")
+        yield Line(_cells(row, str(ranked[row["cell"]])), "result", row["cell"])
     for row in baselines:
-        yield Line(_cells(row, "base"), "baseline")
+        yield Line(_cells(row, "base"), "baseline", row["cell"])
     for row in members:
         if row["status"] != "done":
-            yield Line(_empty(row), "failed")
+            yield Line(_empty(row), "failed", row["cell"])
 
 
 def _cells(row: Row, rank: str) -> tuple[str, ...]:
@@ -116,7 +118,7 @@ def _cells(row: Row, rank: str) -> tuple[str, ...]:
     return (
         rank,
         row["sensor"] + (" SIM" if row["simulated"] else ""),
-        _estimator(row),
+        answer_name(row),
         score(row["score"], unit) + marks,
         interval(row["ci_low"], row["ci_high"], unit),
         score(row["published"], unit) if row["published"] is not None else "–",
@@ -133,10 +135,11 @@ def _cells(row: Row, rank: str) -> tuple[str, ...]:
 
 def _empty(row: Row) -> tuple[str, ...]:
     sensor = row["sensor"] + (" SIM" if row["simulated"] else "")
-    return ("", sensor, _estimator(row), row["status"].upper(), *("–" for _ in COLUMNS[4:]))
+    return ("", sensor, answer_name(row), row["status"].upper(), *("–" for _ in COLUMNS[4:]))
 
 
-def _estimator(row: Row) -> str:
+def answer_name(row: Row) -> str:
+    """Return the estimator's name, with the parameters that are not its defaults."""
     options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
     return f"{row['estimator']} ({options})" if options else str(row["estimator"])
 

@@ -52,7 +52,7 @@ def cell_key(cell: Cell, data: Sequence[str], registry: Registry, sources: Sourc
             "task": task.descriptor.model_dump(mode="json", exclude={"spec": _TOLD_OTHERWISE}),
             "protocol": cell.protocol,
             "split": cell.split,
-            "estimator": estimator.descriptor.model_dump(mode="json", exclude={"title"}),
+            "estimator": estimator.descriptor.model_dump(mode="json", exclude={"title", "linear"}),
             "params": dict(cell.params),
             "seed": cell.seed,
             "data": list(data),

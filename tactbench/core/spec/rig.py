@@ -79,6 +79,8 @@ class EstimatorDescriptor(Frozen):
     """`time`: X is the time index alone. `nothing`: X is a column of zeros."""
     baseline: bool = False
     """A trivial answer, shown under the results."""
+    linear: bool | None = None
+    """Whether answers are linear in the features (for classes: their boundaries are); None: its author does not say."""
     distributions: tuple[str, ...] = ()
     """Distributions beyond tactbench's own that compute its answers: a cell's key covers their versions."""
 

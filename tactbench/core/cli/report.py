@@ -1,0 +1,101 @@
+"""``tactbench report``: the results as one page, with figures and the published numbers beside ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tactbench.core.cli.threads import one_thread
+
+if TYPE_CHECKING:
+    from tactbench.core.report.calibrated import Calibrated
+    from tactbench.core.report.making import Drawer, Report
+
+
+@click.command(name="report")
+@click.argument("folder", type=click.Path(path_type=Path), default=Path("tactbench-results"), required=False)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Where page and figures are put; default: FOLDER/report.",
+)
+@click.option(
+    "--open",
+    "shown",
+    type=click.Choice(("no", "yes")),
+    default="no",
+    show_default=True,
+    help="Show the page in the browser.",
+)
+@click.option("--format", "shape", type=click.Choice(("table", "md", "json", "csv")), default="table",
+              show_default=True, help="How the published numbers and ours are printed.")  # fmt: skip
+@click.pass_context
+def command(ctx: click.Context, folder: Path, out: Path | None, shown: str, shape: str) -> None:
+    """Make one page of all results in FOLDER, which is what `run --out` wrote.
+
+    The published numbers are printed beside ours.
+    """
+    one_thread()
+    from tactbench.core.cli.screen import progress, remark
+    from tactbench.core.errors import UsageError
+    from tactbench.core.matrix.store import Store
+    from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.report.making import make_report
+    from tactbench.core.report.material import open_material
+
+    if not (folder / "index.jsonl").is_file():
+        raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
+    material = open_material(Store(folder), load_registry())
+    with progress() as told:
+        made = make_report(material, out or folder / "report", told, draw=_drawer(), calibrated=_calibrated(folder))
+    _print(made, shape)
+    for sentence in made.missing:
+        remark(f"Left out: {sentence}")
+    for sentence in made.broken:
+        remark(f"Failed: {sentence}")
+    remark(f"Page: {made.page}")
+    if shown == "yes":
+        click.launch(str(made.page))
+    ctx.exit(1 if made.broken else 0)
+
+
+def _drawer() -> Drawer:
+    """Return what draws the paper's figures."""
+    from tactbench.core.report.figures import draw_figures
+
+    return draw_figures
+
+
+def _calibrated(folder: Path) -> Calibrated | None:
+    """Return what the calibration of these results has found; one that is damaged is told of and left out."""
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.errors import FormatError
+    from tactbench.core.report.calibrated import load_calibrated
+
+    try:
+        return load_calibrated(folder)
+    except FormatError as error:
+        remark(f"Failed: {error}")
+        return None
+
+
+def _print(made: Report, shape: str) -> None:
+    from tactbench.core.cli.grid import print_grid, print_records
+    from tactbench.core.report.plain import markdown
+
+    if shape == "md":
+        click.echo(markdown(made.reproduction), nl=False)
+    elif shape != "table":
+        print_records(made.records, shape)
+    else:
+        table = made.reproduction
+        lines = [
+            {name: entry.text for name, entry in zip(table.columns, line, strict=True)} for line in table.lines
+        ]  # fmt: skip
+        styles = ["bold" if kind == "inside" else "" for kind in table.kinds]
+        print_grid(table.title, table.columns, lines, numeric=tuple(table.numeric), styles=styles)
+        for note in table.notes:
+            click.echo(f" {note}")

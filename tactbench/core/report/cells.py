@@ -1,0 +1,104 @@
+"""Every cell, with everything that its row knows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
+from tactbench.core.report.section import Details, Section, Subject
+
+Row = Mapping[str, Any]
+
+# Groups of the row's single values, in order; what nobody has named comes last, so that no key is ever left out.
+_GROUPS: dict[str, tuple[str, ...]] = {
+    "Configuration": (
+        "cell", "key", "sensor", "task", "rig", "simulated", "protocol", "dagger", "split", "estimator", "is_baseline",
+        "repeat", "repeats", "seed", "threads",
+    ),
+    "Answer": (
+        "status", "reason", "metric", "unit", "score", "ci_low", "ci_high", "ci_method", "baseline", "published",
+        "published_reference", "published_remark", "n_recordings", "n_sessions", "n_train", "n_test",
+    ),
+    "Times and memory": (
+        "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95", "latency_n",
+        "peak_rss_mb",
+    ),
+}  # fmt: skip
+_TITLES = {
+    "params": "Parameters other than the defaults",
+    "chosen": "Chosen on validation data",
+    "search": "Every candidate that was compared",
+    "scores": "Other scores: by class, by fold, by other metrics",
+    "counts": "What was counted",
+    "assumptions": "Assumed by the simulation",
+    "plan": "Effects of the first recording: included and left out, with reasons",
+    "confusion": "Confusion: true class down, answer across [rows]",
+    "recordings": "Recordings",
+    "remarks": "Remarks of the recordings",
+    "stamps": "Stamps",
+}
+_APART = ("traceback", "classes")
+"""Shown in places of their own."""
+
+
+def cells_section(subject: Subject) -> Section:
+    """Return the section of cells."""
+    said = ("Everything that is known about each cell. Times are in the unit that ends their name.",)
+    return Section(
+        "cells", "Every cell", said=said, details=tuple(_details(row, subject.anchors) for row in subject.rows)
+    )
+
+
+def _details(row: Row, anchors: Mapping[str, str]) -> Details:
+    single = {name for name, value in row.items() if not isinstance(value, Mapping | list | tuple)} - set(_APART)
+    grouped = {name for names in _GROUPS.values() for name in names} | set(_TITLES)
+    groups = {**_GROUPS, "Also": tuple(sorted(single - grouped))}
+    tables = [_pairs(title, ((name, row[name]) for name in names if name in single)) for title, names in groups.items()]
+    lists = []
+    for name in (*_TITLES, *sorted(set(row) - set(_TITLES) - single - set(_APART))):
+        value, title = row.get(name), _TITLES.get(name, name)
+        if name == "confusion" and value:
+            tables.append(_confusion(title, value, row["classes"]))
+        elif isinstance(value, Mapping) and value:
+            tables.append(_pairs(title, value.items()))
+        elif isinstance(value, list | tuple) and value:
+            if all(isinstance(one, Mapping) for one in value):
+                tables.append(_records(title, value))
+            else:
+                lists.append((title, tuple(map(str, value))))
+    return Details(
+        anchor=anchors[row["cell"]],
+        title=str(row["cell"]),
+        status=str(row["status"]),
+        tables=tuple(table for table in tables if table.lines),
+        lists=tuple(lists),
+        traceback=str(row.get("traceback") or ""),
+    )
+
+
+def _pairs(title: str, pairs: Iterable[tuple[str, Any]]) -> PlainTable:
+    return plain(title, ("name", "value"), [(str(name), _entry(value)) for name, value in pairs])
+
+
+def _records(title: str, records: Sequence[Mapping[str, Any]]) -> PlainTable:
+    columns = list(dict.fromkeys(str(name) for record in records for name in record))
+    numeric = [name for name in columns if any(finite(record.get(name)) is not None for record in records)]
+    return plain(
+        title, columns, [[_entry(record.get(name)) for name in columns] for record in records], numeric=numeric
+    )
+
+
+def _confusion(title: str, table: Sequence[Sequence[int]], classes: Sequence[Any]) -> PlainTable:
+    names = [f"{label}" for label in classes]
+    columns = ("true", *(f"as {name}" for name in names))
+    lines = [[Entry(name), *map(_entry, counts)] for name, counts in zip(names, table, strict=True)]
+    return plain(title, columns, lines, numeric=columns[1:])
+
+
+def _entry(value: Any) -> Entry:
+    if value is None or value == "":
+        return Entry(ABSENT)
+    if isinstance(value, bool):
+        return Entry("yes" if value else "no")
+    return Entry(f"{value:.6g}" if isinstance(value, float) else str(value), finite(value))

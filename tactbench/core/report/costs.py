@@ -1,0 +1,99 @@
+"""What accuracy costs in time: what `tactbench cost` has written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
+from tactbench.core.report.section import Picture, Section, Subject
+
+FOLDER = "cost"
+
+
+def costs_section(subject: Subject) -> Section:
+    """Return the section of costs and comparisons."""
+    tables: list[PlainTable] = []
+    pictures: list[Picture] = []
+    notes: list[str] = []
+    for path in sorted((subject.folder / FOLDER).glob("*.json")):
+        try:
+            table = read_table(path, subject)
+        except (OSError, ValueError) as error:
+            notes.append(f"{FOLDER}/{path.name} cannot be shown: {error}")
+            continue
+        tables.append(table)
+        drawing = path.with_suffix(".png")
+        if drawing.is_file():
+            caption = f"The numbers of the table {table.title!r}, as `tactbench cost` has drawn them."
+            pictures.append(Picture(table.title, caption, drawing.read_bytes()))
+    missing = () if tables else (_command(subject),)
+    return Section(
+        "cost",
+        "What accuracy costs in time",
+        tables=tuple(tables),
+        notes=tuple(notes),
+        pictures=tuple(pictures),
+        missing=missing,
+    )
+
+
+def _command(subject: Subject) -> str:
+    some = next((row for row in subject.rows if row["status"] == "done"), None)
+    command = f"tactbench cost --sensor {some['sensor']} --task {some['task']}" if some else "tactbench cost"
+    return f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."
+
+
+def read_table(path: Path, subject: Subject) -> PlainTable:
+    """Return what a cost file says: an array of flat records, or an object that holds one, whatever their keys.
+
+    What is the same in all records stands below the table, as do the object's own words; quartiles (``…_q1``,
+    ``…_q3``) stay in the file. Numbers lead to the cell that record and object name between them.
+
+    Raises
+    ------
+    ValueError
+        If the file is no such thing.
+    OSError
+        If it cannot be read.
+    """
+    held = json.loads(path.read_text(encoding="utf-8"))
+    about = held if isinstance(held, dict) else {}
+    records: Any = next((value for value in about.values() if _are_records(value)), held)
+    if not _are_records(records):
+        raise ValueError("it holds no array of records; make it again with `tactbench cost`")
+    names = [
+        name for name in dict.fromkeys(name for one in records for name in one) if not name.endswith(("_q1", "_q3"))
+    ]
+    alike = [name for name in names if len(records) > 1 and len({_text(one.get(name)) for one in records}) == 1]
+    columns = [name for name in names if name not in alike]
+    numeric = [name for name in columns if any(finite(one.get(name)) is not None for one in records)]
+    said = {name: value for name, value in about.items() if not isinstance(value, dict | list)} | {
+        name: records[0].get(name) for name in alike
+    }
+    facts = ", ".join(f"{name} {_text(value)}" for name, value in said.items() if _text(value) != ABSENT)
+    words = [f"{name}: {text}." for name, text in (about.get("definitions") or {}).items()]
+    lines = []
+    for one in records:
+        anchor = subject.anchor_of({**about, **one})
+        lines.append([Entry(_text(one.get(name)), finite(one.get(name)), anchor) for name in columns])
+    title = f"Cost: {about.get('title', path.stem)}"
+    return plain(title, columns, lines, numeric=numeric, notes=[f"Of all lines: {facts}.", *words] if facts else words)
+
+
+def _are_records(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(one, dict) for one in value)
+
+
+def _text(value: Any) -> str:
+    if value is None or value in ("", [], {}):
+        return ABSENT
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {_text(one)}" for name, one in value.items())
+    return "; ".join(map(_text, value)) if isinstance(value, list) else str(value)

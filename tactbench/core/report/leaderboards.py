@@ -1,0 +1,64 @@
+"""The leaderboards: every block of the table as a table that can be sorted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from tactbench.core.leaderboard.table import NUMERIC, Block, Line, build_table
+from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, number, plain
+from tactbench.core.report.section import Section, Subject
+
+Row = Mapping[str, Any]
+
+
+def _per_row(row: Row) -> object:
+    return row["predict_s"] / row["batch_rows"] if row["batch_rows"] else None
+
+
+# What a column is sorted by: the text has units of its own line by line.
+VALUES: dict[str, Callable[[Row], object]] = {
+    "score": lambda row: row["score"],
+    "95 % interval": lambda row: row["ci_low"],
+    "published": lambda row: row["published"],
+    "baseline": lambda row: row["baseline"],
+    "n test": lambda row: row["n_test"],
+    "sessions": lambda row: row["n_sessions"],
+    "sim": lambda row: row["sim_s"],
+    "fit": lambda row: row["fit_s"],
+    "latency p50": lambda row: row["latency_ms_p50"],
+    "p95": lambda row: row["latency_ms_p95"],
+    "batch/row": _per_row,
+}
+
+
+def leaderboards_section(subject: Subject) -> Section:
+    """Return the section of leaderboards, failed and skipped cells with their reasons."""
+    table = build_table(subject.rows)
+    rows = {row["cell"]: row for row in subject.rows}
+    tables = tuple(_table(block, table.columns, rows, subject.anchors) for block in table.blocks)
+    said = ("Click a heading to sort by it; click it again to turn the order round.",)
+    return Section("leaderboards", "Leaderboards", said=said, tables=tables, notes=table.notes)
+
+
+def _table(
+    block: Block, columns: tuple[str, ...], rows: Mapping[str, Row], anchors: Mapping[str, str]
+) -> PlainTable:  # fmt: skip
+    lines = []
+    for line in block.lines:
+        row, anchor = rows[line.cell], anchors[line.cell]
+        reason = "" if row["status"] == "done" else str(row["reason"])
+        lines.append([*_entries(line, columns, row, anchor), Entry(reason)])
+    kinds = [line.kind for line in block.lines]
+    return plain(block.title, (*columns, "reason"), lines, numeric=NUMERIC, kinds=kinds)
+
+
+def _entries(line: Line, columns: tuple[str, ...], row: Row, anchor: str) -> list[Entry]:
+    entries = []
+    for name, text in zip(columns, line.cells, strict=True):
+        if name not in NUMERIC or text in ("", ABSENT):
+            entries.append(Entry(text))
+        else:
+            value = finite(VALUES[name](row)) if name in VALUES else number(text)
+            entries.append(Entry(text, value, anchor))
+    return entries

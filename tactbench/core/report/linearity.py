@@ -1,0 +1,69 @@
+"""Linear against non-linear answers to the same question, from the rows alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tactbench.core.leaderboard.numbers import interval, score
+from tactbench.core.leaderboard.table import LOWER_IS_BETTER
+from tactbench.core.plugins.registry import Registry
+
+Row = Mapping[str, Any]
+_SAME = ("sensor", "task", "rig", "protocol", "split", "repeat")
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """The best linear and the best other answer to one question about one sensor."""
+
+    linear: Row
+    other: Row
+
+    @property
+    def where(self) -> str:
+        """What was asked of which sensor, and how."""
+        row = self.linear
+        parts = [row["sensor"] + (" SIM" if row["simulated"] else ""), row["task"], row["protocol"], row["split"] or ""]
+        if row["repeats"] > 1:
+            parts.append(f"repeat {row['repeat']}")
+        return ", ".join(part for part in parts if part)
+
+    @property
+    def sentence(self) -> str:
+        """Which is better, by how much, and whether their intervals are apart."""
+        unit = self.linear["unit"]
+        by = self.other["score"] - self.linear["score"]
+        if by == 0:
+            return "they score the same"
+        better = "non-linear" if (by < 0) == (self.linear["metric"] in LOWER_IS_BETTER) else "linear"
+        low, high = sorted((self.linear, self.other), key=lambda row: float(row["score"]))
+        apart = "are apart" if low["ci_high"] < high["ci_low"] else "overlap"
+        suffix = "" if unit == "1" else f" {unit}"
+        return f"{better} is better by {score(abs(by), unit)}{suffix}; the intervals {apart}"
+
+    @staticmethod
+    def told(row: Row) -> str:
+        """Return a score and its interval as text."""
+        return f"{score(row['score'], row['unit'])} ({interval(row['ci_low'], row['ci_high'], row['unit'])})"
+
+
+def contrasts(rows: Sequence[Row], registry: Registry) -> list[Contrast]:
+    """Return a contrast for each question that was answered in both ways; baselines are neither."""
+    groups: dict[tuple[Any, ...], dict[bool, list[Row]]] = {}
+    for row in rows:
+        kind = _linear(row, registry)
+        if row["status"] == "done" and not row["is_baseline"] and kind is not None:
+            groups.setdefault(tuple(row[name] for name in _SAME), {}).setdefault(kind, []).append(row)
+    return [Contrast(_best(group[True]), _best(group[False])) for group in groups.values() if len(group) == 2]
+
+
+def _linear(row: Row, registry: Registry) -> bool | None:
+    name = row["estimator"]
+    return registry.estimators[name].linear if name in registry.estimators.names() else None
+
+
+def _best(rows: Sequence[Row]) -> Row:
+    sign = 1.0 if rows[0]["metric"] in LOWER_IS_BETTER else -1.0
+    return min(rows, key=lambda row: sign * float(row["score"]))

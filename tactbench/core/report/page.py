@@ -1,0 +1,111 @@
+"""The page: sections in order, laid into one HTML text that needs nothing from anywhere."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+import tactbench
+from tactbench.core.report.cells import cells_section
+from tactbench.core.report.compared import compared_section
+from tactbench.core.report.costs import costs_section
+from tactbench.core.report.findings import findings_section
+from tactbench.core.report.leaderboards import leaderboards_section
+from tactbench.core.report.opening import opening
+from tactbench.core.report.pictures import pictures_section
+from tactbench.core.report.published import published_section
+from tactbench.core.report.section import Maker, Section, Subject
+from tactbench.core.report.sensors import sensors_section
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+TITLE = "tactbench: tactile sensors, what they answer and what it costs"
+
+# Anchor, title and maker of each section: a section that cannot be made says so under its own title.
+SECTIONS: tuple[tuple[str, str, Maker], ...] = (
+    ("about", "What this is", opening),
+    ("reproduction", "Published numbers, and ours", published_section),
+    ("sensors", "Sensors", sensors_section),
+    ("findings", "Findings", findings_section),
+    ("figures", "Figures", pictures_section),
+    ("leaderboards", "Leaderboards", leaderboards_section),
+    ("compared", "The same questions asked otherwise", compared_section),
+    ("cost", "What accuracy costs in time", costs_section),
+    ("cells", "Every cell", cells_section),
+)
+
+
+@dataclass(frozen=True)
+class Page:
+    """The text, and what it lacks."""
+
+    html: str
+    missing: tuple[str, ...]
+    """What sections lack, one sentence each, with the command that makes it."""
+    broken: tuple[str, ...]
+    """One sentence a section that could not be made although its results are there."""
+
+
+def make_page(subject: Subject) -> Page:
+    """Return the page: the same results give the same bytes.
+
+    A section that cannot be made takes no other with it: it says why.
+    """
+    sections: list[Section] = []
+    broken: list[str] = []
+    for anchor, title, make in SECTIONS:
+        try:
+            sections.append(make(subject))
+        except Exception as error:
+            told = f"This section cannot be made from these results: {type(error).__name__}: {error}"
+            broken.append(f"{title}: {told}")
+            sections.append(Section(anchor, title, missing=(told,)))
+    missing = [f"{section.title}: {lacked}" for section in sections for lacked in section.missing]
+    return Page(_render(sections), tuple(one for one in missing if one not in broken), tuple(broken))
+
+
+def _render(sections: Sequence[Section]) -> str:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=PackageLoader("tactbench.core.report", "template"), autoescape=True, undefined=StrictUndefined
+    )
+    environment.filters["prose"] = prose
+    environment.filters["base64"] = lambda content: base64.b64encode(content).decode()
+    style, script = _own("page.css"), _own("page.js")
+    html = environment.get_template("page.html").render(
+        title=TITLE,
+        version=tactbench.__version__,
+        style=Markup(style),
+        script=Markup(script),
+        style_hash=_hash(style),
+        script_hash=_hash(script),
+        sections=sections,
+    )
+    return html + "\n"
+
+
+def prose(text: Any) -> Markup:
+    """Return text with what stands between backticks as code; everything in it is escaped."""
+    from markupsafe import Markup, escape
+
+    parts = str(text).split("`")
+    if len(parts) % 2 == 0:  # a backtick without its partner is a backtick
+        return escape(str(text))
+    shown = [Markup("<code>{}</code>").format(part) if place % 2 else escape(part) for place, part in enumerate(parts)]
+    return Markup("").join(shown)
+
+
+def _own(name: str) -> str:
+    return (resources.files("tactbench.core.report") / "template" / name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    """Return what a Content-Security-Policy calls the text by."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

@@ -1,0 +1,223 @@
+"""Every published number of the tasks beside ours, and in one sentence how the two compare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from tactbench.core.leaderboard.numbers import interval, score
+from tactbench.core.leaderboard.table import LOWER_IS_BETTER
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.report.calibrated import Calibrated, PredictiveRange
+from tactbench.core.spec.task import Published, TaskSpec
+
+Row = Mapping[str, Any]
+Verdict = Literal["inside", "outside", "no answer"]
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """One published number, one of our rows beside it."""
+
+    title: str
+    task: str
+    protocol: str
+    estimator: str
+    sensor: str
+    published: float
+    reference: str
+    remark: str
+    unit: str
+    row: Row | None
+    """What stands beside it; None: nothing has been run."""
+    predicted: PredictiveRange | None
+    verdict: Verdict
+    """`inside`: the published number lies in the interval of our score."""
+    sentence: str
+
+
+def reproduce(registry: Registry, rows: Sequence[Row], calibrated: Calibrated | None = None) -> list[Reproduction]:
+    """Return a line for each published number of each task, and each row that it may stand beside.
+
+    A number without any row gets one line that names the command to run. Tasks come in the order of the rows.
+    """
+    lines: list[Reproduction] = []
+    asked = list(dict.fromkeys(row["task"] for row in rows))
+    known = {descriptor.name: descriptor.spec for descriptor in registry.tasks}
+    for name in sorted(known, key=lambda name: asked.index(name) if name in asked else len(asked)):
+        task = known[name]
+        for published in task.published:
+            beside = [row for row in rows if stands_beside(row, task, published)]
+            lines += [_line(task, published, row, calibrated) for row in beside]
+            if not beside:
+                lines.append(_unanswered(task, published, registry))
+    return lines
+
+
+def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
+    """Tell whether `row` may be compared with a published number: as the row itself says it may."""
+    if row["task"] != task.name or row["params"] or (published.estimator is None and row["is_baseline"]):
+        return False
+    return task.published_for(row["sensor"], row["protocol"], row["estimator"], row["split"]) == published
+
+
+def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tuple[Verdict, str]:
+    """Return how a row compares with a published number, and one sentence that says so.
+
+    Parameters
+    ----------
+    row
+        A row of any status.
+    published
+        In the unit of the row's metric.
+    predicted
+        Where the calibrated twin can put this number; None if nobody has looked.
+    """
+    if row["status"] != "done":
+        return "no answer", f"{row['status']}: {row['reason']}"
+    if row["ci_low"] is None or row["ci_high"] is None:
+        return "no answer", "the row has no interval to compare with"
+    if row["ci_low"] <= published <= row["ci_high"]:
+        if predicted is not None and not predicted.low <= published <= predicted.high:
+            return "inside", f"inside; but {_of_calibration(predicted, published, row['unit'])}"
+        return "inside", "inside"
+    parts = [_difference(row, published), f"the interval is by {row['ci_method']}"]
+    if predicted is not None:
+        parts.append(_of_calibration(predicted, published, row["unit"]))
+    elif row["simulated"]:
+        parts.append("what the twin cannot know may account for it or not: `tactbench calibrate` tells")
+    return "outside", "; ".join(parts)
+
+
+def _difference(row: Row, published: float) -> str:
+    ours, unit = row["score"], row["unit"]
+    by = abs(ours - published)
+    share = f" ({100 * by / abs(published):.1f} %)" if published else ""
+    better = (ours < published) == (row["metric"] in LOWER_IS_BETTER)
+    where = "below" if ours < published else "above"
+    return f"ours is {score(by, unit)}{_suffix(unit)}{share} {where} the published, which is {_word(better)}"
+
+
+def _word(better: bool) -> str:
+    return "better" if better else "worse"
+
+
+def _suffix(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
+
+
+def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> str:
+    inside = predicted.low <= published <= predicted.high
+    told = f"the published lies {'inside' if inside else 'outside'} the calibrated range ({predicted.use})"
+    if not inside:
+        edge = predicted.low if published < predicted.low else predicted.high
+        told += f" by {score(abs(published - edge), unit)}{_suffix(unit)}"
+    elif predicted.asks:
+        asked = ", ".join(f"{name} {low:.3g} … {high:.3g}" for name, (low, high) in sorted(predicted.asks.items()))
+        told += f" and asks for {asked}"
+    return told
+
+
+def _line(task: TaskSpec, published: Published, row: Row, calibrated: Calibrated | None) -> Reproduction:
+    predicted = None
+    if calibrated is not None:
+        predicted = calibrated.range_for(task.name, row["sensor"], published.score)
+    word, sentence = verdict(row, published.score, predicted)
+    return Reproduction(
+        title=_title(task, published, row["sensor"]),
+        task=task.name,
+        protocol=published.protocol,
+        estimator=row["estimator"],
+        sensor=row["sensor"],
+        published=published.score,
+        reference=published.reference,
+        remark=published.remark,
+        unit=task.unit,
+        row=row,
+        predicted=predicted,
+        verdict=word,
+        sentence=sentence,
+    )
+
+
+def _title(task: TaskSpec, published: Published, sensor: str | None) -> str:
+    title = published.title or f"{task.name}, {task.metric}"
+    return f"{title} ({sensor})" if published.sensor is None and sensor else title
+
+
+def _unanswered(task: TaskSpec, published: Published, registry: Registry) -> Reproduction:
+    return Reproduction(
+        title=_title(task, published, None),
+        task=task.name,
+        protocol=published.protocol,
+        estimator=published.estimator or "",
+        sensor=published.sensor or "",
+        published=published.score,
+        reference=published.reference,
+        remark=published.remark,
+        unit=task.unit,
+        row=None,
+        predicted=None,
+        verdict="no answer",
+        sentence=f"not run: `{_command(task, published, registry)}`",
+    )
+
+
+def _command(task: TaskSpec, published: Published, registry: Registry) -> str:
+    """Return what to type for a row that the number may stand beside."""
+    sensor = published.sensor
+    words = ["tactbench run", *([f"--sensor {sensor}"] if sensor else []), f"--task {task.name}"]
+    words.append(f"--protocol {published.protocol}")
+    if published.split:
+        words.append(f"--split {published.split}")
+    trivial = published.estimator in task.baselines  # run with any other
+    if published.estimator and not trivial:
+        words.append(f"--estimator {published.estimator}")
+    unknown = sensor is not None and (sensor not in registry.sensors or registry.sensors[sensor].transducer is None)
+    if unknown or not task.scenes:
+        words.append("--rig replay --recordings DIR")
+    return " ".join(words)
+
+
+def records(lines: Iterable[Reproduction]) -> list[dict[str, Any]]:
+    """Return the lines for programs: flat, the same keys in each."""
+    return [
+        {
+            "title": line.title,
+            "task": line.task,
+            "sensor": line.sensor,
+            "protocol": line.protocol,
+            "estimator": line.estimator,
+            "unit": line.unit,
+            "published": line.published,
+            "reference": line.reference,
+            "remark": line.remark,
+            "cell": line.row["cell"] if line.row else None,
+            "simulated": bool(line.row["simulated"]) if line.row else None,
+            "score": line.row["score"] if line.row else None,
+            "ci_low": line.row["ci_low"] if line.row else None,
+            "ci_high": line.row["ci_high"] if line.row else None,
+            "predicted_low": line.predicted.low if line.predicted else None,
+            "predicted_high": line.predicted.high if line.predicted else None,
+            "predicted_level": line.predicted.level if line.predicted else None,
+            "predicted_use": line.predicted.use if line.predicted else None,
+            "verdict": line.verdict,
+            "sentence": line.sentence,
+        }
+        for line in lines
+    ]
+
+
+def told_interval(line: Reproduction) -> str:
+    """Return the interval of our score as text."""
+    row = line.row
+    return interval(row["ci_low"], row["ci_high"], line.unit) if row else "–"
+
+
+def told_range(line: Reproduction) -> str:
+    """Return the calibrated range as text: bounds, share of the draws, fitted or held out."""
+    one = line.predicted
+    if one is None:
+        return "–"
+    return f"{interval(one.low, one.high, line.unit)} ({one.level:.0%}, {one.use})"

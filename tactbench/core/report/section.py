@@ -1,0 +1,112 @@
+"""A part of the page, and what parts are made of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.leaderboard.table import answer_name
+from tactbench.core.report.calibrated import Calibrated
+from tactbench.core.report.drawn import Drawn
+from tactbench.core.report.material import Material
+from tactbench.core.report.plain import PlainTable
+
+Row = Mapping[str, Any]
+_DESCRIBED = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "seed")
+
+
+@dataclass(frozen=True)
+class Subject:
+    """Everything that a page is about."""
+
+    material: Material
+    drawn: Sequence[Drawn] = ()
+    calibrated: Calibrated | None = None
+    undrawn: tuple[str, ...] = ()
+    """Why figures are missing, a sentence each."""
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """One a cell."""
+        return self.material.rows
+
+    @property
+    def folder(self) -> Path:
+        """The result folder."""
+        return self.material.store.folder
+
+    @cached_property
+    def anchors(self) -> dict[str, str]:
+        """Where the page tells everything about a cell, by the cell's name."""
+        found: dict[str, str] = {}
+        for row in self.rows:
+            stem = "cell-" + (re.sub(r"[^a-z0-9]+", "-", str(row["cell"]).lower()).strip("-") or "nameless")
+            anchor, count = stem, 2
+            while anchor in found.values():
+                anchor, count = f"{stem}-{count}", count + 1
+            found[row["cell"]] = anchor
+        return found
+
+    def anchor_of(self, facts: Mapping[str, Any]) -> str:
+        """Return the anchor of the one cell that `facts` describe: by name, by key, or by what was asked of whom.
+
+        Empty if no cell fits, or several do. Other keys do not matter; an estimator may come with its parameters in
+        brackets.
+        """
+        asked = {name: facts[name] for name in _DESCRIBED if facts.get(name) is not None}
+        named, key = facts.get("cell"), facts.get("key") or None
+        cells = [row for row in self.rows if named == row["cell"] or (key and key == row.get("key"))]
+        if not cells and {"sensor", "task", "estimator"} <= set(asked):
+            name = asked.pop("estimator")
+            alike = [row for row in self.rows if all(row[one] == value for one, value in asked.items())]
+            cells = [row for row in alike if name == answer_name(row)] or [
+                row for row in alike if name == row["estimator"]
+            ]
+        return self.anchors[cells[0]["cell"]] if len(cells) == 1 else ""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure inside the page."""
+
+    title: str
+    caption: str
+    png: bytes
+    cells: tuple[tuple[str, str], ...] = ()
+    """Name and anchor of the cells it shows."""
+
+
+@dataclass(frozen=True)
+class Details:
+    """Everything that is known about one cell, to be unfolded."""
+
+    anchor: str
+    title: str
+    status: str
+    tables: tuple[PlainTable, ...]
+    lists: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    """Titled lists of sentences."""
+    traceback: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page. Text between backticks is shown as code; none of it is markup."""
+
+    anchor: str
+    title: str
+    said: tuple[str, ...] = ()
+    tables: tuple[PlainTable, ...] = ()
+    notes: tuple[str, ...] = ()
+    """Below the tables."""
+    pictures: tuple[Picture, ...] = ()
+    details: tuple[Details, ...] = ()
+    missing: tuple[str, ...] = ()
+    """What the section lacks: one sentence each, with the command that makes it."""
+
+
+Maker = Callable[[Subject], Section]

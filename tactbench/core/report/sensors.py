@@ -1,0 +1,62 @@
+"""The sensors side by side: the paper's Table I, and who states each fact."""
+
+from __future__ import annotations
+
+from tactbench.core.errors import TactbenchError
+from tactbench.core.leaderboard.datasheet import details, table_one
+from tactbench.core.recording.reader import read_meta
+from tactbench.core.report.plain import Entry, PlainTable, plain
+from tactbench.core.report.section import Section, Subject
+from tactbench.core.spec.sensor import SensorSpec
+
+_READINGS = 5
+"""So many first lines of `details` are about readings; the parameters behind them are for `tactbench show --all`."""
+
+
+def sensors_section(subject: Subject) -> Section:
+    """Return the comparison of the sensors that the results are about."""
+    title = "Sensors (the paper's Table I)"
+    names = dict.fromkeys(str(row["sensor"]) for row in subject.rows)
+    found = {name: _spec(name, subject) for name in names}
+    specs = [spec for spec in found.values() if spec is not None]
+    unknown = tuple(
+        f"{name}: neither installed nor in a recording of these results; see `tactbench plugins`."
+        for name, spec in found.items()
+        if spec is None
+    )
+    if not specs:
+        return Section("sensors", title, missing=unknown or ("No cell names a sensor.",))
+    return Section(
+        "sensors",
+        title,
+        said=(f"Every parameter of these sensors, and who states it: `tactbench show {' '.join(found)} --all`.",),
+        tables=(_table("Sensor comparison", specs, table=1), _table("Readings", specs, table=2)),
+        notes=unknown,
+    )
+
+
+def _spec(name: str, subject: Subject) -> SensorSpec | None:
+    """Return a sensor's spec: the installed one, else the one that a recording carries."""
+    registry = subject.material.registry
+    try:
+        if name in registry.sensors:
+            return registry.sensors[name].spec
+        for row in subject.rows:
+            if row["sensor"] == name:
+                for path in subject.material.recordings(row):
+                    return read_meta(path).sensor
+    except TactbenchError:
+        pass  # given twice, or a damaged file: the section says that it is not known
+    return None
+
+
+def _table(title: str, specs: list[SensorSpec], *, table: int) -> PlainTable:
+    rows = table_one(specs) if table == 1 else details(specs)[:_READINGS]
+    columns = ["", *(column for spec in specs for column in (spec.title, f"{spec.title}: source"))]
+    lines = []
+    for row in rows:
+        line = [Entry(row.title)]
+        for fact in row.facts:
+            line += [Entry(fact.text), Entry(": ".join(part for part in (fact.tag, fact.reference) if part))]
+        lines.append(line)
+    return plain(title, columns, lines)

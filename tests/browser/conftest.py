@@ -1,0 +1,66 @@
+"""A real page of a real small run, opened in a headless Chromium that speaks to nobody."""
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.report.making import make_report
+from tactbench.core.report.material import open_material
+from tests.conftest import Shell
+from tests.core.report.results import draw_one, make_results
+
+
+def _found(variable, *names):
+    """Return the program that `variable` names, or the first of `names` on the path."""
+    given = os.environ.get(variable)
+    return given or next((found for name in names if (found := shutil.which(name))), None)
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """A headless Chromium that logs what it loads and says; skipped where there is none."""
+    browser = _found("TACTBENCH_CHROMIUM", "chromium", "chromium-browser", "google-chrome")
+    driver = _found("TACTBENCH_CHROMEDRIVER", "chromedriver")
+    if browser is None or driver is None:
+        pytest.skip(
+            "no chromium and chromedriver on the path (Debian: apt-get install chromium chromium-driver); "
+            "TACTBENCH_CHROMIUM and TACTBENCH_CHROMEDRIVER name others"
+        )
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed: pip install '.[test]'")
+    options = webdriver.ChromeOptions()
+    options.binary_location = browser
+    # No sandbox: continuous integration is root in a container, and the page is our own. /dev/shm is small there.
+    for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--hide-scrollbars"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    running = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    yield running
+    running.quit()
+
+
+@pytest.fixture(scope="session")
+def page(tmp_path_factory) -> Path:
+    """The page of a small run, with a figure, a cost file and skipped cells."""
+    folder = make_results(Shell(tmp_path_factory.mktemp("page")))
+    material = open_material(Store(folder), load_registry())
+    (folder / "cost").mkdir()
+    row = next(row for row in material.rows if row["status"] == "done")
+    points = [{"key": row["key"], "seconds": seconds} for seconds in (0.5, 20.0, 3.0)]
+    (folder / "cost" / "icub-force.json").write_text(json.dumps(points))
+    return make_report(material, folder / "report", None, draw=draw_one).page
+
+
+@pytest.fixture
+def opened(chromium, page):
+    """The page, freshly opened from disk, wide and light."""
+    chromium.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    for log in ("browser", "performance"):
+        chromium.get_log(log)  # what an earlier page said is not this one's
+    chromium.get("about:blank")
+    chromium.get(page.as_uri())
+    return chromium

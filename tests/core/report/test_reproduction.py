@@ -1,0 +1,119 @@
+import pytest
+
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.report.calibrated import Calibrated, PredictiveRange
+from tactbench.core.report.reproduction import records, reproduce, verdict
+from tests.core.leaderboard.rows import row
+
+METHOD = "block bootstrap in time within 1 recording (blocks of 17 rows): spread between sessions is not in it"
+
+
+def force_row(sensor="icub", estimator="lasso", score=0.68, **more):
+    """A row of the force task as the paper asks it; the interval is the score ± 0.1."""
+    named = f"{sensor}/force/{estimator}/{more.get('repeat', 1)}"
+    return (
+        row(sensor, estimator, score)
+        | {"task": "force", "protocol": "karl2016", "split": "roles", "cell": named}
+        | more
+    )
+
+
+def predicted(low, high, **more):
+    return PredictiveRange("force", "icub", 0.7659, low, high, 0.9, "held out", **more)
+
+
+@pytest.mark.parametrize("published", [0.58, 0.68, 0.78])
+def test_inside_the_interval_is_inside_bounds_included(published):
+    assert verdict(force_row(ci_low=0.58, ci_high=0.78), published, None) == ("inside", "inside")
+
+
+@pytest.mark.parametrize(
+    ("metric", "unit", "published", "says"),
+    [
+        ("rmse", "N", 0.88, "ours is 0.2000 N (22.7 %) below the published, which is better"),
+        ("rmse", "N", 0.5, "ours is 0.1800 N (36.0 %) above the published, which is worse"),
+        ("macro_f1", "1", 0.88, "ours is 0.200 (22.7 %) below the published, which is worse"),
+        ("macro_f1", "1", 0.5, "ours is 0.180 (36.0 %) above the published, which is better"),
+        ("macro_f1", "1", 0.0, "ours is 0.680 above the published, which is better"),
+    ],
+)
+def test_a_miss_says_by_how_much_and_which_way_is_better(metric, unit, published, says):
+    word, sentence = verdict(force_row(metric=metric, unit=unit), published, None)
+    assert word == "outside"
+    assert sentence.startswith(says)
+
+
+def test_a_miss_says_what_is_not_in_its_interval_by_the_interval_s_own_words():
+    assert "spread between sessions is not in it" in verdict(force_row(ci_method=METHOD), 0.9, None)[1]
+    over_sessions = verdict(force_row(ci_method="bootstrap over 12 sessions"), 0.9, None)[1]
+    assert "spread" not in over_sessions
+    assert "bootstrap over 12 sessions" in over_sessions
+
+
+def test_a_calibration_says_whether_it_reaches_the_number_and_what_it_asks_for():
+    reaching = verdict(force_row(), 0.9, predicted(0.6, 1.0, asks={"drift_scale": (2.0, 3.5)}))[1]
+    assert "the published lies inside the calibrated range (held out) and asks for drift_scale 2 … 3.5" in reaching
+    missing = verdict(force_row(), 0.9, predicted(0.6, 0.85))[1]
+    assert "the published lies outside the calibrated range (held out) by 0.0500 N" in missing
+    below = verdict(force_row(), 0.4, predicted(0.6, 0.85))[1]
+    assert "by 0.2000 N" in below
+    # What leads to a range that does not reach the number is no explanation of it.
+    assert "asks" not in verdict(force_row(), 0.9, predicted(0.6, 0.85, asks={"drift_scale": (2.0, 3.5)}))[1]
+
+
+def test_only_a_simulated_row_asks_for_a_calibration():
+    assert "tactbench calibrate" in verdict(force_row(), 0.9, None)[1]
+    assert "tactbench calibrate" not in verdict(force_row(simulated=False), 0.9, None)[1]
+    assert "tactbench calibrate" not in verdict(force_row(), 0.9, predicted(0.6, 1.0))[1]
+
+
+def test_inside_by_chance_is_said_when_the_calibration_does_not_reach_it():
+    word, sentence = verdict(force_row(score=0.7), 0.7659, predicted(0.6, 0.7))
+    assert word == "inside"
+    assert "outside the calibrated range" in sentence
+
+
+def test_a_cell_without_an_answer_gives_its_reason():
+    assert verdict(force_row(status="failed", reason="the plug was pulled"), 0.7, None) == (
+        "no answer",
+        "failed: the plug was pulled",
+    )
+
+
+def test_the_five_numbers_of_the_paper_have_a_line_each_even_without_results():
+    lines = [line for line in reproduce(load_registry(), []) if line.reference.startswith("Karl et al. 2016")]
+    assert sorted(line.published for line in lines) == [0.60488, 0.6875, 0.7307, 0.7659, 0.79512]
+    for line in lines:
+        assert line.sentence.startswith("not run: `tactbench run ")
+    (time_index,) = [line for line in lines if line.estimator == "time-index"]
+    assert "--estimator" not in time_index.sentence  # a baseline is run with any answer
+
+
+def test_rows_stand_beside_the_numbers_they_are_comparable_with_and_no_others():
+    beside = force_row()
+    others = [
+        force_row(cell="a", protocol="deployable"),
+        force_row(cell="b", estimator="ridge"),
+        force_row(cell="c", params={"lambda_": 0.3}),
+        force_row(cell="d", task="curvature"),
+    ]
+    lines = [line for line in reproduce(load_registry(), [beside, *others]) if line.row]
+    assert [(line.published, line.row["cell"]) for line in lines] == [(0.7659, beside["cell"])]
+
+
+def test_a_number_of_no_certain_sensor_has_a_line_for_each_sensor_s_recordings():
+    rows = [force_row(sensor, "time-index", is_baseline=True) for sensor in ("biotac", "icub")]
+    lines = [line for line in reproduce(load_registry(), rows) if line.row]
+    assert [(line.published, line.title) for line in lines] == [
+        (0.6875, "force, RMSE of the time index (biotac)"),
+        (0.6875, "force, RMSE of the time index (icub)"),
+    ]
+
+
+def test_records_join_row_and_calibrated_range():
+    calibrated = Calibrated(ranges=(predicted(0.6, 1.0),))
+    found = [one for one in records(reproduce(load_registry(), [force_row()], calibrated)) if one["cell"]]
+    assert [(one["published"], one["score"], one["predicted_high"], one["predicted_use"]) for one in found] == [
+        (0.7659, 0.68, 1.0, "held out")
+    ]
+    assert len({tuple(one) for one in records(reproduce(load_registry(), [force_row()]))}) == 1

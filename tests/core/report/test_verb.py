@@ -1,0 +1,71 @@
+"""`tactbench report`, as a person runs it."""
+
+import json
+
+import pytest
+
+from tests.conftest import Shell
+
+
+@pytest.fixture(scope="module")
+def reported(results):
+    shell = Shell(results.parent)
+    return shell, shell("report")
+
+
+def test_page_on_disk_table_on_stdout_the_rest_on_stderr(reported, results):
+    _, done = reported
+    assert "force, RMSE, iCub" in done.stdout
+    assert "Page: tactbench-results/report/index.html" in done.stderr
+    assert "Left out: " in done.stderr
+    assert list((results / "report" / "figures").glob("*.pdf"))
+    assert (results / "report" / "index.html").read_text().startswith("<!DOCTYPE html>")
+    assert not list(results.rglob("*.partial"))
+
+
+def test_the_same_table_for_programs_and_the_same_page_in_another_folder(reported, results):
+    shell, _ = reported
+    found = json.loads(shell("report", "tactbench-results", "--out", "elsewhere", "--format", "json").stdout)
+    (ours,) = [one for one in found if one["cell"] == "icub/force/twin/karl2016/lasso/1"]
+    assert ours["published"] == 0.7659
+    assert ours["ci_low"] < ours["score"] < ours["ci_high"]
+    page = (shell.folder / "elsewhere" / "index.html").read_bytes()
+    assert page == (results / "report" / "index.html").read_bytes()
+
+
+def one_clear_screen(done, *says):
+    assert done.stdout == ""
+    assert done.stderr.startswith("Error: ")
+    assert "Traceback" not in done.stderr
+    for text in says:
+        assert text in done.stderr
+
+
+def test_a_folder_that_is_not_there_is_not_made(shell):
+    one_clear_screen(shell("report", "nowhere", code=2), "There are no results in nowhere", "tactbench run")
+    assert not (shell.folder / "nowhere").exists()
+
+
+def test_results_without_a_finished_cell_say_what_to_run(shell):
+    shell("run", "--sensor", "icub", "--task", "grasp-stability")
+    (shell.folder / "tactbench-results" / "index.jsonl").touch()
+    one_clear_screen(shell("report", code=2), "No cell in tactbench-results has finished", "tactbench run")
+
+
+def test_a_place_that_refuses_the_page_is_named(reported):
+    shell, _ = reported
+    (shell.folder / "taken").write_text("a file, not a folder")
+    one_clear_screen(shell("report", "--out", "taken", code=2), "taken", "--out")
+
+
+def test_a_row_of_another_version_is_left_out_and_named(reported, results, tmp_path):
+    import shutil
+
+    shutil.copytree(results, tmp_path / "old")
+    index = tmp_path / "old" / "index.jsonl"
+    lines = index.read_text().splitlines()
+    first = json.loads(lines[0])
+    del first["row"]["search"]
+    index.write_text("\n".join([json.dumps(first), *lines[1:]]) + "\n")
+    done = Shell(tmp_path)("report", "old")
+    assert f"Left out: {first['row']['cell']}: its row is of another version" in done.stderr
