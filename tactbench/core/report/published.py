@@ -32,6 +32,7 @@ def published_table(subject: Subject) -> PlainTable:
         if line.remark:
             titles.setdefault(line.remark, []).append(line.title)
     notes = [f"{', '.join(dict.fromkeys(whose))}: {remark}." for remark, whose in titles.items()]
+    notes += subject.calibrated.notes if subject.calibrated else ()
     return plain(
         "Reproduction",
         COLUMNS,

@@ -114,7 +114,7 @@ def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> 
         edge = predicted.low if published < predicted.low else predicted.high
         told += f" by {score(abs(published - edge), unit)}{_suffix(unit)}"
     elif predicted.asks:
-        asked = ", ".join(f"{name} {low:.3g} … {high:.3g}" for name, (low, high) in sorted(predicted.asks.items()))
+        asked = ", ".join(f"{name} {low:.4g} … {high:.4g}" for name, (low, high) in sorted(predicted.asks.items()))
         told += f" and asks for {asked}"
     return told
 
