@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 _PRIOR, _ACCEPTED, _PUBLISHED = "#999999", "#0072B2", "#D55E00"
 
 
-def draw_sensitivity(spec: CalibrationSpec, found: Sequence[Sensitivity], paths: Sequence[Path]) -> None:
-    """Draw a panel for each published number: partial rank correlation with every nuisance, and its interval."""
+def sensitivity_figure(spec: CalibrationSpec, found: Sequence[Sensitivity]) -> Figure:
+    """Return a panel for each published number: partial rank correlation with every nuisance, and its interval."""
     from matplotlib.figure import Figure
 
     shown = [one.output for one in spec.published if any(line.output == one.output for line in found)]
@@ -40,11 +40,11 @@ def draw_sensitivity(spec: CalibrationSpec, found: Sequence[Sensitivity], paths:
         axis.grid(True, axis="x", alpha=0.3)
     panels[0].invert_yaxis()
     figure.supxlabel("partial rank correlation [1]; bars: 95 %; filled circles: interval without 0", fontsize=9)
-    _save(figure, paths)
+    return figure
 
 
-def draw_draws(spec: CalibrationSpec, draws: Sequence[Draw], paths: Sequence[Path]) -> None:
-    """Draw every published number against every nuisance: all draws, the accepted ones, the published value."""
+def draws_figure(spec: CalibrationSpec, draws: Sequence[Draw]) -> Figure:
+    """Return every published number against every nuisance: all draws, the accepted ones, the published value."""
     from matplotlib.figure import Figure
 
     kept = by_fitted(spec, draws).draws
@@ -63,7 +63,7 @@ def draw_draws(spec: CalibrationSpec, draws: Sequence[Draw], paths: Sequence[Pat
         axis.set_xlabel(f"{nuisance.name.replace('_', ' ')} [{nuisance.unit}]", fontsize=8)
     handles, labels = panels[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False, fontsize=9)
-    _save(figure, paths)
+    return figure
 
 
 def _panel(axis: Any, draws: Sequence[Draw], kept: Sequence[Draw], output: str, nuisance: Nuisance) -> None:
@@ -89,6 +89,8 @@ def _wrapped(title: str) -> str:
     return title.replace(", ", "\n", 1)
 
 
-def _save(figure: Figure, paths: Sequence[Path]) -> None:
+def save(figure: Figure, paths: Sequence[Path]) -> None:
+    """Write `figure` under every one of `paths` (.png, .pdf), the same bytes every time; raises OSError."""
     for path in paths:
-        figure.savefig(path, dpi=150)
+        dates = {"CreationDate": None} if path.suffix == ".pdf" else {}
+        figure.savefig(path, dpi=150, metadata=dates)

@@ -91,7 +91,7 @@ def _drawn(spec: CalibrationSpec, draws: int | None, seed: int | None, jobs: int
 def _write(result: CalibrationResult, told: Summary, folder: Path) -> None:
     import json
 
-    from tactbench.core.calibration.figure import draw_draws, draw_sensitivity
+    from tactbench.core.calibration.figure import draws_figure, save, sensitivity_figure
     from tactbench.core.calibration.result import write_result
     from tactbench.core.calibration.summary import acceptance, records
     from tactbench.core.cli.screen import remark
@@ -114,8 +114,12 @@ def _write(result: CalibrationResult, told: Summary, folder: Path) -> None:
         write_result(result, folder)
         for name, content in texts.items():
             replace_file(folder / name, (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode())
-        draw_sensitivity(result.spec, told.sensitivities, [folder / "sensitivity.png", folder / "sensitivity.pdf"])
-        draw_draws(result.spec, told.draws, [folder / "draws.png", folder / "draws.pdf"])
+        figures = {
+            "sensitivity": sensitivity_figure(result.spec, told.sensitivities),
+            "draws": draws_figure(result.spec, told.draws),
+        }
+        for name, figure in figures.items():
+            save(figure, [folder / f"{name}.png", folder / f"{name}.pdf"])
     except OSError as error:
         raise UnwritableError(f"{folder} cannot be written: {error}.", hint="Give another --out.") from error
     remark(f"Files: {folder}/draws.jsonl, draws.csv, run.json, ranges.json, findings.json, sensitivity.json, "

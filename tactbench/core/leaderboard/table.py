@@ -203,7 +203,7 @@ def _no_better(row: Row) -> bool:
 
 
 def _who(row: Row) -> str:
-    return f"{row['sensor']}/{row['task']}/{row['estimator']}"
+    return f"{row['sensor']}/{row['task']}/{answer_name(row)}"
 
 
 def _assumptions(row: Row) -> str:

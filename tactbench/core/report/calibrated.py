@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from tactbench.core.calibration.ranges import LEVEL
-from tactbench.core.calibration.result import load_result
-from tactbench.core.calibration.summary import acceptance, records, summary
+from tactbench.core.calibration.result import CalibrationResult, load_result
+from tactbench.core.calibration.summary import Summary, acceptance, records, summary
 from tactbench.core.calibration.tables import text_tables
 from tactbench.core.report.plain import PlainTable, plain
 
-NARROWER = 0.8
-"""A nuisance is asked for if the accepted draws leave less than this share of its prior's range; a range of few draws
-differs from the prior's by a tenth or two by chance alone."""
-MOST_ASKED = 3
-"""So many nuisances are named, the narrowest first."""
+MOST_NAMED = 2
+"""So many nuisances are named beside a number, those it goes with most first."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +31,8 @@ class PredictiveRange:
     """Share of the draws inside: 0.8."""
     use: str
     """``fitted``: the number chose the draws. ``held out``: it did not, and the range is a prediction."""
-    asks: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """By nuisance, with its unit: where the draws lie that the fitted numbers chose."""
+    goes_with: Mapping[str, float] = field(default_factory=dict)
+    """Partial rank correlation over the prior by nuisance, where its 95 % interval leaves out 0; the largest first."""
 
 
 class Share(NamedTuple):
@@ -72,6 +68,8 @@ class Calibrated:
     """Whose calibration it is, how many draws, which were accepted."""
     tables: tuple[PlainTable, ...] = ()
     """What else the calibration says, as it says it."""
+    sensitivity: Callable[[], Any] | None = None
+    """Draws what decides the numbers: a matplotlib figure."""
 
     def range_for(self, task: str, sensor: str, published: float) -> PredictiveRange | None:
         """Return the range of a published number as one sensor's row stands beside it, or None."""
@@ -99,7 +97,13 @@ def load_calibrated(results: Path) -> Calibrated | None:
         for one in text_tables(result, told)
         if one.columns[0] != "finding"  # those stand in a table of their own, with who states them
     )  # fmt: skip
-    return replace(found, tables=tables)
+    return replace(found, tables=tables, sensitivity=lambda: _sensitivity(result, told))
+
+
+def _sensitivity(result: CalibrationResult, told: Summary) -> Any:
+    from tactbench.core.calibration.figure import sensitivity_figure
+
+    return sensitivity_figure(result.spec, told.sensitivities)
 
 
 def calibrated_from(
@@ -110,9 +114,9 @@ def calibrated_from(
     Parameters
     ----------
     procedure
-        With ``outputs`` (name, task, sensor) and ``nuisances`` (name, sensors, prior).
+        With ``outputs`` (name, task, sensor).
     tables
-        Records called ``published``, ``parameters`` and ``findings``; ranges are ``prior_low``, ``accepted_high`` …,
+        Records called ``published``, ``sensitivity`` and ``findings``; ranges are ``prior_low``, ``accepted_high`` …,
         None where there are too few draws.
     notes
         Sentences to print below.
@@ -133,7 +137,7 @@ def calibrated_from(
                     high=one["accepted_high"],
                     level=level,
                     use=one["use"],
-                    asks=_asked(procedure["nuisances"], tables["parameters"], output["sensor"]),
+                    goes_with=_goes_with(tables["sensitivity"], one["output"]),
                 )
             )
     findings = tuple(
@@ -143,21 +147,11 @@ def calibrated_from(
     return Calibrated(tuple(ranges), findings, tuple(notes))
 
 
-def _asked(
-    nuisances: Sequence[Mapping[str, Any]], parameters: Sequence[Mapping[str, Any]], sensor: str
-) -> dict[str, tuple[float, float]]:
-    """Return the nuisances of a sensor that the accepted draws say most about."""
-    own = {one["name"]: one["prior"]["kind"] for one in nuisances if not one["sensors"] or sensor in one["sensors"]}
-    left: list[tuple[float, str, tuple[float, float]]] = []
-    for one in parameters:
-        if one["name"] in own and one["prior_low"] is not None and one["accepted_low"] is not None:
-            scale = math.log if own[one["name"]] == "log-uniform" else float
-            before = scale(one["prior_high"]) - scale(one["prior_low"])
-            after = scale(one["accepted_high"]) - scale(one["accepted_low"])
-            name = one["name"] if one["unit"] == "1" else f"{one['name']} [{one['unit']}]"
-            if before > 0 and after < NARROWER * before:
-                left.append((after / before, name, (one["accepted_low"], one["accepted_high"])))
-    return {name: bounds for _, name, bounds in sorted(left)[:MOST_ASKED]}
+def _goes_with(sensitivity: Sequence[Mapping[str, Any]], output: str) -> dict[str, float]:
+    """Return the nuisances that an output goes with beyond chance, those it goes with most."""
+    apart = [one for one in sensitivity if one["output"] == output and (one["low"] > 0 or one["high"] < 0)]
+    largest = sorted(apart, key=lambda one: -abs(one["correlation"]))[:MOST_NAMED]
+    return {one["parameter"]: one["correlation"] for one in largest}
 
 
 def _share(one: Mapping[str, Any], name: str) -> Share | None:

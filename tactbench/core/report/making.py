@@ -13,6 +13,7 @@ from tactbench.core.matrix.files import replace_file
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.drawn import Drawn
+from tactbench.core.report.figures.sensitivity import draw_sensitivity
 from tactbench.core.report.material import Material
 from tactbench.core.report.page import make_page
 from tactbench.core.report.plain import PlainTable
@@ -73,6 +74,8 @@ def make_report(
         (out / "figures").mkdir(parents=True, exist_ok=True)
         undrawn: list[str] = []
         drawn, trouble = _drawn(material, out / "figures", progress, draw, undrawn.append)
+        if draw is not None and calibrated is not None:
+            drawn = [*drawn, *draw_sensitivity(calibrated, out / "figures")]
         subject = Subject(material, drawn, calibrated, (*undrawn, *trouble))
         page = make_page(subject)
         # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.

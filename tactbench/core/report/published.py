@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tactbench.core.leaderboard.numbers import score
 from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
-from tactbench.core.report.reproduction import Reproduction, reproduce, told_interval, told_range
+from tactbench.core.report.reproduction import Reproduction, reproduce, told_interval, told_range, unasked
 from tactbench.core.report.section import Section, Subject
 
 COLUMNS = ("number", "published", "ours", "95 % interval", "calibrated range", "verdict")
@@ -32,6 +32,7 @@ def published_table(subject: Subject) -> PlainTable:
         if line.remark:
             titles.setdefault(line.remark, []).append(line.title)
     notes = [f"{', '.join(dict.fromkeys(whose))}: {remark}." for remark, whose in titles.items()]
+    notes += unasked(subject.material.registry, subject.rows)
     notes += subject.calibrated.notes if subject.calibrated else ()
     return plain(
         "Reproduction",

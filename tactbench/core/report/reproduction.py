@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -40,7 +41,8 @@ class Reproduction:
 def reproduce(registry: Registry, rows: Sequence[Row], calibrated: Calibrated | None = None) -> list[Reproduction]:
     """Return a line for each published number of each task, and each row that it may stand beside.
 
-    A number without any row gets one line that names the command to run. Tasks come in the order of the rows.
+    A number without any row gets one line that names the command to run, unless it takes recordings made elsewhere
+    (see `unasked`). Tasks come in the order of the rows.
     """
     lines: list[Reproduction] = []
     asked = list(dict.fromkeys(row["task"] for row in rows))
@@ -50,9 +52,26 @@ def reproduce(registry: Registry, rows: Sequence[Row], calibrated: Calibrated | 
         for published in task.published:
             beside = [row for row in rows if stands_beside(row, task, published)]
             lines += [_line(task, published, row, calibrated) for row in beside]
-            if not beside:
+            if not beside and not _needs_recordings(task, published, registry):
                 lines.append(_unanswered(task, published, registry))
     return lines
+
+
+def unasked(registry: Registry, rows: Sequence[Row]) -> list[str]:
+    """Return a sentence for each published number that only recordings made elsewhere can stand beside."""
+    return [
+        f"Not asked here: {_title(task, published, None)} ({score(published.score, task.unit)}{_suffix(task.unit)}; "
+        f"{published.reference}): `{_command(task, published, registry)}`."
+        for task in (descriptor.spec for descriptor in registry.tasks)
+        for published in task.published
+        if _needs_recordings(task, published, registry) and not any(stands_beside(row, task, published) for row in rows)
+    ]
+
+
+def _needs_recordings(task: TaskSpec, published: Published, registry: Registry) -> bool:
+    sensor = published.sensor
+    unknown = sensor is not None and (sensor not in registry.sensors or registry.sensors[sensor].transducer is None)
+    return unknown or not task.scenes
 
 
 def stands_beside(row: Row, task: TaskSpec, published: Published) -> bool:
@@ -82,7 +101,7 @@ def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tu
         if predicted is not None and not predicted.low <= published <= predicted.high:
             return "inside", f"inside; but {_of_calibration(predicted, published, row['unit'])}"
         return "inside", "inside"
-    parts = [_difference(row, published), f"the interval is by {row['ci_method']}"]
+    parts = [_difference(row, published), f"the interval is by {_without_brackets(row['ci_method'])}"]
     if predicted is not None:
         parts.append(_of_calibration(predicted, published, row["unit"]))
     elif row["simulated"]:
@@ -113,10 +132,14 @@ def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> 
     if not inside:
         edge = predicted.low if published < predicted.low else predicted.high
         told += f" by {score(abs(published - edge), unit)}{_suffix(unit)}"
-    elif predicted.asks:
-        asked = ", ".join(f"{name} {low:.4g} … {high:.4g}" for name, (low, high) in sorted(predicted.asks.items()))
-        told += f" and asks for {asked}"
+    if predicted.goes_with:
+        named = " and ".join(f"{name} ({value:+.2f})" for name, value in predicted.goes_with.items())
+        told += f"; of what is not known the number goes most with {named}"
     return told
+
+
+def _without_brackets(text: str) -> str:
+    return re.sub(r" \([^)]*\)", "", text)
 
 
 def _line(task: TaskSpec, published: Published, row: Row, calibrated: Calibrated | None) -> Reproduction:
@@ -174,8 +197,7 @@ def _command(task: TaskSpec, published: Published, registry: Registry) -> str:
     trivial = published.estimator in task.baselines  # run with any other
     if published.estimator and not trivial:
         words.append(f"--estimator {published.estimator}")
-    unknown = sensor is not None and (sensor not in registry.sensors or registry.sensors[sensor].transducer is None)
-    if unknown or not task.scenes:
+    if _needs_recordings(task, published, registry):
         words.append("--rig replay --recordings DIR")
     return " ".join(words)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.calibration.draw import finished
-from tactbench.core.calibration.figure import draw_draws, draw_sensitivity
+from tactbench.core.calibration.figure import draws_figure, save, sensitivity_figure
 from tactbench.core.calibration.result import CalibrationResult
 from tactbench.core.calibration.sensitivity import sensitivities
 from tactbench.core.calibration.summary import summary
@@ -42,7 +42,7 @@ def test_figures_are_drawn_of_many_draws_and_of_few(tmp_path, n):
     some = finished(result.draws)
     found = sensitivities(result.spec, some, np.random.default_rng(0))
     paths = [tmp_path / "a.png", tmp_path / "a.pdf", tmp_path / "b.png", tmp_path / "b.pdf"]
-    draw_sensitivity(result.spec, found, paths[:2])
-    draw_draws(result.spec, some, paths[2:])
+    save(sensitivity_figure(result.spec, found), paths[:2])
+    save(draws_figure(result.spec, some), paths[2:])
     for path in paths:
         assert path.stat().st_size > 1000

@@ -50,15 +50,22 @@ def test_a_miss_says_what_is_not_in_its_interval_by_the_interval_s_own_words():
     assert "bootstrap over 12 sessions" in over_sessions
 
 
-def test_a_calibration_says_whether_it_reaches_the_number_and_what_it_asks_for():
-    reaching = verdict(force_row(), 0.9, predicted(0.6, 1.0, asks={"drift_scale": (2.0, 3.5)}))[1]
-    assert "the published lies inside the calibrated range (held out) and asks for drift_scale 2 … 3.5" in reaching
+def test_a_calibration_says_whether_it_reaches_the_number_and_what_the_number_goes_with():
+    reaching = verdict(force_row(), 0.9, predicted(0.6, 1.0, goes_with={"drift_scale": -0.52, "warmth": 0.3}))[1]
+    assert "the published lies inside the calibrated range (held out)" in reaching
+    assert reaching.endswith("of what is not known the number goes most with drift_scale (-0.52) and warmth (+0.30)")
     missing = verdict(force_row(), 0.9, predicted(0.6, 0.85))[1]
     assert "the published lies outside the calibrated range (held out) by 0.0500 N" in missing
     below = verdict(force_row(), 0.4, predicted(0.6, 0.85))[1]
     assert "by 0.2000 N" in below
-    # What leads to a range that does not reach the number is no explanation of it.
-    assert "asks" not in verdict(force_row(), 0.9, predicted(0.6, 0.85, asks={"drift_scale": (2.0, 3.5)}))[1]
+    assert "goes most with" not in below
+
+
+def test_the_blocks_of_an_interval_are_the_rows_to_tell():
+    row = force_row(ci_method="block bootstrap in time within 1 recording (blocks of 17 rows): no spread in it")
+    assert (
+        "the interval is by block bootstrap in time within 1 recording: no spread in it" in verdict(row, 0.9, None)[1]
+    )
 
 
 def test_only_a_simulated_row_asks_for_a_calibration():
