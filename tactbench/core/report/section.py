@@ -79,6 +79,11 @@ class Picture:
     cells: tuple[tuple[str, str], ...] = ()
     """Name and anchor of the cells it shows."""
 
+    @property
+    def wide(self) -> bool:
+        """Whether it needs the width of the page: more than 900 pixels, which its header tells."""
+        return int.from_bytes(self.png[16:20], "big") > 900
+
 
 @dataclass(frozen=True)
 class Details:
