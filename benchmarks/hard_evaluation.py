@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from tactbench.plugin import (
     Block,
     ChannelSpec,
     ChannelTarget,
+    EstimatorDescriptor,
     LabelTarget,
     Quality,
     SensorSpec,
@@ -60,15 +62,27 @@ class Made:
 
 
 def families() -> dict[str, Family]:
-    """Return one family for each protocol and installed estimator, of each kind of task that it can do."""
-    estimators = load_registry().estimators
+    """Return one family for each protocol and kind of estimator, of each kind of task that it can do."""
     found: dict[str, Family] = {}
-    for protocol, name in itertools.product(PROTOCOLS, estimators.names()):
-        for kind in estimators[name].kinds:
-            found[f"evaluation: {protocol} x {name} ({kind})"] = partial(
-                any_data, protocol=protocol, name=name, kind=kind
+    for protocol, one in itertools.product(PROTOCOLS, different_estimators()):
+        for kind in one.kinds:
+            found[f"evaluation: {protocol} x {one.name} ({kind})"] = partial(
+                any_data, protocol=protocol, name=one.name, kind=kind
             )
     return found
+
+
+def different_estimators() -> list[EstimatorDescriptor]:
+    """Return the installed estimators, one of each code: ten trees and five hundred are the same code."""
+    first: dict[tuple[str, str], EstimatorDescriptor] = {}
+    for one in load_registry().estimators:
+        try:
+            for name in one.distributions:
+                version(name)
+        except PackageNotFoundError:
+            continue  # an extra that is not installed answers nothing
+        first.setdefault((one.where, one.looks_at), one)
+    return list(first.values())
 
 
 def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:

@@ -1,16 +1,9 @@
-"""The benchmark's own modules, which are no package."""
+"""The benchmark's own modules, which are no package, are put on the path before the tests here are collected."""
 
 from __future__ import annotations
 
 import sys
 
-import pytest
-
 from tests.conftest import ROOT
 
-
-@pytest.fixture(scope="session", autouse=True)
-def _benchmarks_on_the_path():
-    sys.path.insert(0, str(ROOT / "benchmarks"))
-    yield
-    sys.path.remove(str(ROOT / "benchmarks"))
+sys.path.insert(0, str(ROOT / "benchmarks"))
