@@ -16,6 +16,7 @@ from tactbench.core.report.figures import (
     score_by_force,
     validation_curve,
 )
+from tactbench.core.report.figures.few_shot import draw_few_shot
 from tactbench.core.report.figures.group import Group, Remark, groups
 from tactbench.core.report.figures.saving import save
 from tactbench.core.report.figures.sketch import Sketch
@@ -81,4 +82,8 @@ def draw_figures(
             except Exception as error:
                 say(f"No {what} under {group.row['protocol']}: {type(error).__name__}: {error}")
             told.advance(what)
+    try:
+        drawn += draw_few_shot(material, folder)
+    except Exception as error:
+        say(f"No figure of few sessions: {type(error).__name__}: {error}")
     return drawn

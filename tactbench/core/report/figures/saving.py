@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.matrix.files import replace_file
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures.sketch import Sketch
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PNG_DPI = 150
 RASTER_DPI = 300
@@ -21,7 +24,13 @@ _WITHOUT_DATES: dict[str, dict[str, Any]] = {
 
 
 def save(sketch: Sketch, folder: Path) -> Drawn:
-    """Write both files, each whole, and return what was drawn.
+    """Write both files, each whole, and return what was drawn; raises OSError."""
+    png, pdf = write(sketch.figure, sketch.name, folder)
+    return Drawn(sketch.name, sketch.title, sketch.caption, png, pdf, sketch.group.keys)
+
+
+def write(figure: Figure, name: str, folder: Path) -> tuple[Path, Path]:
+    """Write `figure` as PNG and PDF, each whole, and return their paths.
 
     Raises
     ------
@@ -31,10 +40,9 @@ def save(sketch: Sketch, folder: Path) -> Drawn:
     contents = {}
     for ending, dpi in (("png", PNG_DPI), ("pdf", RASTER_DPI)):
         content = io.BytesIO()
-        sketch.figure.savefig(content, format=ending, dpi=dpi, metadata=_WITHOUT_DATES[ending])
+        figure.savefig(content, format=ending, dpi=dpi, metadata=_WITHOUT_DATES[ending])
         contents[ending] = content.getvalue()
-        sketch.figure.set_layout_engine("none")  # the first drawing has put everything in its place
+        figure.set_layout_engine("none")  # the first drawing has put everything in its place
     for ending, content_ in contents.items():
-        replace_file(folder / f"{sketch.name}.{ending}", content_)
-    png, pdf = (folder / f"{sketch.name}.{ending}" for ending in ("png", "pdf"))
-    return Drawn(sketch.name, sketch.title, sketch.caption, png, pdf, sketch.group.keys)
+        replace_file(folder / f"{name}.{ending}", content_)
+    return folder / f"{name}.png", folder / f"{name}.pdf"

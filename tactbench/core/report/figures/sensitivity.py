@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tactbench.core.calibration.figure import save
 from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.drawn import Drawn
+from tactbench.core.report.figures.saving import write
 
 _NAME = "calibration-sensitivity"
 
@@ -21,8 +21,7 @@ def draw_sensitivity(calibrated: Calibrated, folder: Path) -> list[Drawn]:
     """
     if calibrated.sensitivity is None:
         return []
-    png, pdf = folder / f"{_NAME}.png", folder / f"{_NAME}.pdf"
-    save(calibrated.sensitivity(), [png, pdf])
+    png, pdf = write(calibrated.sensitivity(), _NAME, folder)
     caption = (
         "Partial rank correlation of each published number, as simulated, with each nuisance that the simulation "
         "cannot know; a panel a number. Bars: 95 %, bootstrap over draws; filled circles: the interval leaves "

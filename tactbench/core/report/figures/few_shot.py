@@ -1,0 +1,83 @@
+"""What a calibration of n sessions is worth: score against the number of training sessions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tactbench.core.leaderboard.comparison import Curve, few_shot_curves
+from tactbench.core.leaderboard.table import METRIC_NAMES
+from tactbench.core.report.drawn import Drawn
+from tactbench.core.report.figures.saving import write
+from tactbench.core.report.figures.sketch import with_unit
+from tactbench.core.report.figures.style import COLUMN_IN, DASHES, GREY, LINES, MARKERS, PAGE_IN, cycled, panels, styled
+from tactbench.core.report.material import Material
+
+_NAME = "few-shot"
+ACROSS = 3
+"""Panels beside each other."""
+
+
+def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
+    """Draw one panel a task, a line for each sensor and estimator; nothing where fewer than two numbers were tried.
+
+    Raises
+    ------
+    OSError
+        If `folder` cannot be written.
+    """
+    curves = few_shot_curves(material.rows)
+    if not curves:
+        return []
+    tasks: dict[str, list[Curve]] = {}
+    for curve in curves:
+        tasks.setdefault(curve.task, []).append(curve)
+    across = min(len(tasks), ACROSS)
+    down = -(-len(tasks) // ACROSS)
+    with styled():
+        figure, axes = panels(down, across, 1.9, width_in=PAGE_IN if across > 1 else COLUMN_IN)
+        for here in axes.flat[len(tasks) :]:
+            here.set_visible(False)
+        lines = list(dict.fromkeys((curve.sensor, curve.estimator) for curve in curves))
+        for here, (task, own) in zip(axes.flat, tasks.items(), strict=False):
+            _panel(here, own, lines)
+            here.set_title(task)
+        told: dict[str, Any] = {}
+        for here in axes.flat:
+            handles, labels = here.get_legend_handles_labels()
+            told.update(zip(labels, handles, strict=True))
+        figure.legend(told.values(), told.keys(), loc="outside lower center", ncols=3)
+        png, pdf = write(figure, _NAME, folder)
+    keys = tuple(row["key"] for row in material.rows if str(row["split"]).startswith("few-shot") and row["key"])
+    return [Drawn(_NAME, "What few sessions are worth", _caption(curves), png, pdf, keys)]
+
+
+def _panel(here: Any, own: Sequence[Curve], lines: Sequence[tuple[str, str]]) -> None:
+    for curve in own:
+        place = lines.index((curve.sensor, curve.estimator))
+        points = np.array(curve.points)
+        spread = np.abs(points[:, 2:] - points[:, 1:2]).T
+        at = np.log2(points[:, 0]) + 0.05 * (place - (len(lines) - 1) / 2)
+        here.errorbar(
+            at, points[:, 1], yerr=spread, color=cycled(LINES, place), marker=cycled(MARKERS, place), markersize=4,
+            linestyle=cycled(DASHES, place), capsize=2, label=f"{curve.sensor}, {curve.estimator}",
+        )  # fmt: skip
+    trivial = [curve.baseline for curve in own if curve.baseline is not None]
+    if trivial:
+        here.axhline(float(np.mean(trivial)), color=GREY, linestyle=":", label="trivial")
+    counts = sorted({int(point[0]) for curve in own for point in curve.points})
+    here.set_xticks(np.log2(counts), [str(count) for count in counts])
+    here.set_xlabel("training sessions")
+    here.set_ylabel(with_unit(METRIC_NAMES.get(own[0].metric, own[0].metric), own[0].unit))
+
+
+def _caption(curves: Sequence[Curve]) -> str:
+    simulated = " SIM: simulated, no hardware was touched." if any(curve.simulated for curve in curves) else ""
+    return (
+        "Score on the same test sessions after training on the first n sessions, each a recording of every surface; a "
+        "panel a task. Training sets are nested. Bars: 95 % intervals over test sessions; which sessions came first is "
+        f"one draw. Dotted: the trivial baseline, mean over the lines.{simulated}"
+    )
