@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tactbench.core.evaluation.splits import shots
 from tactbench.core.leaderboard.numbers import interval, score
 from tactbench.core.leaderboard.table import METRIC_NAMES
 
@@ -17,7 +18,6 @@ Row = Mapping[str, Any]
 
 AXES = ("protocol", "split", "fold")
 """What may stand side by side."""
-_FEW_SHOT = re.compile(r"few-shot-([0-9]+)")
 _NOTE = (
     "Differences are against the first column; intervals are those of each score alone, and two that overlap may still "
     "differ."
@@ -82,10 +82,10 @@ def few_shot_curves(rows: Iterable[Row]) -> list[Curve]:
     """Return a curve for each sensor, task, estimator and protocol that has answered several few-shot splits."""
     groups: dict[tuple[Any, ...], list[tuple[int, Row]]] = {}
     for row in rows:
-        number = _FEW_SHOT.fullmatch(str(row["split"]))
+        number = shots(str(row["split"]))
         if number and row["status"] == "done":
             key = (*_key(row), row["protocol"], row["sensor"], _answer(row))
-            groups.setdefault(key, []).append((int(number[1]), row))
+            groups.setdefault(key, []).append((number, row))
     curves = []
     for members in groups.values():
         points = sorted((n, row["score"], row["ci_low"], row["ci_high"]) for n, row in members)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tactbench.core.errors import TactbenchError, UsageError
+from tactbench.core.evaluation.splits import shots
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures import (
@@ -65,7 +66,8 @@ def draw_figures(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"The folder {folder} cannot be made: {error.strerror}.", hint="Give another one.") from error
-    work = [(group, draw) for group in groups(material, say) for draw in FIGURES[group.task.kind]]
+    work = [(group, draw) for group in _worth_drawing(material, say) for draw in FIGURES[group.task.kind]]
+    refused: dict[tuple[str, str], list[str]] = {}
     drawn: list[Drawn] = []
     if not work:
         return drawn
@@ -77,13 +79,21 @@ def draw_figures(
             try:
                 sketch = draw(group, say)
                 drawn.append(save(sketch, folder))
-            except TactbenchError as error:
-                say(f"No {what} under {group.row['protocol']}: {error}")
             except Exception as error:
-                say(f"No {what} under {group.row['protocol']}: {type(error).__name__}: {error}")
+                why = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+                refused.setdefault((what, why), []).append(f"{group.row['protocol']}, split {group.row['split']}")
             told.advance(what)
+    for (what, why), where in refused.items():
+        say(f"No {what} under {'; '.join(where)}: {why}")
     try:
         drawn += draw_few_shot(material, folder)
     except Exception as error:
         say(f"No figure of few sessions: {type(error).__name__}: {error}")
     return drawn
+
+
+def _worth_drawing(material: Material, say: Remark) -> list[Group]:
+    """Return the groups of cells, few-shot splits left to the one figure that shows them all."""
+    found = groups(material, say)
+    few = [group for group in found if shots(group.row["split"])]
+    return [group for group in found if len(few) < 2 or group not in few]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tactbench.core.evaluation.splits import shots
 from tactbench.core.leaderboard.comparison import Curve, few_shot_curves
 from tactbench.core.leaderboard.table import METRIC_NAMES
 from tactbench.core.report.drawn import Drawn
@@ -29,7 +30,8 @@ def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
     OSError
         If `folder` cannot be written.
     """
-    curves = few_shot_curves(material.rows)
+    answers = [row for row in material.rows if not row["is_baseline"]]
+    curves = few_shot_curves(answers)
     if not curves:
         return []
     tasks: dict[str, list[Curve]] = {}
@@ -41,7 +43,7 @@ def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
         figure, axes = panels(down, across, 1.9, width_in=PAGE_IN if across > 1 else COLUMN_IN)
         for here in axes.flat[len(tasks) :]:
             here.set_visible(False)
-        lines = list(dict.fromkeys((curve.sensor, curve.estimator) for curve in curves))
+        lines = list(dict.fromkeys(_name(curve) for curve in curves))
         for here, (task, own) in zip(axes.flat, tasks.items(), strict=False):
             _panel(here, own, lines)
             here.set_title(task)
@@ -51,19 +53,19 @@ def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
             told.update(zip(labels, handles, strict=True))
         figure.legend(told.values(), told.keys(), loc="outside lower center", ncols=3)
         png, pdf = write(figure, _NAME, folder)
-    keys = tuple(row["key"] for row in material.rows if str(row["split"]).startswith("few-shot") and row["key"])
+    keys = tuple(row["key"] for row in answers if shots(str(row["split"])) and row["key"])
     return [Drawn(_NAME, "What few sessions are worth", _caption(curves), png, pdf, keys)]
 
 
-def _panel(here: Any, own: Sequence[Curve], lines: Sequence[tuple[str, str]]) -> None:
-    for curve in own:
-        place = lines.index((curve.sensor, curve.estimator))
+def _panel(here: Any, own: Sequence[Curve], lines: Sequence[str]) -> None:
+    for order, curve in enumerate(own):
+        place = lines.index(_name(curve))
         points = np.array(curve.points)
         spread = np.abs(points[:, 2:] - points[:, 1:2]).T
-        at = np.log2(points[:, 0]) + 0.05 * (place - (len(lines) - 1) / 2)
+        at = np.log2(points[:, 0]) + 0.06 * (order - (len(own) - 1) / 2)
         here.errorbar(
             at, points[:, 1], yerr=spread, color=cycled(LINES, place), marker=cycled(MARKERS, place), markersize=4,
-            linestyle=cycled(DASHES, place), capsize=2, label=f"{curve.sensor}, {curve.estimator}",
+            linestyle=cycled(DASHES, place), capsize=2, label=_name(curve),
         )  # fmt: skip
     trivial = [curve.baseline for curve in own if curve.baseline is not None]
     if trivial:
@@ -72,6 +74,11 @@ def _panel(here: Any, own: Sequence[Curve], lines: Sequence[tuple[str, str]]) ->
     here.set_xticks(np.log2(counts), [str(count) for count in counts])
     here.set_xlabel("training sessions")
     here.set_ylabel(with_unit(METRIC_NAMES.get(own[0].metric, own[0].metric), own[0].unit))
+
+
+def _name(curve: Curve) -> str:
+    """Return sensor and estimator; the page's tables have the parameters."""
+    return f"{curve.sensor}, {curve.estimator.partition(' (')[0]}"
 
 
 def _caption(curves: Sequence[Curve]) -> str:

@@ -68,7 +68,9 @@ def test_the_paper_s_figures_are_drawn_as_pdf_and_png_and_nothing_else(all_of_it
         assert one.title
         assert one.caption.endswith(".")
         assert len(one.keys) == 2
-    assert said == ["No validation curve of curvature under karl2016: nothing was chosen on validation data"]
+    assert said == [
+        "No validation curve of curvature under karl2016, split roles: nothing was chosen on validation data"
+    ]
 
 
 def test_marks_are_explained(all_of_it):
