@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tactbench.core.cost.ladder_file import VERSION
+from tactbench.core.report.ladder_table import COLUMNS, SORTED_BY, line, title
 from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
 from tactbench.core.report.section import Picture, Section, Subject
 
@@ -61,6 +63,11 @@ def read_table(path: Path, subject: Subject) -> PlainTable:
     """
     held = json.loads(path.read_text(encoding="utf-8"))
     about = held if isinstance(held, dict) else {}
+    if about.get("version") == VERSION:
+        try:
+            return _ladder(about, subject)
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"it is damaged ({error}); make it again with `tactbench cost`") from error
     records: Any = next((value for value in about.values() if _are_records(value)), held)
     if not _are_records(records):
         raise ValueError("it holds no array of records; make it again with `tactbench cost`")
@@ -81,6 +88,26 @@ def read_table(path: Path, subject: Subject) -> PlainTable:
         lines.append([Entry(_text(one.get(name)), finite(one.get(name)), anchor) for name in columns])
     title = f"Cost: {about.get('title', path.stem)}"
     return plain(title, columns, lines, numeric=numeric, notes=[f"Of all lines: {facts}.", *words] if facts else words)
+
+
+def _ladder(about: Mapping[str, Any], subject: Subject) -> PlainTable:
+    """Return a ladder of estimators as the terminal shows it, each number leading to the cell it was timed for."""
+    lines = []
+    for row in about["rows"]:
+        texts = line(row, about["unit"])
+        anchor = subject.anchor_of({**about, "estimator": row["estimator"]})
+        lines.append(
+            [
+                Entry(texts.get(name) or ABSENT, finite(row.get(SORTED_BY.get(name, ""))), anchor)
+                if name in SORTED_BY
+                else Entry(texts.get(name) or ABSENT)
+                for name in COLUMNS
+            ]
+        )
+    kinds = ["baseline" if row["is_baseline"] else "result" if row["status"] == "done" else "failed"
+             for row in about["rows"]]  # fmt: skip
+    words = [f"{name}: {text}." for name, text in about["definitions"].items()]
+    return plain(f"Cost: {title(about)}", COLUMNS, lines, numeric=tuple(SORTED_BY), notes=words, kinds=kinds)
 
 
 def _are_records(value: Any) -> bool:

@@ -177,6 +177,37 @@ def test_cost_files_are_shown_whatever_their_keys(material, tmp_path):
     assert table.notes[1] == "fit_s: one fit."
 
 
+def ladder_row(estimator, **more):
+    times = {"fit_s": 0.25, "fit_s_q1": 0.2, "fit_s_q3": 0.3, "latency_ms_p50": 2.0, "latency_ms_p95": 4.0,
+             "batch_s_per_row": 1e-6, "data_s": 0.5, "loop_100_hz": True, "loop_1000_hz": False}  # fmt: skip
+    return {
+        "estimator": estimator, "is_baseline": False, "status": "done", "reason": "", "score": 0.7, "ci_low": 0.6,
+        "ci_high": 0.8, "front_fit": True, "front_latency": False, "notes": [], **times, **more,
+    }  # fmt: skip
+
+
+def test_a_ladder_is_shown_as_the_terminal_shows_it_and_sorts_by_the_numbers_behind(material, tmp_path):
+    subject, path = Subject(material), tmp_path / "icub-force.json"
+    lasso = next(row for row in material.rows if row["task"] == "force" and row["estimator"] == "lasso")
+    about = {name: lasso[name] for name in ("sensor", "task", "rig", "protocol", "split", "metric", "unit")}
+    about |= {"version": 1, "higher_is_better": False, "simulated": True, "dagger": True, "rounds": 5, "threads": 1,
+              "definitions": {"fit_s": "one fit"}}  # fmt: skip
+    gone = dict.fromkeys(("score", "ci_low", "ci_high", "fit_s"), None)
+    skipped = ladder_row("forest", **gone, status="skipped", reason="needs <it>", front_fit=False)
+    path.write_text(json.dumps({**about, "rows": [ladder_row("lasso"), skipped]}))
+    table = read_table(path, subject)
+    assert table.title.startswith("Cost: icub, force: RMSE, lower is better · karl2016 † · split roles · SIM")
+    first, second = (dict(zip(table.columns, line, strict=True)) for line in table.lines)
+    assert (first["fit"].text, first["fit"].value) == ("250 ms", 0.25)
+    assert (first["100 Hz loop"].text, first["1 kHz loop"].text, first["front"].text) == ("yes", "no", "fit")
+    assert first["score"].anchor == subject.anchors[lasso["cell"]]
+    assert second["remark"].text == "skipped: needs <it>"
+    assert table.kinds == ("result", "failed")
+    path.write_text(json.dumps({**about, "rows": [{"estimator": "lasso"}]}))
+    with pytest.raises(ValueError, match="make it again"):
+        read_table(path, subject)
+
+
 @pytest.mark.parametrize("text", ['{"points": "none"}', "[]", "not json", "[1, 2]"])
 def test_a_damaged_cost_file_is_named_and_takes_nothing_with_it(results, tmp_path, text):
     shutil.copytree(results, tmp_path / "copy", ignore=shutil.ignore_patterns("recordings"))

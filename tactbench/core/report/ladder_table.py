@@ -1,0 +1,60 @@
+"""A measured ladder of estimators as text: what the terminal and the page both show.
+
+The keys of a ladder are documented in `tactbench.core.cost.ladder_file`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tactbench.core.leaderboard.numbers import duration, interval, score
+from tactbench.core.leaderboard.table import METRIC_NAMES
+
+COLUMNS = (
+    "estimator", "score", "95 % interval", "fit", "quartiles", "latency p50", "p95", "batch/row", "data", "front",
+    "100 Hz loop", "1 kHz loop", "remark",
+)  # fmt: skip
+RIGHT = ("score", "fit", "latency p50", "p95", "batch/row", "data")
+
+SORTED_BY = {
+    "score": "score", "95 % interval": "ci_low", "fit": "fit_s", "quartiles": "fit_s_q1",
+    "latency p50": "latency_ms_p50", "p95": "latency_ms_p95", "batch/row": "batch_s_per_row", "data": "data_s",
+}  # fmt: skip
+"""Column -> key of the number behind it."""
+
+
+def title(about: Mapping[str, Any]) -> str:
+    """Return what holds for all rows: question, metric, protocol, rounds, threads."""
+    better = "higher" if about["higher_is_better"] else "lower"
+    simulated = f" · SIM ({about['rig']})" if about["simulated"] else ""
+    dagger = " †" if about["dagger"] else ""
+    threads = "1 thread" if about["threads"] == 1 else f"{about['threads']} threads"
+    metric = METRIC_NAMES.get(about["metric"], about["metric"])
+    return (
+        f"{about['sensor']}, {about['task']}: {metric}, {better} is better · "
+        f"{about['protocol']}{dagger} · split {about['split']}{simulated} · {about['rounds']} rounds, {threads}"
+    )
+
+
+def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
+    """Return one estimator's texts by column; what was not measured is left out."""
+    name = f"{row['estimator']} (trivial)" if row["is_baseline"] else row["estimator"]
+    told = "; ".join((*([f"{row['status']}: {row['reason']}"] if row["status"] != "done" else []), *row["notes"]))
+    texts = {"estimator": name, "remark": told}
+    if row["score"] is not None:
+        texts |= {"score": score(row["score"], unit), "95 % interval": interval(row["ci_low"], row["ci_high"], unit)}
+    if row["fit_s"] is None:
+        return texts
+    fronts = [what for what, on in (("fit", row["front_fit"]), ("latency", row["front_latency"])) if on]
+    return texts | {
+        "fit": duration(row["fit_s"]),
+        "quartiles": f"{duration(row['fit_s_q1'])} … {duration(row['fit_s_q3'])}",
+        "latency p50": duration(row["latency_ms_p50"] / 1e3),
+        "p95": duration(row["latency_ms_p95"] / 1e3),
+        "batch/row": duration(row["batch_s_per_row"]),
+        "data": duration(row["data_s"]),
+        "front": ", ".join(fronts),
+        "100 Hz loop": "yes" if row["loop_100_hz"] else "no",
+        "1 kHz loop": "yes" if row["loop_1000_hz"] else "no",
+    }
