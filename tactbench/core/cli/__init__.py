@@ -96,12 +96,12 @@ def _exit_code(arguments: list[str] | None) -> int:
 
 
 def _interrupted(arguments: list[str] | None) -> int:
-    verb = (sys.argv[1:] if arguments is None else arguments)[:1]
-    kept = (
-        "What was finished is kept; the same command goes on from there."
-        if verb in (["run"], ["calibrate"])
-        else "Nothing is kept."
-    )
+    words = sys.argv[1:] if arguments is None else arguments
+    kept = "Nothing is kept."
+    if words[:1] in (["run"], ["calibrate"]):
+        kept = "What was finished is kept; the same command goes on from there."
+    elif words[:1] == ["cost"] and "--twin" not in words:
+        kept = "Recordings and scores are kept, times are not: the same command measures them anew."
     click.echo(f"Interrupted. {kept}", err=True)
     return 130
 
