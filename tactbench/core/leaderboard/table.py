@@ -6,6 +6,7 @@ their own: they are not comparable, and no rank spans two blocks.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -169,16 +170,10 @@ def _notes(rows: Sequence[Row]) -> list[str]:
         if row["chosen"]:
             picked = ", ".join(f"{key.rstrip('_')} = {value:g}" for key, value in sorted(row["chosen"].items()))
             notes.append(f"{_who(row)}: chosen on validation data: {picked}.")
-    notes += [
-        f"{_who(row)} is no better than the trivial baseline: see how the recordings differ before blaming the sensor."
-        for row in rows
-        if _no_better(row)
-    ]
+    notes += _no_better_notes(rows)
     notes += _distinct(f"{row['sensor']}/{row['task']}: {told}." for row in rows for told in told_counts(row["counts"]))
     notes += _distinct(f"{row['sensor']}: {remark}" for row in rows for remark in row["remarks"])
-    notes += _distinct(
-        f"{row['task']}: interval by {row['ci_method']}." for row in rows if row["ci_method"] and not row["is_baseline"]
-    )
+    notes += _interval_notes(rows)
     notes += _distinct(
         # What makes no sense to probe makes none with any estimator.
         f"{row['sensor']}/{row['task']}/{row['protocol'] if _is_probe(row) else row['estimator']} {row['status']}: "
@@ -187,6 +182,29 @@ def _notes(rows: Sequence[Row]) -> list[str]:
         if row["status"] != "done"
     )
     return notes
+
+
+def _no_better_notes(rows: Sequence[Row]) -> list[str]:
+    """Return one sentence a sensor and task on the answers that are no better than the trivial one."""
+    names: dict[str, list[str]] = {}
+    for row in rows:
+        if _no_better(row):
+            names.setdefault(f"{row['sensor']}/{row['task']}", []).append(answer_name(row))
+    return [
+        f"{where}/{', '.join(dict.fromkeys(who))} {'is' if len(set(who)) == 1 else 'are'} no better than the trivial "
+        "baseline: see how the recordings differ before blaming the sensor."
+        for where, who in names.items()
+    ]
+
+
+def _interval_notes(rows: Sequence[Row]) -> list[str]:
+    """Return one sentence a task and kind of interval; what is in brackets only where it is the same for all."""
+    kinds: dict[str, list[str]] = {}
+    for row in rows:
+        if row["ci_method"] and not row["is_baseline"]:
+            told = f"{row['task']}: interval by {row['ci_method']}."
+            kinds.setdefault(re.sub(r" \([^)]*\)", "", told), []).append(told)
+    return [told[0] if len(set(told)) == 1 else short for short, told in kinds.items()]
 
 
 def _is_probe(row: Row) -> bool:

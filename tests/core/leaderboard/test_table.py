@@ -122,3 +122,14 @@ def test_latex_keeps_ordinary_spaces_and_sets_thin_ones_in_numbers():
     text = to_latex([row(n_test=4400)])
     assert r"4\,400" in text
     assert "lower is better" in text
+
+
+def test_notes_that_say_the_same_of_several_answers_are_one():
+    from tactbench.core.leaderboard.table import _interval_notes
+
+    method = "block bootstrap in time within 5 recordings (blocks of {} rows): spread between sessions is not in it"
+    rows = [{"task": "curvature", "is_baseline": False, "ci_method": method.format(blocks)} for blocks in (17, 198)]
+    (told,) = _interval_notes(rows)
+    assert told.endswith("within 5 recordings: spread between sessions is not in it.")
+    (alone,) = _interval_notes(rows[:1])
+    assert "(blocks of 17 rows)" in alone
