@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.plugin import FloatArray
+
 
 def least_squares(*, kind: str, seed: int, threads: int) -> Any:
     """Return ordinary least squares with an intercept."""
@@ -38,8 +43,32 @@ def logistic(*, kind: str, seed: int, threads: int, C: float) -> Any:
     return LogisticRegression(C=C, max_iter=2000)
 
 
+class Discriminant:
+    """Linear discriminants that say nothing where the means of all classes coincide.
+
+    scikit-learn then divides zero by zero for the share of variance that each direction explains, which nobody asks for
+    here. Answers that are no numbers are refused by whoever asked.
+    """
+
+    def __init__(self, model: Any) -> None:
+        self.model = model
+
+    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Discriminant:
+        """Learn from X (n, p) and y (n,); raises ValueError where no direction is left to tell classes apart in."""
+        try:
+            with np.errstate(invalid="ignore"):
+                self.model.fit(X, y)
+        except IndexError as error:  # scikit-learn looks for the first of no directions
+            raise ValueError("no feature varies enough to tell the classes apart") from error
+        return self
+
+    def predict(self, X: FloatArray) -> npt.NDArray[Any]:
+        """Return (n,) answers to X (n, p)."""
+        return np.asarray(self.model.predict(X))
+
+
 def discriminant(*, kind: str, seed: int, threads: int) -> Any:
     """Return linear discriminant analysis (Fisher 1936): Gaussian classes with one covariance, nothing to set."""
     from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
-    return LinearDiscriminantAnalysis()
+    return Discriminant(LinearDiscriminantAnalysis())

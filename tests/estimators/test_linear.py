@@ -120,3 +120,11 @@ def test_chance_draws_every_class_equally_often_whatever_training_looked_like():
     counts = np.bincount(chance.predict(np.zeros((3000, 1))), minlength=3)
     # Binomial, n = 3000, p = 1/3: standard deviation 26; five of them.
     np.testing.assert_allclose(counts, 1000, atol=130)
+
+
+def test_a_discriminant_of_classes_with_one_mean_says_nothing_aloud():
+    from tactbench.estimators.linear import discriminant
+
+    X = np.tile(np.eye(3), (4, 1))
+    y = np.repeat([0, 1], 6)
+    assert set(discriminant(kind="classification", seed=0, threads=1).fit(X, y).predict(X)) <= {0, 1}
