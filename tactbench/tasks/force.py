@@ -12,6 +12,7 @@ from tactbench.plugin import (
     TaskSpec,
     hookimpl,
 )
+from tactbench.tasks import eflesh
 from tactbench.tasks.surfaces import at_places, few_shots, on_units
 
 TACTBENCH_API = 1
@@ -61,13 +62,7 @@ SPEC = TaskSpec(
             title="force, RMSE of the time index", reference=_PAPER,
             remark="the paper does not say of which sensor's recordings; offered as a lower bound",
         ),
-        Published(
-            score=0.27, protocol="deployable", sensor="eflesh", split="in-session",
-            title="normal force, RMSE, eFlesh", reference="Pattabiraman et al. 2025, arXiv 2506.09994",
-            remark="a small network; the last fifth of one session's rows, as in the authors' published training code, "
-            "which gives rows without a load-cell sample the nearest one and scales by all rows, tested ones too; "
-            "which session the figure is of is not stated",
-        ),
+        eflesh.published(0.27, "eflesh", "normal force, RMSE, eFlesh"),
     ),
 )  # fmt: skip
 

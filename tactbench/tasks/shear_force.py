@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import ChannelTarget, Published, TaskDescriptor, TaskSpec, hookimpl
+from tactbench.plugin import ChannelTarget, TaskDescriptor, TaskSpec, hookimpl
+from tactbench.tasks import eflesh
 
 TACTBENCH_API = 1
 
@@ -18,15 +19,7 @@ SPEC = TaskSpec(
     splits=("roles", "session", "press", "in-session", "shuffled"),
     estimators=("forest", "ridge"),
     baselines=("mean", "time-index"),
-    published=(
-        Published(
-            score=0.12, protocol="deployable", sensor="eflesh-shear", split="in-session",
-            title="shear force, RMSE, eFlesh", reference="Pattabiraman et al. 2025, arXiv 2506.09994",
-            remark="a small network; the last fifth of one session's rows, as in the authors' published training code, "
-            "which gives rows without a load-cell sample the nearest one and scales by all rows, tested ones too; "
-            "which session the figure is of is not stated",
-        ),
-    ),
+    published=(eflesh.published(0.12, "eflesh-shear", "shear force, RMSE, eFlesh"),),
 )  # fmt: skip
 
 

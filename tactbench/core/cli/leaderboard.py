@@ -9,7 +9,7 @@ import click
 
 from tactbench.core.cli.comparisons import print_comparisons
 from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
-from tactbench.core.leaderboard.comparison import AXES
+from tactbench.core.leaderboard.axes import AXES
 
 
 @click.command(name="leaderboard")

@@ -12,12 +12,10 @@ import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.metrics import Metric, metric_called
+from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import protocol_called
-from tactbench.core.evaluation.selection import features_of, scales, select
-from tactbench.core.evaluation.sets import keep, part
-from tactbench.core.evaluation.splits import make_splits
+from tactbench.core.evaluation.selection import features_of, select
 from tactbench.core.plugins.interfaces import Estimator
-from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
@@ -66,32 +64,21 @@ def contestant(
         What the estimator is told it may use.
     """
     rules, metric = protocol_called(protocol), metric_called(task.metric)
-    make = load_object(descriptor.where)
-
-    def build(**chosen: Any) -> Estimator:
-        made: Estimator = make(kind=task.kind, seed=seed, threads=threads, **{**descriptor.params, **params, **chosen})
-        return made
-
-    build()
-    gap, own = max(descriptor.window_grid), split in task.campaigns
-    assignment = make_splits(data, split, seed, gap=gap, one_by_one=own)[-1]
-    choice = select(descriptor, params, lambda chosen: build(**chosen), data, rules, assignment, metric)
+    build = builder(descriptor, params, task, seed, threads)
+    assignment = assigned(task, descriptor, data, split, seed)[-1]
+    choice = select(descriptor, params, build, data, rules, assignment, metric)
     k = choice.k if choice else descriptor.window_grid[0]
-    counts: Counter[str] = Counter()
-    kept = keep(data, rules, assignment.train, "training", counts)
-    others = keep(data, rules, assignment.test, "test", counts)
-    scale_train, scale_test = scales(rules, kept, others)
-    train, test = part(kept, scale_train, k), part(others, scale_test, k)
+    fold = prepared(assignment, data, rules, k, Counter())
     chosen = choice.params if choice else {}
     return Contestant(
         name=descriptor.name,
-        build=lambda: build(**chosen),
+        build=lambda: build(chosen),
         fold=assignment.name,
-        X_train=features_of(train, descriptor),
-        y_train=train.y,
-        X_test=features_of(test, descriptor),
-        y_test=test.y,
+        X_train=features_of(fold.train, descriptor),
+        y_train=fold.train.y,
+        X_test=features_of(fold.test, descriptor),
+        y_test=fold.test.y,
         n_classes=len(data.classes),
         metric=metric,
-        trained_on=tuple(data.metas[place] for place in np.unique(train.recording)),
+        trained_on=tuple(data.metas[place] for place in np.unique(fold.train.recording)),
     )

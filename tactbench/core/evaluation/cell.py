@@ -13,26 +13,24 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.errors import DataError, UnknownNameError, UsageError
+from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.evaluation.fitting import answers as answers_of
 from tactbench.core.evaluation.fitting import fit
 from tactbench.core.evaluation.interval import LEVEL, score_interval
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
+from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
 from tactbench.core.evaluation.replication import replicates
-from tactbench.core.evaluation.selection import Build, Choice, features_of, scales, select
-from tactbench.core.evaluation.sets import constant_features, keep, part
+from tactbench.core.evaluation.selection import Build, Choice, features_of, select
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
     Assignment,
     assert_disjoint,
     choose_split,
-    make_splits,
 )
 from tactbench.core.evaluation.timing import peak_rss_mb, single_row_latency_s
 from tactbench.core.plugins.interfaces import Estimator
-from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import Answers, Fold, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
@@ -143,10 +141,9 @@ def evaluate(
     rules = protocol_called(protocol)
     metric = metric_called(task.metric)
     chosen_split = choose_split(task, rules, data, split)
-    own = chosen_split in task.campaigns
-    assignments = make_splits(data, chosen_split, seed, gap=max(estimator.window_grid), one_by_one=own)
+    assignments = assigned(task, estimator, data, chosen_split, seed)
     assert_disjoint(assignments)
-    build = _builder(estimator, params, task, seed, threads)
+    build = builder(estimator, params, task, seed, threads)
     counts: Counter[str] = Counter(data.counts)
     total = _Sum()
     with _thread_limit(threads):
@@ -158,28 +155,6 @@ def evaluate(
             raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
         latency = 1e3 * single_row_latency_s(total.model, features_of(total.test, estimator), clock)
     return _result(task, rules, metric, chosen_split, data, total, counts, latency, seed, threads)
-
-
-def _builder(
-    estimator: EstimatorDescriptor, params: Mapping[str, Any], task: TaskSpec, seed: int, threads: int
-) -> Build:
-    if task.kind not in estimator.kinds:
-        raise UsageError(
-            f"The estimator {estimator.name!r} does {' and '.join(estimator.kinds)}; task {task.name!r} is "
-            f"{task.kind}.",
-            hint="See what others do with `tactbench list estimators`.",
-        )
-    for name in params:
-        if name not in estimator.params:
-            raise UnknownNameError(f"parameter of estimator {estimator.name!r}", name, estimator.params)
-    make = load_object(estimator.where)  # imports happen here, before any clock is read
-
-    def build(chosen: Mapping[str, Any]) -> Estimator:
-        made: Estimator = make(kind=task.kind, seed=seed, threads=threads, **{**estimator.params, **params, **chosen})
-        return made
-
-    build({})
-    return build
 
 
 def _thread_limit(threads: int) -> AbstractContextManager[Any]:
@@ -204,7 +179,7 @@ def _fold(
     began = clock()
     choice = select(estimator, params, build, data, rules, assignment, metric, counts)
     total.search_s += clock() - began
-    fold = _prepared(assignment, data, rules, choice.k if choice else estimator.window_grid[0], counts)
+    fold = prepared(assignment, data, rules, choice.k if choice else estimator.window_grid[0], counts)
     _worth_answering(fold, data)
     X_train, X_test = features_of(fold.train, estimator), features_of(fold.test, estimator)
     model = build(choice.params if choice else {})
@@ -222,7 +197,8 @@ def _fold(
         _add(total, "train", fold.train, fitted, number, data)
     if fold.validation is not None and len(fold.validation):
         on_validation = answers_of(model, features_of(fold.validation, estimator), estimator.name, n_classes)
-        total.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
+        if not choice:
+            total.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
         if alone:
             _add(total, "validation", fold.validation, on_validation, number, data)
     if choice:
@@ -250,19 +226,6 @@ def _add(total: _Sum, role: Role, asked: Part, given: npt.NDArray[Any], number: 
 def _joined(folds: Sequence[Answers]) -> Answers:
     names = [column.name for column in fields(Answers)]
     return Answers(**{name: np.concatenate([getattr(one, name) for one in folds]) for name in names})
-
-
-def _prepared(assignment: Assignment, data: Dataset, rules: ProtocolSpec, k: int, counts: Counter[str]) -> Fold:
-    train = keep(data, rules, assignment.train, "training", counts)
-    test = keep(data, rules, assignment.test, "test", counts)
-    for name in constant_features(train, data.features):
-        counts[f"folds in which {name} never changes in training"] += 1
-    scale_train, scale_test = scales(rules, train, test)
-    validation = None
-    if assignment.validation is not None:
-        kept = keep(data, rules, assignment.validation, "validation", counts)
-        validation = part(kept, scales(rules, train, kept)[1], k)
-    return Fold(assignment.name, part(train, scale_train, k), part(test, scale_test, k), validation)
 
 
 def _worth_answering(fold: Fold, data: Dataset) -> None:

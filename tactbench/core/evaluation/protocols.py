@@ -83,6 +83,11 @@ FIRST_FRAME = ProtocolSpec(
 PROTOCOLS = {protocol.name: protocol for protocol in (KARL2016, KARL2016_TRAINING_SCALE, DEPLOYABLE, FIRST_FRAME)}
 
 
+def is_probe(name: str) -> bool:
+    """Tell whether a protocol asks what recordings give away; an unknown name is none."""
+    return name in PROTOCOLS and PROTOCOLS[name].probe
+
+
 def protocol_called(name: str) -> ProtocolSpec:
     """Return a protocol by name; raises UnknownNameError."""
     if name not in PROTOCOLS:

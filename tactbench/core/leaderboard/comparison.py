@@ -12,12 +12,10 @@ from typing import Any
 
 from tactbench.core.evaluation.splits import shots
 from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.table import METRIC_NAMES
+from tactbench.core.leaderboard.table import METRIC_NAMES, answer_name, sensor_name
 
 Row = Mapping[str, Any]
 
-AXES = ("protocol", "split", "fold")
-"""What may stand side by side."""
 _NOTE = (
     "Differences are against the first column; intervals are those of each score alone, and two that overlap may still "
     "differ."
@@ -61,7 +59,7 @@ def compare(rows: Iterable[Row], by: str) -> list[Comparison]:
     rows
         Rows of a leaderboard.
     by
-        One of `AXES`.
+        One of `tactbench.core.leaderboard.axes.AXES`.
     """
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
@@ -84,7 +82,7 @@ def few_shot_curves(rows: Iterable[Row]) -> list[Curve]:
     for row in rows:
         number = shots(str(row["split"]))
         if number and row["status"] == "done":
-            key = (*_key(row), row["protocol"], row["sensor"], _answer(row))
+            key = (*_key(row), row["protocol"], row["sensor"], answer_name(row))
             groups.setdefault(key, []).append((number, row))
     curves = []
     for members in groups.values():
@@ -95,7 +93,7 @@ def few_shot_curves(rows: Iterable[Row]) -> list[Curve]:
                 Curve(
                     sensor=first["sensor"],
                     task=first["task"],
-                    estimator=_answer(first),
+                    estimator=answer_name(first),
                     metric=first["metric"],
                     unit=first["unit"],
                     simulated=first["simulated"],
@@ -108,11 +106,6 @@ def few_shot_curves(rows: Iterable[Row]) -> list[Curve]:
 
 def _key(row: Row) -> tuple[Any, ...]:
     return row["task"], "sim" if row["simulated"] else row["rig"], row["repeat"]
-
-
-def _answer(row: Row) -> str:
-    options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
-    return f"{row['estimator']} ({options})" if options else str(row["estimator"])
 
 
 def _worth_showing(members: Sequence[Row]) -> list[Row]:
@@ -146,7 +139,7 @@ def _numbers_first(name: str) -> tuple[bool, float]:
 def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> Comparison:
     lines: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
     for row in members:
-        cells = lines.setdefault((row["sensor"] + (" SIM" if row["simulated"] else ""), _answer(row)), {})
+        cells = lines.setdefault((sensor_name(row), answer_name(row)), {})
         if by == "fold":
             cells |= {way: _record(row, by, way, value) for way, value in _scores_of_folds(row)}
         else:
@@ -177,7 +170,7 @@ def _record(row: Row, by: str, way: str, value: float | None) -> dict[str, Any]:
     return {
         "task": row["task"],
         "sensor": row["sensor"],
-        "estimator": _answer(row),
+        "estimator": answer_name(row),
         "simulated": row["simulated"],
         "is_baseline": row["is_baseline"],
         "protocol": row["protocol"],

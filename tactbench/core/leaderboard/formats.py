@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard import probe
@@ -62,53 +62,73 @@ def to_csv(rows: Sequence[Row]) -> str:
 def to_markdown(rows: Sequence[Row]) -> str:
     """Return the table as Markdown, a heading a block."""
     table = build_table(rows)
-    parts = []
+    parts: list[str] = []
     for block in table.blocks:
-        parts.append(f"### {_md(block.title)}\n")
-        parts.append("| " + " | ".join(table.columns) + " |")
-        parts.append("|" + "|".join("---:" if name in NUMERIC else "---" for name in table.columns) + "|")
-        parts += ["| " + " | ".join(_md(cell) for cell in line.cells) + " |" for line in block.lines]
-        parts.append("")
-    parts += [f"- {_md(note)}" for note in table.notes]
+        parts += [*markdown_grid(block.title, table.columns, NUMERIC, [line.cells for line in block.lines]), ""]
+    parts += [f"- {markdown_text(note)}" for note in table.notes]
     probed = probe.build_probe(rows)
     if probed is not None:
-        parts += ["", f"### {_md(probed.title)}\n", "| " + " | ".join(probed.columns) + " |"]
-        parts.append("|" + "|".join("---:" if name in probe.NUMERIC else "---" for name in probed.columns) + "|")
-        parts += ["| " + " | ".join(_md(cell) for cell in line) + " |" for line in probed.lines]
-        parts += ["", *(f"- {_md(note)}" for note in probed.notes)]
+        parts += ["", *markdown_grid(probed.title, probed.columns, probe.NUMERIC, probed.lines)]
+        parts += ["", *(f"- {markdown_text(note)}" for note in probed.notes)]
     return "\n".join(parts) + "\n"
+
+
+def markdown_grid(
+    title: str, columns: Sequence[str], numeric: Collection[str], lines: Iterable[Iterable[str]]
+) -> list[str]:
+    """Return a heading and a table as lines of Markdown, columns of numbers to the right."""
+    return [
+        f"### {markdown_text(title)}\n",
+        "| " + " | ".join(markdown_text(name) for name in columns) + " |",
+        "|" + "|".join("---:" if name in numeric else "---" for name in columns) + "|",
+        *("| " + " | ".join(markdown_text(cell) for cell in line) + " |" for line in lines),
+    ]
+
+
+def markdown_text(text: str) -> str:
+    """Return text that no table of Markdown breaks at."""
+    return text.replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")
 
 
 def to_latex(rows: Sequence[Row]) -> str:
     """Return the table as LaTeX for the booktabs package, a table a block."""
     table = build_table(rows)
-    parts = []
+    parts: list[str] = []
     for block in table.blocks:
-        alignment = "".join("r" if name in NUMERIC else "l" for name in table.columns)
-        parts += [r"\begin{table}", rf"\caption{{{_tex(block.title)}}}", rf"\begin{{tabular}}{{{alignment}}}"]
-        parts += [r"\toprule", " & ".join(_tex(name) for name in table.columns) + r" \\", r"\midrule"]
-        parts += [" & ".join(_tex(cell) for cell in line.cells) + r" \\" for line in block.lines]
-        parts += [r"\bottomrule", r"\end{tabular}"]
-        parts += [rf"\par\footnotesize {_tex(note)}" for note in _notes_of(table, block.title)]
-        parts += [r"\end{table}", ""]
+        lines = [line.cells for line in block.lines]
+        parts += _latex_grid(block.title, table.columns, NUMERIC, lines, _notes_of(table, block.title))
     probed = probe.build_probe(rows)
     if probed is not None:
-        alignment = "".join("r" if name in probe.NUMERIC else "l" for name in probed.columns)
-        parts += [r"\begin{table}", rf"\caption{{{_tex(probed.title)}}}", rf"\begin{{tabular}}{{{alignment}}}"]
-        parts += [r"\toprule", " & ".join(_tex(name) for name in probed.columns) + r" \\", r"\midrule"]
-        parts += [" & ".join(_tex(cell) for cell in line) + r" \\" for line in probed.lines]
-        parts += [r"\bottomrule", r"\end{tabular}"]
-        parts += [rf"\par\footnotesize {_tex(note)}" for note in probed.notes]
-        parts += [r"\end{table}", ""]
+        parts += _latex_grid(probed.title, probed.columns, probe.NUMERIC, probed.lines, probed.notes)
     return "\n".join(parts) + "\n"
+
+
+def _latex_grid(
+    title: str,
+    columns: Sequence[str],
+    numeric: Collection[str],
+    lines: Iterable[Iterable[str]],
+    notes: Iterable[str],
+) -> list[str]:
+    alignment = "".join("r" if name in numeric else "l" for name in columns)
+    return [
+        r"\begin{table}",
+        rf"\caption{{{_tex(title)}}}",
+        rf"\begin{{tabular}}{{{alignment}}}",
+        r"\toprule",
+        " & ".join(_tex(name) for name in columns) + r" \\",
+        r"\midrule",
+        *(" & ".join(_tex(cell) for cell in line) + r" \\" for line in lines),
+        r"\bottomrule",
+        r"\end{tabular}",
+        *(rf"\par\footnotesize {_tex(note)}" for note in notes),
+        r"\end{table}",
+        "",
+    ]
 
 
 def _notes_of(table: Table, title: str) -> tuple[str, ...]:
     return table.notes if table.blocks and table.blocks[-1].title == title else ()
-
-
-def _md(text: str) -> str:
-    return text.replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")
 
 
 _TEX = {

@@ -17,6 +17,11 @@ def interval(low: float | None, high: float | None, unit: str) -> str:
     return "–" if low is None or high is None else f"{score(low, unit)} … {score(high, unit)}"
 
 
+def suffix(unit: str) -> str:
+    """Return what follows a number: its unit, and nothing where it has none."""
+    return "" if unit == "1" else f" {unit}"
+
+
 def duration(seconds: float | None) -> str:
     """Return a duration with three significant digits and a unit that fits."""
     if seconds is None:

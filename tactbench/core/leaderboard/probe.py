@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
-from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER
+from tactbench.core.leaderboard.numbers import interval, score, suffix
+from tactbench.core.leaderboard.table import LOWER_IS_BETTER, answer_name, sensor_name
 
 Row = Mapping[str, Any]
 
@@ -83,11 +83,10 @@ def _partner(row: Row, rows: Sequence[Row], *, protocol: str, split: str) -> Row
 
 def _line(row: Row, shuffled: Row | None, first: Row | None) -> tuple[str, ...]:
     unit = row["unit"]
-    options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
     return (
-        row["sensor"] + (" SIM" if row["simulated"] else ""),
+        sensor_name(row),
         row["task"],
-        f"{row['estimator']} ({options})" if options else row["estimator"],
+        answer_name(row),
         row["split"],
         str(row["repeat"]) if row["repeats"] > 1 else "",
         score(row["score"], unit),
@@ -116,8 +115,7 @@ def _about_first(row: Row, first: Row | None) -> list[str]:
     if not beyond:
         return []
     unit = row["unit"]
-    suffix = "" if unit == "1" else f" {unit}"
-    told = f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix}"
+    told = f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix(unit)}"
     leak = _skill(first["score"], trivial, row) >= LEAK_SHARE * _skill(row["score"], trivial, row)
     return [f"LEAK: {told}" if leak else f"{told}: a part of the answer is known before"]
 
@@ -148,8 +146,8 @@ def _about_shuffled(row: Row, shuffled: Row | None) -> list[str]:
     best = row["ci_low"] if _lower_is_better(row) else row["ci_high"]
     if _skill(shuffled["score"], best, row) <= 0:
         return []
-    suffix = "" if row["unit"] == "1" else f" {row['unit']}"
-    said = f"optimistic by {score(abs(shuffled['score'] - row['score']), row['unit'])}{suffix} when shuffled"
+    by = score(abs(shuffled["score"] - row["score"]), row["unit"])
+    said = f"optimistic by {by}{suffix(row['unit'])} when shuffled"
     same = shuffled["n_test"] == row["n_test"] and set(shuffled["recordings"]) == set(row["recordings"])
     return [said if same else f"{said} (tested on other rows)"]
 

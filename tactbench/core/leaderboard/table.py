@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tactbench.core.evaluation.protocols import PROTOCOLS
+from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.numbers import duration, interval, score, whole
 
@@ -118,7 +118,7 @@ def _cells(row: Row, rank: str) -> tuple[str, ...]:
     per_row = row["predict_s"] / row["batch_rows"] if row["batch_rows"] else None
     return (
         rank,
-        row["sensor"] + (" SIM" if row["simulated"] else ""),
+        sensor_name(row),
         answer_name(row),
         score(row["score"], unit) + marks,
         interval(row["ci_low"], row["ci_high"], unit),
@@ -135,8 +135,13 @@ def _cells(row: Row, rank: str) -> tuple[str, ...]:
 
 
 def _empty(row: Row) -> tuple[str, ...]:
-    sensor = row["sensor"] + (" SIM" if row["simulated"] else "")
+    sensor = sensor_name(row)
     return ("", sensor, answer_name(row), row["status"].upper(), *("–" for _ in COLUMNS[4:]))
+
+
+def sensor_name(row: Row) -> str:
+    """Return a sensor's name, marked where it was simulated."""
+    return f"{row['sensor']} SIM" if row["simulated"] else str(row["sensor"])
 
 
 def answer_name(row: Row) -> str:
@@ -174,13 +179,13 @@ def _notes(rows: Sequence[Row]) -> list[str]:
     notes += _distinct(f"{row['sensor']}/{row['task']}: {told}." for row in rows for told in told_counts(row["counts"]))
     notes += _distinct(f"{row['sensor']}: {remark}" for row in rows for remark in row["remarks"])
     notes += _interval_notes(rows)
-    notes += _distinct(
-        # What makes no sense to probe makes none with any estimator.
-        f"{row['sensor']}/{row['task']}/{row['protocol'] if _is_probe(row) else row['estimator']} {row['status']}: "
-        f"{row['reason']}"
-        for row in rows
-        if row["status"] != "done"
-    )
+    stopped: list[str] = []
+    for row in rows:
+        if row["status"] != "done":
+            # What makes no sense to probe makes none with any estimator.
+            who = row["protocol"] if is_probe(row["protocol"]) else row["estimator"]
+            stopped.append(f"{row['sensor']}/{row['task']}/{who} {row['status']}: {row['reason']}")
+    notes += _distinct(stopped)
     return notes
 
 
@@ -207,14 +212,10 @@ def _interval_notes(rows: Sequence[Row]) -> list[str]:
     return [told[0] if len(set(told)) == 1 else short for short, told in kinds.items()]
 
 
-def _is_probe(row: Row) -> bool:
-    return row["protocol"] in PROTOCOLS and PROTOCOLS[row["protocol"]].probe
-
-
 def _no_better(row: Row) -> bool:
     if row["status"] != "done" or row["is_baseline"] or row["baseline"] is None:
         return False
-    if _is_probe(row):
+    if is_probe(row["protocol"]):
         return False  # no better than trivial is what a probe should be
     lower = row["metric"] in LOWER_IS_BETTER
     return bool(row["ci_high"] >= row["baseline"] if lower else row["ci_low"] <= row["baseline"])

@@ -8,7 +8,7 @@ from itertools import product
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
-from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, PROTOCOLS, protocol_called
+from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called
 from tactbench.core.evaluation.splits import shots
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
@@ -117,7 +117,7 @@ def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:
     Where several are asked for, a pair that does not go together becomes a row that says so; a single one is refused.
     """
     for name in choice.protocol:
-        if name not in task.protocols and not (name in PROTOCOLS and PROTOCOLS[name].probe):
+        if name not in task.protocols and not is_probe(name):
             raise UnknownNameError(f"protocol of task {task.name!r}", name, task.protocols)
     splits: list[str | None] = list(dict.fromkeys(split for name in choice.split for split in _expanded(task, name)))
     ways = list(product(choice.protocol or task.protocols[:1], splits or [None]))

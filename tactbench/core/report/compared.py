@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
-from tactbench.core.leaderboard.comparison import AXES, compare
+from tactbench.core.leaderboard.axes import AXES
+from tactbench.core.leaderboard.comparison import compare
 from tactbench.core.leaderboard.probe import NUMERIC, build_probe
 from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, number, plain
 from tactbench.core.report.section import Section, Subject

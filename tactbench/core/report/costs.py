@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -86,8 +87,8 @@ def read_table(path: Path, subject: Subject) -> PlainTable:
     for one in records:
         anchor = subject.anchor_of({**about, **one})
         lines.append([Entry(_text(one.get(name)), finite(one.get(name)), anchor) for name in columns])
-    title = f"Cost: {about.get('title', path.stem)}"
-    return plain(title, columns, lines, numeric=numeric, notes=[f"Of all lines: {facts}.", *words] if facts else words)
+    notes = [f"Of all lines: {facts}.", *words] if facts else words
+    return plain(f"Cost: {about.get('title', path.stem)}", columns, lines, numeric=numeric, notes=notes)
 
 
 def _ladder(about: Mapping[str, Any], subject: Subject) -> PlainTable:
@@ -96,14 +97,12 @@ def _ladder(about: Mapping[str, Any], subject: Subject) -> PlainTable:
     for row in about["rows"]:
         texts = line(row, about["unit"])
         anchor = subject.anchor_of({**about, "estimator": row["estimator"]})
-        lines.append(
-            [
-                Entry(texts.get(name) or ABSENT, finite(row.get(SORTED_BY.get(name, ""))), anchor)
-                if name in SORTED_BY
-                else Entry(texts.get(name) or ABSENT)
-                for name in COLUMNS
-            ]
-        )
+        entries = []
+        for name in COLUMNS:
+            key = SORTED_BY.get(name)
+            entry = Entry(texts.get(name) or ABSENT)
+            entries.append(replace(entry, value=finite(row.get(key)), anchor=anchor) if key else entry)
+        lines.append(entries)
     kinds = ["baseline" if row["is_baseline"] else "result" if row["status"] == "done" else "failed"
              for row in about["rows"]]  # fmt: skip
     words = [f"{name}: {text}." for name, text in about["definitions"].items()]

@@ -13,10 +13,9 @@ import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.preparation import assigned, prepared
 from tactbench.core.evaluation.protocols import protocol_called
-from tactbench.core.evaluation.selection import features_of, scales
-from tactbench.core.evaluation.sets import keep, part
-from tactbench.core.evaluation.splits import make_splits
+from tactbench.core.evaluation.selection import features_of
 from tactbench.core.matrix.keys import versions
 from tactbench.core.report.material import Material
 from tactbench.core.report.stored import stored
@@ -104,11 +103,9 @@ def _features(material: Material, row: Mapping[str, Any], test: Answers) -> Floa
     estimator = material.registry.estimators[row["estimator"]]
     data = load_dataset(task, material.recordings(row))
     rules = protocol_called(row["protocol"])
-    (assignment,) = make_splits(data, row["split"], row["seed"], gap=max(estimator.window_grid))
-    ignored: Counter[str] = Counter()
-    kept = keep(data, rules, assignment.test, "test", ignored)
-    scale = scales(rules, keep(data, rules, assignment.train, "training", ignored), kept)[1]
-    asked = part(kept, scale, int(row["chosen"].get("k", estimator.window_grid[0])))
+    (assignment,) = assigned(task, estimator, data, row["split"], row["seed"])
+    k = int(row["chosen"].get("k", estimator.window_grid[0]))
+    asked = prepared(assignment, data, rules, k, Counter()).test
     if not (np.array_equal(asked.recording, test.recording) and np.array_equal(asked.row, test.row)):
         raise DataError(
             f"The recordings of {row['cell']} give other test rows than were answered.", hint="Run it again."

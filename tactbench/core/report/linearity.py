@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER
+from tactbench.core.leaderboard.numbers import interval, score, suffix
+from tactbench.core.leaderboard.table import LOWER_IS_BETTER, sensor_name
 from tactbench.core.plugins.registry import Registry
 
 Row = Mapping[str, Any]
@@ -25,7 +25,7 @@ class Contrast:
     def where(self) -> str:
         """What was asked of which sensor, and how."""
         row = self.linear
-        parts = [row["sensor"] + (" SIM" if row["simulated"] else ""), row["task"], row["protocol"], row["split"] or ""]
+        parts = [sensor_name(row), row["task"], row["protocol"], row["split"] or ""]
         if row["repeats"] > 1:
             parts.append(f"repeat {row['repeat']}")
         return ", ".join(part for part in parts if part)
@@ -40,8 +40,7 @@ class Contrast:
         better = "non-linear" if (by < 0) == (self.linear["metric"] in LOWER_IS_BETTER) else "linear"
         low, high = sorted((self.linear, self.other), key=lambda row: float(row["score"]))
         apart = "are apart" if low["ci_high"] < high["ci_low"] else "overlap"
-        suffix = "" if unit == "1" else f" {unit}"
-        return f"{better} is better by {score(abs(by), unit)}{suffix}; the intervals {apart}"
+        return f"{better} is better by {score(abs(by), unit)}{suffix(unit)}; the intervals {apart}"
 
     @staticmethod
     def told(row: Row) -> str:

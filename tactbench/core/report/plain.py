@@ -7,6 +7,8 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
+from tactbench.core.leaderboard.formats import markdown_grid, markdown_text
+
 ABSENT = "–"
 _DIGITS = r"[-+−]?[\d\u202f]+(?:\.\d+)?(?:[eE][-+]?\d+)?"
 _NUMBER = re.compile(rf"({_DIGITS})(?: … {_DIGITS})?(?: %)?(?: ?[†‡*])*")
@@ -87,12 +89,7 @@ def finite(value: object) -> float | None:
 
 def markdown(table: PlainTable) -> str:
     """Return the table as Markdown, its notes as a list below."""
-    parts = [f"### {_md(table.title)}", "", "| " + " | ".join(_md(name) for name in table.columns) + " |"]
-    parts.append("|" + "|".join("---:" if name in table.numeric else "---" for name in table.columns) + "|")
-    parts += ["| " + " | ".join(_md(entry.text) for entry in line) + " |" for line in table.lines]
-    parts += ["", *(f"- {_md(note)}" for note in table.notes)] if table.notes else []
+    lines = [[entry.text for entry in line] for line in table.lines]
+    parts = markdown_grid(table.title, table.columns, table.numeric, lines)
+    parts += ["", *(f"- {markdown_text(note)}" for note in table.notes)] if table.notes else []
     return "\n".join(parts) + "\n"
-
-
-def _md(text: str) -> str:
-    return text.replace("\\", "\\\\").replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")

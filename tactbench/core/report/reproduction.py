@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from tactbench.core.leaderboard.numbers import interval, score
+from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.leaderboard.table import LOWER_IS_BETTER
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.calibrated import Calibrated, PredictiveRange
@@ -60,7 +60,7 @@ def reproduce(registry: Registry, rows: Sequence[Row], calibrated: Calibrated | 
 def unasked(registry: Registry, rows: Sequence[Row]) -> list[str]:
     """Return a sentence for each published number that only recordings made elsewhere can stand beside."""
     return [
-        f"Not asked here: {_title(task, published, None)} ({score(published.score, task.unit)}{_suffix(task.unit)}; "
+        f"Not asked here: {_title(task, published, None)} ({score(published.score, task.unit)}{suffix(task.unit)}; "
         f"{published.reference}): `{_command(task, published, registry)}`."
         for task in (descriptor.spec for descriptor in registry.tasks)
         for published in task.published
@@ -115,15 +115,11 @@ def _difference(row: Row, published: float) -> str:
     share = f" ({100 * by / abs(published):.1f} %)" if published else ""
     better = (ours < published) == (row["metric"] in LOWER_IS_BETTER)
     where = "below" if ours < published else "above"
-    return f"ours is {score(by, unit)}{_suffix(unit)}{share} {where} the published, which is {_word(better)}"
+    return f"ours is {score(by, unit)}{suffix(unit)}{share} {where} the published, which is {_word(better)}"
 
 
 def _word(better: bool) -> str:
     return "better" if better else "worse"
-
-
-def _suffix(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"
 
 
 def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> str:
@@ -131,7 +127,7 @@ def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> 
     told = f"the published lies {'inside' if inside else 'outside'} the calibrated range ({predicted.use})"
     if not inside:
         edge = predicted.low if published < predicted.low else predicted.high
-        told += f" by {score(abs(published - edge), unit)}{_suffix(unit)}"
+        told += f" by {score(abs(published - edge), unit)}{suffix(unit)}"
     if predicted.goes_with:
         named = " and ".join(f"{name} ({value:+.2f})" for name, value in predicted.goes_with.items())
         told += f"; of what is not known the number goes most with {named}"
@@ -147,12 +143,27 @@ def _line(task: TaskSpec, published: Published, row: Row, calibrated: Calibrated
     if calibrated is not None:
         predicted = calibrated.range_for(task.name, row["sensor"], published.score)
     word, sentence = verdict(row, published.score, predicted)
+    return _beside(task, published, row, predicted, word, sentence)
+
+
+def _unanswered(task: TaskSpec, published: Published, registry: Registry) -> Reproduction:
+    return _beside(task, published, None, None, "no answer", f"not run: `{_command(task, published, registry)}`")
+
+
+def _beside(
+    task: TaskSpec,
+    published: Published,
+    row: Row | None,
+    predicted: PredictiveRange | None,
+    word: Verdict,
+    sentence: str,
+) -> Reproduction:
     return Reproduction(
-        title=_title(task, published, row["sensor"]),
+        title=_title(task, published, row["sensor"] if row else None),
         task=task.name,
         protocol=published.protocol,
-        estimator=row["estimator"],
-        sensor=row["sensor"],
+        estimator=row["estimator"] if row else published.estimator or "",
+        sensor=row["sensor"] if row else published.sensor or "",
         published=published.score,
         reference=published.reference,
         remark=published.remark,
@@ -167,24 +178,6 @@ def _line(task: TaskSpec, published: Published, row: Row, calibrated: Calibrated
 def _title(task: TaskSpec, published: Published, sensor: str | None) -> str:
     title = published.title or f"{task.name}, {task.metric}"
     return f"{title} ({sensor})" if published.sensor is None and sensor else title
-
-
-def _unanswered(task: TaskSpec, published: Published, registry: Registry) -> Reproduction:
-    return Reproduction(
-        title=_title(task, published, None),
-        task=task.name,
-        protocol=published.protocol,
-        estimator=published.estimator or "",
-        sensor=published.sensor or "",
-        published=published.score,
-        reference=published.reference,
-        remark=published.remark,
-        unit=task.unit,
-        row=None,
-        predicted=None,
-        verdict="no answer",
-        sentence=f"not run: `{_command(task, published, registry)}`",
-    )
 
 
 def _command(task: TaskSpec, published: Published, registry: Registry) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.errors import TactbenchError
+from tactbench.core.leaderboard.table import answer_name
 from tactbench.core.matrix.store import Row
 from tactbench.core.report.material import Material
 from tactbench.core.samples import Answers
@@ -74,7 +75,7 @@ def _group(material: Material, rows: list[Row], remark: Remark) -> Group | None:
         remark(f"No figures of {about}: {error}")
         return None
     results = [row for row in rows if not row["is_baseline"]]
-    names = list(dict.fromkeys(answerer(row) for row in results))
+    names = list(dict.fromkeys(answer_name(row) for row in results))
     if not names:
         remark(f"No figures of {about}: no cell is done but baselines.")
         return None
@@ -82,7 +83,7 @@ def _group(material: Material, rows: list[Row], remark: Remark) -> Group | None:
     if len(names) > 1:
         others = ", ".join(name for name in names if name != shown)
         remark(f"Figures of {about} show {shown}; not shown: {others}.")
-    panels = _panels(material, [row for row in results if answerer(row) == shown], remark)
+    panels = _panels(material, [row for row in results if answer_name(row) == shown], remark)
     if not panels:
         remark(f"No figures of {about}: no answers of {shown} can be read.")
         return None
@@ -104,9 +105,3 @@ def _panels(material: Material, rows: list[Row], remark: Remark) -> dict[str, Pa
             remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run it again.")
     order = list(dict.fromkeys(row["sensor"] for row in rows))
     return {sensor: found[sensor] for sensor in order if sensor in found}
-
-
-def answerer(row: Row) -> str:
-    """Return an estimator's name, with parameters that are not its defaults."""
-    options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
-    return f"{row['estimator']} ({options})" if options else str(row["estimator"])

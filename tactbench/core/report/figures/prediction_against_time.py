@@ -6,7 +6,7 @@ import numpy as np
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.leaderboard.numbers import score
+from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.report.figures.group import Group, Panel, Remark
 from tactbench.core.report.figures.sketch import Sketch, heading, marks, metric_name, quantity, sensors, with_unit
 from tactbench.core.report.figures.style import BLUE, VERMILLION, corner, panels
@@ -46,7 +46,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
                 np.insert(time[order], breaks, np.nan), line, "-", color=VERMILLION, linewidth=0.7, label="prediction"
             )
             here.set_title(f"{panel.sensor}, {WORDS[role]}")
-            corner(here, f"{metric} {score(_score(panel, role, group.task), unit)}{_in_unit(unit)}")
+            corner(here, f"{metric} {score(_score(panel, role, group.task), unit)}{suffix(unit)}")
             if place == len(shown) - 1:
                 here.set_xlabel("time [s]" if clocked else "row of the recording")
         axes[place, 0].set_ylabel(with_unit(quantity(group.task), group.task.unit))
@@ -91,7 +91,3 @@ def _score(panel: Panel, role: Role, task: TaskSpec) -> float:
     if role == "test":
         return float(panel.row["score"])
     return metric_called(task.metric).of(answers.y_true, answers.y_pred)
-
-
-def _in_unit(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.core.leaderboard.numbers import score
+from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.report.figures.group import Group, Remark
 from tactbench.core.report.figures.sketch import Sketch, heading, marks, metric_name, quantity, sensors, with_unit
 from tactbench.core.report.figures.style import BLUE, VERMILLION, corner, panels
@@ -20,7 +20,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
     count = len(group.panels)
     rows, columns = -(-count // ACROSS), min(count, ACROSS)
     figure, axes = panels(rows, columns, 1.75, sharex=True, sharey=True)
-    unit = "" if group.task.unit == "1" else f" {group.task.unit}"
+    unit = suffix(group.task.unit)
     every = [
         values for panel in group.panels for values in (panel.answers["test"].y_true, panel.answers["test"].y_pred)
     ]

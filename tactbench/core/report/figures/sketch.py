@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tactbench.core.leaderboard.table import METRIC_NAMES
-from tactbench.core.report.figures.group import Group, answerer
+from tactbench.core.leaderboard.table import METRIC_NAMES, answer_name
+from tactbench.core.report.figures.group import Group
 from tactbench.core.spec.task import LabelTarget, TaskSpec
 
 if TYPE_CHECKING:
@@ -34,14 +34,14 @@ class Sketch:
         """Short and unique among the figures of a folder, whatever else is in it."""
         row = self.group.row
         rig = "" if row["simulated"] else row["rig"]
-        parts = (self.kind, row["task"], row["protocol"], row["split"], answerer(row), rig)
+        parts = (self.kind, row["task"], row["protocol"], row["split"], answer_name(row), rig)
         return re.sub(r"[^a-z0-9]+", "-", "-".join(part for part in parts if part).lower()).strip("-")
 
 
 def heading(group: Group, *more: str) -> str:
     """Return what stands above a figure: question, answer, protocol with its marks, SIM; in lines that fit a column."""
     row = group.row
-    parts = [row["task"], answerer(row), row["protocol"] + (" †" if row["dagger"] else "")]
+    parts = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
     if row["split"] not in (None, "roles"):
         parts.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
     parts += ["SIM" if row["simulated"] else f"rig {row['rig']}", *more]
