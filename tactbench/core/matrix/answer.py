@@ -77,6 +77,9 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "seed": cell.seed,
         "status": "planned",
         "reason": "",
+        "traceback": "",
+        "signal": None,
+        "log": "",
         "metric": task.metric,
         "unit": task.unit,
         "score": None,
@@ -99,6 +102,10 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "latency_n": None,
         "threads": None,
         "peak_rss_mb": None,
+        "wall_s": None,
+        "concurrency": None,
+        "host": "",
+        "made_by": "",
         "simulated": False,
         "dagger": False,
         "stamps": [],
@@ -112,6 +119,7 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "scores": {},
         "confusion": None,
         "classes": [],
+        "replicates": {},
     }
 
 

@@ -22,6 +22,7 @@ from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.recording.format import partial_path
 from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.spec.status import STOPPED
 
 SEED_DECIDES = (
     "cell", "status", "metric", "score", "ci_low", "ci_high", "ci_method", "n_recordings", "n_train", "n_test",
@@ -46,7 +47,7 @@ class Outcome:
     @property
     def failures(self) -> list[Row]:
         """The rows of cells that should have ended otherwise."""
-        return [row for row in self.rows if row["status"] not in ("done", "skipped")]
+        return [row for row in self.rows if row["status"] in STOPPED]
 
 
 def run_matrix(
