@@ -50,9 +50,10 @@ def test_the_memory_changes_nothing_and_may_be_rubbish(package, tmp_path):
     assert digest(tmp_path) == before
 
 
-def test_tables_do_not_belong_to_what_decides_a_score():
-    from tactbench.core.matrix.source import _files
-
-    names = {name for name, _ in _files("tactbench")}
-    assert "core/evaluation/__init__.py" in names
-    assert not any(name.startswith(("core/cli", "core/leaderboard")) for name in names)
+def test_tables_do_not_belong_to_what_decides_a_score(tmp_path):
+    sources = SourceDigests(tmp_path / "memory.json")
+    for purpose, other in (("answer", ("sensors/", "rigs/")), ("recording", ("tasks/", "core/evaluation/"))):
+        names = sources.behind(["tactbench.sensors.biotac"], purpose).packages["tactbench"]
+        assert "core/recording/reader.py" in names
+        assert not any(name.startswith(("core/cli", "core/leaderboard")) for name in names)
+        assert any(name.startswith(other) for name in names) == (purpose == "answer")
