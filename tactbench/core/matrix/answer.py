@@ -75,6 +75,7 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "repeat": cell.repeat,
         "repeats": cell.repeats,
         "seed": cell.seed,
+        "simulation": cell.simulation.model_dump(exclude_defaults=True),
         "status": "planned",
         "reason": "",
         "traceback": "",

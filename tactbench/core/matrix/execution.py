@@ -19,7 +19,7 @@ from tactbench.core.matrix.answer import Answer, answer, failed, opening
 from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.interfaces import Rig, RigContext, Shelf
-from tactbench.core.plugins.registry import Registry, load_object, load_registry
+from tactbench.core.plugins.registry import Registry, installed, load_object
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -115,12 +115,6 @@ def _interrupts_held_back() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@lru_cache(maxsize=1)
-def installed() -> Registry:
-    """Return the registry of this process."""
-    return load_registry()
 
 
 def rig_of(name: str, registry: Registry, recordings: Path | None = None) -> Rig | Shelf:

@@ -31,8 +31,8 @@ SHOWING = (
     "core/matrix/progress.py", "core/matrix/provenance.py", "core/matrix/store", "__main__.py", "testing.py",
     "benchmarks.yaml", "matrices/", "calibration.yaml", "calibration/",
 )  # fmt: skip
-"""Rooms of tactbench that show, keep or compare what was computed: a new colour in a table computes nothing again. Of the
-core: the floors above the matrix, and the matrix's own keeping. Everything else counts: in doubt, a room counts."""
+"""Rooms of tactbench that show, keep or compare what was computed: a new colour in a table computes nothing again.
+Of the core: the floors above the matrix, and the matrix's own keeping. In doubt, a room counts."""
 
 _NOT_FOR: dict[Purpose, tuple[str, ...]] = {
     # Answers are made from recordings, whose bytes are in the key: how those came about is their own affair.

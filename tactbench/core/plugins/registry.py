@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
 from typing import Any, Generic, Literal, TypeVar, cast
@@ -162,6 +163,12 @@ def load_registry(points: Iterable[EntryPoint] | None = None) -> Registry:
     for _, point in sorted(unique.items()):
         _greet(registry, point)
     return registry
+
+
+@lru_cache(maxsize=1)
+def installed() -> Registry:
+    """Return the registry of this process, loaded once."""
+    return load_registry()
 
 
 def _greet(registry: Registry, point: EntryPoint) -> None:

@@ -50,10 +50,12 @@ def test_the_memory_changes_nothing_and_may_be_rubbish(package, tmp_path):
     assert digest(tmp_path) == before
 
 
-def test_tables_do_not_belong_to_what_decides_a_score(tmp_path):
-    sources = SourceDigests(tmp_path / "memory.json")
-    for purpose, other in (("answer", ("sensors/", "rigs/")), ("recording", ("tasks/", "core/evaluation/"))):
-        names = sources.behind(["tactbench.sensors.biotac"], purpose).packages["tactbench"]
-        assert "core/recording/reader.py" in names
-        assert not any(name.startswith(("core/cli", "core/leaderboard")) for name in names)
-        assert any(name.startswith(other) for name in names) == (purpose == "answer")
+@pytest.mark.parametrize(
+    ("purpose", "module", "not_counted"),
+    [("answer", "tactbench.tasks.force", ("sensors/", "rigs/")),
+     ("recording", "tactbench.sensors.biotac", ("tasks/", "estimators/", "core/evaluation/", "core/matrix/"))],
+)  # fmt: skip
+def test_what_shows_results_or_serves_another_purpose_does_not_count(tmp_path, purpose, module, not_counted):
+    names = SourceDigests(tmp_path / "memory.json").behind([module], purpose).packages["tactbench"]
+    assert {"core/recording/reader.py", "core/samples.py", "plugin.py"} <= set(names)
+    assert not any(name.startswith(("core/cli", "core/leaderboard", *not_counted)) for name in names)
