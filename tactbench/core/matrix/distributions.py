@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sysconfig
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -55,10 +55,19 @@ class Distributions:
 
 
 def _in(place: Path) -> Iterator[tuple[str, str, Path]]:
+    """Yield name, version and the folder that says so; wheels have it in the folder's name, old ways in a file."""
     for folder in place.glob("*.dist-info"):
         name, _, version = folder.name.removesuffix(".dist-info").partition("-")
         if version:
             yield normal(name), version, folder
+    for folder in place.glob("*.egg-info"):
+        try:
+            said = (folder / "PKG-INFO").read_text(encoding="utf-8")
+        except (OSError, ValueError):
+            continue
+        found = dict(re.findall(r"^(Name|Version): *(\S+)$", said, re.MULTILINE))
+        if len(found) == 2:
+            yield normal(found["Name"]), found["Version"], folder
 
 
 def _brings(folder: Path, package: str) -> bool:
@@ -74,7 +83,7 @@ def _brings(folder: Path, package: str) -> bool:
     return re.search(rf'^"?{re.escape(package)}(/|\.[^/\n]*(py|so|pyd),)', record, re.MULTILINE) is not None
 
 
-def installed_distributions(paths: list[str]) -> dict[str, str]:
+def installed_distributions(paths: Iterable[str]) -> dict[str, str]:
     """Return name -> version of everything installed along `paths`, read off the names of the folders that say so."""
     found: dict[str, str] = {}
     for path in paths:

@@ -14,15 +14,7 @@ from tactbench.core.matrix.keys import Fixed, Keys, Section, configuration_of
 from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.recorded import Recorded
-
-
-@dataclass(frozen=True)
-class Material:
-    """The recordings of one cell."""
-
-    paths: tuple[Path, ...]
-    orders: tuple[Order, ...] = ()
-    """How they are made; empty if they were made elsewhere."""
+from tactbench.core.matrix.store import Store
 
 
 @dataclass(frozen=True)
@@ -50,28 +42,39 @@ def recording_entry(order: Order, keys: Keys) -> Entry:
 
 
 def explain(
-    cell: Cell, material: Material, keys: Keys, recorded: Recorded, book: KeyBook, folder: Path, known: str
+    cell: Cell,
+    paths: Sequence[Path],
+    orders: Sequence[Order],
+    keys: Keys,
+    recorded: Recorded,
+    book: KeyBook,
+    store: Store,
+    known: str,
 ) -> Explanation:
     """Say whether the result of `cell` would be reused, and what differs.
 
     Parameters
     ----------
+    paths
+        Its recordings, whether they are there or not.
+    orders
+        How they are made; none if they were made elsewhere.
     known
         Key of the latest result of that name, or nothing.
     """
     now = _sections(keys.answer(cell), _configuration(cell))
-    missing = [path for path in material.paths if not path.exists()]
+    missing = [path for path in paths if not path.exists()]
     before = book.sections(cell.name, known) if known else book.sections(cell.name)
-    if missing or not material.paths:
+    if missing or not paths:
         reasons = differences({name: part for name, part in (before or {}).items() if name != "data"}, now)
         reasons = reasons if before else []
-        return Explanation("", False, (*reasons, *_unmade(material, missing, keys, book)))
+        return Explanation("", False, (*reasons, *_unmade(paths, orders, missing, keys, book)))
     try:
-        key = keys.of_cell(cell, [recorded.digest(path) for path in material.paths])
-        now["data"] = _plain(_data(material.paths, recorded, folder))
+        key = keys.of_cell(cell, [recorded.digest(path) for path in paths])
+        now["data"] = _plain(_data(paths, recorded, store.folder))
     except TactbenchError as error:
         return Explanation("", False, (str(error),))
-    if key == known:
+    if key == known or store.finished(key) is not None:
         return Explanation(key, True, ())
     if before is None:
         said = "" if not known else "What the result that is there was made of is not recorded in this folder."
@@ -79,15 +82,17 @@ def explain(
     return Explanation(key, False, tuple(differences(before, now)))
 
 
-def _unmade(material: Material, missing: Sequence[Path], keys: Keys, book: KeyBook) -> list[str]:
+def _unmade(
+    paths: Sequence[Path], orders: Sequence[Order], missing: Sequence[Path], keys: Keys, book: KeyBook
+) -> list[str]:
     """Say why recordings have to be made; a reason that several share is said once."""
-    if not material.paths:
+    if not paths:
         return ["There are no recordings of it."]
-    if not material.orders:
+    if not orders:
         return [f"recording {path} is not there" for path in missing]
     reasons: dict[str, None] = {}
     never: list[str] = []
-    for order in material.orders:
+    for order in orders:
         if order.path not in missing:
             continue
         entry = recording_entry(order, keys)
@@ -97,7 +102,7 @@ def _unmade(material: Material, missing: Sequence[Path], keys: Keys, book: KeyBo
             continue
         found = differences(before, _sections(entry.fixed, entry.configuration))
         reasons.update(dict.fromkeys(found or [f"recording {order.scene.name} was removed"]))
-    said = [f"{len(never)} of {len(material.orders)} recordings were never made, {never[0]} first"] if never else []
+    said = [f"{len(never)} of {len(orders)} recordings were never made, {never[0]} first"] if never else []
     return [*said, *reasons]
 
 

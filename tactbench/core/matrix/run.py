@@ -7,22 +7,22 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from tactbench.core.errors import NotApplicable, UsageError
-from tactbench.core.matrix.execution import InProcess, Job, Workers, prepare, record, rig_of, solve, workers
+from tactbench.core.errors import NotApplicable
+from tactbench.core.matrix.execution import InProcess, Job, Workers, prepare, record, solve, workers
 from tactbench.core.matrix.explanation import beside, cell_entry, recording_entry
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import Keys, keys_of
-from tactbench.core.matrix.material import Need, Order, need_of, on_the_shelf, orders_for, sensors_on, serving
-from tactbench.core.matrix.plan import Cell, plan_cells
+from tactbench.core.matrix.material import Order
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.planned import Needed, planned
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.provenance import gather
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
-from tactbench.core.plugins.interfaces import Shelf
-from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.plugins.registry import installed
 from tactbench.core.recording.format import partial_path
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
@@ -106,57 +106,21 @@ def carry_out(
     sources = SourceDigests(store.folder / "cache" / "sources.json")
     recorded = Recorded(store.folder / "cache" / "recordings.json")
     book = KeyBook(store.folder / "cache" / "keys")
-    cells, material = _material(matrix, registry, sources, store, recordings, recorded)
+    cells, material = planned(matrix, registry, sources, store, recordings, recorded)
     keys = keys_of(registry, sources)
     troubles = _acquire(cells, material, keys, book, jobs, told)
     with workers(jobs) as crew:
         rows, computed = _evaluate(cells, material, troubles, crew, jobs, keys, book, store, told)
+    fill_baselines(rows)
+    provenance = gather(sources, seed=matrix.seed, jobs=jobs)
     sources.save()
     recorded.save()
-    fill_baselines(rows)
-    provenance = gather()
-    provenance["jobs"] = jobs
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, computed, recorded.number_made, used)
 
 
-@dataclass
-class _Material:
-    orders: dict[Need, list[Order]]
-    shelf: dict[Need, list[Path]]
-    recorded: Recorded
-
-    def paths(self, cell: Cell) -> list[Path]:
-        wanted = need_of(cell)
-        return self.shelf.get(wanted) or [order.path for order in self.orders.get(wanted, ())]
-
-
-def _material(
-    matrix: MatrixSpec,
-    registry: Registry,
-    sources: SourceDigests,
-    store: Store,
-    recordings: Path | None,
-    recorded: Recorded,
-) -> tuple[list[Cell], _Material]:
-    rig = rig_of(matrix.rig, registry, recordings)
-    if hasattr(rig, "recordings"):
-        found = on_the_shelf(cast(Shelf, rig), recorded)
-        cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
-        shelf = {
-            wanted: serving(registry.tasks[wanted[1]].spec, wanted[2], found[wanted[0]])
-            for wanted in dict.fromkeys(need_of(cell) for cell in cells)
-        }
-        return cells, _Material({}, shelf, recorded)
-    if not matrix.sensors:
-        raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
-    sensors = [registry.sensors[name].name for name in matrix.sensors]
-    cells = plan_cells(matrix, sensors, registry)
-    return cells, _Material(orders_for(cells, registry, sources, store, matrix.simulation), {}, recorded)
-
-
 def _acquire(
-    cells: Sequence[Cell], material: _Material, keys: Keys, book: KeyBook, jobs: int, told: Progress
+    cells: Sequence[Cell], material: Needed, keys: Keys, book: KeyBook, jobs: int, told: Progress
 ) -> dict[Path, BaseException]:
     """Make the recordings that are missing; return what went wrong, by path.
 
@@ -203,7 +167,7 @@ def _import_estimators(cells: Sequence[Cell]) -> None:
 
 def _evaluate(
     cells: Sequence[Cell],
-    material: _Material,
+    material: Needed,
     troubles: dict[Path, BaseException],
     crew: Workers,
     jobs: int,
