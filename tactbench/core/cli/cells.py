@@ -91,7 +91,13 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
             cell = cell_of(row)
             paths, orders = _material(cell, row, registry, sources, store)
             return Subject(store, keys, sources, recorded, cell, row, paths, orders)
-    matrix, folder = matrix_asked(registry, **(options or {}))
+    asked = dict(options or {})
+    if not asked["config"] and any(given in name for name in rows):
+        given = meant(given, list(rows), known)
+        # The options change how the cell was asked; what they do not mention stays.
+        was = {"sensors": (rows[given]["sensor"],), "tasks": (rows[given]["task"],), "rig": rows[given]["rig"]}
+        asked |= {name: value for name, value in was.items() if not asked[name]}
+    matrix, folder = matrix_asked(registry, **asked)
     cells, needed = planned(matrix, registry, sources, store, folder, recorded)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
     made = tuple(needed.orders.get(need_of(cell), ()))

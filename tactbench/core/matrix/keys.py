@@ -11,10 +11,10 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
+from tactbench.core.matrix.distributions import installed_distributions, normal
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.source import Source, SourceDigests
 from tactbench.core.plugins.registry import Registry
@@ -139,13 +139,9 @@ def configuration_of(cell: Cell) -> Section:
 @lru_cache(maxsize=8)
 def versions(more: tuple[str, ...] = ()) -> dict[str, str]:
     """Return the versions that may change a number: Python's, those of `RELEVANT` and of the distributions `more`."""
+    installed = installed_distributions(sys.path)
     found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    for name in (*RELEVANT, *more):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "missing"
-    return found
+    return found | {name: installed.get(normal(name), "missing") for name in (*RELEVANT, *more)}
 
 
 def _fixed(source: Source, distributions: tuple[str, ...], **descriptors: Section) -> Fixed:

@@ -8,8 +8,8 @@ from itertools import product
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called
-from tactbench.core.evaluation.splits import shots
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.scene import Simulation

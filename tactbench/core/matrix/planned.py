@@ -49,7 +49,8 @@ def planned(
     UsageError
         If the matrix asks for something that is not there.
     """
-    rig = rig_of(matrix.rig, registry, recordings)
+    # A simulated rig is no shelf: it is built when it has something to record.
+    rig = None if registry.rigs[matrix.rig].simulated else rig_of(matrix.rig, registry, recordings)
     if hasattr(rig, "recordings"):
         found = on_the_shelf(cast(Shelf, rig), recorded)
         cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)

@@ -23,7 +23,6 @@ from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import installed
-from tactbench.core.recording.format import partial_path
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
 
@@ -153,6 +152,8 @@ def _acquire(
                 for order, outcome in crew.each(record, missing[1:], meanwhile=lambda: _import_estimators(cells)):
                     note(order, outcome)
     except BaseException:
+        from tactbench.core.recording.format import partial_path
+
         # Workers that were ended in the middle could not tidy up behind themselves.
         for order in missing:
             partial_path(order.path).unlink(missing_ok=True)
