@@ -16,7 +16,7 @@ def replace_file(path: Path, content: bytes) -> None:
     OSError
         If the folder cannot be written; nothing is left behind.
     """
-    if _holds(path, content):
+    if content and _holds(path, content):
         return
     aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:

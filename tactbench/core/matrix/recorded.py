@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,10 +26,12 @@ class Recorded:
     ----------
     memory
         A JSON file that remembers what was read, so that a run in which nothing is new opens none; it may be lost.
+    clock
+        As for `FileMemory`.
     """
 
-    def __init__(self, memory: Path) -> None:
-        self._memory = FileMemory(memory)
+    def __init__(self, memory: Path, clock: Callable[[], int] = time.time_ns) -> None:
+        self._memory = FileMemory(memory, clock)
         self._digests: dict[Path, str] = {}
         self._made: dict[Path, os.stat_result | None] = {}
 
