@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import sys
 import tempfile
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,7 +79,8 @@ def _compute(found: Subject) -> Again:
             elsewhere = Store(Path(place))
             made = orders_for([found.cell], installed(), found.sources, elsewhere, found.cell.simulation)
             orders = made[need_of(found.cell)]
-        return compute_again(found.cell, row, found.store, before or found.paths, orders, remark)
+        with redirect_stdout(sys.stderr):  # what a plugin prints is no result
+            return compute_again(found.cell, row, found.store, before or found.paths, orders, remark)
 
 
 def _text(facts: dict[str, Any]) -> str:

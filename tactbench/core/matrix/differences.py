@@ -45,11 +45,18 @@ def _section(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Itera
         within = "" if name in ("configuration", "versions") else f"{name}: "
         flat_old, flat_new = dict(_flat(old)), dict(_flat(new))
         for place in sorted({*flat_old, *flat_new}):
+            if _filled(place, flat_old) or _filled(place, flat_new):
+                continue
             if flat_old.get(place, _NONE) != flat_new.get(place, _NONE):
                 yield f"{within}{place} {_shown(flat_old.get(place, _NONE))} -> {_shown(flat_new.get(place, _NONE))}"
 
 
 _NONE = object()
+
+
+def _filled(place: str, facts: Mapping[str, Any]) -> bool:
+    """Return whether there is something inside `place`: that is told instead."""
+    return any(name.startswith((f"{place}.", f"{place}[") if place else "") and name != place for name in facts)
 
 
 def _digest(recording: Any) -> Any:
