@@ -129,6 +129,15 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
     }
 
 
+def reused(known: Row, cell: Cell, task: TaskSpec) -> Row:
+    """Return the row of a finished cell as `cell` names it today, beside what is published today.
+
+    Its key covers neither: they change no number of ours.
+    """
+    named = {"cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
+    return {**known, **named, **_published(cell, task, known["split"])}
+
+
 def _published(cell: Cell, task: TaskSpec, split: str | None) -> Row:
     """Return the published figure that the cell may stand beside: one of ours with its defaults only."""
     found = task.published_for(cell.sensor, cell.protocol, cell.estimator, split)

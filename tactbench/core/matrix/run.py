@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import NotApplicable
+from tactbench.core.matrix.answer import reused
 from tactbench.core.matrix.execution import InProcess, Job, Workers, prepare, record, solve, workers
 from tactbench.core.matrix.explanation import beside, cell_entry, recording_entry
 from tactbench.core.matrix.key_book import KeyBook
@@ -196,7 +197,7 @@ def _evaluate(
                 trouble = error
         known = store.finished(found[cell.name]) if trouble is None else None
         if known is not None and known["status"] == "done":
-            rows[cell.name] = {**known, "cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
+            rows[cell.name] = reused(known, cell, installed().tasks[cell.task].spec)
         else:
             waiting.append((cell, tuple(paths), trouble))
     if waiting:
