@@ -15,8 +15,13 @@
     │   ├── UnwritableError           the place for it refuses: exit code 2
     │   └── MappingError              (also ValueError) a foreign table does not fit its mapping: exit code 2
     ├── RigError                      a rig cannot carry out a scene
-    └── DataError                     (also ValueError) recordings cannot become X and y
-        └── NotApplicable             the cell is skipped, with this reason
+    ├── DataError                     (also ValueError) recordings cannot become X and y
+    │   └── NotApplicable             the cell is skipped, with this reason
+    └── CellStopped                   a cell or a recording ended without a result (carries status, signal and log)
+        ├── Raised                    something of no kind of ours was raised in another process
+        ├── Crashed                   its process was ended by a signal, or ended itself
+        ├── TimedOut                  it took longer than it may
+        └── OutOfMemory               it took more memory than it may, or than there is
 
 Every message names what was given, what was expected and the next step.
 """
@@ -25,6 +30,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
+from typing import Literal
 
 
 class TactbenchError(Exception):
@@ -39,6 +45,8 @@ class TactbenchError(Exception):
     """
 
     exit_code = 1
+    traceback_text = ""
+    """Where it was raised, if that was in another process."""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
@@ -151,3 +159,77 @@ class DataError(TactbenchError, ValueError):
 
 class NotApplicable(DataError):  # noqa: N818  (a result, not a failure)
     """The cell does not apply: its row says ``skipped`` and this reason."""
+
+
+class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
+    """A cell or a recording ended without a result.
+
+    Parameters
+    ----------
+    message, hint
+        As of every error.
+    signal
+        Number of the signal that ended its process, if one did.
+    log
+        The end of what it had printed.
+    traceback_text
+        Where it was, as far as that is known.
+
+    Attributes
+    ----------
+    spent_s
+        Seconds until it ended; None: not known.
+    """
+
+    status: Literal["failed", "crashed", "timeout", "out-of-memory"] = "crashed"
+
+    def __init__(
+        self, message: str, *, hint: str = "", signal: int | None = None, log: str = "", traceback_text: str = ""
+    ) -> None:
+        super().__init__(message, hint=hint)
+        self.signal = signal
+        self.log = log
+        self.spent_s: float | None = None
+        self.traceback_text = traceback_text
+
+    def __reduce__(self) -> tuple[object, ...]:
+        told = (self.message, self.hint, self.signal, self.log, self.traceback_text, self.spent_s)
+        return (_stopped, (type(self), *told))
+
+
+def _stopped(
+    kind: type[CellStopped],
+    message: str,
+    hint: str,
+    signal: int | None,
+    log: str,
+    traceback_text: str,
+    spent_s: float | None,
+) -> CellStopped:
+    error = kind(message, hint=hint, signal=signal, log=log, traceback_text=traceback_text)
+    error.spent_s = spent_s
+    return error
+
+
+class Raised(CellStopped):
+    """Something of no kind of ours was raised in another process; the message names its type."""
+
+    status = "failed"
+
+
+class Crashed(CellStopped):
+    """Its process was ended by a signal, or ended itself."""
+
+    status = "crashed"
+
+
+class TimedOut(CellStopped):
+    """It took longer than it may."""
+
+    status = "timeout"
+
+
+class OutOfMemory(CellStopped):
+    """It took more memory than it may, or than there is."""
+
+    status = "out-of-memory"

@@ -8,37 +8,51 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.engines import choice_of, engine_options
 from tactbench.core.cli.selection import matrix_asked, selecting_options
 from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
+    from tactbench.core.matrix.engines.choice import EngineName
     from tactbench.core.matrix.run import Outcome
 
 
 @click.command(name="run")
 @selecting_options
-@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
+@engine_options
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, /, jobs: int, out: Path, shape: str, **asked: Any) -> None:
+def command(
+    ctx: click.Context,
+    /,
+    out: Path,
+    shape: str,
+    engine: EngineName | None,
+    jobs: int,
+    timeout: float | None,
+    memory: int | None,
+    scheduler: str | None,
+    **asked: Any,
+) -> None:
     """Acquire, evaluate, rank.
 
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.
     """
     one_thread()
-    from tactbench.core.cli.screen import progress
+    from tactbench.core.cli.progress import progress
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
 
     matrix, folder = matrix_asked(installed(), **asked)
+    choice = choice_of(matrix, engine=engine, jobs=jobs, timeout=timeout, memory=memory, scheduler=scheduler)
     store = Store(out)
     with progress() as told:
-        outcome = run_matrix(matrix, store, jobs=jobs, recordings=folder, progress=told)
+        outcome = run_matrix(matrix, store, choice=choice, recordings=folder, progress=told)
     print_rows(outcome.rows, shape)
     if shape == "table":
         _side_by_side(outcome)
@@ -59,6 +73,7 @@ def _side_by_side(outcome: Outcome) -> None:
 def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:
     """Write the table's files; say where they are and what to try next."""
     from tactbench.core.cli.screen import remark
+    from tactbench.core.cli.stopped import tell_stopped
     from tactbench.core.leaderboard.formats import FORMATS as TEXTS
     from tactbench.core.matrix.files import replace_file
 
@@ -68,8 +83,7 @@ def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:
     remark(f"\n{cells - outcome.computed} of {cells} cells were found finished, {outcome.computed} computed now; "
            f"{outcome.recorded} recordings made now.")  # fmt: skip
     remark(f"Files: {folder}/leaderboard.md, .csv, .json; scores.json; recordings/; cells/; run.json")
-    for row in outcome.failures:
-        remark(f"Failed: {row['cell']}: {row['reason']}")
+    tell_stopped(outcome.failures, folder)
     if shape == "table":
         _suggest(outcome.rows[0])
 

@@ -8,11 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from tactbench.core.matrix.execution import record, solve
+from tactbench.core.matrix.acquiring import record
+from tactbench.core.matrix.engines.in_process import InProcess
+from tactbench.core.matrix.leaving import SEED_DECIDES
 from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.recorded import Recorded
-from tactbench.core.matrix.run import SEED_DECIDES
+from tactbench.core.matrix.solving import Job, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.samples import Answers
 from tactbench.core.spec.scene import Role
@@ -70,7 +72,9 @@ def compute_again(
     if orders and trouble is None:
         found += _recordings(paths, [(order.scene.name, made[order.path]) for order in orders])
     told(f"evaluating {cell.name}")
-    row, sets = solve((cell, tuple(order.path for order in orders) or tuple(paths), trouble))
+    job: Job = (cell, tuple(order.path for order in orders) or tuple(paths), trouble)
+    ((_, outcome),) = InProcess().each(solve, [job])
+    row, sets = (unanswered(cell, outcome), {}) if isinstance(outcome, BaseException) else outcome
     found += _rows(before, row)
     if row["status"] == "done" and before["status"] == "done":
         found += _answers(store.answers(before["key"]), sets)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tactbench.core.errors import NotApplicable, TactbenchError
+from tactbench.core.errors import CellStopped, NotApplicable, TactbenchError
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import Registry
@@ -32,7 +32,13 @@ def answer(
     dataset: Callable[[str, tuple[Path, ...]], Dataset],
     working: Callable[[str], None] | None = None,
 ) -> Answer:
-    """Evaluate one cell; an exception becomes a row that says ``failed`` or ``skipped``."""
+    """Evaluate one cell; an exception becomes a row that says ``failed`` or ``skipped``.
+
+    Raises
+    ------
+    MemoryError
+        It is the engine that knows whether the cell took too much or there was too little.
+    """
     from tactbench.core.evaluation.cell import evaluate
 
     task = registry.tasks[cell.task].spec
@@ -54,8 +60,10 @@ def answer(
         )
     except NotApplicable as reason:
         return {**row, "status": "skipped", "reason": str(reason)}, {}
+    except MemoryError:
+        raise
     except Exception as error:
-        return failed(row, error), {}
+        return stopped(row, error), {}
     metas = [material.metas[place] for place in range(len(material.metas))]
     row.update(_told_by(metas))
     row.update(_scored(result))
@@ -148,10 +156,23 @@ def _published(cell: Cell, task: TaskSpec, split: str | None) -> Row:
     return {"published": found.score, "published_reference": found.reference, "published_remark": remark}
 
 
-def failed(row: Row, error: BaseException) -> Row:
-    """Return `row` saying how the cell failed."""
-    said = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-    return {**row, "status": "failed", "reason": said, "traceback": "".join(traceback.format_exception(error))}
+def stopped(row: Row, error: BaseException) -> Row:
+    """Return `row` saying how the cell was stopped; an exception that is no engine's word makes it ``failed``."""
+    said = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {_text(error)}"
+    where = error.traceback_text if isinstance(error, TactbenchError) else ""
+    if not where and error.__traceback__ is not None:
+        where = "".join(traceback.format_exception(error))
+    row = {**row, "status": "failed", "reason": said.rstrip(": "), "traceback": where}
+    if isinstance(error, CellStopped):
+        row |= {"status": error.status, "signal": error.signal, "log": error.log, "wall_s": error.spent_s}
+    return row
+
+
+def _text(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:
+        return "(its text cannot be read)"
 
 
 def _told_by(metas: Sequence[RecordingMeta]) -> Row:

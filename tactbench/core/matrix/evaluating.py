@@ -1,0 +1,150 @@
+"""Answering the cells: those that are finished are found again, the others go to an engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import CellStopped, PluginContractError
+from tactbench.core.matrix.answer import reused
+from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.explanation import beside, cell_entry
+from tactbench.core.matrix.in_flight import InFlight
+from tactbench.core.matrix.key_book import KeyBook
+from tactbench.core.matrix.keys import Keys
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.planning import Material
+from tactbench.core.matrix.preloading import import_estimators, shared
+from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.reading import read_apart
+from tactbench.core.matrix.recorded import read_digest
+from tactbench.core.matrix.solving import Job, solve, unanswered
+from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.status import STOPPED
+
+
+@dataclass
+class Evaluated:
+    """The rows so far."""
+
+    rows: dict[str, Row] = field(default_factory=dict)
+    """By name of the cell."""
+    computed: int = 0
+    """Cells computed now; the others were found finished."""
+
+
+def evaluate_all(
+    cells: Sequence[Cell],
+    material: Material,
+    choice: EngineChoice,
+    registry: Registry,
+    keys: Keys,
+    book: KeyBook,
+    store: Store,
+    told: Progress,
+) -> Evaluated:
+    """Give every cell its row: found in `store`, computed now, or saying why it could not be."""
+    done = Evaluated()
+    known_as: dict[str, str] = {}
+    waiting: list[Job] = []
+    digests = _digests(cells, material, choice)
+    for cell in cells:
+        paths = material.paths(cell)
+        trouble = material.trouble(cell) or next((d for p in paths if isinstance(d := digests[p], BaseException)), None)
+        if trouble is None:
+            try:
+                known_as[cell.name] = keys.of_cell(cell, [str(digests[path]) for path in paths])
+            except Exception as error:
+                trouble = error
+        known = store.finished(known_as[cell.name]) if trouble is None else None
+        if known is not None and known["status"] == "done":
+            done.rows[cell.name] = reused(known, cell, registry.tasks[cell.task].spec)
+        else:
+            waiting.append((cell, tuple(paths), trouble))
+    done.computed = len(waiting)
+    if waiting:
+        book.write(
+            cell_entry(cell, known_as[cell.name], keys, paths, material.recorded, store.folder)
+            for cell, paths, trouble in waiting
+            if trouble is None
+        )
+        _compute(waiting, known_as, choice, store, told, done)
+    return done
+
+
+def _digests(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> dict[Path, str | BaseException]:
+    """Return the content digest of every recording, or why it has none; those made now are known already."""
+    wanted = {path: None for cell in cells if material.trouble(cell) is None for path in material.paths(cell)}
+    found = material.recorded.digests(list(wanted), lambda unknown: read_apart(read_digest, unknown, choice))
+    return {**{path: "" for cell in cells for path in material.paths(cell)}, **found}
+
+
+def _compute(
+    waiting: list[Job], keys: dict[str, str], choice: EngineChoice, store: Store, told: Progress, done: Evaluated
+) -> None:
+    jobs = [job for job in waiting if job[2] is None]
+    marks = InFlight(store.folder)
+    if len(jobs) == 1 and choice.here(1) and marks.ended_a_run(keys[jobs[0][0].name]):
+        choice = EngineChoice("isolated", 1, choice.limits)
+    here = choice.here(len(jobs))
+    told.begin("evaluating", len(waiting), alone=here)
+    work = partial(solve, concurrency=choice.concurrency(len(jobs)), working=told.working if here else None)
+    engine = choice.engine(len(jobs))
+    hopeless: Iterator[tuple[Job, Any]] = (
+        (job, (unanswered(job[0], job[2]), {})) for job in waiting if job[2] is not None
+    )
+    for job, outcome in _each(hopeless, engine.each(work, _marked(_ordered(jobs, choice), marks, keys, here))):
+        cell = job[0]
+        row, sets = _judged(cell, outcome)
+        row["key"] = keys.get(cell.name, "")
+        row["recordings"] = [beside(Path(path), store.folder) for path in row["recordings"]]
+        if row["status"] == "done":
+            store.keep(row["key"], row, sets)
+        done.rows[cell.name] = row
+        marks.clear()
+        told.advance(cell.name, stopped=row["status"] in STOPPED)
+
+
+def _each(*several: Iterable[tuple[Job, Any]]) -> Iterator[tuple[Job, Any]]:
+    for some in several:
+        yield from some
+
+
+def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
+    """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
+    groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
+    for job in jobs:
+        groups.setdefault((job[0].task, job[1]), []).append(job)
+    if choice.shares(len(jobs)):
+        return shared(groups, choice)
+    if choice.forks(len(jobs)):
+        import_estimators([job[0] for job in jobs], choice)
+    return [job for group in groups.values() for job in group]
+
+
+def _marked(jobs: Iterable[Job], marks: InFlight, keys: dict[str, str], here: bool) -> Iterator[Job]:
+    """Yield `jobs`; where a cell may end this process, note each before it begins."""
+    for job in jobs:
+        if here:
+            marks.set(keys[job[0].name])
+        yield job
+
+
+def _judged(cell: Cell, outcome: Any) -> tuple[Row, Any]:
+    """Return the row and answers of a cell; what stopped it, or what is wrong with them, makes the row."""
+    if isinstance(outcome, BaseException):
+        return unanswered(cell, outcome), {}
+    from tactbench.core.matrix.checking import fault_in
+
+    fault = fault_in(outcome, unanswered(cell, CellStopped("")))
+    if fault:
+        error = PluginContractError(
+            f"The cell's result is not one: {fault}.", hint="Its estimator or task is at fault."
+        )
+        return unanswered(cell, error), {}
+    row, sets = outcome
+    return row, sets

@@ -1,0 +1,21 @@
+"""What is installed in this process: the registry, and rigs built from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tactbench.core.errors import RigError
+from tactbench.core.plugins.interfaces import Rig, RigContext, Shelf
+from tactbench.core.plugins.registry import Registry, load_object
+from tactbench.core.plugins.registry import installed as installed
+
+
+def rig_of(name: str, registry: Registry, recordings: Path | None = None) -> Rig | Shelf:
+    """Build the rig called `name`."""
+    descriptor = registry.rigs[name]
+    built = load_object(descriptor.where)(RigContext(effects=tuple(registry.effects), recordings=recordings))
+    if not (hasattr(built, "open") or hasattr(built, "recordings")):
+        raise RigError(
+            f"The rig {name!r} has neither open() nor recordings().", hint="See docs/plugins.md: a Rig or a Shelf."
+        )
+    return built  # type: ignore[no-any-return]
