@@ -116,6 +116,7 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "chosen": {},
         "search": [],
         "recordings": [],
+        "digests": [],
         "scores": {},
         "confusion": None,
         "classes": [],

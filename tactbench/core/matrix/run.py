@@ -58,15 +58,14 @@ def run_matrix(
     recordings: Path | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Carry out `matrix` and write the files of a run: ``run.json``, ``scores.json`` and ``unfinished.json``.
+    """Carry out `matrix` and write the files of a run: ``run.json`` and ``scores.json``.
 
     The parameters are those of `carry_out`.
     """
-    outcome = carry_out(matrix, store, jobs=jobs, recordings=recordings, progress=progress)
-    store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
-    store.write("scores.json", scores_text(outcome.rows))
-    unfinished = [row for row in outcome.rows if row["status"] != "done"]
-    store.write("unfinished.json", json.dumps(unfinished, indent=1, sort_keys=True) + "\n")
+    with store.hold():
+        outcome = carry_out(matrix, store, jobs=jobs, recordings=recordings, progress=progress)
+        store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
+        store.write("scores.json", scores_text(outcome.rows))
     return outcome
 
 
@@ -97,18 +96,25 @@ def carry_out(
     ------
     UsageError
         If the matrix asks for something that is not there. Nothing has been run then.
+    FolderError
+        If another run holds the folder, or the disk refuses; what was finished before is kept.
     """
-    told = progress or Silence()
+    with store.hold():
+        return _carry_out(matrix, store, jobs, recordings, progress or Silence())
+
+
+def _carry_out(matrix: MatrixSpec, store: Store, jobs: int, recordings: Path | None, told: Progress) -> Outcome:
     registry = installed()
     sources = SourceDigests(store.folder / "cache" / "sources.json")
     cells, material = _material(matrix, registry, sources, store, recordings)
-    troubles = _acquire(cells, material, jobs, told)
-    with workers(jobs) as crew:
-        rows, computed = _evaluate(cells, material, troubles, crew, jobs, registry, sources, store, told)
-    sources.save()
-    fill_baselines(rows)
     provenance = gather()
     provenance["jobs"] = jobs
+    made_by = {"made_by": store.begin(provenance), "host": provenance["host"]}
+    troubles = _acquire(cells, material, jobs, told)
+    with workers(jobs) as crew:
+        rows, computed = _evaluate(cells, material, troubles, crew, jobs, registry, sources, store, made_by, told)
+    sources.save()
+    fill_baselines(rows)
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, computed, len(material.made), used)
 
@@ -196,6 +202,7 @@ def _evaluate(
     registry: Registry,
     sources: SourceDigests,
     store: Store,
+    made_by: Row,
     told: Progress,
 ) -> tuple[list[Row], int]:
     digests = _Digests(material.made)
@@ -218,6 +225,7 @@ def _evaluate(
         known = store.finished(keys[cell.name]) if trouble is None else None
         if known is not None and known["status"] == "done":
             rows[cell.name] = {**known, "cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
+            store.reuse(rows[cell.name])
         else:
             waiting.append((cell, tuple(paths), trouble))
     if waiting:
@@ -226,9 +234,13 @@ def _evaluate(
         for (cell, _, trouble), outcome in crew.each(work, waiting):
             row, sets = outcome if not isinstance(outcome, BaseException) else solve((cell, (), outcome))
             row["key"] = keys.get(cell.name, "")
+            row["digests"] = [digests[Path(path)] for path in row["recordings"]]
             row["recordings"] = [_beside(path, store.folder) for path in row["recordings"]]
+            row |= made_by
             if row["status"] == "done" and trouble is None:
                 store.keep(row["key"], row, sets)
+            else:
+                store.note(row)
             rows[cell.name] = row
             told.advance(cell.name)
     return [rows[cell.name] for cell in cells], len(waiting)
