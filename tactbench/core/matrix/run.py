@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
-from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.errors import NotApplicable, UnwritableError, UsageError
 from tactbench.core.matrix.execution import InProcess, Job, Workers, installed, prepare, record, rig_of, solve, workers
 from tactbench.core.matrix.keys import cell_key
 from tactbench.core.matrix.material import Need, Order, need_of, on_the_shelf, orders_for, sensors_on, serving
@@ -167,6 +167,8 @@ def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progre
     told.begin("recording", len(missing), alone=hands == 1)
 
     def note(order: Order, outcome: str | BaseException) -> None:
+        if isinstance(outcome, UnwritableError):
+            raise outcome  # the disk is no cell's fault, and refuses the next one too
         if isinstance(outcome, BaseException):
             troubles[order.path] = outcome
         else:
@@ -266,14 +268,14 @@ def fill_baselines(rows: Sequence[Row]) -> None:
     """Write the score of the first baseline of each group beside every row of the group."""
     by_group: dict[tuple[Any, ...], float] = {}
     for row in rows:
-        if row["is_baseline"] and row["status"] == "done":
+        if row.get("is_baseline") and row["status"] == "done":
             by_group.setdefault(_group(row), row["score"])
     for row in rows:
         row["baseline"] = by_group.get(_group(row))
 
 
 def _group(row: Row) -> tuple[Any, ...]:
-    return tuple(row[key] for key in ("sensor", "task", "rig", "protocol", "split", "repeat"))
+    return tuple(row.get(key) for key in ("sensor", "task", "rig", "protocol", "split", "repeat"))
 
 
 def scores_text(rows: Sequence[Row]) -> str:

@@ -13,7 +13,7 @@ from tactbench.core.errors import FolderError
 _FULL = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the quota is used up",
-    errno.EFBIG: "a file may not be that big",
+    errno.EFBIG: "a file would be larger than this process may write",
 }
 _GONE = {errno.ENOENT, errno.ESTALE, errno.ENOTDIR}
 KEPT = "What was finished before is kept"
@@ -34,15 +34,21 @@ def writing(folder: Path) -> Iterator[None]:
         raise refusal(folder, error) from error
 
 
-def refusal(folder: Path, error: OSError) -> FolderError:
-    """Return the error to raise when the system refuses to write into a result folder."""
+def refusal(folder: Path, error: OSError, *, begun: bool = True) -> FolderError:
+    """Return the error to raise when the system refuses to write into a result folder.
+
+    Parameters
+    ----------
+    begun
+        Whether it could be written before.
+    """
     number = error.errno or 0
     if number in _FULL:
         return FolderError(
             f"The folder {folder} cannot be written: {_FULL[number]}.",
             hint=f"{KEPT}: make room, and the same command goes on from there.",
         )
-    if number in _GONE:
+    if begun and number in _GONE:
         return removed(folder)
     return FolderError(
         f"The folder {folder} cannot be written: {error.strerror or error}.",

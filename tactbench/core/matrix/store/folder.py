@@ -74,7 +74,7 @@ class Store:
                 (self.folder / part).mkdir(parents=True, exist_ok=True)
             self._lock = Lock(self.folder)
         except OSError as error:
-            raise refusal(self.folder, error) from error
+            raise refusal(self.folder, error, begun=False) from error
         try:
             leftovers.sweep(self.folder)
             yield self

@@ -21,7 +21,7 @@ def sweep(folder: Path) -> int:
     for place in (folder, folder / "cells", folder / "provenance", folder / "cache"):
         for path in _files(place):
             named = _ASIDE.fullmatch(path.name)
-            if named and not _lives(int(named[1])):
+            if named and not alive(named[1]):
                 swept += _remove(path)
     for sensor in _folders(folder / "recordings"):
         swept += sum(_sweep_recording(path) for path in _files(sensor) if path.suffix != ".h5")
@@ -63,9 +63,12 @@ def _remove(path: Path) -> int:
     return 0
 
 
-def _lives(process: int) -> bool:
+def alive(process: str) -> bool:
+    """Return whether the process of this number lives; text that is no number is taken for one that does."""
+    if not process.isdecimal() or int(process) > 2**31:
+        return True
     try:
-        os.kill(process, 0)
+        os.kill(int(process), 0)
     except ProcessLookupError:
         return False
     except OSError:

@@ -33,3 +33,15 @@ def kept(store, cell: str, score: float = 1.0, **more):
 
 PLAN = [{"effect": f"effect {number}", "reason": "called for by a test, at length"} for number in range(6)]
 """Big enough to be shared."""
+
+
+def whole(cell: str, score: float = 1.0, **more):
+    """Return a finished row with every key of the format."""
+    from tactbench.core.matrix.answer import opening
+    from tactbench.core.matrix.plan import Cell
+    from tactbench.core.plugins.registry import load_registry
+
+    task = load_registry().tasks["force"].spec
+    row = opening(Cell("icub", "force", "twin", "karl2016", "roles", "mean", (), False, 1, 1, 1), task)
+    scored = {"score": score, "ci_low": score, "ci_high": score, "n_recordings": 1, "n_sessions": 1, "n_test": 3}
+    return {**row, **scored, "cell": cell, "status": "done", "simulated": True, "key": key(cell), **more}
