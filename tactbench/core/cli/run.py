@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
 @click.option("--probe", is_flag=True, help="Also ask what the recordings give away: first frame alone, shuffled rows.")
+@click.option("--latency/--no-latency", default=None, help="Measure how long one row takes, up to 0.3 s a cell.")
 @simulation_options
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
@@ -61,6 +62,7 @@ def command(
     out: Path,
     shape: str,
     probe: bool,
+    latency: bool | None,
     recordings: Path | None,
     effects: str | None,
     rung: str | None,
@@ -81,6 +83,8 @@ def command(
     simulation = simulation_of(load_registry(), matrix.rig, effects=effects, rung=rung, tolerance=tolerance)
     if probe:
         matrix = matrix.model_copy(update={"probe": True})
+    if latency is not None:
+        matrix = matrix.model_copy(update={"latency": latency})
     if simulation is not None:
         matrix = matrix.model_copy(update={"simulation": simulation})
     folder = recordings or (Path(matrix.recordings) if matrix.recordings else None)

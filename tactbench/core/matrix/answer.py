@@ -46,6 +46,7 @@ def answer(
             threads=1,
             progress=working,
             dataset=material,
+            latency=cell.latency,
         )
     except NotApplicable as reason:
         return {**row, "status": "skipped", "reason": str(reason)}, {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -76,7 +77,9 @@ def workers(jobs: int) -> Iterator[Workers]:
     if jobs == 1:
         yield InProcess()
         return
-    pool = ProcessPoolExecutor(jobs, mp_context=get_context(_start_method()))
+    pool = ProcessPoolExecutor(
+        jobs, mp_context=get_context(_start_method()), initializer=_end_with, initargs=(os.getpid(),)
+    )
     try:
         yield Processes(pool)
     except BaseException:
@@ -85,6 +88,16 @@ def workers(jobs: int) -> Iterator[Workers]:
             process.terminate()
         raise
     pool.shutdown()
+
+
+def _end_with(parent: int) -> None:
+    """Let the kernel end this worker when its run is killed: an orphan would wait for work, or record, for ever."""
+    import ctypes
+
+    with suppress(OSError, AttributeError, TypeError):  # not Linux: it waits, and holds nothing
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG, see prctl(2)
+    if os.getppid() != parent:
+        os._exit(1)  # it was killed before this was asked for
 
 
 def _start_method() -> str:

@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -248,6 +249,7 @@ def _evaluate(
     return [rows[cell.name] for cell in cells], len(waiting)
 
 
+@lru_cache(maxsize=4096)
 def _beside(path: str, folder: Path) -> str:
     """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
     inside = Path(path).is_relative_to(folder)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.errors import FormatError, RecordingError
 from tactbench.core.matrix.files import replace_file
 from tactbench.core.matrix.store import leftovers, limits
-from tactbench.core.matrix.store.disk import refusal, removed, sync_folder, writing
+from tactbench.core.matrix.store.disk import refusal, removed, sync_all, sync_folder, writing
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
 from tactbench.core.matrix.store.rows import NAMING, Row
@@ -25,9 +25,11 @@ if TYPE_CHECKING:
     from tactbench.core.spec.scene import Role
 
 _PARTS = ("recordings", "cells", "provenance", "cache")
-_SYNC_EVERY_S = 1.0
-"""A shard's bytes are on the disk before it gets its name. The names follow at most so much later: a power cut in
-between costs the cells of this second, never a wrong one."""
+_SYNC_EVERY_S = 0.1
+"""Cells that take longer are on the disk, bytes and name, before the next one begins. Where many end within this time
+they are synced together: each for itself would take longer than all else that is done for a small cell. A power cut may
+then leave files with a name and without their bytes; the next run, which sees that this one broke off, reads every
+shard again before it believes one. A process that is killed loses nothing either way."""
 
 
 class Store:
@@ -50,7 +52,7 @@ class Store:
         self._latest: dict[str, Entry] = {}
         self._orphans: list[Entry] = []
         self._provenance = ("", "{}")
-        self._synced = 0.0
+        self._synced, self._unsynced = -_SYNC_EVERY_S, 0
         self._followed: dict[tuple[str, str], bool] = {}
 
     # One run at a time
@@ -77,9 +79,14 @@ class Store:
             raise refusal(self.folder, error, begun=False) from error
         try:
             leftovers.sweep(self.folder)
-            yield self
-            with suppress(OSError):
-                sync_folder(self.folder / "cells")
+            if self._lock.broke_off:
+                self._distrust()
+            try:
+                yield self
+            finally:
+                if self._unsynced and self._lock.in_place():
+                    with suppress(OSError):
+                        self._sync()
         finally:
             self._lock.release()
             self._lock = None
@@ -132,18 +139,22 @@ class Store:
         with self._written():
             if self._lock is None:
                 path.parent.mkdir(parents=True, exist_ok=True)
+            due = time.monotonic() - self._synced >= _SYNC_EVERY_S
             try:
                 with aside.open("wb") as file:
                     file.write(image)
-                    file.flush()
-                    os.fsync(file.fileno())
+                    if due:
+                        file.flush()
+                        os.fsync(file.fileno())
                 ledger.append(entry)
                 aside.replace(path)
             except BaseException:
                 with suppress(OSError):
                     aside.unlink(missing_ok=True)
                 raise
-            self._sync()
+            self._unsynced += 1
+            if due:
+                self._sync()
         self._place(entry)
 
     def note(self, row: Row) -> None:
@@ -343,10 +354,19 @@ class Store:
             yield
 
     def _sync(self) -> None:
-        now = time.monotonic()
-        if now - self._synced >= _SYNC_EVERY_S:
+        if self._unsynced > 1:
+            sync_all(self.folder / "cells")
+        else:
             sync_folder(self.folder / "cells")
-            self._synced = now
+        self._synced, self._unsynced = time.monotonic(), 0
+
+    def _distrust(self) -> None:
+        """Forget finished cells whose shards are not, byte by byte, what was written."""
+        self._read()
+        for key, entry in list(self._done.items()):
+            if self._size(key) == _bytes(entry) and self.image(entry) is None:
+                del self._done[key]
+                self._read().troubles.append(f"{entry.row['cell']!r} is computed again: its shard is damaged")
 
 
 def _bytes(entry: Entry) -> int:

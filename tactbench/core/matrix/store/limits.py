@@ -12,7 +12,7 @@ SHARED_CHARACTERS = 2**31
 """What all rows of a ledger amount to once what they share is written out in each."""
 SHARD_BYTES = 2**30
 ARRAY_BYTES = 2**30
-"""Of one column of answers, in memory: compressed bytes may claim a thousand times what they hold."""
+"""Of the answers of one role, in memory: compressed bytes may claim a thousand times what they hold."""
 PROVENANCE_BYTES = 2**20
 TEXT_CHARACTERS = 2**16
 """Of a log or a traceback, when it is written."""

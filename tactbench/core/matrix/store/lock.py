@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tactbench.core.errors import FolderError
 from tactbench.core.matrix.files import replace_file
+from tactbench.core.matrix.store.disk import sync_folder
 
 _HELD: set[int] = set()
 """Descriptors that a child must let go: else an orphaned worker would hold the folder after its run was killed."""
@@ -47,6 +48,8 @@ class Lock:
         self.works = True
         """False where the file system knows no locks."""
         self._note = folder / "cache" / "held.json"
+        self.broke_off = False
+        """Whether the last run here was killed, or the power was cut: it did not tidy up."""
         self._descriptor = os.open(folder, os.O_RDONLY)
         try:
             self.works = _flock(self._descriptor)
@@ -57,11 +60,13 @@ class Lock:
                 hint="Wait until it ends, or give another folder with --out DIR.",
             ) from error
         _HELD.add(self._descriptor)
+        self.broke_off = self._note.exists()
         # For people only: nothing is decided by this clock.
         since = time.strftime("%Y-%m-%d %H:%M:%S %z")
         about = {"pid": os.getpid(), "host": platform.node(), "since": since}
         try:
             replace_file(self._note, json.dumps(about).encode())
+            sync_folder(self._note.parent)
         except BaseException:
             self._close()
             raise

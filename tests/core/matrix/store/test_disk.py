@@ -116,7 +116,7 @@ def test_a_limit_on_the_size_of_files_is_told(tmp_path):
         "import resource, sys\nfrom pathlib import Path\nfrom tactbench.core.errors import FolderError\n"
         "from tests.core.matrix.store.made import kept\nfrom tactbench.core.matrix.store import Store\n"
         "store = Store(Path(sys.argv[1]))\nkept(store, 'a')\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000))\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500))\n"
         "try:\n    kept(store, 'b')\nexcept FolderError as error:\n    print(error)\n"
     )
     from tests.conftest import ROOT
