@@ -1,6 +1,6 @@
 """What isolation costs a cell: engine `isolated` against a bare fork and pipe, and against the engine's reused process.
 
-The process first imports what cells share (scikit-learn), as a run does. Then trivial cells, turn and turn about: a bare
+The process first imports what cells share (scikit-learn), as a run does. Then trivial cells, turn and turn about: bare
 ``os.fork`` with a pipe, written in ten lines; `Isolated`, with and without limits; `Processes`, which forks once.
 Prints medians over rounds, and the ratio to the bare fork. Bound: 20 ms per trivial cell after preload.
 
@@ -78,7 +78,9 @@ def main() -> None:
     print(f"cores {os.cpu_count()}, rounds {rounds}, {cells} cells a round; median [min, max], ms per trivial cell")
     for name, times in spent.items():
         ratio = statistics.median(a / b for a, b in zip(times, spent["bare fork and pipe"], strict=True))
-        print(f"{name:<20} {statistics.median(times):7.3f} [{min(times):.3f}, {max(times):.3f}]   x {ratio:.2f} of bare")
+        print(
+            f"{name:<20} {statistics.median(times):7.3f} [{min(times):.3f}, {max(times):.3f}]   x {ratio:.2f} of bare"
+        )
     worst = max(statistics.median(spent[name]) for name in ("isolated", "isolated, limited"))
     print(f"bound {BOUND_MS:g} ms: {'kept' if worst <= BOUND_MS else 'MISSED'}")
     sys.exit(worst > BOUND_MS)
