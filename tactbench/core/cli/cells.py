@@ -82,7 +82,7 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
     keys = keys_of(registry, sources)
     rows = {row["cell"]: row for row in store.rows()}
     known = {name: str(row.get("key", "")) for name, row in rows.items()}
-    if options is None or not any(options.values()):
+    if options is None or not any(_given(name, value) for name, value in options.items()):
         try:
             row = rows[meant(given, list(rows), known)]
         except UsageError:
@@ -103,6 +103,10 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
     made = tuple(needed.orders.get(need_of(cell), ()))
     return Subject(store, keys, sources, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)
+
+
+def _given(option: str, value: Any) -> bool:
+    return bool(value) if option == "probe" else value is not None and value != ()
 
 
 def _material(

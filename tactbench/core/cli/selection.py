@@ -30,6 +30,7 @@ _OPTIONS = (
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat."),
     click.option("--probe", is_flag=True,
                  help="Also ask what the recordings give away: first frame alone, shuffled rows."),
+    click.option("--latency/--no-latency", default=None, help="Measure how long one row takes, up to 0.3 s a cell."),
     simulation_options,
 )  # fmt: skip
 
@@ -45,6 +46,7 @@ def matrix_asked(
     registry: Registry,
     *,
     probe: bool,
+    latency: bool | None,
     recordings: Path | None,
     effects: str | None,
     rung: str | None,
@@ -62,6 +64,8 @@ def matrix_asked(
     simulation = simulation_of(registry, matrix.rig, effects=effects, rung=rung, tolerance=tolerance)
     if probe:
         matrix = matrix.model_copy(update={"probe": True})
+    if latency is not None:
+        matrix = matrix.model_copy(update={"latency": latency})
     if simulation is not None:
         matrix = matrix.model_copy(update={"simulation": simulation})
     return matrix, recordings or (Path(matrix.recordings) if matrix.recordings else None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from tactbench.core.errors import TactbenchError
@@ -127,12 +128,13 @@ def _plain(section: Section) -> Section:
 
 def _data(paths: Sequence[Path], recorded: Recorded, folder: Path) -> dict[str, dict[str, str]]:
     return {
-        name: {"digest": recorded.digest(path), "path": beside(path, folder)}
+        name: {"digest": recorded.digest(path), "path": beside(str(path), folder)}
         for name, path in zip(recording_names(paths), paths, strict=True)
     }
 
 
-def beside(path: Path, folder: Path) -> str:
+@lru_cache(maxsize=4096)
+def beside(path: str, folder: Path) -> str:
     """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
-    inside = path.is_relative_to(folder)
-    return str(path.relative_to(folder)) if inside else str(path.resolve())
+    inside = Path(path).is_relative_to(folder)
+    return str(Path(path).relative_to(folder)) if inside else str(Path(path).resolve())

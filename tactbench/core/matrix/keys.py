@@ -133,6 +133,7 @@ def configuration_of(cell: Cell) -> Section:
         "split": cell.split,
         "params": dict(cell.params),
         "seed": cell.seed,
+        **({} if cell.latency else {"latency": False}),
     }
 
 

@@ -73,6 +73,7 @@ def cell_of(row: Mapping[str, Any]) -> Cell:
             repeat=row["repeat"],
             repeats=row["repeats"],
             seed=row["seed"],
+            latency=row["status"] != "done" or row.get("latency_n") is not None,
             simulation=Simulation.model_validate(row.get("simulation", {})),
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:

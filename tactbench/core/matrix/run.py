@@ -53,15 +53,14 @@ def run_matrix(
     recordings: Path | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Carry out `matrix` and write the files of a run: ``run.json``, ``scores.json`` and ``unfinished.json``.
+    """Carry out `matrix` and write the files of a run: ``run.json`` and ``scores.json``.
 
     The parameters are those of `carry_out`.
     """
-    outcome = carry_out(matrix, store, choice=choice, recordings=recordings, progress=progress)
-    store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
-    store.write("scores.json", scores_text(outcome.rows))
-    unfinished = [row for row in outcome.rows if row["status"] != "done"]
-    store.write("unfinished.json", json.dumps(unfinished, indent=1, sort_keys=True) + "\n")
+    with store.hold():
+        outcome = carry_out(matrix, store, choice=choice, recordings=recordings, progress=progress)
+        store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
+        store.write("scores.json", scores_text(outcome.rows))
     return outcome
 
 
@@ -92,22 +91,31 @@ def carry_out(
     ------
     UsageError
         If the matrix asks for something that is not there. Nothing has been run then.
+    FolderError
+        If another run holds the folder, or the disk refuses; what was finished before is kept.
     """
-    told = progress or Silence()
     chosen = (choice or EngineChoice()).checked()
+    with store.hold():
+        return _carry_out(matrix, store, chosen, recordings, progress or Silence())
+
+
+def _carry_out(
+    matrix: MatrixSpec, store: Store, choice: EngineChoice, recordings: Path | None, told: Progress
+) -> Outcome:
     registry = installed()
     sources = SourceDigests(store.folder / "cache" / "sources.json")
     recorded = Recorded(store.folder / "cache" / "recordings.json")
     keys, book = keys_of(registry, sources), KeyBook(store.folder / "cache" / "keys")
-    cells, material = plan(matrix, registry, sources, store, recordings, recorded, chosen)
-    inherited = chosen.named(len(cells)) != "dask"
-    meanwhile = (lambda: import_estimators(cells, chosen)) if inherited else None
-    acquire_missing(material, chosen, keys, book, told, meanwhile)
-    found = evaluate_all(cells, material, chosen, registry, keys, book, store, told)
-    rows = [found.rows[cell.name] for cell in cells]
-    fill_baselines(rows)
-    provenance = gather(sources, seed=matrix.seed, jobs=chosen.jobs, engine=chosen.named(len(cells)))
+    cells, material = plan(matrix, registry, sources, store, recordings, recorded, choice)
+    provenance = gather(sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.named(len(cells)))
+    made_by = store.begin(provenance)
+    inherited = choice.named(len(cells)) != "dask"
+    meanwhile = (lambda: import_estimators(cells, choice)) if inherited else None
+    acquire_missing(material, choice, keys, book, told, meanwhile)
+    found = evaluate_all(cells, material, choice, registry, keys, book, store, made_by, told)
     sources.save()
     recorded.save()
+    rows = [found.rows[cell.name] for cell in cells]
+    fill_baselines(rows)
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, found.computed, recorded.number_made, used)

@@ -27,7 +27,7 @@ Job = tuple[Cell, tuple[Path, ...], "BaseException | None"]
 Wanted = tuple[str, tuple[Path, ...]]
 """A task and recordings."""
 
-_host = lru_cache(maxsize=1)(host_id)
+this_host = lru_cache(maxsize=1)(host_id)
 
 
 def prepare(cell: Cell) -> None:
@@ -93,7 +93,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
         return unanswered(cell, trouble), {}
     _seed_everything(cell.seed)
     row, sets = answer(cell, registry, recordings, DATASETS, working)
-    timed = {"wall_s": time.perf_counter() - began, "concurrency": concurrency, "host": _host()}
+    timed = {"wall_s": time.perf_counter() - began, "concurrency": concurrency, "host": this_host()}
     return {**row, **timed, "log": printed()}, sets
 
 

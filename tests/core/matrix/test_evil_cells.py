@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tactbench.core.matrix.store import Store
 from tests.conftest import Shell
 from tests.core.cost.test_ladder import presses
 
@@ -19,7 +20,7 @@ ENGINES = {
 }
 """Every engine that the evil cells must survive under: one place for all of them."""
 
-LIMITS = ("--timeout", "4", "--memory", "150")
+LIMITS = ("--timeout", "3", "--memory", "60")
 ASKED = ("run", "--rig", "replay", "--recordings", "shelf", "--sensor", "made", "--task", "force", "--split", "session")
 HONEST = ("ols", "mean", "time-index")
 ENDS = {
@@ -28,9 +29,9 @@ ENDS = {
     "evil-interrupt": ("failed", None, "KeyboardInterrupt"),
     "evil-abort": ("crashed", 6, "SIGABRT"),
     "evil-vanish": ("crashed", None, "exit code 0"),
-    "evil-hang": ("timeout", None, "longer than 4 s"),
-    "evil-deaf": ("timeout", None, "longer than 4 s"),
-    "evil-eat": ("out-of-memory", None, "more than 150 MB"),
+    "evil-hang": ("timeout", None, "longer than 3 s"),
+    "evil-deaf": ("timeout", None, "longer than 3 s"),
+    "evil-eat": ("out-of-memory", None, "more than 60 MB"),
     "evil-shape": ("failed", None, "answered 120 rows with shape (119,)"),
     "evil-nan": ("failed", None, "120 values that are NaN or infinite"),
     "evil-text": ("failed", None, "values of type <U"),
@@ -45,15 +46,16 @@ ENDS = {
 
 
 def run(shell, *arguments, out="out", code=1):
-    """Run and return the rows by estimator, complete as the folder keeps them, and what the command printed."""
+    """Run and return the listed rows by estimator, and what the command printed."""
     done = shell(*ASKED, *arguments, "--out", out, "--format", "json", plugins=("evil",), code=code)
     listed = json.loads(done.stdout)
     assert Counter(row["cell"] for row in listed).most_common(1)[0][1] == 1, "one row a cell"
     return {row["estimator"]: row for row in listed}, done
 
 
-def whole_rows(folder, name="unfinished.json"):
-    return {row["estimator"]: row for row in json.loads((folder / name).read_text())}
+def whole_rows(folder):
+    """Return the rows by estimator, complete as the folder keeps them."""
+    return {row["estimator"]: row for row in Store(folder).rows()}
 
 
 def processes_in(folder):
@@ -89,7 +91,9 @@ def test_every_evil_cell_has_one_row_and_the_others_are_right(engine, alone, tmp
     for name, (status, _, says) in ENDS.items():
         assert rows[name]["status"] == status, rows[name]
         assert says in rows[name]["reason"]
-    stopped = whole_rows(tmp_path / "out")
+    kept = whole_rows(tmp_path / "out")
+    assert set(kept) == set(rows), "what was written over is computed again"
+    stopped = {name: row for name, row in kept.items() if row["status"] != "done"}
     assert set(stopped) == {name for name, end in ENDS.items() if end[0] != "done"}
     for name, row in stopped.items():
         assert row["signal"] == ENDS[name][1]
@@ -110,8 +114,7 @@ def test_what_a_cell_prints_is_in_its_row(alone, tmp_path):
     for engine in ("in-process", "isolated"):
         rows, _ = run(Shell(tmp_path), "--estimator", "evil-print", "--engine", engine, out=engine, code=0)
         assert rows["evil-print"]["status"] == "done"
-        index = [json.loads(line)["row"] for line in (tmp_path / engine / "index.jsonl").read_text().splitlines()]
-        (log,) = [row["log"] for row in index if row["estimator"] == "evil-print"]
+        log = whole_rows(tmp_path / engine)["evil-print"]["log"]
         for said in ("said by print", "said to stderr", "to descriptor 1", "said by a child"):
             assert said in log
 
@@ -125,12 +128,6 @@ def test_one_cell_that_ends_the_run_has_its_row_after_the_next_one(alone, tmp_pa
     rows, _ = run(shell, "--estimator", "evil-abort")
     assert (rows["evil-abort"]["status"], rows["mean"]["status"]) == ("crashed", "done")
     assert not list((tmp_path / "out").rglob("running"))
-
-
-def broken_shelf(tmp_path):
-    presses(tmp_path / "shelf")
-    for name, content in (("press-1.h5", b"\x89HDF\r\n\x1a\n" + b"\0" * 2000), ("more.h5", b"no recording at all")):
-        (tmp_path / "shelf" / name).write_bytes(content)
 
 
 def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
@@ -228,7 +225,7 @@ def test_engine_and_number_of_jobs_and_order_change_no_byte(alone, tmp_path):
 def test_the_time_of_a_cell_says_where_and_beside_how_many(alone, tmp_path):
     (tmp_path / "shelf").symlink_to(alone[1])
     run(Shell(tmp_path), "--estimator", "ols", "--jobs", "2", code=0)
-    rows = [json.loads(line)["row"] for line in (tmp_path / "out" / "index.jsonl").read_text().splitlines()]
+    rows = whole_rows(tmp_path / "out").values()
     assert {row["concurrency"] for row in rows} == {2}
     assert len({row["host"] for row in rows}) == 1
     assert all(row["wall_s"] >= row["fit_s"] > 0 for row in rows)
