@@ -2,10 +2,12 @@
 
 import json
 import shutil
+from dataclasses import replace
 
-import h5py
+import numpy as np
 import pytest
 
+from tactbench.core.matrix.store import Store
 from tests.conftest import Shell
 from tests.core.matrix.plugin_packages import write_acme
 
@@ -59,13 +61,26 @@ def test_a_replayed_cell_is_answered_from_the_same_recordings(here):
     assert (found["answer"], found["recordings_made"]) == ("identical", 0)
 
 
-def test_a_prediction_changed_by_hand_is_found(here):
-    key = {row["cell"]: row["key"] for row in rows(here)}[CELLS[0]]
-    with h5py.File(here.folder / "results" / "cells" / f"{key}.h5", "r+") as shard:
-        shard["test/y_pred"][3] += 1e-12
+def test_another_prediction_in_the_folder_is_found(here):
+    store = Store(here.folder / "results")
+    (row,) = [row for row in store.rows() if row["cell"] == CELLS[0]]
+    answers = store.answers(row["key"])
+    y_pred = answers["test"].y_pred.copy()
+    y_pred[3] = np.nextafter(y_pred[3], np.inf)
+    store.keep(row["key"], row, {**answers, "test": replace(answers["test"], y_pred=y_pred)})
     found = here(CELLS[0], code=1)
     assert found["answer"] == "different"
-    assert any("answers" in difference for difference in found["differences"])
+    assert found["differences"] == [f"answers on test: 1 of {len(y_pred)} values of y_pred differ"]
+
+
+def test_a_shard_with_other_bytes_is_found(here):
+    key = {row["cell"]: row["key"] for row in rows(here)}[CELLS[0]]
+    shard = here.folder / "results" / "cells" / f"{key}.h5"
+    content = bytearray(shard.read_bytes())
+    content[len(content) // 2] ^= 1
+    shard.write_bytes(content)
+    found = here(CELLS[0], code=1)
+    assert (found["answer"], found["differences"]) == ("different", ["the answers in the folder cannot be read"])
 
 
 def test_a_recording_changed_by_hand_is_found(here):
