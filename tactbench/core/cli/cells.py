@@ -64,7 +64,6 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
         If there is no such folder or cell, or more than one cell is meant.
     """
     from tactbench.core.cli.selection import matrix_asked
-    from tactbench.core.matrix.engines.choice import EngineChoice
     from tactbench.core.matrix.keys import keys_of
     from tactbench.core.matrix.material import need_of
     from tactbench.core.matrix.naming import cell_of, meant
@@ -99,7 +98,7 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
         was = {"sensors": (rows[given]["sensor"],), "tasks": (rows[given]["task"],), "rig": rows[given]["rig"]}
         asked |= {name: value for name, value in was.items() if not asked[name]}
     matrix, folder = matrix_asked(registry, **asked)
-    cells, needed = plan(matrix, registry, sources, store, folder, recorded, EngineChoice())
+    cells, needed = plan(matrix, registry, sources, store, folder, recorded)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
     made = tuple(needed.orders.get(need_of(cell), ()))
     return Subject(store, keys, sources, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)

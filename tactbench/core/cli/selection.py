@@ -30,7 +30,8 @@ _OPTIONS = (
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat."),
     click.option("--probe", is_flag=True,
                  help="Also ask what the recordings give away: first frame alone, shuffled rows."),
-    click.option("--latency/--no-latency", default=None, help="Measure how long one row takes, up to 0.3 s a cell."),
+    click.option("--latency/--no-latency", default=None,
+                 help="Measure how long one row takes, up to 0.3 s a cell. Default: yes."),
     simulation_options,
 )  # fmt: skip
 
@@ -46,11 +47,11 @@ def matrix_asked(
     registry: Registry,
     *,
     probe: bool,
-    latency: bool | None,
     recordings: Path | None,
     effects: str | None,
     rung: str | None,
     tolerance: float | None,
+    latency: bool | None,
     **asked: Any,
 ) -> tuple[MatrixSpec, Path | None]:
     """Return the matrix that the options ask for, and the folder of the recordings to replay if there is one.

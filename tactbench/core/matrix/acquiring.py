@@ -9,26 +9,20 @@ from functools import lru_cache
 
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engines.choice import EngineChoice
-from tactbench.core.matrix.explanation import recording_entry
-from tactbench.core.matrix.installed import installed, rig_of
-from tactbench.core.matrix.key_book import KeyBook
-from tactbench.core.matrix.keys import Keys
+from tactbench.core.matrix.explanation import Book
+from tactbench.core.matrix.installed import built
 from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.interfaces import Rig
+from tactbench.core.plugins.registry import installed
 
 GRACE_S = 5.0
 """Seconds that a real rig has to stand still and let go of its devices when its time is up."""
 
 
 def acquire_missing(
-    material: Material,
-    choice: EngineChoice,
-    keys: Keys,
-    book: KeyBook,
-    told: Progress,
-    meanwhile: Callable[[], None] | None = None,
+    material: Material, book: Book, choice: EngineChoice, told: Progress, meanwhile: Callable[[], None] | None = None
 ) -> None:
     """Make the recordings that are missing, and note in `material` which were made and what went wrong.
 
@@ -49,9 +43,9 @@ def acquire_missing(
     missing = [order for path, order in unique.items() if not path.exists()]
     if not missing:
         return
+    book.note_recordings(missing)
     from tactbench.core.recording.format import partial_path
 
-    book.write(recording_entry(order, keys) for order in missing)
     simulated = all(installed().rigs[order.rig].simulated for order in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     told.begin("recording", len(missing), alone=False)
@@ -76,7 +70,7 @@ def acquire_missing(
 
 @lru_cache(maxsize=4)
 def _rig(name: str) -> Rig:
-    return rig_of(name, installed())  # type: ignore[return-value]
+    return built(name, installed())  # type: ignore[return-value]
 
 
 def record(order: Order) -> str:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 from tactbench.core.errors import TactbenchError
@@ -40,6 +39,22 @@ def recording_entry(order: Order, keys: Keys) -> Entry:
     """Return what went into a recording's key, for the book."""
     scene = {"role": order.role, "seed": order.seed, "scene": order.scene.model_dump()}
     return Entry(_name(order), order.path.stem[-12:], scene, keys.maker(order.sensor, order.rig))
+
+
+@dataclass(frozen=True)
+class Book:
+    """Where a run notes what goes into the keys it makes."""
+
+    pages: KeyBook
+    keys: Keys
+
+    def note_recordings(self, orders: Sequence[Order]) -> None:
+        """Note what goes into the keys of recordings that are to be made."""
+        self.pages.write(recording_entry(order, self.keys) for order in orders)
+
+    def note_cells(self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path) -> None:
+        """Note what goes into the keys of cells that are to be computed: each with its key and its recordings."""
+        self.pages.write(cell_entry(cell, key, self.keys, paths, recorded, folder) for cell, key, paths in cells)
 
 
 def explain(
@@ -128,13 +143,12 @@ def _plain(section: Section) -> Section:
 
 def _data(paths: Sequence[Path], recorded: Recorded, folder: Path) -> dict[str, dict[str, str]]:
     return {
-        name: {"digest": recorded.digest(path), "path": beside(str(path), folder)}
+        name: {"digest": recorded.digest(path), "path": beside(path, folder)}
         for name, path in zip(recording_names(paths), paths, strict=True)
     }
 
 
-@lru_cache(maxsize=4096)
-def beside(path: str, folder: Path) -> str:
+def beside(path: Path, folder: Path) -> str:
     """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
-    inside = Path(path).is_relative_to(folder)
-    return str(Path(path).relative_to(folder)) if inside else str(Path(path).resolve())
+    inside = path.is_relative_to(folder)
+    return str(path.relative_to(folder)) if inside else str(path.resolve())

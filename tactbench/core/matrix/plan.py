@@ -37,10 +37,10 @@ class Cell:
     repeats: int
     seed: int
     """Seed of this repeat: of the scenes it records and of its estimators."""
-    simulation: Simulation = _AS_PLANNED
-    """How a simulated rig is asked to carry out its scenes."""
     latency: bool = True
     """Whether the latency of single rows is measured."""
+    simulation: Simulation = _AS_PLANNED
+    """How a simulated rig is asked to carry out its scenes."""
 
     @property
     def name(self) -> str:
@@ -89,8 +89,8 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                         repeat=repeat,
                         repeats=matrix.repeats,
                         seed=matrix.seed + repeat - 1,
-                        simulation=matrix.simulation,
                         latency=matrix.latency,
+                        simulation=matrix.simulation,
                     )
                     cells[cell] = None  # once, in the order in which they were asked for
     return with_probes(list(cells), registry) if matrix.probe else list(cells)

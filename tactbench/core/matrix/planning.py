@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar, cast
 
-from tactbench.core.errors import NotApplicable, RigError, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.errors import NotApplicable, TactbenchError, UnknownNameError, UsageError
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.engines.in_process import InProcess
-from tactbench.core.matrix.installed import rig_of
+from tactbench.core.matrix.installed import built, listed
 from tactbench.core.matrix.material import Need, Order, need_of, orders_for
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells
 from tactbench.core.matrix.recorded import Recorded
@@ -33,7 +33,7 @@ class Material:
     """Where the recordings of cells come from."""
 
     recorded: Recorded
-    """What those say that were read, now or earlier."""
+    """What is known of recordings, those made now among them."""
     orders: dict[Need, list[Order]] = field(default_factory=dict)
     """What a rig has to record."""
     shelf: dict[Need, list[Path]] = field(default_factory=dict)
@@ -69,7 +69,7 @@ def plan(
     store: Store,
     recordings: Path | None,
     recorded: Recorded,
-    choice: EngineChoice,
+    choice: EngineChoice | None = None,
 ) -> tuple[list[Cell], Material]:
     """Return the cells of `matrix`, and where their recordings come from.
 
@@ -80,22 +80,13 @@ def plan(
     UsageError
         If the matrix asks for something that is not there.
     """
-    name = registry.rigs[matrix.rig].name
-    if registry.rigs[name].simulated:
-        cells, material = _from_rig(matrix, registry, sources, store, recorded)
-        if all(order.path.exists() for orders in material.orders.values() for order in orders):
-            return cells, material  # there is nothing to simulate: the rig's libraries need not be loaded
-    rig = _greeted(lambda: rig_of(name, registry, recordings), f"The rig {name!r} could not be built", choice)
-    if isinstance(rig, BaseException):
-        return _in_vain(matrix, registry, recorded, rig)
-    if hasattr(rig, "recordings"):
-        return _from_shelf(matrix, registry, cast(Shelf, rig), recorded, choice)
-    return _from_rig(matrix, registry, sources, store, recorded)
-
-
-def _from_rig(
-    matrix: MatrixSpec, registry: Registry, sources: SourceDigests, store: Store, recorded: Recorded
-) -> tuple[list[Cell], Material]:
+    chosen = choice or EngineChoice()
+    if not registry.rigs[matrix.rig].simulated:  # a simulated one is no shelf: it is built when it has to record
+        rig = _greeted(lambda: built(matrix.rig, registry, recordings), chosen)
+        if isinstance(rig, BaseException):
+            return _in_vain(matrix, registry, recorded, rig)
+        if hasattr(rig, "recordings"):
+            return _from_shelf(matrix, registry, cast(Shelf, rig), recorded, chosen)
     cells = plan_cells(matrix, _named(matrix, registry), registry)
     for task in {cell.task for cell in cells}:
         _known_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
@@ -105,7 +96,7 @@ def _from_rig(
 def _from_shelf(
     matrix: MatrixSpec, registry: Registry, shelf: Shelf, recorded: Recorded, choice: EngineChoice
 ) -> tuple[list[Cell], Material]:
-    paths = _greeted(lambda: list(shelf.recordings()), f"The recordings of rig {matrix.rig!r} cannot be listed", choice)
+    paths = _greeted(lambda: listed(matrix.rig, shelf), choice)
     if isinstance(paths, BaseException):
         return _in_vain(matrix, registry, recorded, paths)
     found = holdings(paths, matrix.sensors, registry, recorded, choice)
@@ -129,17 +120,12 @@ def _in_vain(
     return cells, Material(recorded, troubles={need_of(cell): trouble for cell in cells})
 
 
-def _greeted(ask: Callable[[], R], what: str, choice: EngineChoice) -> R | BaseException:
+def _greeted(ask: Callable[[], R], choice: EngineChoice) -> R | BaseException:
     """Return what a rig says, or why it does not; raises what is the user's to mend."""
     ((_, outcome),) = InProcess(choice.limits).each(lambda _: ask(), [None])
-    if not isinstance(outcome, BaseException):
-        return outcome
     if isinstance(outcome, TactbenchError) and outcome.exit_code == UsageError.exit_code:
         raise outcome
-    said = str(outcome) if isinstance(outcome, TactbenchError) else f"{type(outcome).__name__}: {outcome}"
-    error = RigError(f"{what}: {said.rstrip(': ')}", hint="See `tactbench plugins` for who brings it.")
-    error.__cause__ = outcome
-    return error.with_traceback(outcome.__traceback__)
+    return outcome
 
 
 def _named(matrix: MatrixSpec, registry: Registry) -> list[str]:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.engines.in_process import InProcess
-from tactbench.core.matrix.installed import installed
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.solving import DATASETS, Job, prepare
+from tactbench.core.plugins.registry import installed
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from tactbench.core.matrix.remembered import Facts, FileMemory
-
-T = TypeVar("T")
-
-Read = Callable[[Sequence[Path]], Mapping[Path, "T | BaseException"]]
-"""Reads files, wherever that is safe, and returns what stopped it in place of what it could not read."""
 
 
 class Subject(NamedTuple):
@@ -22,21 +17,6 @@ class Subject(NamedTuple):
     sensor: str
     scene: str | None
     """None: nobody planned its scene, for example that of an imported table."""
-
-
-def read_digest(path: Path) -> str:
-    """Read the content digest of a recording; raises RecordingError."""
-    from tactbench.core.recording.reader import content_digest
-
-    return content_digest(path)
-
-
-def read_subject(path: Path) -> Subject:
-    """Read what a recording is of; raises RecordingError."""
-    from tactbench.core.recording.reader import read_meta
-
-    meta = read_meta(path)
-    return Subject(meta.sensor.name, meta.scene.name if meta.scene else None)
 
 
 class Recorded:
@@ -55,30 +35,37 @@ class Recorded:
         self._digests: dict[Path, str] = {}
         self._made: dict[Path, os.stat_result | None] = {}
 
+    def unread(self, paths: Iterable[Path], fact: str) -> list[Path]:
+        """Return those of `paths` that would have to be opened for the `fact`: ``digest`` or ``sensor``."""
+        return [path for path in paths if path not in self._digests and fact not in self._facts(path)]
+
+    def learn(self, path: Path, read: Read) -> None:
+        """Take in what was read of a recording, perhaps in another process."""
+        before, facts, after = read
+        if "digest" in facts:
+            self._digests[path] = facts["digest"]
+        if before is not None and after is not None:
+            self._memory.learn(before, after, facts)
+
     def digest(self, path: Path) -> str:
-        """Return the content digest of a recording, read here if need be; raises RecordingError."""
-        return _or_raise(self.digests([path], lambda unknown: _each(read_digest, unknown))[path])
+        """Return the content digest of a recording; raises RecordingError if it cannot be read."""
+        if path not in self._digests:
+            known = self._facts(path).get("digest")
+            if known is None:
+                self.learn(path, read_digest(path))
+            else:
+                self._digests[path] = known
+        return self._digests[path]
 
     def subject(self, path: Path) -> Subject:
-        """Return what a recording is of, read here if need be; raises RecordingError."""
-        return _or_raise(self.subjects([path], lambda unknown: _each(read_subject, unknown))[path])
-
-    def digests(self, paths: Sequence[Path], read: Read[str]) -> dict[Path, str | BaseException]:
-        """Return the content digest of every recording, or why it has none; `read` reads those not known."""
-        known = {path: self._digests.get(path) or self._facts(path).get("digest") for path in paths}
-        found = self._learn([path for path in paths if known[path] is None], read, lambda digest: {"digest": digest})
-        whole = {path: digest if digest is not None else found[path] for path, digest in known.items()}
-        self._digests.update((path, digest) for path, digest in whole.items() if isinstance(digest, str))
-        return whole
-
-    def subjects(self, paths: Sequence[Path], read: Read[Subject]) -> dict[Path, Subject | BaseException]:
-        """Return what every recording is of, or why nobody can tell; `read` reads those not known."""
-        known = {path: self._facts(path) for path in paths}
-        found = self._learn([path for path in paths if "sensor" not in known[path]], read, Subject._asdict)
-        return {
-            path: found[path] if path in found else Subject(str(facts["sensor"]), facts["scene"])
-            for path, facts in known.items()
-        }
+        """Return what a recording is of; raises RecordingError if it cannot be read."""
+        facts = self._facts(path)
+        sensor = facts.get("sensor")
+        if sensor is None:
+            read = read_subject(path)
+            self.learn(path, read)
+            facts = read[1]
+        return Subject(str(sensor or facts["sensor"]), facts["scene"])
 
     def made(self, path: Path, digest: str) -> None:
         """Note the digest of a recording that was made now, as its writer computed it."""
@@ -102,26 +89,24 @@ class Recorded:
         stat = _stat(path)
         return {} if stat is None else self._memory.facts(stat)  # where there is none, reading says what is wrong
 
-    def _learn(
-        self, paths: Sequence[Path], read: Read[T], facts: Callable[[T], Facts]
-    ) -> Mapping[Path, T | BaseException]:
-        before = {path: _stat(path) for path in paths}
-        found = read(paths) if paths else {}
-        for path, said in found.items():
-            old, new = before[path], _stat(path)
-            if old is not None and new is not None and not isinstance(said, BaseException):
-                self._memory.learn(old, new, facts(said))
-        return found
+
+Read = tuple["os.stat_result | None", "dict[str, Any]", "os.stat_result | None"]
+"""Facts, and what the file looked like before and after they were read."""
 
 
-def _each(read: Callable[[Path], T], paths: Sequence[Path]) -> dict[Path, T | BaseException]:
-    return {path: read(path) for path in paths}
+def read_digest(path: Path) -> Read:
+    """Read the content digest of a recording; raises RecordingError if it cannot be read."""
+    from tactbench.core.recording.reader import content_digest
+
+    return _stat(path), {"digest": content_digest(path)}, _stat(path)
 
 
-def _or_raise(found: T | BaseException) -> T:
-    if isinstance(found, BaseException):
-        raise found
-    return found
+def read_subject(path: Path) -> Read:
+    """Read what a recording is of; raises RecordingError if it cannot be read."""
+    from tactbench.core.recording.reader import read_meta
+
+    before, meta, after = _stat(path), read_meta(path), _stat(path)
+    return before, {"sensor": meta.sensor.name, "scene": meta.scene.name if meta.scene else None}, after
 
 
 def _stat(path: Path) -> os.stat_result | None:

@@ -46,11 +46,14 @@ def holdings(
         raise MissingRecordingError("The shelf is empty.", hint="Import recordings with `tactbench import`.")
     found: dict[str, dict[Path, Subject]] = {}
     broken: dict[Path, BaseException] = {}
-    looked = recorded.subjects(paths, lambda unknown: read_apart(read_subject, unknown, choice))
-    for path, subject in looked.items():
-        if isinstance(subject, BaseException):
-            broken[path] = subject
+    for path, read in read_apart(read_subject, recorded.unread(paths, "sensor"), choice).items():
+        if isinstance(read, BaseException):
+            broken[path] = read
         else:
+            recorded.learn(path, read)
+    for path in paths:
+        if path not in broken:
+            subject = recorded.subject(path)
             found.setdefault(subject.sensor, {})[path] = subject
     unreadable: dict[str, dict[Path, BaseException]] = {}
     for path, error in broken.items():

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 from tactbench.core.errors import NotApplicable
 from tactbench.core.matrix.answer import Answer, answer, opening, stopped
 from tactbench.core.matrix.engines.log import printed
-from tactbench.core.matrix.installed import installed
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.provenance import host_id
-from tactbench.core.plugins.registry import load_object
+from tactbench.core.plugins.registry import installed, load_object
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset
@@ -56,10 +55,10 @@ class Datasets:
 
     def __call__(self, task: str, recordings: tuple[Path, ...]) -> Dataset:
         """Return `recordings` as `task` needs them; raises as `load_dataset` does."""
+        from tactbench.core.evaluation.dataset import load_dataset
+
         wanted = (task, recordings)
         if wanted not in self._kept:
-            from tactbench.core.evaluation.dataset import load_dataset
-
             self.keep(wanted, load_dataset(installed().tasks[task].spec, recordings))
         self._kept.move_to_end(wanted)
         return self._kept[wanted]
