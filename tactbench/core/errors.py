@@ -15,6 +15,11 @@
     │   ├── UnwritableError           the place for it refuses: exit code 2
     │   └── MappingError              (also ValueError) a foreign table does not fit its mapping: exit code 2
     ├── RigError                      a rig cannot carry out a scene
+    ├── CellStopped                   a cell ended badly (carries its status, signal and log)
+    │   ├── Crashed
+    │   ├── TimedOut
+    │   └── OutOfMemory
+    ├── EngineError                   where cells are computed is gone, or computes with something else
     └── DataError                     (also ValueError) recordings cannot become X and y
         └── NotApplicable             the cell is skipped, with this reason
 
@@ -39,6 +44,7 @@ class TactbenchError(Exception):
     """
 
     exit_code = 1
+    traceback_text = ""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
@@ -143,6 +149,45 @@ class MappingError(RecordingError, ValueError):
 
 class RigError(TactbenchError):
     """A rig cannot carry out a scene."""
+
+
+class CellStopped(TactbenchError):  # noqa: N818
+    """A cell ended badly."""
+
+    status: str = "failed"
+
+    def __init__(self, message: str, *, hint: str = "", signal: int | None = None, log: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.signal, self.log = signal, log
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (_restopped, (type(self), self.message, self.hint, self.signal, self.log))
+
+
+def _restopped(kind: type[CellStopped], message: str, hint: str, signal: int | None, log: str) -> CellStopped:
+    return kind(message, hint=hint, signal=signal, log=log)
+
+
+class Crashed(CellStopped):
+    """A signal ended the cell."""
+
+    status: str = "crashed"
+
+
+class TimedOut(CellStopped):
+    """The cell took longer than it may."""
+
+    status: str = "timeout"
+
+
+class OutOfMemory(CellStopped):
+    """The cell took more memory than it may."""
+
+    status: str = "out-of-memory"
+
+
+class EngineError(TactbenchError):
+    """Where cells are computed is gone, or computes with something else than this process."""
 
 
 class DataError(TactbenchError, ValueError):

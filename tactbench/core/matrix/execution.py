@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from functools import lru_cache
@@ -186,3 +186,17 @@ def solve(job: Job, working: Callable[[str], None] | None = None) -> Answer:
             return {**row, "status": "skipped", "reason": str(trouble)}, {}
         return failed(row, trouble), {}
     return answer(cell, registry, recordings, _dataset, working)
+
+
+def _shares(job: Job) -> dict[Hashable, Callable[[], object]]:
+    """Return what other jobs need as well and a parent may load for its children, by what it is."""
+    cell, recordings, trouble = job
+    if trouble is not None:
+        return {}
+    return {
+        ("dataset", cell.task, recordings): lambda: _dataset(cell.task, recordings),
+        ("estimator", cell.task, cell.estimator): lambda: prepare(cell),
+    }
+
+
+setattr(solve, "shares", _shares)  # noqa: B010  (a function has no such attribute to a type checker)

@@ -1,0 +1,128 @@
+"""Which Dask workers compute for a run: those that agree with the client, as they come and go."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from tactbench.core.errors import UsageError
+from tactbench.core.matrix.engines.cell_server import PATIENCE_S
+from tactbench.core.matrix.engines.dask_worker import examine, leave
+from tactbench.core.matrix.engines.request import Setting
+
+POLL_S = 0.5
+"""How often the scheduler is asked who is there."""
+GATHER_S = 10.0
+"""How long the first worker may take to appear."""
+EXAM_S = PATIENCE_S + 30.0
+"""How long workers may take to be examined: one may be busy for somebody else."""
+
+
+class Crew:
+    """The workers of a scheduler that have been examined and may compute.
+
+    Parameters
+    ----------
+    client
+        A `distributed.Client`.
+    setting
+        What workers must agree with.
+    files
+        Fingerprints of files that every worker must see.
+    told
+        Called with a sentence about each worker that is not used.
+    """
+
+    def __init__(
+        self, client: Any, setting: Setting, files: Mapping[str, str], told: Callable[[str], None] | None = None
+    ) -> None:
+        self._client = client
+        self._setting = setting
+        self._files = dict(files)
+        self._told = told or (lambda sentence: None)
+        self._exams: dict[str, tuple[Any, int]] = {}
+        self._refused: dict[str, str] = {}
+        self._looked = float("-inf")
+        self._judged: SimpleQueue[Any] = SimpleQueue()
+        self.threads: dict[str, int] = {}
+        """Cells at once, by address of the workers that may compute"""
+
+    def gather(self) -> None:
+        """Wait until every worker that is there now has been examined.
+
+        Raises
+        ------
+        UsageError
+            If there is none, or one of them would compute with something else than this process.
+        """
+        began = time.monotonic()
+        self.look()
+        while self._exams or not (self.threads or self._refused):
+            waited = time.monotonic() - began
+            if waited > (EXAM_S if self._exams else GATHER_S):
+                break
+            self._wait()
+            self.look()
+        if self._refused:
+            raise UsageError(
+                " ".join(self._refused.values()),
+                hint="Start workers in the environment and on the files of this run, and stop the others.",
+            )
+        if not self.threads:
+            where = self._client.scheduler.address
+            raise UsageError(
+                f"The Dask scheduler at {where} has no worker{' that answers' if self._exams else ''}.",
+                hint=f"Start some with `dask worker {where}`.",
+            )
+
+    def _wait(self) -> None:
+        with suppress(Empty, TimeoutError):
+            if self._exams:
+                self._judged.get(timeout=POLL_S)
+            else:
+                self._client.wait_for_workers(1, timeout=POLL_S)
+
+    def look(self) -> None:
+        """Ask the scheduler who is there, at most once in `POLL_S`; examine newcomers, judge the examined."""
+        self._judge()
+        if time.monotonic() - self._looked < POLL_S or self._client.status != "running":
+            return
+        self._looked = time.monotonic()
+        there = self._client.scheduler_info(n_workers=-1)["workers"]
+        for gone in set(self.threads) - set(there):
+            del self.threads[gone]
+        for gone in set(self._exams) - set(there):
+            self._exams.pop(gone)
+        for address, facts in there.items():
+            if not (address in self.threads or address in self._exams or address in self._refused):
+                exam = self._client.submit(
+                    examine, self._setting, self._files, pure=False, workers=[address], allow_other_workers=False
+                )
+                self._exams[address] = exam, int(facts["nthreads"])
+                exam.add_done_callback(self._judged.put)
+
+    def _judge(self) -> None:
+        for address, (exam, threads) in list(self._exams.items()):
+            if exam.status == "finished":
+                against = exam.result()
+            elif exam.status == "error":
+                against = [f"it has another tactbench or none ({exam.exception()})"]
+            elif exam.status in ("cancelled", "lost"):
+                del self._exams[address]
+                continue
+            else:
+                continue
+            del self._exams[address]
+            if against:
+                self._refused[address] = f"The Dask worker at {address} cannot be used: {'; '.join(against)}."
+                self._told(self._refused[address])
+            else:
+                self.threads[address] = threads
+
+    def leave(self) -> None:
+        """Have the workers end what they keep for this run."""
+        if self._client.status == "running" and self.threads:
+            self._client.run(leave, self._setting.session, workers=list(self.threads), on_error="ignore")

@@ -1,0 +1,114 @@
+"""The cell server: a process with one thread that forks a child for each cell it is asked for.
+
+A process with threads must not fork: the child would inherit locks that nobody releases. It starts one of these
+instead (see `cell_server`) and asks it over a pair of sockets. What a first child has survived, the server then loads
+itself, so that later children inherit it: nothing that a plugin or a recording does on loading reaches the server.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pickle
+import select
+import signal
+import sys
+from collections.abc import Callable, Hashable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Any
+
+from tactbench.core.errors import EngineError
+from tactbench.core.matrix.engines.isolated import Isolated
+from tactbench.core.matrix.engines.request import Request, Setting, pack, pack_reply
+from tactbench.core.matrix.engines.sight import unseen
+from tactbench.core.matrix.engines.surroundings import differences, surroundings
+
+IDLE_S = 600.0
+"""A server that nobody has asked for so long ends: whoever started it may have forgotten it."""
+
+
+class _Left(BaseException):
+    """Whoever started this server has gone."""
+
+
+def main(arguments: list[str]) -> None:
+    """Serve over the socket with the file descriptor ``arguments[0]`` until its other end is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    channel: Connection[Any, Any] = Connection(int(arguments[0]))
+    with suppress(_Left, EOFError, BrokenPipeError, ConnectionResetError):
+        _end_with(channel)
+        setting: Setting = pickle.loads(channel.recv_bytes())
+        channel.send_bytes(pack(settle(setting)))
+        serve(channel, setting)
+
+
+def _end_with(channel: Connection[Any, Any]) -> None:
+    """Raise `_Left` wherever this process is, once the other end of `channel` is closed.
+
+    The kernel tells by SIGIO: while a child runs nobody here reads the channel.
+    """
+    watched = select.poll()
+    watched.register(channel.fileno(), 0)  # POLLHUP is always told
+
+    def look(number: int, frame: object) -> None:
+        if watched.poll(0):
+            signal.signal(signal.SIGIO, signal.SIG_IGN)
+            raise _Left
+
+    def leave(number: int, frame: object) -> None:
+        raise _Left
+
+    signal.signal(signal.SIGTERM, leave)
+    signal.signal(signal.SIGIO, look)
+    fcntl.fcntl(channel, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(channel, fcntl.F_SETFL, fcntl.fcntl(channel, fcntl.F_GETFL) | os.O_ASYNC)
+
+
+def settle(setting: Setting) -> list[str]:
+    """Go to the folder of `setting`; return what stands against computing here, one clause for each."""
+    against = []
+    try:
+        os.chdir(setting.folder)
+    except OSError as error:
+        against.append(f"it cannot enter {setting.folder} ({error.strerror or error})")
+    if setting.surroundings:
+        from tactbench.core.matrix.execution import installed
+
+        against += differences(setting.surroundings, surroundings(installed()))
+    return against
+
+
+def serve(channel: Connection[Any, Any], setting: Setting) -> None:
+    """Answer requests one after the other; return when there are none for `IDLE_S`."""
+    children = Isolated(1, setting.limits)
+    survived: set[Hashable] = set()
+    while channel.poll(IDLE_S):
+        request: Request = pickle.loads(channel.recv_bytes())
+        channel.send_bytes(pack_reply(_answer(channel, children, request, survived)))
+
+
+def _answer(channel: Connection[Any, Any], children: Isolated, request: Request, survived: set[Hashable]) -> Any:
+    against = unseen(request.files)
+    if against:
+        return EngineError("; ".join(against))
+    share: Callable[[Any], dict[Hashable, Callable[[], object]]] = getattr(request.work, "shares", lambda item: {})
+    loads = share(request.item)
+    for what, load in loads.items():
+        if what in survived:
+            with suppress(Exception):  # the child meets it again, and tells
+                load()
+
+    def work(item: Any) -> Any:
+        channel.close()  # a child that outlives this server must not look like it
+        signal.signal(signal.SIGIO, signal.SIG_DFL)
+        return request.work(item)
+
+    ((_, outcome),) = children.each(work, [request.item])
+    if not isinstance(outcome, BaseException):
+        survived.update(loads)
+    return outcome
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
