@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 @click.option("--repeats", type=click.IntRange(min=1), metavar="N", help="Repeat everything with N seeds.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")
 @click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
+@click.option("--engine", type=click.Choice(("local", "dask")), default="local", help="Where cells are computed.")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask scheduler.")
 @click.option("--probe", is_flag=True, help="Also ask what the recordings give away: first frame alone, shuffled rows.")
 @simulation_options
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
@@ -58,6 +60,8 @@ def command(
     ctx: click.Context,
     /,
     jobs: int,
+    engine: str,
+    scheduler: str | None,
     out: Path,
     shape: str,
     probe: bool,
@@ -86,7 +90,9 @@ def command(
     folder = recordings or (Path(matrix.recordings) if matrix.recordings else None)
     store = Store(out)
     with progress() as told:
-        outcome = run_matrix(matrix, store, jobs=jobs, recordings=folder, progress=told)
+        outcome = run_matrix(
+            matrix, store, jobs=jobs, engine=engine, scheduler=scheduler, recordings=folder, progress=told
+        )
     print_rows(outcome.rows, shape)
     if shape == "table":
         _side_by_side(outcome)

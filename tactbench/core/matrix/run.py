@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from tactbench.core.errors import NotApplicable, UsageError
+from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.engines.opening import open_engine
 from tactbench.core.matrix.execution import InProcess, Job, Workers, installed, prepare, record, rig_of, solve, workers
 from tactbench.core.matrix.keys import cell_key
 from tactbench.core.matrix.material import Need, Order, need_of, on_the_shelf, orders_for, sensors_on, serving
@@ -55,6 +57,8 @@ def run_matrix(
     store: Store,
     *,
     jobs: int = 1,
+    engine: str = "local",
+    scheduler: str | None = None,
     recordings: Path | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
@@ -62,7 +66,9 @@ def run_matrix(
 
     The parameters are those of `carry_out`.
     """
-    outcome = carry_out(matrix, store, jobs=jobs, recordings=recordings, progress=progress)
+    outcome = carry_out(
+        matrix, store, jobs=jobs, engine=engine, scheduler=scheduler, recordings=recordings, progress=progress
+    )
     store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
     store.write("scores.json", scores_text(outcome.rows))
     unfinished = [row for row in outcome.rows if row["status"] != "done"]
@@ -75,6 +81,8 @@ def carry_out(
     store: Store,
     *,
     jobs: int = 1,
+    engine: str = "local",
+    scheduler: str | None = None,
     recordings: Path | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
@@ -103,8 +111,14 @@ def carry_out(
     sources = SourceDigests(store.folder / "cache" / "sources.json")
     cells, material = _material(matrix, registry, sources, store, recordings)
     troubles = _acquire(cells, material, jobs, told)
-    with workers(jobs) as crew:
-        rows, computed = _evaluate(cells, material, troubles, crew, jobs, registry, sources, store, told)
+    if engine == "dask" and scheduler:
+        from tactbench.core.matrix.engines.dask_cluster import check_scheduler
+
+        check_scheduler(scheduler)
+    with open_engine(engine, jobs, Limits(), scheduler) as crew:
+        rows, computed = _evaluate(
+            cells, material, troubles, crew, jobs + (engine == "dask"), registry, sources, store, told
+        )
     sources.save()
     fill_baselines(rows)
     provenance = gather()

@@ -7,7 +7,7 @@ import uuid
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -59,8 +59,30 @@ def open_dask(
     UsageError
         If the library is missing or the scheduler does not answer.
     """
-    with client_of(address, jobs) as client:
-        yield DaskEngine(client, limits, told)
+    with client_of(address, jobs) as client, closing(DaskEngine(client, limits, told)) as engine:
+        yield engine
+
+
+class Dask:
+    """The engine, opened when there is something to do.
+
+    Parameters
+    ----------
+    jobs, limits, scheduler
+        As of `open_dask`; `scheduler` is the address.
+    """
+
+    def __init__(self, jobs: int, limits: Limits, scheduler: str | None = None) -> None:
+        self._jobs, self._limits, self._scheduler = jobs, limits, scheduler
+
+    def each(
+        self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
+    ) -> Iterator[tuple[T, R | BaseException]]:
+        """Open the cluster, yield as `DaskEngine` does, close it."""
+        every = list(items)
+        if every:
+            with open_dask(self._scheduler, self._jobs, self._limits) as engine:
+                yield from engine.each(work, every, meanwhile)
 
 
 @dataclass(eq=False)
@@ -101,6 +123,7 @@ class DaskEngine:
         self._limits = limits
         self._told = told
         self._alone_s = alone_s
+        self._crew: Crew | None = None
 
     def each(
         self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
@@ -115,12 +138,11 @@ class DaskEngine:
         waiting = deque(_Flight(item) for item in items)
         if not waiting:
             return
-        setting = Setting(
-            uuid.uuid4().hex, str(Path.cwd()), self._limits, surroundings(installed()), dict(thread_bounds())
-        )
-        crew = Crew(self._client, setting, fingerprints(waiting[0].item), self._told)
-        crew.gather()
-        with _Round(self._client, crew, setting, work, waiting) as round_:
+        if self._crew is None:
+            self._crew = Crew(self._client, self._setting(), self._told)
+        crew = self._crew
+        crew.gather(fingerprints(waiting[0].item))
+        with _Round(self._client, crew, work, waiting) as round_:
             if meanwhile is not None:
                 meanwhile()
             seen = time.monotonic()
@@ -132,6 +154,16 @@ class DaskEngine:
                 yield from round_.turn()
             for flight in (*round_.flying.values(), *waiting):
                 yield flight.item, self._gone()
+
+    def close(self) -> None:
+        """Have the workers end what they keep for this engine."""
+        if self._crew is not None:
+            self._crew.leave()
+            self._crew = None
+
+    def _setting(self) -> Setting:
+        agreed = surroundings(installed())
+        return Setting(uuid.uuid4().hex, str(Path.cwd()), self._limits, agreed, dict(thread_bounds()))
 
     def _gone(self) -> EngineError:
         where = self._client.scheduler.address if self._client.scheduler is not None else "that was asked"
@@ -151,18 +183,14 @@ class _Round(Generic[T]):
         A `distributed.Client`.
     crew
         Who may compute.
-    setting
-        What is the same for all cells.
     work
         What is to be done with an item.
     waiting
         What has not been sent; taken from and given back to.
     """
 
-    def __init__(
-        self, client: Any, crew: Crew, setting: Setting, work: Callable[[T], Any], waiting: deque[_Flight[T]]
-    ) -> None:
-        self._client, self._crew, self._setting, self._work, self._waiting = client, crew, setting, work, waiting
+    def __init__(self, client: Any, crew: Crew, work: Callable[[T], Any], waiting: deque[_Flight[T]]) -> None:
+        self._client, self._crew, self._work, self._waiting = client, crew, work, waiting
         self._arrivals: SimpleQueue[str] = SimpleQueue()
         self.flying: dict[str, _Flight[T]] = {}
 
@@ -171,10 +199,10 @@ class _Round(Generic[T]):
         return self
 
     def __exit__(self, *_: object) -> None:
-        with suppress(OSError, TimeoutError):
-            if self._client.status == "running":
+        if self.flying and self._client.status == "running":
+            with suppress(OSError, TimeoutError):
                 self._client.cancel([flight.future for flight in self.flying.values()], force=True)
-            self._crew.leave()
+            self._crew.leave()  # with the cells at work
 
     def turn(self) -> Iterator[tuple[T, Any]]:
         """Wait a moment; yield what has come back."""
@@ -218,7 +246,7 @@ class _Round(Generic[T]):
             flight.address = address
             request = pack(Request(self._work, flight.item, fingerprints(flight.item)))
             flight.future = self._client.submit(
-                carry_out, self._setting, f"Dask worker {address}", request,
+                carry_out, self._crew.setting, f"Dask worker {address}", request,
                 pure=False, workers=[address], allow_other_workers=False,
             )  # fmt: skip
             self.flying[flight.future.key] = flight

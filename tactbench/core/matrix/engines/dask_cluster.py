@@ -87,7 +87,10 @@ def client_of(address: str | None, jobs: int) -> Iterator[Any]:
 def _own_cluster(jobs: int) -> Iterator[Any]:
     """Start a scheduler and `jobs` workers of one thread each on the loopback; leave no process and no file."""
     # What cells take is watched by the engine; the workers themselves only pass requests on.
-    with TemporaryDirectory(prefix="tactbench-dask-") as scratch:
+    import dask
+
+    scratch_of = TemporaryDirectory(prefix="tactbench-dask-")
+    with scratch_of as scratch, dask.config.set({"temporary-directory": scratch}):
         with _interrupts_held_back():
             cluster = import_distributed().LocalCluster(
                 n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", memory_limit=0,

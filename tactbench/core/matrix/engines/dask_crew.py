@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+import uuid
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -30,18 +32,14 @@ class Crew:
         A `distributed.Client`.
     setting
         What workers must agree with.
-    files
-        Fingerprints of files that every worker must see.
     told
         Called with a sentence about each worker that is not used.
     """
 
-    def __init__(
-        self, client: Any, setting: Setting, files: Mapping[str, str], told: Callable[[str], None] | None = None
-    ) -> None:
+    def __init__(self, client: Any, setting: Setting, told: Callable[[str], None] | None = None) -> None:
         self._client = client
-        self._setting = setting
-        self._files = dict(files)
+        self.setting = setting
+        self._files: dict[str, str] = {}
         self._told = told or (lambda sentence: None)
         self._exams: dict[str, tuple[Any, int]] = {}
         self._refused: dict[str, str] = {}
@@ -50,14 +48,23 @@ class Crew:
         self.threads: dict[str, int] = {}
         """Cells at once, by address of the workers that may compute"""
 
-    def gather(self) -> None:
+    def gather(self, files: Mapping[str, str]) -> None:
         """Wait until every worker that is there now has been examined.
+
+        Parameters
+        ----------
+        files
+            Fingerprints of files that every worker must see.
 
         Raises
         ------
         UsageError
             If there is none, or one of them would compute with something else than this process.
         """
+        self._files = dict(files)
+        self._refused.clear()
+        self.threads.clear()
+        self._looked = float("-inf")
         began = time.monotonic()
         self.look()
         while self._exams or not (self.threads or self._refused):
@@ -99,7 +106,7 @@ class Crew:
         for address, facts in there.items():
             if not (address in self.threads or address in self._exams or address in self._refused):
                 exam = self._client.submit(
-                    examine, self._setting, self._files, pure=False, workers=[address], allow_other_workers=False
+                    examine, self.setting, self._files, pure=False, workers=[address], allow_other_workers=False
                 )
                 self._exams[address] = exam, int(facts["nthreads"])
                 exam.add_done_callback(self._judged.put)
@@ -123,6 +130,8 @@ class Crew:
                 self.threads[address] = threads
 
     def leave(self) -> None:
-        """Have the workers end what they keep for this run."""
+        """Have the workers end what they keep and do for this crew; what comes later begins anew."""
+        session, self.setting = self.setting.session, replace(self.setting, session=uuid.uuid4().hex)
         if self._client.status == "running" and self.threads:
-            self._client.run(leave, self._setting.session, workers=list(self.threads), on_error="ignore")
+            with suppress(OSError, TimeoutError):
+                self._client.run(leave, session, workers=list(self.threads), on_error="ignore")

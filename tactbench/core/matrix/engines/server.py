@@ -15,6 +15,7 @@ import signal
 import sys
 from collections.abc import Callable, Hashable
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -92,8 +93,7 @@ def _answer(channel: Connection[Any, Any], children: Isolated, request: Request,
     against = unseen(request.files)
     if against:
         return EngineError("; ".join(against))
-    share: Callable[[Any], dict[Hashable, Callable[[], object]]] = getattr(request.work, "shares", lambda item: {})
-    loads = share(request.item)
+    loads = _shares(request.work, request.item)
     for what, load in loads.items():
         if what in survived:
             with suppress(Exception):  # the child meets it again, and tells
@@ -108,6 +108,14 @@ def _answer(channel: Connection[Any, Any], children: Isolated, request: Request,
     if not isinstance(outcome, BaseException):
         survived.update(loads)
     return outcome
+
+
+def _shares(work: Any, item: Any) -> dict[Hashable, Callable[[], object]]:
+    """Return what may be loaded for all children that do `work`: a function says it in its attribute ``shares``."""
+    while isinstance(work, partial):
+        work = work.func
+    shares = getattr(work, "shares", None)
+    return {} if shares is None else shares(item)
 
 
 if __name__ == "__main__":
