@@ -15,13 +15,14 @@
     │   ├── UnwritableError           the place for it refuses: exit code 2
     │   └── MappingError              (also ValueError) a foreign table does not fit its mapping: exit code 2
     ├── RigError                      a rig cannot carry out a scene
-    ├── CellStopped                   a cell ended badly (carries its status, signal and log)
-    │   ├── Crashed
-    │   ├── TimedOut
-    │   └── OutOfMemory
-    ├── EngineError                   where cells are computed is gone, or computes with something else
-    └── DataError                     (also ValueError) recordings cannot become X and y
-        └── NotApplicable             the cell is skipped, with this reason
+    ├── DataError                     (also ValueError) recordings cannot become X and y
+    │   └── NotApplicable             the cell is skipped, with this reason
+    ├── EngineError                   where cells are computed is gone, or computes with something else than this process
+    └── CellStopped                   a cell or a recording ended without a result (carries status, signal and log)
+        ├── Raised                    something of no kind of ours was raised in another process
+        ├── Crashed                   its process was ended by a signal, or ended itself
+        ├── TimedOut                  it took longer than it may
+        └── OutOfMemory               it took more memory than it may, or than there is
 
 Every message names what was given, what was expected and the next step.
 """
@@ -30,6 +31,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
+from typing import Literal
 
 
 class TactbenchError(Exception):
@@ -45,6 +47,7 @@ class TactbenchError(Exception):
 
     exit_code = 1
     traceback_text = ""
+    """Where it was raised, if that was in another process."""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
@@ -151,48 +154,87 @@ class RigError(TactbenchError):
     """A rig cannot carry out a scene."""
 
 
-class CellStopped(TactbenchError):  # noqa: N818
-    """A cell ended badly."""
-
-    status: str = "failed"
-
-    def __init__(self, message: str, *, hint: str = "", signal: int | None = None, log: str = "") -> None:
-        super().__init__(message, hint=hint)
-        self.signal, self.log = signal, log
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return (_restopped, (type(self), self.message, self.hint, self.signal, self.log))
-
-
-def _restopped(kind: type[CellStopped], message: str, hint: str, signal: int | None, log: str) -> CellStopped:
-    return kind(message, hint=hint, signal=signal, log=log)
-
-
-class Crashed(CellStopped):
-    """A signal ended the cell."""
-
-    status: str = "crashed"
-
-
-class TimedOut(CellStopped):
-    """The cell took longer than it may."""
-
-    status: str = "timeout"
-
-
-class OutOfMemory(CellStopped):
-    """The cell took more memory than it may."""
-
-    status: str = "out-of-memory"
-
-
-class EngineError(TactbenchError):
-    """Where cells are computed is gone, or computes with something else than this process."""
-
-
 class DataError(TactbenchError, ValueError):
     """Recordings cannot be turned into X and y."""
 
 
 class NotApplicable(DataError):  # noqa: N818  (a result, not a failure)
     """The cell does not apply: its row says ``skipped`` and this reason."""
+
+
+class EngineError(TactbenchError):
+    """Where cells are computed is gone, or computes with something else than this process."""
+
+
+class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
+    """A cell or a recording ended without a result.
+
+    Parameters
+    ----------
+    message, hint
+        As of every error.
+    signal
+        Number of the signal that ended its process, if one did.
+    log
+        The end of what it had printed.
+    traceback_text
+        Where it was, as far as that is known.
+
+    Attributes
+    ----------
+    spent_s
+        Seconds until it ended; None: not known.
+    """
+
+    status: Literal["failed", "crashed", "timeout", "out-of-memory"] = "crashed"
+
+    def __init__(
+        self, message: str, *, hint: str = "", signal: int | None = None, log: str = "", traceback_text: str = ""
+    ) -> None:
+        super().__init__(message, hint=hint)
+        self.signal = signal
+        self.log = log
+        self.spent_s: float | None = None
+        self.traceback_text = traceback_text
+
+    def __reduce__(self) -> tuple[object, ...]:
+        told = (self.message, self.hint, self.signal, self.log, self.traceback_text, self.spent_s)
+        return (_stopped, (type(self), *told))
+
+
+def _stopped(
+    kind: type[CellStopped],
+    message: str,
+    hint: str,
+    signal: int | None,
+    log: str,
+    traceback_text: str,
+    spent_s: float | None,
+) -> CellStopped:
+    error = kind(message, hint=hint, signal=signal, log=log, traceback_text=traceback_text)
+    error.spent_s = spent_s
+    return error
+
+
+class Raised(CellStopped):
+    """Something of no kind of ours was raised in another process; the message names its type."""
+
+    status = "failed"
+
+
+class Crashed(CellStopped):
+    """Its process was ended by a signal, or ended itself."""
+
+    status = "crashed"
+
+
+class TimedOut(CellStopped):
+    """It took longer than it may."""
+
+    status = "timeout"
+
+
+class OutOfMemory(CellStopped):
+    """It took more memory than it may, or than there is."""
+
+    status = "out-of-memory"

@@ -10,7 +10,7 @@ from tactbench.core.calibration.draw import Draw
 from tactbench.core.calibration.journal import Journal
 from tactbench.core.calibration.trial import Trial, carry_out
 from tactbench.core.errors import TactbenchError
-from tactbench.core.matrix.execution import workers
+from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.keys import versions
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.provenance import gather
@@ -39,13 +39,11 @@ def carry_out_missing(
     """
     numbers = [number for number in range(draws) if number not in journal.draws]
     if numbers:
-        told.begin("drawing", len(numbers), alone=jobs == 1)
+        told.begin("drawing", len(numbers), alone=False)
         # One folder for all: workers that are ended in the middle cannot tidy up behind themselves, and one may still
         # be writing when it is emptied; that must not hide the interruption.
-        with (
-            tempfile.TemporaryDirectory(prefix="tactbench-draws-", ignore_cleanup_errors=True) as scratch,
-            workers(min(jobs, len(numbers))) as crew,
-        ):
+        with tempfile.TemporaryDirectory(prefix="tactbench-draws-", ignore_cleanup_errors=True) as scratch:
+            crew = EngineChoice().pool(min(jobs, len(numbers)))
             missing = [Trial(spec, seed, number, Path(scratch)) for number in numbers]
             for trial, outcome in crew.each(work, missing):
                 if isinstance(outcome, BaseException):

@@ -69,7 +69,8 @@ def _drawn(spec: CalibrationSpec, draws: int | None, seed: int | None, jobs: int
     from tactbench.core.calibration.result import CalibrationResult
     from tactbench.core.calibration.run import carry_out_missing, made_by
     from tactbench.core.calibration.trial import checked
-    from tactbench.core.cli.screen import progress, remark
+    from tactbench.core.cli.progress import progress
+    from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UnwritableError
 
     checked(spec)

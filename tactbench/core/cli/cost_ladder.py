@@ -33,7 +33,8 @@ def show_ladder(
     """Score and time the estimators, print them as `shape`, and write the files of the ladder into `out`."""
     import time
 
-    from tactbench.core.cli.screen import progress, remark
+    from tactbench.core.cli.progress import progress
+    from tactbench.core.cli.screen import remark
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import flat_csv, write_ladder
     from tactbench.core.leaderboard.table import METRIC_NAMES

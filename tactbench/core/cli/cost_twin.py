@@ -17,7 +17,7 @@ _COLUMNS = ("", "way", "time", "rms", "worst", "unit", "noise / 3", "front")
 def show_twin(sensors: tuple[str, ...], rig: str | None, out: Path, shape: str) -> None:
     """Measure the simulated rig `rig` (default: the first) for `sensors`; print `shape`, write files into `out`."""
     from tactbench.core.cli.config import default_matrix
-    from tactbench.core.cli.screen import progress
+    from tactbench.core.cli.progress import progress
     from tactbench.core.cli.twin import simulated_rig
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_object, load_registry

@@ -23,7 +23,7 @@ def command(mapping: Path, root: Path | None, out: Path | None, replace: bool) -
 
     All of them are written, or none. What was marked as "no sample" is counted. See docs/mappings.md.
     """
-    from tactbench.core.cli.screen import progress
+    from tactbench.core.cli.progress import progress
     from tactbench.core.recording.mapping import import_tables
 
     target = Path("recordings") / mapping.stem if out is None else out

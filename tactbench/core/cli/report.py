@@ -39,7 +39,8 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shown: str, shap
     The published numbers are printed beside ours.
     """
     one_thread()
-    from tactbench.core.cli.screen import progress, remark
+    from tactbench.core.cli.progress import progress
+    from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import load_registry

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.cli.engines import choice_of, engine_options
 from tactbench.core.cli.simulation import simulation_of, simulation_options
 from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
+    from tactbench.core.matrix.engines.choice import EngineName
     from tactbench.core.matrix.run import Outcome
     from tactbench.core.spec.matrix import MatrixSpec
 
@@ -46,9 +48,7 @@ if TYPE_CHECKING:
 @click.option("--config", metavar="FILE", help="A matrix like benchmarks.yaml, or the name of a packaged one.")
 @click.option("--repeats", type=click.IntRange(min=1), metavar="N", help="Repeat everything with N seeds.")
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")
-@click.option("--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Processes.")
-@click.option("--engine", type=click.Choice(("local", "dask")), default="local", help="Where cells are computed.")
-@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask scheduler.")
+@engine_options
 @click.option("--probe", is_flag=True, help="Also ask what the recordings give away: first frame alone, shuffled rows.")
 @simulation_options
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
@@ -59,9 +59,6 @@ if TYPE_CHECKING:
 def command(
     ctx: click.Context,
     /,
-    jobs: int,
-    engine: str,
-    scheduler: str | None,
     out: Path,
     shape: str,
     probe: bool,
@@ -69,6 +66,11 @@ def command(
     effects: str | None,
     rung: str | None,
     tolerance: float | None,
+    engine: EngineName | None,
+    jobs: int,
+    timeout: float | None,
+    memory: int | None,
+    scheduler: str | None,
     **asked: Any,
 ) -> None:
     """Acquire, evaluate, rank.
@@ -76,13 +78,14 @@ def command(
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.
     """
     one_thread()
-    from tactbench.core.cli.screen import progress
+    from tactbench.core.cli.progress import progress
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import load_registry
 
     matrix = _matrix(**asked, replaying=recordings is not None)
     simulation = simulation_of(load_registry(), matrix.rig, effects=effects, rung=rung, tolerance=tolerance)
+    choice = choice_of(matrix, engine=engine, jobs=jobs, timeout=timeout, memory=memory, scheduler=scheduler)
     if probe:
         matrix = matrix.model_copy(update={"probe": True})
     if simulation is not None:
@@ -90,9 +93,7 @@ def command(
     folder = recordings or (Path(matrix.recordings) if matrix.recordings else None)
     store = Store(out)
     with progress() as told:
-        outcome = run_matrix(
-            matrix, store, jobs=jobs, engine=engine, scheduler=scheduler, recordings=folder, progress=told
-        )
+        outcome = run_matrix(matrix, store, choice=choice, recordings=folder, progress=told)
     print_rows(outcome.rows, shape)
     if shape == "table":
         _side_by_side(outcome)
@@ -160,6 +161,7 @@ def _side_by_side(outcome: Outcome) -> None:
 def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:
     """Write the table's files; say where they are and what to try next."""
     from tactbench.core.cli.screen import remark
+    from tactbench.core.cli.stopped import tell_stopped
     from tactbench.core.leaderboard.formats import FORMATS as TEXTS
     from tactbench.core.matrix.files import replace_file
 
@@ -169,8 +171,7 @@ def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:
     remark(f"\n{cells - outcome.computed} of {cells} cells were found finished, {outcome.computed} computed now; "
            f"{outcome.recorded} recordings made now.")  # fmt: skip
     remark(f"Files: {folder}/leaderboard.md, .csv, .json; scores.json; recordings/; cells/; run.json")
-    for row in outcome.failures:
-        remark(f"Failed: {row['cell']}: {row['reason']}")
+    tell_stopped(outcome.failures, folder)
     if shape == "table":
         _suggest(outcome.rows[0])
 

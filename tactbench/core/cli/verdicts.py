@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.cli.grid import print_grid, print_records
-from tactbench.core.cli.screen import progress, remark
+from tactbench.core.cli.progress import progress
+from tactbench.core.cli.screen import remark
 from tactbench.core.errors import TactbenchError, UnknownNameError, UsageError
 from tactbench.core.plugins.checks import Check, Verdict
 from tactbench.core.plugins.registry import load_object

@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from tactbench.core.errors import NotApplicable, TactbenchError
+from tactbench.core.errors import CellStopped, NotApplicable, TactbenchError
 from tactbench.core.evaluation.cell import CellResult, evaluate
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.matrix.plan import Cell
@@ -29,7 +29,13 @@ def answer(
     dataset: Callable[[str, tuple[Path, ...]], Dataset],
     working: Callable[[str], None] | None = None,
 ) -> Answer:
-    """Evaluate one cell; an exception becomes a row that says ``failed`` or ``skipped``."""
+    """Evaluate one cell; an exception becomes a row that says ``failed`` or ``skipped``.
+
+    Raises
+    ------
+    MemoryError
+        It is the engine that knows whether the cell took too much or there was too little.
+    """
     task = registry.tasks[cell.task].spec
     row = opening(cell, task)
     try:
@@ -49,8 +55,10 @@ def answer(
         )
     except NotApplicable as reason:
         return {**row, "status": "skipped", "reason": str(reason)}, {}
+    except MemoryError:
+        raise
     except Exception as error:
-        return failed(row, error), {}
+        return stopped(row, error), {}
     metas = [material.metas[place] for place in range(len(material.metas))]
     row.update(_told_by(metas))
     row.update(_scored(result))
@@ -133,10 +141,23 @@ def _published(cell: Cell, task: TaskSpec, split: str | None) -> Row:
     return {"published": found.score, "published_reference": found.reference, "published_remark": remark}
 
 
-def failed(row: Row, error: BaseException) -> Row:
-    """Return `row` saying how the cell failed."""
-    said = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-    return {**row, "status": "failed", "reason": said, "traceback": "".join(traceback.format_exception(error))}
+def stopped(row: Row, error: BaseException) -> Row:
+    """Return `row` saying how the cell was stopped; an exception that is no engine's word makes it ``failed``."""
+    said = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {_text(error)}"
+    where = error.traceback_text if isinstance(error, TactbenchError) else ""
+    if not where and error.__traceback__ is not None:
+        where = "".join(traceback.format_exception(error))
+    row = {**row, "status": "failed", "reason": said.rstrip(": "), "traceback": where}
+    if isinstance(error, CellStopped):
+        row |= {"status": error.status, "signal": error.signal, "log": error.log, "wall_s": error.spent_s}
+    return row
+
+
+def _text(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:
+        return "(its text cannot be read)"
 
 
 def _told_by(metas: Sequence[RecordingMeta]) -> Row:

@@ -1,21 +1,17 @@
-"""The recordings a cell needs: found on a shelf, or still to be made by a rig."""
+"""The recordings that cells need of a rig."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tactbench.core.errors import MissingRecordingError, UnknownNameError
 from tactbench.core.matrix.keys import recording_key
 from tactbench.core.matrix.plan import Cell, serves
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.scene import Role, Scene, Simulation
-from tactbench.core.spec.task import TaskSpec
 
 Need = tuple[str, str, str | None, int]
 """Sensor, task, split and seed: what decides which recordings a cell needs."""
@@ -59,35 +55,3 @@ def orders_for(
             path = store.recording_path(cell.sensor, scene.name, key)
             orders[wanted].append(Order(cell.sensor, cell.rig, scene, planned.role, cell.seed, path))
     return orders
-
-
-def on_the_shelf(shelf: Shelf) -> dict[str, dict[Path, RecordingMeta]]:
-    """Return what a shelf holds, by name of sensor; raises MissingRecordingError if it holds nothing."""
-    from tactbench.core.recording.reader import read_meta
-
-    found: dict[str, dict[Path, RecordingMeta]] = {}
-    for path in shelf.recordings():
-        meta = read_meta(path)
-        found.setdefault(meta.sensor.name, {})[path] = meta
-    if not found:
-        raise MissingRecordingError("The shelf is empty.", hint="Import recordings with `tactbench import`.")
-    return found
-
-
-def sensors_on(shelf: Mapping[str, Mapping[Path, RecordingMeta]], asked: Iterable[str]) -> list[str]:
-    """Return the sensors to run: those asked for, or all that the shelf has recordings of."""
-    names = list(asked)
-    for name in names:
-        if name not in shelf:
-            raise UnknownNameError("sensor in these recordings", name, shelf)
-    return names or sorted(shelf)
-
-
-def serving(task: TaskSpec, split: str | None, recordings: Mapping[Path, RecordingMeta]) -> list[Path]:
-    """Return the recordings of a shelf that belong to `task` under `split`.
-
-    A recording of a scene that some task planned serves the campaigns that plan a scene of this name; a recording whose
-    scene nobody planned (an imported table) may serve any task.
-    """
-    names = {planned.scene.name for planned in task.scenes_for(split)}
-    return [path for path, meta in recordings.items() if meta.scene is None or not names or meta.scene.name in names]

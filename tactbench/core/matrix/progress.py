@@ -17,8 +17,14 @@ class Progress(Protocol):
             False: this process is about to fork, and must not be given a thread for the display.
         """
 
-    def advance(self, what: str) -> None:
-        """Finish one step; `what` names it."""
+    def advance(self, what: str, *, stopped: bool = False) -> None:
+        """Finish one step; `what` names it.
+
+        Parameters
+        ----------
+        stopped
+            True: it should have ended otherwise.
+        """
 
     def working(self, what: str) -> None:
         """Say what is being done now, without finishing anything."""
@@ -30,7 +36,7 @@ class Silence:
     def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
         """Say nothing."""
 
-    def advance(self, what: str) -> None:
+    def advance(self, what: str, *, stopped: bool = False) -> None:
         """Say nothing."""
 
     def working(self, what: str) -> None:

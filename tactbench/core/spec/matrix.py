@@ -56,6 +56,10 @@ class MatrixSpec(Frozen):
     rig: str = "twin"
     recordings: str | None = None
     """Folder of recordings for rigs that replay; relative to where tactbench is run."""
+    timeout_s: float | None = Field(default=None, gt=0)
+    """Seconds that one cell or one recording may take."""
+    memory_mb: int | None = Field(default=None, ge=1)
+    """MB (2**20 bytes) that one cell or one recording may take beyond what all share."""
     probe: bool = False
     """Also run the cells that show what recordings give away; see docs/real-recordings.md."""
     simulation: Simulation = Simulation()

@@ -1,1 +1,1 @@
-"""Where work is done: in this process, in processes of their own, or on a cluster; results do not depend on which."""
+"""Where work is done, and what guards it: here, in a process of its own each, or in processes that are reused."""

@@ -11,21 +11,19 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic
 
 from tactbench.core.errors import Crashed, EngineError
 from tactbench.core.matrix.engines.cell_server import thread_bounds
 from tactbench.core.matrix.engines.dask_cluster import client_of
 from tactbench.core.matrix.engines.dask_crew import POLL_S, Crew
 from tactbench.core.matrix.engines.dask_worker import carry_out
+from tactbench.core.matrix.engines.engine import R, T
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.request import Request, Setting, pack, unpack_reply
 from tactbench.core.matrix.engines.sight import fingerprints
 from tactbench.core.matrix.engines.surroundings import surroundings
-from tactbench.core.matrix.execution import installed
-
-T = TypeVar("T")
-R = TypeVar("R")
+from tactbench.core.matrix.installed import installed
 
 DEATHS = 3
 """So many workers may die over a cell; after the first it has a worker for itself, so that it is known who did it."""

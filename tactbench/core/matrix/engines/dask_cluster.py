@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
 import socket
-import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -14,6 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from tactbench.core.errors import UsageError
+from tactbench.core.matrix.engines.family import interrupts_held_back
 
 CONNECT_S = 10.0
 """How long a scheduler may take to answer."""
@@ -38,8 +37,8 @@ def import_distributed() -> Any:
     return distributed
 
 
-def check_scheduler(address: str) -> None:
-    """Make sure that there is a scheduler at `address` before anything is done; starts no thread.
+def check_scheduler(address: str | None) -> None:
+    """Make sure that the library is there, and a scheduler at `address` if one is given; starts no thread.
 
     Raises
     ------
@@ -47,6 +46,8 @@ def check_scheduler(address: str) -> None:
         If the library is missing, the address makes no sense, or nothing listens there within `CONNECT_S`.
     """
     import_distributed()
+    if address is None:
+        return
     from distributed.comm.addressing import get_address_host_port
 
     try:
@@ -91,7 +92,7 @@ def _own_cluster(jobs: int) -> Iterator[Any]:
 
     scratch_of = TemporaryDirectory(prefix="tactbench-dask-")
     with scratch_of as scratch, dask.config.set({"temporary-directory": scratch}):
-        with _interrupts_held_back():
+        with interrupts_held_back():
             cluster = import_distributed().LocalCluster(
                 n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", memory_limit=0,
                 dashboard_address=None, scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
@@ -100,7 +101,7 @@ def _own_cluster(jobs: int) -> Iterator[Any]:
         try:
             yield cluster
         finally:
-            with _interrupts_held_back():
+            with interrupts_held_back():
                 cluster.close(timeout=CONNECT_S)
 
 
@@ -153,16 +154,3 @@ def _environment_kept() -> Iterator[None]:
         for name in set(os.environ) - set(before):
             del os.environ[name]
         os.environ.update(before)
-
-
-@contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """Start threads and processes that are deaf to Ctrl-C: it is this process that ends them, in order."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,58 +1,36 @@
-"""Each item in a forked child of this single-threaded process."""
+"""Each item of work in a process of its own: whatever it does, it does it to itself."""
 
 from __future__ import annotations
 
-import os
-import pickle
-import signal
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from typing import TypeVar
 
-from tactbench.core.errors import Crashed, TimedOut
-from tactbench.core.matrix.engines.limits import Limits
-
-T = TypeVar("T")
-R = TypeVar("R")
+from tactbench.core.matrix.engines.crew import guarded
+from tactbench.core.matrix.engines.engine import R, T
+from tactbench.core.matrix.engines.limits import UNLIMITED, Limits
 
 
 class Isolated:
-    """One forked child an item."""
+    """A forked child for each item, up to `jobs` at once.
 
-    def __init__(self, jobs: int, limits: Limits) -> None:
+    Parameters
+    ----------
+    jobs
+        Items carried out at the same time.
+    limits
+        What each may take; its process is killed beyond.
+
+    Notes
+    -----
+    The calling process must be its only thread. What it holds when an item is taken, libraries and recordings, its
+    child shares until one of the two writes to it.
+    """
+
+    def __init__(self, jobs: int = 1, limits: Limits = UNLIMITED) -> None:
+        self._jobs = jobs
         self._limits = limits
 
     def each(
         self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
     ) -> Iterator[tuple[T, R | BaseException]]:
-        """Yield every item with its result or its error."""
-        from multiprocessing.connection import Pipe
-
-        for item in items:
-            here, there = Pipe(duplex=False)
-            log = tempfile.TemporaryFile()  # noqa: SIM115
-            pid = os.fork()
-            if pid == 0:
-                os.dup2(log.fileno(), 1)
-                os.dup2(log.fileno(), 2)
-                try:
-                    result: R | BaseException = work(item)
-                except BaseException as error:
-                    result = error
-                there.send_bytes(pickle.dumps(result))
-                os._exit(0)
-            there.close()
-            try:
-                if not here.poll(self._limits.timeout_s):
-                    yield item, TimedOut("The cell took too long.")
-                    continue
-                yield item, pickle.loads(here.recv_bytes())
-            except EOFError:
-                yield item, Crashed("The cell crashed.", signal=os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
-                pid = 0
-            finally:
-                if pid:
-                    os.kill(pid, signal.SIGKILL)
-                    os.waitpid(pid, 0)
-                here.close()
-                log.close()
+        """Yield every item with its result or what stopped it, in the order in which they end."""
+        return guarded(work, items, self._jobs, self._limits, meanwhile)

@@ -1,4 +1,4 @@
-"""What a cell may take."""
+"""How much an item of work may take."""
 
 from __future__ import annotations
 
@@ -7,9 +7,18 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds that end a cell which passes them; None is no bound."""
+    """What one item, a cell or a recording, may take; None: no limit."""
 
     timeout_s: float | None = None
-    """Wall clock, s."""
+    """Seconds by the wall."""
     memory_mb: int | None = None
-    """Memory that a cell may take beyond what it starts with, MB."""
+    """MB (2**20 bytes) beyond what all items share: libraries and recordings that were read before it began."""
+    grace_s: float = 0.0
+    """Seconds between being asked to end and being ended: a real device wants to be closed."""
+
+    def exceeded(self, spent_s: float) -> bool:
+        """Return whether so many seconds are more than allowed."""
+        return self.timeout_s is not None and spent_s > self.timeout_s
+
+
+UNLIMITED = Limits()

@@ -6,14 +6,12 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from tactbench.core.matrix.engines.cell_server import LOOK_S, CellServer, ServerEndedError, ended_twice, thread_bounds
+from tactbench.core.matrix.engines.engine import R, T
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.request import Request, Setting, pack, unpack_reply
-
-T = TypeVar("T")
-R = TypeVar("R")
 
 
 class Served:

@@ -74,7 +74,7 @@ def settle(setting: Setting) -> list[str]:
     except OSError as error:
         against.append(f"it cannot enter {setting.folder} ({error.strerror or error})")
     if setting.surroundings:
-        from tactbench.core.matrix.execution import installed
+        from tactbench.core.matrix.installed import installed
 
         against += differences(setting.surroundings, surroundings(installed()))
     return against

@@ -1,0 +1,121 @@
+"""How a long run shows what it is doing: a bar on a terminal, a line a tenth elsewhere."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+from tactbench.core.cli.screen import remark
+from tactbench.core.matrix.progress import Progress
+
+
+@contextmanager
+def progress() -> Iterator[Progress]:
+    """Show progress on stderr."""
+    if not sys.stderr.isatty():
+        yield Lines(time.monotonic)
+        return
+    # A cell in this process prints to its log: what is shown meanwhile needs a way of its own to the terminal.
+    with os.fdopen(os.dup(sys.stderr.fileno()), "w", encoding="utf-8", errors="replace") as terminal:
+        bar = _Bar(terminal)
+        try:
+            yield bar
+        finally:
+            bar.end()
+
+
+def duration(seconds: float) -> str:
+    """Return a rough duration for readers who wait: ``40 s``, ``7 min``, ``2 h 5 min``."""
+    if seconds < 90:
+        return f"{max(1, round(seconds))} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
+
+
+class Lines:
+    """One line a stage and one a finished tenth of it: readable in a log.
+
+    Parameters
+    ----------
+    clock
+        Seconds, monotonic.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._began_s = 0.0
+        self._stage, self._total, self._done, self._stopped = "", 0, 0, 0
+
+    def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
+        """Say what begins."""
+        self._stage, self._total, self._done, self._stopped = stage, total, 0, 0
+        self._began_s = self._clock()
+        remark(f"{stage}: {total} to do")
+
+    def advance(self, what: str, *, stopped: bool = False) -> None:
+        """Say how far it is, once a tenth."""
+        self._done += 1
+        self._stopped += stopped
+        if self._done == self._total or self._done * 10 // self._total > (self._done - 1) * 10 // self._total:
+            remark(f"{self._stage}: {self._done}/{self._total} {what}{self._beside()}")
+
+    def _beside(self) -> str:
+        said = [f"{self._stopped} stopped"] if self._stopped else []
+        left = self._total - self._done
+        if left:
+            said.append(f"about {duration((self._clock() - self._began_s) / self._done * left)} to go")
+        return f" ({', '.join(said)})" if said else ""
+
+    def working(self, what: str) -> None:
+        """Say nothing: what is under way is no line."""
+
+
+class _Bar:
+    """A bar a stage; its clock ticks by a thread where a thread is allowed, else with each step."""
+
+    def __init__(self, terminal: TextIO) -> None:
+        self._terminal = terminal
+        self._shown: Any = None
+        self._task: Any = None
+        self._stopped = 0
+
+    def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import Progress as RichProgress
+
+        self.end()
+        columns = (
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[stopped]}", markup=False, style="red"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[now]}", markup=False),
+        )
+        # The terminal is handed over as it is: rich must not take over streams that cells print to.
+        self._shown = RichProgress(
+            *columns, console=Console(file=self._terminal), auto_refresh=alone, redirect_stdout=False,
+            redirect_stderr=False,
+        )  # fmt: skip
+        self._stopped = 0
+        self._task = self._shown.add_task(f"{stage:<10}", total=total, now="", stopped="")
+        self._shown.start()
+
+    def advance(self, what: str, *, stopped: bool = False) -> None:
+        self._stopped += stopped
+        said = f"{self._stopped} stopped" if self._stopped else ""
+        self._shown.update(self._task, advance=1, now=what, stopped=said, refresh=True)
+
+    def working(self, what: str) -> None:
+        self._shown.update(self._task, now=what, refresh=True)
+
+    def end(self) -> None:
+        if self._shown is not None:
+            self._shown.stop()
+            self._shown = None

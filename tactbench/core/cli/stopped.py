@@ -1,0 +1,35 @@
+"""The end of a run: every cell that should have ended otherwise, and how to look into it."""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.cli.screen import remark
+
+WIDTH = 200
+"""Characters of a reason that are shown; the whole of it is in the row."""
+
+
+def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
+    """Name every cell of `rows` with its reason in one line, and the commands that look into it."""
+    if not rows:
+        return
+    counts = Counter(row["status"] for row in rows)
+    remark(f"\nStopped: {', '.join(f'{number} {status}' for status, number in sorted(counts.items()))}.")
+    for row in rows:
+        remark(f"  {row['status']:<13}  {row['cell']}: {one_line(row['reason'])}")
+    cell = shlex.quote(str(rows[0]["cell"]))
+    where = shlex.quote(str(folder))
+    remark(f"Look into one:  tactbench why {cell} --out {where}")
+    remark(f"Try it again:   tactbench rerun {cell} --out {where}")
+
+
+def one_line(reason: str) -> str:
+    """Return `reason` in one line of readable length; what could move a terminal's cursor is shown, not done."""
+    line = " ".join(str(reason).split())
+    line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line)
+    return line if len(line) <= WIDTH else line[: WIDTH - 1] + "…"

@@ -1,0 +1,70 @@
+"""Whether what came back from a cell is what a cell gives; a plugin may have lied to whoever computed it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from tactbench.core.matrix.store import Row
+from tactbench.core.samples import Answers
+from tactbench.core.spec.status import STATUSES
+
+_COLUMNS = tuple(column.name for column in fields(Answers))
+
+
+def fault_in(given: Any, opened: Row) -> str:
+    """Return what is wrong with what a cell gave, as a clause; "" if nothing is.
+
+    Parameters
+    ----------
+    given
+        What came; a row and its answers by role are wanted.
+    opened
+        The row that the cell began with: keys and name must still be the same.
+    """
+    if not (isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], dict)):
+        return f"it gave a {type(given).__name__} and not a row with its answers"
+    row, sets = given
+    if set(row) != set(opened):
+        return f"its row has other keys: {', '.join(sorted(map(str, set(row) ^ set(opened))))}"
+    if row["cell"] != opened["cell"]:
+        return f"its row is that of another cell, {row['cell']!r}"
+    if row["status"] not in STATUSES:
+        return f"its status is {row['status']!r}"
+    try:
+        json.dumps(row, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        return f"its row is not plain data: {error}"
+    if row["status"] != "done":
+        return ""
+    for name in ("score", "ci_low", "ci_high"):
+        if row[name] is None and name != "score":
+            continue  # an interval may be undefined
+        if not (isinstance(row[name], int | float) and math.isfinite(row[name])):
+            return f"its {name} is {row[name]!r}, not a finite number"
+    return _fault_in_answers(sets, row)
+
+
+def _fault_in_answers(sets: Any, row: Row) -> str:
+    if not (isinstance(sets, Mapping) and "test" in sets):
+        return "it has no answers to the test set"
+    for role, answers in sets.items():
+        if not isinstance(answers, Answers):
+            return f"its {role} answers are a {type(answers).__name__}"
+        columns = {name: getattr(answers, name) for name in _COLUMNS}
+        for name, column in columns.items():
+            if not (isinstance(column, np.ndarray) and column.ndim == 1 and column.dtype.kind in "biufSU"):
+                return f"its {role} answers have no plain column {name}"
+        lengths = {name: len(column) for name, column in columns.items()}
+        if len(set(lengths.values())) != 1:
+            return f"the columns of its {role} answers differ in length: {lengths}"
+        if answers.y_pred.dtype.kind == "f" and not np.isfinite(answers.y_pred).all():
+            return f"some of its {role} answers are NaN or infinite"
+    if len(sets["test"]) != row["n_test"]:
+        return f"it gave {len(sets['test'])} test answers and says {row['n_test']}"
+    return ""

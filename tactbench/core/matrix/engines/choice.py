@@ -1,0 +1,105 @@
+"""Which engine: the one asked for, or the one that fits the work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+from tactbench.core.errors import UsageError
+from tactbench.core.matrix.engines.engine import Engine
+from tactbench.core.matrix.engines.family import can_fork
+from tactbench.core.matrix.engines.in_process import InProcess
+from tactbench.core.matrix.engines.isolated import Isolated
+from tactbench.core.matrix.engines.limits import UNLIMITED, Limits
+from tactbench.core.matrix.engines.processes import Processes
+
+EngineName = Literal["in-process", "isolated", "dask"]
+ENGINES: tuple[EngineName, ...] = get_args(EngineName)
+
+
+@dataclass(frozen=True)
+class EngineChoice:
+    """How cells are to be carried out."""
+
+    name: EngineName | None = None
+    """None: in process for one cell without limits, isolated otherwise."""
+    jobs: int = 1
+    """Cells at once."""
+    limits: Limits = field(default_factory=Limits)
+    scheduler: str | None = None
+    """Address of a Dask scheduler; None: a cluster on this machine."""
+
+    def checked(self) -> EngineChoice:
+        """Return this choice; raise UsageError if its parts do not go together."""
+        if self.name == "in-process" and self.jobs > 1:
+            raise UsageError(
+                f"The engine in-process carries out one cell at a time; --jobs {self.jobs} was given.",
+                hint="Leave out --jobs, or use --engine isolated.",
+            )
+        if self.scheduler is not None and self.name != "dask":
+            raise UsageError("--scheduler is for --engine dask.", hint="Add --engine dask, or leave it out.")
+        return self
+
+    def ready(self) -> None:
+        """Make sure that the engine can be opened, before anything is recorded.
+
+        Raises
+        ------
+        UsageError
+            If the library of the Dask engine is missing, or nobody answers at the scheduler's address.
+        """
+        if self.name == "dask":
+            from tactbench.core.matrix.engines.dask_cluster import check_scheduler
+
+            check_scheduler(self.scheduler)
+
+    def named(self, cells: int) -> EngineName:
+        """Return the name of the engine for so many cells."""
+        if self.name is not None:
+            return self.name
+        return "in-process" if cells == 1 and self.limits == UNLIMITED else "isolated"
+
+    def concurrency(self, cells: int) -> int:
+        """Return how many of so many cells are carried out at once."""
+        return 1 if self.named(cells) == "in-process" else max(1, min(self.jobs, cells))
+
+    def shares(self, cells: int) -> bool:
+        """Return whether every cell is forked off this process, and inherits what it holds at that moment."""
+        return self.named(cells) == "isolated" and can_fork()
+
+    def here(self, cells: int) -> bool:
+        """Return whether cells are really carried out in this process: one that aborts ends it."""
+        return self.named(cells) == "in-process" and (cells == 1 or not can_fork())
+
+    def engine(self, cells: int) -> Engine:
+        """Return the engine for so many cells.
+
+        In process, one cell is carried out here. Several are carried out in one forked process, one after the other,
+        that this one looks after: a cell that ends it costs its own row and nobody else's.
+        """
+        name = self.named(cells)
+        if name == "dask":
+            return _dask(self)
+        if self.here(cells):
+            return InProcess(self.limits)
+        if not can_fork():
+            return _served(self)
+        return Processes(1, self.limits) if name == "in-process" else Isolated(self.jobs, self.limits)
+
+    def pool(self, hands: int, *, grace_s: float = 0.0) -> Engine:
+        """Return reused processes for `hands` items at once, for what is no cell; here where this cannot fork."""
+        limits = replace(self.limits, grace_s=grace_s)
+        return Processes(hands, limits) if can_fork() else InProcess(limits)
+
+
+def _dask(choice: EngineChoice) -> Engine:
+    from tactbench.core.matrix.engines.dask import Dask
+
+    return Dask(choice.jobs, choice.limits, choice.scheduler)
+
+
+def _served(choice: EngineChoice) -> Engine:
+    """Return an engine for a process that must not fork."""
+    from tactbench.core.matrix.engines.served import Served
+
+    return Served(choice.jobs, choice.limits)

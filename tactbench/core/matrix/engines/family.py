@@ -1,0 +1,140 @@
+"""Processes and their descendants: who dies with whom, and who is left over. Linux; elsewhere nothing is known."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+# prctl(2)
+_SET_PDEATHSIG, _SET_CHILD_SUBREAPER, _GET_CHILD_SUBREAPER = 1, 36, 37
+
+_ours: set[int] = set()
+"""Processes that engines of this process have started and not yet buried."""
+
+
+def can_fork() -> bool:
+    """Return whether this process may fork: it is its only thread.
+
+    A fork of a process with threads copies their locks in an undefined state. The command line keeps BLAS at one
+    thread, so that there are none.
+    """
+    try:
+        return len(list(Path("/proc/self/task").iterdir())) == 1
+    except OSError:
+        return False
+
+
+def die_with_parent(parent: int) -> None:
+    """Have this process killed when its parent ends, however that ends; end it now if that has happened already."""
+    _prctl(_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+
+
+def born(pid: int) -> None:
+    """Remember a process as one that an engine looks after."""
+    _ours.add(pid)
+
+
+def end_group(pid: int) -> int:
+    """Kill what is left of a process and of its group; return its wait status."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(pid, signal.SIGKILL)
+    with suppress(ProcessLookupError, PermissionError):
+        os.kill(pid, signal.SIGKILL)  # it may not have founded its group yet
+    _, status = os.waitpid(pid, 0)
+    _ours.discard(pid)
+    return status
+
+
+def descendants(pid: int) -> list[int]:
+    """Return the processes below `pid`, itself not among them."""
+    found: list[int] = []
+    for child in _children(pid):
+        found += [child, *descendants(child)]
+    return found
+
+
+@contextmanager
+def adopting() -> Iterator[None]:
+    """Become the parent of whatever the processes started meanwhile leave behind, and end it."""
+    before = _get_subreaper()
+    strangers = set(_children(os.getpid()))
+    _prctl(_SET_CHILD_SUBREAPER, 1)
+    try:
+        yield
+    finally:
+        bury_orphans(strangers)
+        _prctl(_SET_CHILD_SUBREAPER, before)
+
+
+def bury_orphans(spared: set[int]) -> None:
+    """End children that nobody here has started, except those `spared`: a cell that is over has left them behind.
+
+    A parent that is killed hands its children on: ended generation by generation, at most as many as nobody nests.
+    """
+    for _ in range(64):
+        orphans = set(_children(os.getpid())) - _ours - spared
+        if not orphans:
+            return
+        for pid in orphans:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+            with suppress(ChildProcessError):
+                os.waitpid(pid, 0)
+
+
+def own_children() -> set[int]:
+    """Return the children of this process."""
+    return set(_children(os.getpid()))
+
+
+def _children(pid: int) -> list[int]:
+    found: list[int] = []
+    try:
+        for task in os.scandir(f"/proc/{pid}/task"):
+            found += [int(word) for word in (Path(task.path) / "children").read_text().split()]
+    except OSError:
+        pass  # it has ended, or the system does not tell
+    return found
+
+
+@contextmanager
+def interrupts_held_back() -> Iterator[None]:
+    """Start processes that are deaf to Ctrl-C from their first instruction on: it is the parent that ends them.
+
+    A terminal sends the interrupt to all of them at once, and one that is still starting would print where it was. The
+    signal is blocked, which children inherit; one that comes meanwhile waits here and is delivered afterwards.
+    """
+    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@lru_cache(maxsize=1)
+def _library() -> Any:
+    return ctypes.CDLL(None)
+
+
+def _prctl(option: int, value: int) -> None:
+    with suppress(AttributeError, OSError):
+        _library().prctl(option, ctypes.c_ulong(value), 0, 0, 0)
+
+
+def _get_subreaper() -> int:
+    value = ctypes.c_int(0)
+    with suppress(AttributeError, OSError):
+        _library().prctl(_GET_CHILD_SUBREAPER, ctypes.byref(value), 0, 0, 0)
+    return value.value

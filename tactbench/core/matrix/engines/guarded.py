@@ -1,0 +1,209 @@
+"""One forked process as its parent sees it: started, watched, ended."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import Any
+
+from tactbench.core.errors import CellStopped, TactbenchError
+from tactbench.core.matrix.engines import family, memory, verdict
+from tactbench.core.matrix.engines.child import WHERE_ARE_YOU, live
+from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.engines.log import cut_back, flush, open_log, tail
+from tactbench.core.matrix.engines.message import Inbox, Message, Told, ask, asked
+
+WORD_S = 0.1
+"""Seconds that a process which is about to be ended has to say where it is."""
+
+
+class Guarded:
+    """A forked process that carries out items, one at a time.
+
+    Parameters
+    ----------
+    work
+        What it does with an item; inherited, never pickled.
+    items
+        What it may be asked for, by number; inherited as well.
+    limits
+        What one item may take.
+    """
+
+    def __init__(self, work: Callable[[Any], Any], items: list[Any], limits: Limits) -> None:
+        self.number: int | None = None
+        """The item it is busy with."""
+        self._limits = limits
+        self._log = open_log()
+        self._last = ""
+        """What the log held when the process was buried."""
+        self._inbox = Inbox()
+        self._stopped: CellStopped | None = None
+        """Why this process was told to end."""
+        link, theirs = os.pipe()
+        their_orders, orders = os.pipe()
+        flush()
+        parent = os.getpid()
+        with family.interrupts_held_back():
+            self.pid = os.fork()
+            if self.pid == 0:
+                os.close(link)
+                os.close(orders)
+                live(work, _ordered(items, their_orders), theirs, self._log, limits, parent)
+            family.born(self.pid)
+        os.close(theirs)
+        os.close(their_orders)
+        os.set_blocking(link, False)
+        self.link, self._orders = link, orders
+        self.ended = os.pidfd_open(self.pid) if hasattr(os, "pidfd_open") else -1
+        """Becomes readable when the process is over; -1 where the system has no such thing."""
+        self._began_mb = memory.resident_mb(parent)
+
+    def ask(self, number: int) -> None:
+        """Have it carry out item `number`."""
+        self.number = number
+        self._began_s = time.monotonic()
+        self._ends_s = None if self._limits.timeout_s is None else self._began_s + self._limits.timeout_s
+        self._kills = memory.oom_kills()
+        self._began_mb = max(self._began_mb, memory.resident_mb(self.pid))
+        with suppress(BrokenPipeError):  # it is over already: what it says or does not say will tell
+            ask(self._orders, number)
+
+    def waits_s(self, now_s: float) -> float:
+        """Return the seconds until this process must be looked at again, at most."""
+        tick = 0.1 if self._limits.memory_mb is None else 0.02
+        return tick if self._ends_s is None else max(0.0, min(tick, self._ends_s - now_s))
+
+    def look(self) -> Any:
+        """Return what came of the item it is busy with: a result, an error, or `PENDING`."""
+        outcome = self._looked()
+        if isinstance(outcome, CellStopped):
+            outcome.spent_s = time.monotonic() - self._began_s
+        return outcome
+
+    def _looked(self) -> Any:
+        alive = self._inbox.read(self.link)
+        over = not alive or (self.ended >= 0 and wait_for([self.ended], 0))
+        if over:
+            self._inbox.read(self.link)
+        try:
+            message = self._inbox.message()
+        except Exception as error:
+            return self._said(Told.of(error))
+        if message is not None and self._stopped is None:
+            return self._judged(message)
+        if over:
+            return self._over()
+        return self._limited()
+
+    def _judged(self, message: Message) -> Any:
+        if self._limits.exceeded(message.spent_s):
+            return self._with_log(verdict.too_slow(self._limits))
+        return self._said(message.result) if isinstance(message.result, Told) else message.result
+
+    def _said(self, told: Told) -> TactbenchError:
+        return told.error(self._printed())
+
+    def _over(self) -> CellStopped:
+        """Say why the process ended without a result, and bury it."""
+        status = self._bury()
+        if self._stopped is not None:
+            return self._with_log(self._stopped)
+        return verdict.crashed(status, self._printed(), memory_was_short=memory.oom_kills() > self._kills)
+
+    def _limited(self) -> Any:
+        """End the process if it has taken more than it may."""
+        cut_back(self._log)
+        now_s = time.monotonic()
+        if self._ends_s is not None and now_s >= self._ends_s:
+            if self._stopped is not None:  # it was asked to end, and the time for that is up as well
+                return self._over()
+            self._stopped = verdict.too_slow(self._limits)
+            self._stopped.traceback_text = self._where()
+            if not self._limits.grace_s:
+                return self._over()
+            self._please_end(now_s)
+        elif self._stopped is None and self._takes_too_much():
+            self._stopped = verdict.out_of_memory(self._limits)
+            return self._over()
+        return PENDING
+
+    def _takes_too_much(self) -> bool:
+        most = self._limits.memory_mb
+        return most is not None and memory.taken_mb(self.pid, self._began_mb) > most
+
+    def _please_end(self, now_s: float) -> None:
+        self._ends_s = now_s + self._limits.grace_s
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGTERM)
+
+    def _where(self) -> str:
+        """Have the process write where it is, and return that; "" if it does not."""
+        if WHERE_ARE_YOU is None:
+            return ""
+        before = len(self._printed())
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, WHERE_ARE_YOU)
+        until = time.monotonic() + WORD_S
+        length = -1
+        while time.monotonic() < until and not (length == len(self._printed()) > before):
+            length = len(self._printed())
+            wait_for([], WORD_S / 20)
+        said = self._printed()[before:]
+        return said if "most recent call first" in said else ""
+
+    def _with_log(self, stopped: CellStopped) -> CellStopped:
+        stopped.log = self._printed()
+        return stopped
+
+    def tidy(self) -> None:
+        """End what an item that is over has left running below this process."""
+        for pid in family.descendants(self.pid):
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(pid, signal.SIGKILL)
+
+    def end(self) -> None:
+        """End the process: at once, or after the time it has to close what is open."""
+        if self.pid and self.number is not None and self._limits.grace_s and self.ended >= 0:
+            self._please_end(time.monotonic())
+            wait_for([self.ended], self._limits.grace_s)
+        self._bury()
+
+    def _bury(self) -> int:
+        if not self.pid:
+            return 0
+        status = family.end_group(self.pid)
+        self._last = tail(self._log)
+        self.pid = 0
+        for descriptor in (self.link, self._orders, self.ended, self._log):
+            if descriptor >= 0:
+                os.close(descriptor)
+        return status
+
+    def _printed(self) -> str:
+        return tail(self._log) if self.pid else self._last
+
+
+def wait_for(descriptors: list[int], seconds: float) -> bool:
+    """Wait until one of `descriptors` can be read or so many seconds have passed; return whether one can."""
+    poll = select.poll()
+    for descriptor in descriptors:
+        poll.register(descriptor, select.POLLIN)
+    return bool(poll.poll(1e3 * seconds))
+
+
+class Pending:
+    """Says that there is nothing to say yet."""
+
+
+PENDING = Pending()
+
+
+def _ordered(items: list[Any], orders: int) -> Iterator[Any]:
+    """Yield the items that the parent asks for, until it asks for no more."""
+    while (number := asked(orders)) is not None:
+        yield items[number]

@@ -1,0 +1,151 @@
+"""Answering the cells: those that are finished are found again, the others go to an engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import CellStopped, PluginContractError
+from tactbench.core.matrix.checking import fault_in
+from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.in_flight import InFlight
+from tactbench.core.matrix.keys import cell_key
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.planning import Material
+from tactbench.core.matrix.preloading import shared
+from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.reading import read_apart
+from tactbench.core.matrix.solving import Job, solve, unanswered
+from tactbench.core.matrix.source import SourceDigests
+from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.status import STOPPED
+
+
+@dataclass
+class Evaluated:
+    """The rows so far."""
+
+    rows: dict[str, Row] = field(default_factory=dict)
+    """By name of the cell."""
+    computed: int = 0
+    """Cells computed now; the others were found finished."""
+
+
+def evaluate_all(
+    cells: Sequence[Cell],
+    material: Material,
+    choice: EngineChoice,
+    registry: Registry,
+    sources: SourceDigests,
+    store: Store,
+    told: Progress,
+) -> Evaluated:
+    """Give every cell its row: found in `store`, computed now, or saying why it could not be."""
+    done = Evaluated()
+    keys: dict[str, str] = {}
+    waiting: list[Job] = []
+    digests = _digests(cells, material, choice)
+    for cell in cells:
+        paths = material.paths(cell)
+        trouble = material.trouble(cell) or next((d for p in paths if isinstance(d := digests[p], BaseException)), None)
+        if trouble is None:
+            try:
+                keys[cell.name] = cell_key(cell, [str(digests[path]) for path in paths], registry, sources)
+            except Exception as error:
+                trouble = error
+        known = store.finished(keys[cell.name]) if trouble is None else None
+        if known is not None and known["status"] == "done":
+            done.rows[cell.name] = {**known, "cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
+        else:
+            waiting.append((cell, tuple(paths), trouble))
+    done.computed = len(waiting)
+    if waiting:
+        _compute(waiting, keys, choice, store, told, done)
+    return done
+
+
+def _digests(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> dict[Path, str | BaseException]:
+    """Return the content digest of every recording, or why it has none; those made now are known already."""
+    wanted = {path: None for cell in cells if material.trouble(cell) is None for path in material.paths(cell)}
+    found: dict[Path, str | BaseException] = dict(material.made)
+    found |= read_apart(_digest, [path for path in wanted if path not in found], choice)
+    return {**{path: "" for cell in cells for path in material.paths(cell)}, **found}
+
+
+def _digest(path: Path) -> str:
+    from tactbench.core.recording.reader import content_digest
+
+    return content_digest(path)
+
+
+def _compute(
+    waiting: list[Job], keys: dict[str, str], choice: EngineChoice, store: Store, told: Progress, done: Evaluated
+) -> None:
+    jobs = [job for job in waiting if job[2] is None]
+    marks = InFlight(store.folder)
+    if len(jobs) == 1 and choice.here(1) and marks.ended_a_run(keys[jobs[0][0].name]):
+        choice = EngineChoice("isolated", 1, choice.limits)
+    here = choice.here(len(jobs))
+    told.begin("evaluating", len(waiting), alone=here)
+    work = partial(solve, concurrency=choice.concurrency(len(jobs)), working=told.working if here else None)
+    engine = choice.engine(len(jobs))
+    hopeless: Iterator[tuple[Job, Any]] = (
+        (job, (unanswered(job[0], job[2]), {})) for job in waiting if job[2] is not None
+    )
+    for job, outcome in _each(hopeless, engine.each(work, _marked(_ordered(jobs, choice), marks, keys, here))):
+        cell = job[0]
+        row, sets = _judged(cell, outcome)
+        row["key"] = keys.get(cell.name, "")
+        row["recordings"] = [_beside(path, store.folder) for path in row["recordings"]]
+        if row["status"] == "done":
+            store.keep(row["key"], row, sets)
+        done.rows[cell.name] = row
+        marks.clear()
+        told.advance(cell.name, stopped=row["status"] in STOPPED)
+
+
+def _each(*several: Iterable[tuple[Job, Any]]) -> Iterator[tuple[Job, Any]]:
+    for some in several:
+        yield from some
+
+
+def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
+    """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
+    groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
+    for job in jobs:
+        groups.setdefault((job[0].task, job[1]), []).append(job)
+    if choice.shares(len(jobs)):
+        return shared(groups, choice)
+    return [job for group in groups.values() for job in group]
+
+
+def _marked(jobs: Iterable[Job], marks: InFlight, keys: dict[str, str], here: bool) -> Iterator[Job]:
+    """Yield `jobs`; where a cell may end this process, note each before it begins."""
+    for job in jobs:
+        if here:
+            marks.set(keys[job[0].name])
+        yield job
+
+
+def _judged(cell: Cell, outcome: Any) -> tuple[Row, Any]:
+    """Return the row and answers of a cell; what stopped it, or what is wrong with them, makes the row."""
+    if isinstance(outcome, BaseException):
+        return unanswered(cell, outcome), {}
+    fault = fault_in(outcome, unanswered(cell, CellStopped("")))
+    if fault:
+        error = PluginContractError(
+            f"The cell's result is not one: {fault}.", hint="Its estimator or task is at fault."
+        )
+        return unanswered(cell, error), {}
+    row, sets = outcome
+    return row, sets
+
+
+def _beside(path: str, folder: Path) -> str:
+    """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
+    inside = Path(path).is_relative_to(folder)
+    return str(Path(path).relative_to(folder)) if inside else str(Path(path).resolve())

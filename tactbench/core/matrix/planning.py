@@ -1,0 +1,144 @@
+"""What a run will do: its cells, and where their recordings come from. Nothing is recorded yet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar, cast
+
+from tactbench.core.errors import NotApplicable, RigError, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.evaluation.splits import shots
+from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.engines.in_process import InProcess
+from tactbench.core.matrix.installed import rig_of
+from tactbench.core.matrix.material import Need, Order, need_of, orders_for
+from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells
+from tactbench.core.matrix.shelf import holdings, sensors_on, serving
+from tactbench.core.matrix.source import SourceDigests
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.interfaces import Shelf
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.spec.task import TaskSpec
+
+R = TypeVar("R")
+ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuffled")
+"""Splits that every recording acquired by a rig can be asked for; its scene's labels are further ones."""
+
+
+@dataclass
+class Material:
+    """Where the recordings of cells come from."""
+
+    orders: dict[Need, list[Order]] = field(default_factory=dict)
+    """What a rig has to record."""
+    shelf: dict[Need, list[Path]] = field(default_factory=dict)
+    """What exists already."""
+    troubles: dict[Need, BaseException] = field(default_factory=dict)
+    """Why there are no recordings, or not all of them."""
+    made: dict[Path, str] = field(default_factory=dict)
+    """Content digests of the recordings made now."""
+    refused: dict[Path, BaseException] = field(default_factory=dict)
+    """Recordings that could not be made, and why."""
+
+    def paths(self, cell: Cell) -> list[Path]:
+        """Return the recordings of a cell."""
+        wanted = need_of(cell)
+        return self.shelf.get(wanted) or [order.path for order in self.orders.get(wanted, ())]
+
+    def trouble(self, cell: Cell) -> BaseException | None:
+        """Return why a cell cannot have its recordings, if so."""
+        wanted = need_of(cell)
+        if wanted in self.troubles:
+            return self.troubles[wanted]
+        paths = self.paths(cell)
+        if not paths:
+            return NotApplicable(
+                f"Task {cell.task!r} has no scenes for rig {cell.rig!r}, and there are no recordings of it.",
+                hint="Use --rig replay --recordings DIR.",
+            )
+        return next((self.refused[path] for path in paths if path in self.refused), None)
+
+
+def plan(
+    matrix: MatrixSpec,
+    registry: Registry,
+    sources: SourceDigests,
+    store: Store,
+    recordings: Path | None,
+    choice: EngineChoice,
+) -> tuple[list[Cell], Material]:
+    """Return the cells of `matrix`, and where their recordings come from.
+
+    A rig that cannot be built, or that lists its recordings badly, costs the cells that need it, not the run.
+
+    Raises
+    ------
+    UsageError
+        If the matrix asks for something that is not there.
+    """
+    name = registry.rigs[matrix.rig].name
+    rig = _greeted(lambda: rig_of(name, registry, recordings), f"The rig {name!r} could not be built", choice)
+    if isinstance(rig, BaseException):
+        return _in_vain(matrix, registry, rig)
+    if hasattr(rig, "recordings"):
+        return _from_shelf(matrix, registry, cast(Shelf, rig), choice)
+    cells = plan_cells(matrix, _named(matrix, registry), registry)
+    for task in {cell.task for cell in cells}:
+        _known_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
+    return cells, Material(orders_for(cells, registry, sources, store, matrix.simulation))
+
+
+def _from_shelf(
+    matrix: MatrixSpec, registry: Registry, shelf: Shelf, choice: EngineChoice
+) -> tuple[list[Cell], Material]:
+    paths = _greeted(lambda: list(shelf.recordings()), f"The recordings of rig {matrix.rig!r} cannot be listed", choice)
+    if isinstance(paths, BaseException):
+        return _in_vain(matrix, registry, paths)
+    found = holdings(paths, matrix.sensors, registry, choice)
+    cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
+    material = Material()
+    for wanted in dict.fromkeys(need_of(cell) for cell in cells):
+        sensor, task, split, _ = wanted
+        material.shelf[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
+        if trouble is not None:
+            material.troubles[wanted] = trouble
+    return cells, material
+
+
+def _in_vain(matrix: MatrixSpec, registry: Registry, trouble: BaseException) -> tuple[list[Cell], Material]:
+    """Return the cells of a rig that cannot be used; every one of them says why."""
+    if not matrix.sensors:
+        raise trouble
+    cells = plan_cells(matrix, matrix.sensors, registry)
+    return cells, Material(troubles={need_of(cell): trouble for cell in cells})
+
+
+def _greeted(ask: Callable[[], R], what: str, choice: EngineChoice) -> R | BaseException:
+    """Return what a rig says, or why it does not; raises what is the user's to mend."""
+    ((_, outcome),) = InProcess(choice.limits).each(lambda _: ask(), [None])
+    if not isinstance(outcome, BaseException):
+        return outcome
+    if isinstance(outcome, TactbenchError) and outcome.exit_code == UsageError.exit_code:
+        raise outcome
+    said = str(outcome) if isinstance(outcome, TactbenchError) else f"{type(outcome).__name__}: {outcome}"
+    error = RigError(f"{what}: {said.rstrip(': ')}", hint="See `tactbench plugins` for who brings it.")
+    error.__cause__ = outcome
+    return error.with_traceback(outcome.__traceback__)
+
+
+def _named(matrix: MatrixSpec, registry: Registry) -> list[str]:
+    if not matrix.sensors:
+        raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
+    return [registry.sensors[name].name for name in matrix.sensors]
+
+
+def _known_splits(task: TaskSpec, splits: Sequence[str | None]) -> None:
+    """Refuse a split that no recording of this task's scenes can be asked for, before any is made."""
+    labels = {label for planned in task.scenes for label in planned.scene.labels}
+    few = (FEW_SHOT,) if any(shots(name) for name in task.splits) else ()
+    known = {*ACQUIRED_SPLITS, *task.splits, *task.campaigns, *labels, *few}
+    for split in splits:
+        if split is not None and split not in known and shots(split) is None:
+            raise UnknownNameError(f"split of task {task.name!r}", split, known)

@@ -1,0 +1,61 @@
+"""Heavy things once, before processes are forked that share them: recordings and the estimators' libraries."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.engines.in_process import InProcess
+from tactbench.core.matrix.installed import installed
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.solving import DATASETS, Job, prepare
+
+Groups = Mapping[tuple[str, tuple[Path, ...]], Sequence[Job]]
+"""Cells by task and recordings."""
+
+
+def shared(groups: Groups, choice: EngineChoice) -> Iterator[Job]:
+    """Yield the cells group by group; before each group, have here what several of its cells need.
+
+    Recordings that cannot be read are the trouble of their cells.
+    """
+    for (task, recordings), jobs in groups.items():
+        import_estimators([job[0] for job in jobs], choice)
+        trouble = None
+        if len(jobs) > 1 and (task, recordings) not in DATASETS:
+            # Read in a process of its own: what it does to the reader, it does not do to the run.
+            ((_, outcome),) = choice.pool(1).each(_read, [(task, recordings)])
+            if isinstance(outcome, BaseException):
+                trouble = outcome
+            else:
+                DATASETS.keep((task, recordings), outcome)
+        for cell, paths, _ in jobs:
+            yield cell, paths, trouble
+
+
+def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
+    """Build the estimator of each cell once, so that what it imports is there; what is wrong with it is its cells' own.
+
+    What others bring is built in a process of its own first: only what that process survives is done here as well.
+    """
+    registry = installed()
+    several = {(cell.task, cell.estimator): cell for cell in cells if (cell.task, cell.estimator) not in _prepared}
+    _prepared.update(several)
+    foreign = [cell for cell in several.values() if not _our_own(registry.estimators.owned(cell.estimator).module)]
+    survived = [cell for cell, outcome in choice.pool(1).each(prepare, foreign) if outcome is None] if foreign else []
+    for _ in InProcess(choice.limits).each(prepare, [*(set(several.values()) - set(foreign)), *survived]):
+        pass
+
+
+_prepared: set[tuple[str, str]] = set()
+
+
+def _our_own(module: str) -> bool:
+    """Return whether a plugin comes with this package: tested with it, and trusted not to end this process."""
+    return module.partition(".")[0] == __name__.partition(".")[0]
+
+
+def _read(wanted: tuple[str, tuple[Path, ...]]) -> Dataset:
+    return DATASETS(*wanted)

@@ -1,0 +1,120 @@
+"""One cell, carried out in whatever process an engine has chosen for it."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from functools import lru_cache
+from pathlib import Path
+
+from tactbench.core.errors import NotApplicable
+from tactbench.core.evaluation.dataset import Dataset, load_dataset
+from tactbench.core.matrix.answer import Answer, answer, opening, stopped
+from tactbench.core.matrix.engines.log import printed
+from tactbench.core.matrix.installed import installed
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.provenance import host_id
+from tactbench.core.plugins.registry import load_object
+
+Job = tuple[Cell, tuple[Path, ...], "BaseException | None"]
+"""A cell, its recordings, and why there are none if the rig could not make them."""
+
+Wanted = tuple[str, tuple[Path, ...]]
+"""A task and recordings."""
+
+_host = lru_cache(maxsize=1)(host_id)
+
+
+def prepare(cell: Cell) -> None:
+    """Import what a cell's estimator needs, so that no clock and no waiting person sees it later."""
+    registry = installed()
+    descriptor = registry.estimators[cell.estimator]
+    kind = registry.tasks[cell.task].spec.kind
+    load_object(descriptor.where)(kind=kind, seed=0, threads=1, **descriptor.params)
+
+
+class Datasets:
+    """Recordings as a task needs them, the last used of them kept: forked children share what is here.
+
+    Parameters
+    ----------
+    most
+        So many are kept.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._kept: OrderedDict[Wanted, Dataset] = OrderedDict()
+
+    def __contains__(self, wanted: Wanted) -> bool:
+        return wanted in self._kept
+
+    def __call__(self, task: str, recordings: tuple[Path, ...]) -> Dataset:
+        """Return `recordings` as `task` needs them; raises as `load_dataset` does."""
+        wanted = (task, recordings)
+        if wanted not in self._kept:
+            self.keep(wanted, load_dataset(installed().tasks[task].spec, recordings))
+        self._kept.move_to_end(wanted)
+        return self._kept[wanted]
+
+    def keep(self, wanted: Wanted, dataset: Dataset) -> None:
+        """Keep what was read elsewhere, in place of the one used longest ago."""
+        self._kept[wanted] = dataset
+        while len(self._kept) > self._most:
+            self._kept.popitem(last=False)
+
+
+DATASETS = Datasets(2)
+"""Those of this process."""
+
+
+def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None = None) -> Answer:
+    """Answer one cell.
+
+    An exception of a plugin or a recording becomes a row. What is more than an exception, such as SystemExit, and a
+    MemoryError are left to the engine that called.
+
+    Parameters
+    ----------
+    concurrency
+        Cells that may be at work at once while this one is timed.
+    """
+    began = time.perf_counter()
+    cell, recordings, trouble = job
+    registry = installed()
+    if trouble is not None:
+        return unanswered(cell, trouble), {}
+    _seed_everything(cell.seed)
+    row, sets = answer(cell, registry, recordings, DATASETS, working)
+    timed = {"wall_s": time.perf_counter() - began, "concurrency": concurrency, "host": _host()}
+    return {**row, **timed, "log": printed()}, sets
+
+
+def _shares(job: Job) -> dict[Hashable, Callable[[], object]]:
+    """Return what cells like this one need as well and a process may load for its children, by what it is."""
+    cell, recordings, _ = job
+    return {
+        ("recordings", cell.task, recordings): lambda: DATASETS(cell.task, recordings),
+        ("estimator", cell.task, cell.estimator): lambda: prepare(cell),
+    }
+
+
+setattr(solve, "shares", _shares)  # noqa: B010  (type checkers know no attributes of functions)
+
+
+def unanswered(cell: Cell, trouble: BaseException) -> dict[str, object]:
+    """Return the row of a cell that could not be carried out, or not to its end."""
+    row = opening(cell, installed().tasks[cell.task].spec)
+    if isinstance(trouble, NotApplicable):
+        return {**row, "status": "skipped", "reason": str(trouble)}
+    return stopped(row, trouble)
+
+
+def _seed_everything(seed: int) -> None:
+    """Give the global generators the cell's seed: who draws from them shall not depend on the cells before."""
+    import numpy as np
+
+    random.seed(seed)
+    np.random.seed(seed % 2**32)  # noqa: NPY002  (it is this old generator that others draw from)
