@@ -118,6 +118,7 @@ class DaskEngine:
         self, client: Any, limits: Limits, told: Callable[[str], None] | None = None, *, alone_s: float = ALONE_S
     ) -> None:
         self._client = client
+        self._where = client.scheduler.address
         self._limits = limits
         self._told = told
         self._alone_s = alone_s
@@ -164,10 +165,9 @@ class DaskEngine:
         return Setting(uuid.uuid4().hex, str(Path.cwd()), self._limits, agreed, dict(thread_bounds()))
 
     def _gone(self) -> EngineError:
-        where = self._client.scheduler.address if self._client.scheduler is not None else "that was asked"
         what = f"has had no worker for {self._alone_s:.0f} s" if self._client.status == "running" else "went away"
         return EngineError(
-            f"The Dask scheduler at {where} {what} before this cell was computed.",
+            f"The Dask scheduler at {self._where} {what} before this cell was computed.",
             hint="Start it, or workers for it, and give the same command again: what was finished is kept.",
         )
 

@@ -8,6 +8,7 @@ import socket
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -90,6 +91,7 @@ def _own_cluster(jobs: int) -> Iterator[Any]:
     # What cells take is watched by the engine; the workers themselves only pass requests on.
     import dask
 
+    resource_tracker.ensure_running()  # it lets interrupts in again where it is started: let that be before
     scratch_of = TemporaryDirectory(prefix="tactbench-dask-")
     with scratch_of as scratch, dask.config.set({"temporary-directory": scratch}):
         with interrupts_held_back():

@@ -22,6 +22,9 @@ GATHER_S = 10.0
 EXAM_S = PATIENCE_S + 30.0
 """How long workers may take to be examined: one may be busy for somebody else."""
 
+MOST = 3
+"""So many reasons are told."""
+
 
 class Crew:
     """The workers of a scheduler that have been examined and may compute.
@@ -42,7 +45,7 @@ class Crew:
         self._files: dict[str, str] = {}
         self._told = told or (lambda sentence: None)
         self._exams: dict[str, tuple[Any, int]] = {}
-        self._refused: dict[str, str] = {}
+        self._refused: dict[str, list[str]] = {}
         self._looked = float("-inf")
         self._judged: SimpleQueue[Any] = SimpleQueue()
         self.threads: dict[str, int] = {}
@@ -75,7 +78,7 @@ class Crew:
             self.look()
         if self._refused:
             raise UsageError(
-                " ".join(self._refused.values()),
+                _refusal(self._refused),
                 hint="Start workers in the environment and on the files of this run, and stop the others.",
             )
         if not self.threads:
@@ -124,8 +127,8 @@ class Crew:
                 continue
             del self._exams[address]
             if against:
-                self._refused[address] = f"The Dask worker at {address} cannot be used: {'; '.join(against)}."
-                self._told(self._refused[address])
+                self._refused[address] = against
+                self._told(_refusal({address: against}))
             else:
                 self.threads[address] = threads
 
@@ -135,3 +138,15 @@ class Crew:
         if self._client.status == "running" and self.threads:
             with suppress(OSError, TimeoutError):
                 self._client.run(leave, session, workers=list(self.threads), on_error="ignore")
+
+
+def _refusal(refused: Mapping[str, list[str]]) -> str:
+    """Return what stands against workers; those against which the same stands together."""
+    alike: dict[str, list[str]] = {}
+    for address, against in refused.items():
+        more = f"; and {len(against) - MOST} more" if len(against) > MOST else ""
+        alike.setdefault("; ".join(against[:MOST]) + more, []).append(address)
+    return " ".join(
+        f"The Dask worker{'s' if addresses[1:] else ''} at {', '.join(addresses)} cannot be used: {why}."
+        for why, addresses in alike.items()
+    )

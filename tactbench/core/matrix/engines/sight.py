@@ -21,11 +21,11 @@ def paths_in(item: object) -> Iterator[Path]:
 
 
 def fingerprints(item: object) -> dict[str, str]:
-    """Return the fingerprint of every file that `item` names and that can be read here."""
+    """Return the fingerprint of every file that `item` names and that can be read here, by its absolute path."""
     found = {}
     for path in paths_in(item):
         try:
-            found[str(path)] = fingerprint(path)
+            found[str(path.absolute())] = fingerprint(path)
         except OSError:
             continue  # the cell itself will say what is wrong with it
     return found
