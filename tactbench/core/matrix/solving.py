@@ -12,6 +12,7 @@ from pathlib import Path
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.matrix.answer import Answer, answer, opening, stopped
+from tactbench.core.matrix.engines.company import company
 from tactbench.core.matrix.engines.log import printed
 from tactbench.core.matrix.installed import installed
 from tactbench.core.matrix.plan import Cell
@@ -79,7 +80,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     Parameters
     ----------
     concurrency
-        Cells that may be at work at once while this one is timed.
+        Cells that may be at work at once while this one is timed, where the engine does not know better.
     """
     began = time.perf_counter()
     cell, recordings, trouble = job
@@ -88,7 +89,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
         return unanswered(cell, trouble), {}
     _seed_everything(cell.seed)
     row, sets = answer(cell, registry, recordings, DATASETS, working)
-    timed = {"wall_s": time.perf_counter() - began, "concurrency": concurrency, "host": _host()}
+    timed = {"wall_s": time.perf_counter() - began, "concurrency": company(concurrency), "host": _host()}
     return {**row, **timed, "log": printed()}, sets
 
 

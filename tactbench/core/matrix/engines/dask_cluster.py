@@ -7,8 +7,9 @@ import os
 import socket
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import resource_tracker
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -64,8 +65,10 @@ def check_scheduler(address: str | None) -> None:
 
 
 @contextmanager
-def client_of(address: str | None, jobs: int) -> Iterator[Any]:
+def client_of(address: str | None, jobs: int) -> Iterator[tuple[Any, Path]]:
     """Open a client of the scheduler at `address`, or of a cluster of `jobs` workers of our own.
+
+    With it comes a folder for what is worth nothing afterwards.
 
     Raises
     ------
@@ -75,36 +78,31 @@ def client_of(address: str | None, jobs: int) -> Iterator[Any]:
     import_distributed()
     import dask
 
-    quick = {"distributed.diagnostics.nvml": False, "distributed.worker.profile.enabled": False}
-    with _quiet(), _environment_kept(), dask.config.set(quick):
-        if address is None:
-            with _own_cluster(jobs) as cluster, _connected(cluster) as client:
-                yield client
-        else:
-            with _connected(address) as client:
-                yield client
+    with TemporaryDirectory(prefix="tactbench-dask-") as scratch, ExitStack() as stack:
+        quick = {"distributed.diagnostics.nvml": False, "distributed.worker.profile.enabled": False}
+        stack.enter_context(_quiet())
+        stack.enter_context(_environment_kept())
+        stack.enter_context(dask.config.set({"temporary-directory": scratch, **quick}))
+        to = stack.enter_context(_own_cluster(jobs)) if address is None else address
+        yield stack.enter_context(_connected(to)), Path(scratch)
 
 
 @contextmanager
 def _own_cluster(jobs: int) -> Iterator[Any]:
-    """Start a scheduler and `jobs` workers of one thread each on the loopback; leave no process and no file."""
-    # What cells take is watched by the engine; the workers themselves only pass requests on.
-    import dask
-
+    """Start a scheduler and `jobs` workers of one thread each on the loopback; leave no process."""
     resource_tracker.ensure_running()  # it lets interrupts in again where it is started: let that be before
-    scratch_of = TemporaryDirectory(prefix="tactbench-dask-")
-    with scratch_of as scratch, dask.config.set({"temporary-directory": scratch}):
+    with interrupts_held_back():
+        # What cells take is watched by the engine; the workers themselves only pass requests on.
+        cluster = import_distributed().LocalCluster(
+            n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", memory_limit=0,
+            dashboard_address=None, scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
+            silence_logs=logging.CRITICAL + 1,
+        )  # fmt: skip
+    try:
+        yield cluster
+    finally:
         with interrupts_held_back():
-            cluster = import_distributed().LocalCluster(
-                n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", memory_limit=0,
-                dashboard_address=None, scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-                local_directory=scratch, silence_logs=logging.CRITICAL + 1,
-            )  # fmt: skip
-        try:
-            yield cluster
-        finally:
-            with interrupts_held_back():
-                cluster.close(timeout=CONNECT_S)
+            cluster.close(timeout=CONNECT_S)
 
 
 @contextmanager

@@ -50,6 +50,7 @@ class Crew:
         self._judged: SimpleQueue[Any] = SimpleQueue()
         self.threads: dict[str, int] = {}
         """Cells at once, by address of the workers that may compute"""
+        self._hosts: dict[str, str] = {}
 
     def gather(self, files: Mapping[str, str]) -> None:
         """Wait until every worker that is there now has been examined.
@@ -106,6 +107,7 @@ class Crew:
             del self.threads[gone]
         for gone in set(self._exams) - set(there):
             self._exams.pop(gone)
+        self._hosts = {address: str(facts.get("host", "")) for address, facts in there.items()}
         for address, facts in there.items():
             if not (address in self.threads or address in self._exams or address in self._refused):
                 exam = self._client.submit(
@@ -131,6 +133,11 @@ class Crew:
                 self._told(_refusal({address: against}))
             else:
                 self.threads[address] = threads
+
+    def company(self, address: str) -> int:
+        """Return how many cells may be at work at once on the machine of a worker."""
+        host = self._hosts.get(address)
+        return sum(threads for other, threads in self.threads.items() if self._hosts.get(other) == host)
 
     def leave(self) -> None:
         """Have the workers end what they keep and do for this crew; what comes later begins anew."""

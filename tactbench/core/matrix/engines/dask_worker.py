@@ -42,10 +42,10 @@ def carry_out(setting: Setting, where: str, request: bytes) -> bytes:
         try:
             server = _take(setting)
         except EngineError as error:
-            return pack_reply(EngineError(f"{where}: {error.message}"))
+            return pack_reply(EngineError(f"{where} cannot compute this cell: {error.message}"))
         try:
             if server.against:
-                return pack_reply(EngineError(f"{where} was not used: {'; '.join(server.against)}."))
+                return pack_reply(EngineError(f"{where} cannot compute this cell: {'; '.join(server.against)}."))
             return server.ask(request)
         except ServerEndedError as error:
             ended = error
@@ -53,7 +53,7 @@ def carry_out(setting: Setting, where: str, request: bytes) -> bytes:
         finally:
             _give_back(server)
     assert ended is not None
-    return pack_reply(ended_twice(ended, f" on {where}"))
+    return pack_reply(ended_twice(ended, f" for {where}"))
 
 
 def leave(session: str) -> None:

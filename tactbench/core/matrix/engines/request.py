@@ -22,6 +22,8 @@ class Setting:
     limits: Limits = field(default_factory=Limits)
     surroundings: Mapping[str, str] = field(default_factory=dict)
     """What the process that asks computes with; empty: the server need not agree"""
+    memory: str = ""
+    """File that remembers digests of sources, if there is one; nobody but the process that asks writes it"""
     threads: Mapping[str, str] = field(default_factory=dict)
     """Environment variables that hold numerical libraries at a number of threads"""
 
@@ -34,6 +36,10 @@ class Request:
     item: Any
     files: Mapping[str, str] = field(default_factory=dict)
     """Fingerprints of the files that the item names"""
+    where: str = "This machine"
+    """Who is asked, for readers"""
+    company: int | None = None
+    """Cells that may be at work at once on the machine that is asked, if that is known"""
 
 
 @dataclass(frozen=True)

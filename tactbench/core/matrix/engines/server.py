@@ -17,9 +17,11 @@ from collections.abc import Callable, Hashable
 from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import EngineError
+from tactbench.core.matrix.engines.company import keep_company
 from tactbench.core.matrix.engines.isolated import Isolated
 from tactbench.core.matrix.engines.request import Request, Setting, pack, pack_reply
 from tactbench.core.matrix.engines.sight import unseen
@@ -75,8 +77,11 @@ def settle(setting: Setting) -> list[str]:
         against.append(f"it cannot enter {setting.folder} ({error.strerror or error})")
     if setting.surroundings:
         from tactbench.core.matrix.installed import installed
+        from tactbench.core.matrix.source import SourceDigests
 
-        against += differences(setting.surroundings, surroundings(installed()))
+        # A memory on another machine is not there, and costs half a second.
+        sources = SourceDigests(Path(setting.memory or os.devnull))
+        against += differences(setting.surroundings, surroundings(installed(), sources))
     return against
 
 
@@ -92,7 +97,10 @@ def serve(channel: Connection[Any, Any], setting: Setting) -> None:
 def _answer(channel: Connection[Any, Any], children: Isolated, request: Request, survived: set[Hashable]) -> Any:
     against = unseen(request.files)
     if against:
-        return EngineError("; ".join(against))
+        return EngineError(
+            f"{request.where} cannot compute this cell: {'; '.join(against)}.",
+            hint="Every worker must see the files of the run, unchanged, at the same paths.",
+        )
     loads = _shares(request.work, request.item)
     for what, load in loads.items():
         if what in survived:
@@ -102,6 +110,8 @@ def _answer(channel: Connection[Any, Any], children: Isolated, request: Request,
     def work(item: Any) -> Any:
         channel.close()  # a child that outlives this server must not look like it
         signal.signal(signal.SIGIO, signal.SIG_DFL)
+        if request.company is not None:
+            keep_company(request.company)
         return request.work(item)
 
     ((_, outcome),) = children.each(work, [request.item])

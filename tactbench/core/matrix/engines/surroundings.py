@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
-from pathlib import Path
 
 from tactbench.core.matrix.keys import RELEVANT, versions
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.plugins.registry import Registry
 
 
-def surroundings(registry: Registry) -> dict[str, str]:
+def surroundings(registry: Registry, sources: SourceDigests) -> dict[str, str]:
     """Return versions and digests of sources that may change a number, by a name for readers.
 
     Parameters
     ----------
     registry
         What is installed. A plugin that could not be loaded does not count, nor does a distribution that is missing.
+    sources
+        Digests of packages.
     """
     modules = [shelf.owned(one.name).module for shelf in registry.shelves().values() for one in shelf]
     packages = {"tactbench", *(module.partition(":")[0].partition(".")[0] for module in modules)}
-    sources = SourceDigests(Path(os.devnull))
     found = {f"the source of {package}": sources.package(package) for package in sorted(packages)}
     more = {name for estimator in registry.estimators for name in estimator.distributions} - set(RELEVANT)
     for name, version in versions(tuple(sorted(more))).items():
