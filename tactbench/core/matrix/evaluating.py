@@ -15,7 +15,7 @@ from tactbench.core.matrix.in_flight import InFlight
 from tactbench.core.matrix.keys import cell_key
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material
-from tactbench.core.matrix.preloading import shared
+from tactbench.core.matrix.preloading import import_estimators, shared
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.reading import read_apart
 from tactbench.core.matrix.solving import Job, solve, unanswered
@@ -120,6 +120,8 @@ def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
         groups.setdefault((job[0].task, job[1]), []).append(job)
     if choice.shares(len(jobs)):
         return shared(groups, choice)
+    if choice.forks(len(jobs)):
+        import_estimators([job[0] for job in jobs], choice)
     return [job for group in groups.values() for job in group]
 
 

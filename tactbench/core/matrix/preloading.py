@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -40,6 +41,7 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
 
     What others bring is built in a process of its own first: only what that process survives is done here as well.
     """
+    importlib.import_module("threadpoolctl")  # every cell holds its threads with it
     registry = installed()
     several = {(cell.task, cell.estimator): cell for cell in cells if (cell.task, cell.estimator) not in _prepared}
     _prepared.update(several)

@@ -96,7 +96,8 @@ def carry_out(
     registry = installed()
     sources = SourceDigests(store.folder / "cache" / "sources.json")
     cells, material = plan(matrix, registry, sources, store, recordings, chosen)
-    acquire_missing(material, chosen, told, meanwhile=lambda: import_estimators(cells, chosen))
+    inherited = chosen.named(len(cells)) != "dask"
+    acquire_missing(material, chosen, told, (lambda: import_estimators(cells, chosen)) if inherited else None)
     found = evaluate_all(cells, material, chosen, registry, sources, store, told)
     sources.save()
     rows = [found.rows[cell.name] for cell in cells]

@@ -20,27 +20,35 @@ def _run(path, *, n=30, jobs=1, spec=None, seed=5, work=work, made_by=MADE_BY):
     return carry_out_missing(spec, seed, n, journal, jobs=jobs, told=Silence(), work=work), journal
 
 
-class Interrupted(BaseException):
+class Ended(BaseException):
     pass
 
 
 def _stops_at(number):
     def one(trial):
         if trial.number == number:
-            raise Interrupted
+            raise Ended
         return work(trial)
 
     return one
 
 
-def test_an_interrupted_run_goes_on_to_the_same_file(tmp_path):
+def _noting(path):
+    def one(trial):
+        with path.open("a") as file:
+            file.write(f"{trial.number}\n")
+        return work(trial)
+
+    return one
+
+
+def test_a_run_that_was_ended_goes_on_to_the_same_file(tmp_path):
     whole, _ = _run(tmp_path / "whole.jsonl")
-    with pytest.raises(Interrupted):
+    with pytest.raises(TactbenchError, match="draw 11 was ended"):
         _run(tmp_path / "cut.jsonl", work=_stops_at(11))
     assert len((tmp_path / "cut.jsonl").read_text().splitlines()) == 1 + 11
-    done = []
-    rest, journal = _run(tmp_path / "cut.jsonl", work=lambda trial: done.append(trial.number) or work(trial))
-    assert done == list(range(11, 30))
+    rest, journal = _run(tmp_path / "cut.jsonl", work=_noting(tmp_path / "done"))
+    assert (tmp_path / "done").read_text().split() == [str(number) for number in range(11, 30)]
     assert (tmp_path / "cut.jsonl").read_bytes() == (tmp_path / "whole.jsonl").read_bytes()
     assert draws_csv(procedure(), rest) == draws_csv(procedure(), whole)
     assert journal.seconds == pytest.approx(15.0)

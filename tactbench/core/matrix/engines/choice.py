@@ -63,9 +63,13 @@ class EngineChoice:
         """Return how many of so many cells are carried out at once."""
         return 1 if self.named(cells) == "in-process" else max(1, min(self.jobs, cells))
 
+    def forks(self, cells: int) -> bool:
+        """Return whether cells are carried out in processes forked off this one, which inherit what it has imported."""
+        return self.named(cells) != "dask" and not self.here(cells) and can_fork()
+
     def shares(self, cells: int) -> bool:
         """Return whether every cell is forked off this process, and inherits what it holds at that moment."""
-        return self.named(cells) == "isolated" and can_fork()
+        return self.named(cells) == "isolated" and self.forks(cells)
 
     def here(self, cells: int) -> bool:
         """Return whether cells are really carried out in this process: one that aborts ends it."""
@@ -87,9 +91,11 @@ class EngineChoice:
         return Processes(1, self.limits) if name == "in-process" else Isolated(self.jobs, self.limits)
 
     def pool(self, hands: int, *, grace_s: float = 0.0) -> Engine:
-        """Return reused processes for `hands` items at once, for what is no cell; here where this cannot fork."""
+        """Return reused processes for `hands` items at once, for what is no cell."""
         limits = replace(self.limits, grace_s=grace_s)
-        return Processes(hands, limits) if can_fork() else InProcess(limits)
+        if can_fork():
+            return Processes(hands, limits)
+        return _served(replace(self, limits=limits, jobs=hands)) if hands > 1 else InProcess(limits)
 
 
 def _dask(choice: EngineChoice) -> Engine:

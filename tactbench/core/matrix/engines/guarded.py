@@ -88,6 +88,8 @@ class Guarded:
     def _looked(self) -> Any:
         alive = self._inbox.read(self.link)
         over = not alive or (self.ended >= 0 and wait_for([self.ended], 0))
+        if not alive and self.ended >= 0 and not wait_for([self.ended], WORD_S):
+            self._stopped = self._stopped or verdict.silenced()
         if over:
             self._inbox.read(self.link)
         try:

@@ -31,6 +31,14 @@ def out_of_memory(limits: Limits, error: MemoryError | None = None, traceback_te
     )
 
 
+def silenced() -> Crashed:
+    """Say that a process has cut itself off."""
+    return Crashed(
+        "It closed the pipe that its result should have come by, and so gave no result.",
+        hint="Something in it closes what is not its own, as os.closerange does.",
+    )
+
+
 def crashed(status: int, log: str, *, memory_was_short: bool) -> Crashed | OutOfMemory:
     """Say how a process ended that gave no result.
 

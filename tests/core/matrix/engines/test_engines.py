@@ -1,0 +1,252 @@
+"""What all engines promise: one answer an item, whatever the item does."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tactbench.core.errors import Crashed, NotApplicable, OutOfMemory, Raised, TimedOut
+from tactbench.core.matrix.engines.in_process import InProcess
+from tactbench.core.matrix.engines.isolated import Isolated
+from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.engines.processes import Processes
+from tests.core.matrix.engines.works import work
+
+LIMITS = Limits(timeout_s=1.0, memory_mb=64)
+GUARDED = {
+    "isolated": Isolated(1, LIMITS),
+    "isolated-3": Isolated(3, LIMITS),
+    "reused": Processes(1, LIMITS),
+    "reused-2": Processes(2, LIMITS),
+}
+EVERY = {"in-process": InProcess(LIMITS), **GUARDED}
+
+
+@pytest.fixture(params=GUARDED)
+def guarded(request):
+    return GUARDED[request.param]
+
+
+@pytest.fixture(params=EVERY)
+def engine(request):
+    return EVERY[request.param]
+
+
+def outcomes(engine, *whats):
+    """Return what came of each; every item must come once."""
+    found = list(engine.each(work, whats))
+    assert sorted(what for what, _ in found) == sorted(whats)
+    return dict(found)
+
+
+def alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize(
+    ("what", "kind", "says"),
+    [
+        ("raises", Raised, "ValueError: no such luck"),
+        ("exits", Raised, "SystemExit: 3"),
+        ("interrupts", Raised, "KeyboardInterrupt"),
+        ("refuses", NotApplicable, "not this one Try another."),
+        ("aborts", Crashed, "signal 6 (SIGABRT)"),
+        ("terminates", Crashed, "signal 15 (SIGTERM)"),
+        ("kills", Crashed, "signal 9 (SIGKILL)"),
+        ("vanishes", Crashed, "exit code 0"),
+        ("hangs", TimedOut, "longer than 1 s"),
+        ("deaf", TimedOut, "longer than 1 s"),
+        ("eats", OutOfMemory, "more than 64 MB"),
+        ("unspeakable", Raised, "pickle"),
+        ("closes", Crashed, "gave no result"),
+    ],
+)
+@pytest.mark.parametrize("name", ["isolated", "reused-2"])
+def test_whatever_an_item_does_it_does_to_itself(name, what, kind, says):
+    found = outcomes(GUARDED[name], "fine", what, "prints")
+    assert (found["fine"], found["prints"]) == ("fine", "printed")
+    assert type(found[what]) is kind
+    assert says in str(found[what])
+
+
+@pytest.mark.parametrize(
+    ("what", "kind"),
+    [("raises", ValueError), ("exits", SystemExit), ("interrupts", KeyboardInterrupt), ("hangs", TimedOut),
+     ("eats", OutOfMemory), ("refuses", NotApplicable)],
+)  # fmt: skip
+def test_in_process_everything_short_of_the_processs_end_is_a_result(what, kind):
+    found = outcomes(EVERY["in-process"], "fine", what, "prints")
+    assert (found["fine"], found["prints"]) == ("fine", "printed")
+    assert type(found[what]) is kind
+
+
+def test_a_crash_knows_its_signal_and_where_it_was(guarded):
+    crash = outcomes(guarded, "aborts")["aborts"]
+    assert crash.signal == signal.SIGABRT
+    assert "works.py" in crash.traceback_text
+    assert "in aborts" in crash.traceback_text
+    assert crash.spent_s >= 0
+
+
+def test_what_hangs_is_told_where_and_what_it_printed(guarded):
+    late = outcomes(guarded, "hangs")["hangs"]
+    assert "in hangs" in late.traceback_text
+    assert late.log.startswith("about to hang\n")
+    assert late.spent_s == pytest.approx(1.0, abs=0.9)  # a busy machine looks late, never early
+    assert late.spent_s >= 1.0
+
+
+def test_one_who_hears_no_signal_is_ended_as_well_and_nothing_is_said_of_where(guarded):
+    assert outcomes(guarded, "deaf")["deaf"].traceback_text == ""
+
+
+def test_a_traceback_crosses_the_border_between_processes(guarded):
+    error = outcomes(guarded, "raises")["raises"]
+    assert error.status == "failed"
+    assert 'raise ValueError("no such luck")' in error.traceback_text
+
+
+def test_what_is_printed_reaches_no_stream_of_ours(engine, capfd):
+    outcomes(engine, "prints")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_endless_talk_is_cut_to_its_end(guarded):
+    def chatty(what):
+        from tactbench.core.matrix.engines.log import printed
+
+        work(what)
+        return printed()
+
+    ((_, said),) = guarded.each(chatty, ["chatters"])
+    assert len(said) == 2**16
+    assert said.endswith("the end\n")
+
+
+@pytest.mark.parametrize("name", [*GUARDED])
+def test_who_forks_is_heard_once(name):
+    found = list(GUARDED[name].each(work, ["forks", "fine", "forks"]))
+    assert sorted(outcome for _, outcome in found) == ["fine", "one", "one"]
+
+
+def test_in_process_who_forks_is_heard_once():
+    code = (
+        "from tactbench.core.matrix.engines.in_process import InProcess\n"
+        "from tests.core.matrix.engines.works import work\n"
+        "for item, outcome in InProcess().each(work, ['forks', 'fine']):\n"
+        "    print(item, outcome, flush=True)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout == "forks one\nfine fine\n"
+
+
+@pytest.mark.parametrize("what", ["leaves", "flees"])
+def test_nobody_is_left_behind(guarded, what):
+    pid = outcomes(guarded, what, "fine")[what]
+    assert isinstance(pid, int)
+    assert not alive(pid)
+
+
+def test_isolated_items_have_a_process_each_and_reused_ones_share():
+    pids = [pid for _, pid in Isolated(2).each(work, ["whoami"] * 4)]
+    assert len(set(pids)) == 4
+    assert os.getpid() not in pids
+    assert len({pid for _, pid in Processes(1).each(work, ["whoami"] * 4)}) == 1
+    assert {pid for _, pid in InProcess().each(work, ["whoami"] * 2)} == {os.getpid()}
+
+
+def test_no_more_than_jobs_are_at_work_and_items_are_taken_as_there_is_room():
+    taken = []
+
+    def items():
+        for number in range(6):
+            taken.append(number)
+            yield number
+
+    ahead = [len(taken) - heard for heard, _ in enumerate(Isolated(2).each(lambda item: item, items()))]
+    assert max(ahead) <= 3, "two at work, one just heard"
+    assert taken == list(range(6))
+
+
+def test_what_is_prepared_while_an_item_is_taken_its_process_inherits():
+    prepared = []
+
+    def items():
+        for number in range(3):
+            prepared.append(number)
+            yield number
+
+    assert dict(Isolated(1).each(lambda item: item in prepared, items())) == {0: True, 1: True, 2: True}
+
+
+def test_meanwhile_is_done_once_here_while_others_work():
+    did = []
+    assert len(list(Processes(2).each(work, ["whoami"] * 5, lambda: did.append(os.getpid())))) == 5
+    assert did == [os.getpid()]
+
+
+def test_no_items_no_processes(engine):
+    assert list(engine.each(work, [])) == []
+
+
+def test_memory_is_counted_beyond_what_is_shared():
+    shared = bytearray(100 * 2**20)
+    shared[::4096] = b"\1" * len(shared[::4096])
+
+    def reads(item):
+        return sum(memoryview(shared)[:: 2**20]) >= 0
+
+    assert dict(Isolated(1, Limits(memory_mb=64)).each(reads, [0])) == {0: True}
+
+
+def test_memory_of_a_child_of_the_cell_counts_even_where_nobody_asks_it():
+    def feeds_a_child(item):
+        import resource
+
+        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+        resource.setrlimit(resource.RLIMIT_DATA, (hard, hard))  # the soft guard can be taken off
+        if os.fork() == 0:
+            work("eats")
+        os.wait()
+
+    ((_, outcome),) = Isolated(1, Limits(timeout_s=30, memory_mb=256)).each(feeds_a_child, [0])
+    assert type(outcome) is OutOfMemory
+
+
+def test_a_device_has_time_to_be_let_go_of(tmp_path):
+    def holds(path):
+        try:
+            time.sleep(60)
+        finally:
+            path.write_text("let go")
+
+    path = tmp_path / "device"
+    engine = Processes(1, Limits(timeout_s=0.3, grace_s=20.0))
+    ((_, outcome),) = engine.each(holds, [path])
+    assert type(outcome) is TimedOut
+    assert path.read_text() == "let go"
+
+
+def test_an_iteration_given_up_ends_everybody():
+    pids = []
+
+    def told(item):
+        os.write(writing, f"{os.getpid()}\n".encode())
+        work(item)
+
+    reading, writing = os.pipe()
+    running = Isolated(2).each(told, ["vanishes", "hangs", "hangs"])
+    next(running)
+    while len(pids) < 2:
+        pids += os.read(reading, 100).split()
+    running.close()
+    os.close(reading)
+    os.close(writing)
+    assert not any(alive(int(pid)) for pid in pids)

@@ -1,0 +1,5 @@
+"""Cannot even be imported."""
+
+import os
+
+os.abort()

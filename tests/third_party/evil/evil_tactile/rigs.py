@@ -1,0 +1,89 @@
+"""The code behind the rigs. All of them carry out a scene by yielding a ramp of force; if they come to it."""
+
+import os
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from tactbench.plugin import Block, ChannelSpec, RigError, StreamSpec
+
+FORCE = StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
+SECOND = "flat-validation"
+"""The second scene of the task `force`."""
+
+
+class Ramp:
+    plan = ()
+    assumptions = {}
+    drawn = {}
+    reference = (FORCE,)
+
+    def __init__(self, sensor, seed):
+        self.streams = sensor.spec.streams
+        self.seed = seed
+
+    def __iter__(self):
+        rng = np.random.default_rng(self.seed)
+        t_ns = np.arange(500, dtype=np.int64) * 10_000_000
+        force = np.linspace(0.0, 5.0, 500) + rng.normal(0.0, 0.1, 500)
+        for stream in self.streams:
+            gains = np.arange(1, len(stream.channels) + 1)
+            yield Block(stream.name, t_ns, (100 + np.outer(force, gains)).astype(stream.dtype))
+        yield Block("force_torque", t_ns, force[:, None])
+
+
+class Rig:
+    def __init__(self, happens=None):
+        self.happens = happens
+
+    @contextmanager
+    def open(self, sensor, scene, *, seed):
+        try:
+            if self.happens is not None:
+                self.happens(scene)
+            yield Ramp(sensor, seed)
+        finally:
+            with Path("let-go-of").open("a") as file:
+                file.write(f"{scene.name}\n")
+
+
+def unbuilt(context):
+    raise OSError("no such port: /dev/ttyEVIL0")
+
+
+def leaving(context):
+    print("good bye")
+    sys.exit(0)
+
+
+def _closed(scene):
+    raise RigError(f"{scene.name}: the door is locked.", hint="Find the key.")
+
+
+def _dying(scene):
+    if scene.name == SECOND:
+        os.abort()
+
+
+def _stuck(scene):
+    if scene.name == SECOND:
+        print("stuck in", scene.name, flush=True)
+        time.sleep(3600)
+
+
+def closed(context):
+    return Rig(_closed)
+
+
+def dying(context):
+    return Rig(_dying)
+
+
+def stuck(context):
+    return Rig(_stuck)
+
+
+device = stuck
