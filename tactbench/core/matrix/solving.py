@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.matrix.answer import Answer, answer, opening, stopped
 from tactbench.core.matrix.engines.company import company
 from tactbench.core.matrix.engines.log import printed
+from tactbench.core.matrix.engines.share import Share
 from tactbench.core.matrix.installed import installed
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.provenance import host_id
@@ -93,13 +94,18 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     return {**row, **timed, "log": printed()}, sets
 
 
-def _shares(job: Job) -> dict[Hashable, Callable[[], object]]:
-    """Return what cells like this one need as well and a process may load for its children, by what it is."""
+def our_own(estimator: str) -> bool:
+    """Return whether an estimator comes with this package: tested with it, and trusted not to end whoever builds it."""
+    return installed().estimators.owned(estimator).module.partition(".")[0] == __name__.partition(".")[0]
+
+
+def _shares(job: Job) -> list[Share]:
+    """Return what other cells need as well, so that a process may load it for its children."""
     cell, recordings, _ = job
-    return {
-        ("recordings", cell.task, recordings): lambda: DATASETS(cell.task, recordings),
-        ("estimator", cell.task, cell.estimator): lambda: prepare(cell),
-    }
+    return [
+        Share(("estimator", cell.task, cell.estimator), lambda: prepare(cell), trusted=our_own(cell.estimator)),
+        Share(("recordings", cell.task, recordings), lambda: DATASETS(cell.task, recordings)),
+    ]
 
 
 setattr(solve, "shares", _shares)  # noqa: B010  (type checkers know no attributes of functions)

@@ -15,7 +15,9 @@ from tactbench.core.errors import Crashed, EngineError
 from tactbench.core.matrix.engines.request import Setting, pack
 
 PATIENCE_S = 60.0
-"""How long a server may take to start; and to answer after the time its cell may take."""
+"""How long a server may take to start; and to answer after the time that its children may take."""
+_CHILDREN = 3
+"""Children that one request may need: two that try what is shared, and the cell."""
 LOOK_S = 1.0
 """How often a silent server is looked at: a grandchild of it may hold its end of the channel open."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -85,14 +87,14 @@ class CellServer:
         Raises
         ------
         ServerEndedError
-            If the server ended, or did not answer in the time that a cell may take and `PATIENCE_S`.
+            If the server ended, or did not answer in the time that its children may take and `PATIENCE_S`.
         """
         bound = self.setting.limits.timeout_s
         try:
             self.channel.send_bytes(request)
         except OSError as error:
             raise self._ended() from error
-        return self._hear(None if bound is None else bound + PATIENCE_S)
+        return self._hear(None if bound is None else _CHILDREN * bound + PATIENCE_S)
 
     def hear(self) -> bytes:
         """Return the packed reply that is waiting; raises like `ask`."""

@@ -1,8 +1,8 @@
 """The cell server: a process with one thread that forks a child for each cell it is asked for.
 
 A process with threads must not fork: the child would inherit locks that nobody releases. It starts one of these
-instead (see `cell_server`) and asks it over a pair of sockets. What a first child has survived, the server then loads
-itself, so that later children inherit it: nothing that a plugin or a recording does on loading reaches the server.
+instead (see `cell_server`) and asks it over a pair of sockets. What several cells need, the server loads itself and
+they inherit; but what a plugin brings, or a file, only after a child of its own has survived the same.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import signal
 import sys
 from collections.abc import Callable, Hashable
 from contextlib import suppress
-from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from tactbench.core.errors import EngineError
 from tactbench.core.matrix.engines.company import keep_company
 from tactbench.core.matrix.engines.isolated import Isolated
 from tactbench.core.matrix.engines.request import Request, Setting, pack, pack_reply
+from tactbench.core.matrix.engines.share import Share, shares_of
 from tactbench.core.matrix.engines.sight import unseen
 from tactbench.core.matrix.engines.surroundings import differences, surroundings
 
@@ -87,45 +87,62 @@ def settle(setting: Setting) -> list[str]:
 
 def serve(channel: Connection[Any, Any], setting: Setting) -> None:
     """Answer requests one after the other; return when there are none for `IDLE_S`."""
-    children = Isolated(1, setting.limits)
-    survived: set[Hashable] = set()
+    children = _Children(channel, setting)
     while channel.poll(IDLE_S):
         request: Request = pickle.loads(channel.recv_bytes())
-        channel.send_bytes(pack_reply(_answer(channel, children, request, survived)))
+        channel.send_bytes(pack_reply(_answer(children, request)))
 
 
-def _answer(channel: Connection[Any, Any], children: Isolated, request: Request, survived: set[Hashable]) -> Any:
+def _answer(children: _Children, request: Request) -> Any:
     against = unseen(request.files)
     if against:
         return EngineError(
             f"{request.where} cannot compute this cell: {'; '.join(against)}.",
             hint="Every worker must see the files of the run, unchanged, at the same paths.",
         )
-    loads = _shares(request.work, request.item)
-    for what, load in loads.items():
-        if what in survived:
-            with suppress(Exception):  # the child meets it again, and tells
-                load()
+    for share in shares_of(request.work, request.item):
+        children.inherit(share)
 
     def work(item: Any) -> Any:
-        channel.close()  # a child that outlives this server must not look like it
-        signal.signal(signal.SIGIO, signal.SIG_DFL)
         if request.company is not None:
             keep_company(request.company)
         return request.work(item)
 
-    ((_, outcome),) = children.each(work, [request.item])
-    if not isinstance(outcome, BaseException):
-        survived.update(loads)
-    return outcome
+    return children.one(work, request.item)
 
 
-def _shares(work: Any, item: Any) -> dict[Hashable, Callable[[], object]]:
-    """Return what may be loaded for all children that do `work`: a function says it in its attribute ``shares``."""
-    while isinstance(work, partial):
-        work = work.func
-    shares = getattr(work, "shares", None)
-    return {} if shares is None else shares(item)
+class _Children:
+    """Forked processes, and what they inherit."""
+
+    def __init__(self, channel: Connection[Any, Any], setting: Setting) -> None:
+        self._channel = channel
+        self._engine = Isolated(1, setting.limits)
+        self._tried: set[Hashable] = set()
+
+    def one(self, work: Callable[[Any], Any], item: Any) -> Any:
+        """Return what came of `item` in a child of its own."""
+
+        def begun(item: Any) -> Any:
+            self._channel.close()  # a child that outlives this server must not look like it
+            signal.signal(signal.SIGIO, signal.SIG_DFL)
+            return work(item)
+
+        ((_, outcome),) = self._engine.each(begun, [item])
+        return outcome
+
+    def inherit(self, share: Share) -> None:
+        """Load what is shared, once; what is not trusted only if a child survives it. Cells tell what is wrong."""
+        if share.what in self._tried:
+            return
+        self._tried.add(share.what)
+        if share.trusted or self.one(_survived, share) is True:
+            with suppress(Exception):
+                share.load()
+
+
+def _survived(share: Share) -> bool:
+    share.load()
+    return True
 
 
 if __name__ == "__main__":

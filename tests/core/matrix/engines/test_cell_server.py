@@ -15,7 +15,7 @@ from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.request import Request, Setting, pack, unpack_reply
 from tactbench.core.matrix.engines.served import Served
 from tests.core.matrix.engines.patience import gone, until
-from tests.core.matrix.engines.work import count_loads, misbehave, process, read, square
+from tests.core.matrix.engines.work import misbehave, process, read, square, what_is_loaded
 
 
 @pytest.fixture
@@ -61,9 +61,9 @@ def test_each_item_has_a_process_of_its_own_and_the_server_stays(server):
     assert first[1:] == second[1:] == (server._process.pid, os.getpid())
 
 
-def test_what_a_child_has_survived_the_server_loads_once_for_all(server):
-    counted = [asked(server, partial(count_loads), item) for item in ("a", "a", "b", "a", "b")]
-    assert counted == [[], ["a"], [], ["a", "a"], ["b"]]
+def test_what_a_child_survives_the_server_loads_once_for_all(server):
+    inherited = [asked(server, partial(what_is_loaded), item) for item in ("a", "a", "bomb", "trusted", "bomb", "b")]
+    assert inherited == [["a"], ["a"], ["a"], ["a", "trusted"], ["a", "trusted"], ["a", "trusted", "b"]]
 
 
 def test_a_server_that_sees_other_files_does_not_compute(server, tmp_path):

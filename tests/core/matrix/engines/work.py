@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 from tactbench.core.errors import DataError
+from tactbench.core.matrix.engines.share import Share
 
 
 def square(number):
@@ -69,9 +70,15 @@ def wait_for(job):
 loaded = []
 
 
-def count_loads(item):
-    """How often this process or its parent has loaded what `item` needs."""
-    return [one for one in loaded if one == item]
+def what_is_loaded(item):
+    """What this process has inherited and what it has loaded itself."""
+    return list(loaded)
 
 
-count_loads.shares = lambda item: {("letter", item): lambda: loaded.append(item)}
+def _load(item):
+    if item == "bomb":
+        os.abort()
+    loaded.append(item)
+
+
+what_is_loaded.shares = lambda item: [Share(item, lambda: _load(item), trusted=item == "trusted")]
