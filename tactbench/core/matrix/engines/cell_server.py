@@ -7,7 +7,7 @@ import pickle
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing.connection import Pipe
 
@@ -81,32 +81,42 @@ class CellServer:
         """Whether it can be asked."""
         return self._process.poll() is None and not self.channel.closed
 
-    def ask(self, request: bytes) -> bytes:
+    def ask(self, request: bytes, wanted: Callable[[], bool] = lambda: True) -> bytes:
         """Return the packed reply to a packed request.
+
+        Parameters
+        ----------
+        request
+            A packed `Request`.
+        wanted
+            Asked now and then whether anybody still waits for the reply.
 
         Raises
         ------
         ServerEndedError
-            If the server ended, or did not answer in the time that its children may take and `PATIENCE_S`.
+            If the server ended, or did not answer in the time that its children may take and `PATIENCE_S`, or
+            nobody waits for it any more.
         """
         bound = self.setting.limits.timeout_s
         try:
             self.channel.send_bytes(request)
         except OSError as error:
             raise self._ended() from error
-        return self._hear(None if bound is None else _CHILDREN * bound + PATIENCE_S)
+        return self._hear(None if bound is None else _CHILDREN * bound + PATIENCE_S, wanted)
 
     def hear(self) -> bytes:
         """Return the packed reply that is waiting; raises like `ask`."""
         return self._hear(PATIENCE_S)
 
-    def _hear(self, seconds: float | None) -> bytes:
+    def _hear(self, seconds: float | None, wanted: Callable[[], bool] = lambda: True) -> bytes:
         waited = 0.0
         try:
             while not self.channel.poll(LOOK_S):
                 waited += LOOK_S
                 if self._process.poll() is not None and not self.channel.poll(0):
                     raise self._ended()
+                if not wanted():
+                    raise ServerEndedError("Nobody waits for the cell any more.")
                 if seconds is not None and waited >= seconds:
                     raise ServerEndedError(f"A cell server did not answer for {waited:.0f} s.")
             return self.channel.recv_bytes()

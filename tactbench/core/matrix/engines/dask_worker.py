@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import atexit
 from collections import deque
+from collections.abc import Callable
 from threading import Lock
 
 from tactbench.core.errors import EngineError
@@ -35,8 +36,10 @@ def examine(setting: Setting, files: dict[str, str]) -> list[str]:
 def carry_out(setting: Setting, where: str, request: bytes) -> bytes:
     """Return the packed reply to a packed request; `where` names this worker for readers.
 
-    A server that ends over a request is replaced once; the second time the cell has crashed.
+    A server that ends over a request is replaced once; the second time the cell has crashed. A cell that nobody waits
+    for any more, because the run was killed, is ended.
     """
+    wanted = _wanted()
     ended: ServerEndedError | None = None
     for _ in range(2):
         try:
@@ -46,10 +49,12 @@ def carry_out(setting: Setting, where: str, request: bytes) -> bytes:
         try:
             if server.against:
                 return pack_reply(EngineError(f"{where} cannot compute this cell: {'; '.join(server.against)}."))
-            return server.ask(request)
+            return server.ask(request, wanted)
         except ServerEndedError as error:
             ended = error
             server.close()
+            if not wanted():
+                break
         finally:
             _give_back(server)
     assert ended is not None
@@ -65,6 +70,20 @@ def leave(session: str) -> None:
         server.terminate()
     for server in idle:
         server.close()
+
+
+def _wanted() -> Callable[[], bool]:
+    """Return what tells whether the task that this thread carries out is still wanted by anybody."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def wanted() -> bool:
+        task = worker.state.tasks.get(key)
+        return task is not None and task.state != "cancelled"
+
+    return wanted
 
 
 @atexit.register

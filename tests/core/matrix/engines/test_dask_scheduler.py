@@ -1,6 +1,8 @@
 """A scheduler and workers that somebody has started: who may compute, and what happens when they go."""
 
 import signal
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -55,6 +57,28 @@ def test_a_worker_that_sees_other_files_is_refused(cluster, worker, tmp_path):
             engine._crew.gather({**fingerprints(seen), str(tmp_path / "nowhere"): "0" * 16})
 
 
+RUN = """
+import sys
+from pathlib import Path
+from tactbench.core.matrix.engines.dask import open_dask
+from tactbench.core.matrix.engines.limits import Limits
+from tests.core.matrix.engines.work import wait_for
+with open_dask(sys.argv[1], 1, Limits()) as engine:
+    list(engine.each(wait_for, [(Path(sys.argv[2]), Path("/no/such/file"))]))
+"""
+
+
+def test_a_cell_ends_when_the_run_that_wanted_it_is_killed(cluster, worker, tmp_path):
+    begun = tmp_path / "begun"
+    run = subprocess.Popen([sys.executable, "-c", RUN, cluster.address, str(begun)])
+    try:
+        assert until(lambda: begun.exists() and begun.read_text())
+    finally:
+        run.kill()
+        run.wait()
+    assert until(lambda: gone(int(begun.read_text())))
+
+
 def test_workers_may_come_late_and_one_that_differs_gets_nothing(cluster, worker, tmp_path):
     begun, second, go = tmp_path / "begun", tmp_path / "second", tmp_path / "go"
     old = posing_as(tmp_path / "old", "scipy", "0.1")
@@ -82,7 +106,7 @@ def test_workers_may_come_late_and_one_that_differs_gets_nothing(cluster, worker
 
 
 def test_when_the_scheduler_goes_the_cells_left_say_so(tmp_path, monkeypatch):
-    monkeypatch.setattr(dask_cluster, "CONNECT_S", 3.0)
+    monkeypatch.setattr(dask_cluster, "CONNECT_S", 2.0)
     with started(tmp_path) as own:
         own.worker()
         begun = tmp_path / "begun"
