@@ -135,7 +135,7 @@ class DaskEngine:
             if meanwhile is not None:
                 meanwhile()
             seen = time.monotonic()
-            while waiting or round_.flying:
+            while round_.busy:
                 if self._client.status == "running" and crew.threads:
                     seen = time.monotonic()
                 elif self._client.status == "closed" or time.monotonic() - seen > self._alone_s:

@@ -57,6 +57,7 @@ class Round(Generic[T]):
         self._client, self._crew, self._work, self._waiting = client, crew, work, waiting
         self._number = len(waiting)
         self._arrivals: SimpleQueue[str] = SimpleQueue()
+        self._unsent: list[tuple[T, EngineError]] = []
         self.flying: dict[str, Flight[T]] = {}
 
     def __enter__(self) -> Round[T]:
@@ -69,23 +70,34 @@ class Round(Generic[T]):
                 self._client.cancel([flight.future for flight in self.flying.values()], force=True)
             self._crew.leave()  # with the cells at work
 
+    @property
+    def busy(self) -> bool:
+        """Whether there is anything left to send, to wait for or to tell."""
+        return bool(self._waiting or self.flying or self._unsent)
+
     def turn(self) -> Iterator[tuple[T, Any]]:
         """Wait a moment; yield what has come back."""
         self._crew.look()
         for key in [key for key, flight in self.flying.items() if flight.address not in self._crew.threads]:
             flight = self.flying.pop(key)
             flight.future.cancel()
+            flight.future.release()
             flight.deaths += 1
             if flight.deaths < DEATHS:
                 self._waiting.appendleft(flight)
             else:
                 yield flight.item, _killer(flight)
         self._send()
+        while self._unsent:
+            yield self._unsent.pop()
+        if not self.flying and not self._waiting:
+            return
         try:
             flight = self.flying.pop(self._arrivals.get(timeout=POLL_S))
         except (Empty, KeyError):
             return  # nothing, or something that was given up before
         outcome = _outcome(flight)
+        flight.future.release()  # here, and not by its destructor: there a Ctrl-C would be lost
         if outcome is None and flight.lost < LOSSES:
             flight.lost += 1
             self._waiting.appendleft(flight)
@@ -107,10 +119,14 @@ class Round(Generic[T]):
             if free[address] < self._share(flight, address):
                 return
             self._waiting.popleft()
+            where, company = f"The Dask worker at {address}", min(self._crew.company(address), self._number)
+            try:
+                request = pack(Request(self._work, flight.item, fingerprints(flight.item), where, company))
+            except Exception as error:
+                self._unsent.append((flight.item, EngineError(f"The cell cannot be sent to a worker: {error}.")))
+                continue
             free[address] -= self._share(flight, address)
             flight.address = address
-            where, company = f"The Dask worker at {address}", min(self._crew.company(address), self._number)
-            request = pack(Request(self._work, flight.item, fingerprints(flight.item), where, company))
             flight.future = self._client.submit(
                 carry_out, self._crew.setting, where, request,
                 pure=False, workers=[address], allow_other_workers=False,

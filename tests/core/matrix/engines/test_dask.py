@@ -52,6 +52,12 @@ def test_whatever_a_cell_does_is_its_own_outcome(engine):
     assert isinstance(outcomes["lambda"], Exception)
 
 
+def test_an_item_that_cannot_be_sent_has_its_error(engine):
+    outcomes = dict(engine.each(square, [2, sys, 3]))
+    assert (outcomes[2], outcomes[3]) == (4, 9)
+    assert "cannot be sent" in str(outcomes[sys])
+
+
 def test_a_cell_that_hangs_is_ended_in_time(engine):
     short = DaskEngine(engine._client, Limits(timeout_s=0.5))
     outcomes = dict(short.each(misbehave, ["hang", "fine"]))
