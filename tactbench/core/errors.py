@@ -5,7 +5,8 @@
     TactbenchError
     ├── UsageError                    what was asked for cannot be: exit code 2
     │   ├── UnknownNameError          no sensor, rig, task … of that name (carries the nearest names)
-    │   └── ConfigError               a YAML file does not say what it should (carries file and line)
+    │   ├── ConfigError               a YAML file does not say what it should (carries file and line)
+    │   └── FolderError               a result folder refuses, is held by another run, or contradicts another
     ├── PluginError                   a plugin cannot be used
     │   ├── DuplicateNameError        two distributions give one name
     │   └── PluginContractError       a plugin does not keep the interface it promised
@@ -99,6 +100,10 @@ class ConfigError(UsageError):
     def __init__(self, file: str, line: int | None, message: str, *, hint: str = "") -> None:
         where = f"{file}:{line}" if line else file
         super().__init__(f"{where}: {message}", hint=hint)
+
+
+class FolderError(UsageError):
+    """A result folder cannot be read or written, is held by another run, or contradicts another one."""
 
 
 class PluginError(TactbenchError):

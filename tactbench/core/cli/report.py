@@ -23,6 +23,14 @@ if TYPE_CHECKING:
     help="Where page and figures are put; default: FOLDER/report.",
 )
 @click.option(
+    "--recordings",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="DIR",
+    help="Recordings that lie elsewhere and may be opened; may be repeated. Needed only where they were changed since, "
+    "or the results are somebody else's.",
+)
+@click.option(
     "--open",
     "shown",
     type=click.Choice(("no", "yes")),
@@ -33,7 +41,9 @@ if TYPE_CHECKING:
 @click.option("--format", "shape", type=click.Choice(("table", "md", "json", "csv")), default="table",
               show_default=True, help="How the published numbers and ours are printed.")  # fmt: skip
 @click.pass_context
-def command(ctx: click.Context, folder: Path, out: Path | None, shown: str, shape: str) -> None:
+def command(
+    ctx: click.Context, folder: Path, out: Path | None, recordings: tuple[Path, ...], shown: str, shape: str
+) -> None:
     """Make one page of all results in FOLDER, which is what `run --out` wrote.
 
     The published numbers are printed beside ours.
@@ -49,7 +59,10 @@ def command(ctx: click.Context, folder: Path, out: Path | None, shown: str, shap
 
     if not (folder / "index.jsonl").is_file():
         raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
-    material = open_material(Store(folder), load_registry())
+    store = Store(folder, recordings=recordings)
+    material = open_material(store, load_registry())
+    for sentence in store.troubles:
+        remark(f"{folder}: {sentence}")
     with progress() as told:
         made = make_report(material, out or folder / "report", told, draw=_drawer(), calibrated=_calibrated(folder))
     _print(made, shape)

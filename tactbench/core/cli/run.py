@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat.")
 @engine_options
 @click.option("--probe", is_flag=True, help="Also ask what the recordings give away: first frame alone, shuffled rows.")
+@click.option("--latency/--no-latency", default=None, help="Measure how long one row takes, up to 0.3 s a cell.")
 @simulation_options
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
@@ -62,6 +63,7 @@ def command(
     out: Path,
     shape: str,
     probe: bool,
+    latency: bool | None,
     recordings: Path | None,
     effects: str | None,
     rung: str | None,
@@ -88,6 +90,8 @@ def command(
     choice = choice_of(matrix, engine=engine, jobs=jobs, timeout=timeout, memory=memory, scheduler=scheduler)
     if probe:
         matrix = matrix.model_copy(update={"probe": True})
+    if latency is not None:
+        matrix = matrix.model_copy(update={"latency": latency})
     if simulation is not None:
         matrix = matrix.model_copy(update={"simulation": simulation})
     folder = recordings or (Path(matrix.recordings) if matrix.recordings else None)

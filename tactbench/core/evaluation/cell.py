@@ -31,7 +31,7 @@ from tactbench.core.evaluation.splits import (
 )
 from tactbench.core.evaluation.timing import peak_rss_mb, single_row_latency_s
 from tactbench.core.plugins.interfaces import Estimator
-from tactbench.core.samples import Answers, Fold, Part
+from tactbench.core.samples import Answers, FloatArray, Fold, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
@@ -66,9 +66,10 @@ class CellResult:
     fit_s: float
     predict_s: float
     batch_rows: int
-    latency_ms_p50: float
-    latency_ms_p95: float
-    latency_n: int
+    latency_ms_p50: float | None
+    """None where latency was not measured; `latency_ms_p95` and `latency_n` alike"""
+    latency_ms_p95: float | None
+    latency_n: int | None
     threads: int
     peak_rss_mb: float | None
     search: tuple[Mapping[str, Any], ...]
@@ -107,6 +108,7 @@ def evaluate(
     threads: int = 1,
     progress: Callable[[str], None] | None = None,
     dataset: Dataset | None = None,
+    latency: bool = True,
 ) -> CellResult:
     """Answer `task` from `recordings` with `estimator`, and measure how well and at what cost.
 
@@ -126,6 +128,8 @@ def evaluate(
         Told what is being done.
     dataset
         The recordings, if they have been read already.
+    latency
+        Whether to measure how long the answer to one row takes.
 
     Raises
     ------
@@ -153,8 +157,14 @@ def evaluate(
             _fold(total, number, assignment, estimator, params, build, data, rules, metric, counts, clock, alone)
         if total.model is None:
             raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
-        latency = 1e3 * single_row_latency_s(total.model, features_of(total.test, estimator), clock)
-    return _result(task, rules, metric, chosen_split, data, total, counts, latency, seed, threads)
+        waits = _latency_ms(total.model, features_of(total.test, estimator), clock) if latency else {}
+    return _result(task, rules, metric, chosen_split, data, total, counts, waits, seed, threads)
+
+
+def _latency_ms(model: Estimator, X: FloatArray, clock: Callable[[], float]) -> dict[str, Any]:
+    waits = 1e3 * single_row_latency_s(model, X, clock)
+    p50, p95 = (float(np.quantile(waits, share)) for share in (0.5, 0.95))
+    return {"latency_ms_p50": p50, "latency_ms_p95": p95, "latency_n": len(waits)}
 
 
 def _thread_limit(threads: int) -> AbstractContextManager[Any]:
@@ -251,7 +261,7 @@ def _result(
     data: Dataset,
     total: _Sum,
     counts: Counter[str],
-    latency_ms: npt.NDArray[np.float64],
+    latency: Mapping[str, Any],
     seed: int,
     threads: int,
 ) -> CellResult:
@@ -303,9 +313,9 @@ def _result(
         fit_s=total.fit_s,
         predict_s=total.predict_s,
         batch_rows=len(y),
-        latency_ms_p50=float(np.quantile(latency_ms, 0.5)),
-        latency_ms_p95=float(np.quantile(latency_ms, 0.95)),
-        latency_n=len(latency_ms),
+        latency_ms_p50=latency.get("latency_ms_p50"),
+        latency_ms_p95=latency.get("latency_ms_p95"),
+        latency_n=latency.get("latency_n"),
         threads=threads,
         peak_rss_mb=peak_rss_mb(),
         search=_search(total.chosen, total.names),

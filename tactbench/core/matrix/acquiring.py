@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 from tactbench.core.acquisition import acquire
+from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.installed import installed, rig_of
 from tactbench.core.matrix.material import Order
@@ -32,6 +33,11 @@ def acquire_missing(
     ----------
     meanwhile
         Done here while others are busy.
+
+    Raises
+    ------
+    UnwritableError
+        If the disk refuses them.
     """
     unique = {order.path: order for orders in material.orders.values() for order in orders}
     missing = [order for path, order in unique.items() if not path.exists()]
@@ -42,7 +48,10 @@ def acquire_missing(
     told.begin("recording", len(missing), alone=False)
     pool = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S)
     try:
-        for order, outcome in pool.each(record, missing, meanwhile):
+        outcomes = pool.each(record, missing, meanwhile)
+        for order, outcome in outcomes:
+            if isinstance(outcome, UnwritableError):
+                raise outcome  # the disk is no cell's fault, and refuses the next one too
             if isinstance(outcome, BaseException):
                 material.refused[order.path] = outcome
                 partial_path(order.path).unlink(missing_ok=True)

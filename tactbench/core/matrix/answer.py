@@ -52,6 +52,7 @@ def answer(
             threads=1,
             progress=working,
             dataset=material,
+            latency=cell.latency,
         )
     except NotApplicable as reason:
         return {**row, "status": "skipped", "reason": str(reason)}, {}
@@ -124,6 +125,7 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "chosen": {},
         "search": [],
         "recordings": [],
+        "digests": [],
         "scores": {},
         "confusion": None,
         "classes": [],

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.preloading import import_estimators, shared
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.reading import read_apart
-from tactbench.core.matrix.solving import Job, solve, unanswered
+from tactbench.core.matrix.solving import Job, solve, this_host, unanswered
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import Registry
@@ -42,9 +43,13 @@ def evaluate_all(
     registry: Registry,
     sources: SourceDigests,
     store: Store,
+    made_by: str,
     told: Progress,
 ) -> Evaluated:
-    """Give every cell its row: found in `store`, computed now, or saying why it could not be."""
+    """Give every cell its row: found in `store`, computed now, or saying why it could not be.
+
+    `made_by` is the id of this run's provenance.
+    """
     done = Evaluated()
     keys: dict[str, str] = {}
     waiting: list[Job] = []
@@ -57,15 +62,46 @@ def evaluate_all(
                 keys[cell.name] = cell_key(cell, [str(digests[path]) for path in paths], registry, sources)
             except Exception as error:
                 trouble = error
-        known = store.finished(keys[cell.name]) if trouble is None else None
-        if known is not None and known["status"] == "done":
-            done.rows[cell.name] = {**known, "cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
+        found = store.finished(keys[cell.name]) if trouble is None else None
+        if found is not None and found["status"] == "done":
+            done.rows[cell.name] = {**found, "cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
+            store.reuse(done.rows[cell.name])
         else:
             waiting.append((cell, tuple(paths), trouble))
     done.computed = len(waiting)
     if waiting:
-        _compute(waiting, keys, choice, store, told, done)
+        known = _Known(keys, digests, made_by)
+        _compute(waiting, known, choice, store, told, done)
+        spoilt = [job for job in waiting if _spoilt(done.rows[job[0].name], store)]
+        if spoilt:
+            _compute(spoilt, known, choice, store, told, done)
     return done
+
+
+def _spoilt(row: Row, store: Store) -> bool:
+    """Return whether a cell was finished and its shard is not what was written: a later cell has laid hands on it."""
+    return row["status"] == "done" and store.finished(row["key"]) is None
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What rows say that the run knows, and their cells do not."""
+
+    keys: Mapping[str, str]
+    digests: Mapping[Path, str | BaseException]
+    made_by: str
+
+    def told(self, row: Row, folder: Path) -> Row:
+        """Return `row` with all of it."""
+        found = [self.digests.get(Path(path), "") for path in row["recordings"]]
+        return {
+            **row,
+            "key": self.keys.get(row["cell"], ""),
+            "digests": [digest for digest in found if isinstance(digest, str)],
+            "recordings": [_beside(path, folder) for path in row["recordings"]],
+            "made_by": self.made_by,
+            "host": row["host"] or this_host(),
+        }
 
 
 def _digests(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> dict[Path, str | BaseException]:
@@ -83,11 +119,11 @@ def _digest(path: Path) -> str:
 
 
 def _compute(
-    waiting: list[Job], keys: dict[str, str], choice: EngineChoice, store: Store, told: Progress, done: Evaluated
+    waiting: list[Job], known: _Known, choice: EngineChoice, store: Store, told: Progress, done: Evaluated
 ) -> None:
     jobs = [job for job in waiting if job[2] is None]
     marks = InFlight(store.folder)
-    if len(jobs) == 1 and choice.here(1) and marks.ended_a_run(keys[jobs[0][0].name]):
+    if len(jobs) == 1 and choice.here(1) and marks.ended_a_run(known.keys[jobs[0][0].name]):
         choice = EngineChoice("isolated", 1, choice.limits)
     here = choice.here(len(jobs))
     told.begin("evaluating", len(waiting), alone=here)
@@ -96,19 +132,26 @@ def _compute(
     hopeless: Iterator[tuple[Job, Any]] = (
         (job, (unanswered(job[0], job[2]), {})) for job in waiting if job[2] is not None
     )
-    for job, outcome in _each(hopeless, engine.each(work, _marked(_ordered(jobs, choice), marks, keys, here))):
-        cell = job[0]
-        row, sets = _judged(cell, outcome)
-        row["key"] = keys.get(cell.name, "")
-        row["recordings"] = [_beside(path, store.folder) for path in row["recordings"]]
-        if row["status"] == "done":
-            store.keep(row["key"], row, sets)
-        done.rows[cell.name] = row
-        marks.clear()
-        told.advance(cell.name, stopped=row["status"] in STOPPED)
+    computed = engine.each(work, _marked(_ordered(jobs, choice), marks, known.keys, here))
+    with closing(_each(hopeless, computed)) as outcomes:
+        for job, outcome in outcomes:
+            _entered(job[0], outcome, known, store, told, done)
+            marks.clear()
 
 
-def _each(*several: Iterable[tuple[Job, Any]]) -> Iterator[tuple[Job, Any]]:
+def _entered(cell: Cell, outcome: Any, known: _Known, store: Store, told: Progress, done: Evaluated) -> None:
+    """Keep what came of a cell."""
+    row, sets = _judged(cell, outcome)
+    row = known.told(row, store.folder)
+    if row["status"] == "done":
+        store.keep(row["key"], row, sets)
+    else:
+        store.note(row)
+    done.rows[cell.name] = row
+    told.advance(cell.name, stopped=row["status"] in STOPPED)
+
+
+def _each(*several: Iterable[tuple[Job, Any]]) -> Generator[tuple[Job, Any], None, None]:
     for some in several:
         yield from some
 
@@ -125,7 +168,7 @@ def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
     return [job for group in groups.values() for job in group]
 
 
-def _marked(jobs: Iterable[Job], marks: InFlight, keys: dict[str, str], here: bool) -> Iterator[Job]:
+def _marked(jobs: Iterable[Job], marks: InFlight, keys: Mapping[str, str], here: bool) -> Iterator[Job]:
     """Yield `jobs`; where a cell may end this process, note each before it begins."""
     for job in jobs:
         if here:
@@ -147,6 +190,7 @@ def _judged(cell: Cell, outcome: Any) -> tuple[Row, Any]:
     return row, sets
 
 
+@lru_cache(maxsize=4096)
 def _beside(path: str, folder: Path) -> str:
     """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
     inside = Path(path).is_relative_to(folder)

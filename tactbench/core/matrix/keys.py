@@ -55,6 +55,7 @@ def cell_key(cell: Cell, data: Sequence[str], registry: Registry, sources: Sourc
             "estimator": estimator.descriptor.model_dump(mode="json", exclude={"title", "linear"}),
             "params": dict(cell.params),
             "seed": cell.seed,
+            **({} if cell.latency else {"latency": False}),
             "data": list(data),
             "source": _sources([task.module, estimator.module, estimator.descriptor.where], sources),
             "versions": versions(estimator.descriptor.distributions),

@@ -34,6 +34,8 @@ class Cell:
     repeats: int
     seed: int
     """Seed of this repeat: of the scenes it records and of its estimators."""
+    latency: bool = True
+    """Whether the latency of single rows is measured."""
 
     @property
     def name(self) -> str:
@@ -62,7 +64,7 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
         If a name is unknown, a protocol or split is not one of the task's, an estimator cannot answer this kind of
         question, or a parameter is not one of the estimator's.
     """
-    cells: list[Cell] = []
+    cells: dict[Cell, None] = {}
     for repeat in range(1, matrix.repeats + 1):
         for choice in matrix.tasks:
             task = registry.tasks[choice.name].spec
@@ -82,10 +84,10 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                         repeat=repeat,
                         repeats=matrix.repeats,
                         seed=matrix.seed + repeat - 1,
+                        latency=matrix.latency,
                     )
-                    if cell not in cells:
-                        cells.append(cell)
-    return with_probes(cells, registry) if matrix.probe else cells
+                    cells[cell] = None  # once, in the order in which they were asked for
+    return with_probes(list(cells), registry) if matrix.probe else list(cells)
 
 
 def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
@@ -94,7 +96,8 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     For every answer, and for its task's first baseline: the same under `deployable` with kept apart what the cell keeps
     apart, under `first-frame`, and with rows shuffled. A split in time keeps no recordings apart and is not probed.
     """
-    every = list(cells)
+    every = dict.fromkeys(cells)
+    asked = frozenset(every)
     for cell in cells:
         rules = protocol_called(cell.protocol)
         task = registry.tasks[cell.task].spec
@@ -102,13 +105,13 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
             continue
         if rules.roles_only and task.splits[:1] == ("roles",):
             same = replace(cell, protocol=DEPLOYABLE.name, split=None)
-            if same in cells:
+            if same in asked:
                 continue  # asked for already, and probed as such
         split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
         honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
         added = (honest, replace(honest, protocol=FIRST_FRAME.name), replace(honest, split="shuffled"))
-        every += [one for one in added if one not in every]
-    return every
+        every |= dict.fromkeys(added)
+    return list(every)
 
 
 def _ways(task: TaskSpec, choice: TaskChoice) -> list[tuple[str, str | None]]:

@@ -50,15 +50,14 @@ def run_matrix(
     recordings: Path | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Carry out `matrix` and write the files of a run: ``run.json``, ``scores.json`` and ``unfinished.json``.
+    """Carry out `matrix` and write the files of a run: ``run.json`` and ``scores.json``.
 
     The parameters are those of `carry_out`.
     """
-    outcome = carry_out(matrix, store, choice=choice, recordings=recordings, progress=progress)
-    store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
-    store.write("scores.json", scores_text(outcome.rows))
-    unfinished = [row for row in outcome.rows if row["status"] != "done"]
-    store.write("unfinished.json", json.dumps(unfinished, indent=1, sort_keys=True) + "\n")
+    with store.hold():
+        outcome = carry_out(matrix, store, choice=choice, recordings=recordings, progress=progress)
+        store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
+        store.write("scores.json", scores_text(outcome.rows))
     return outcome
 
 
@@ -89,19 +88,28 @@ def carry_out(
     ------
     UsageError
         If the matrix asks for something that is not there. Nothing has been run then.
+    FolderError
+        If another run holds the folder, or the disk refuses; what was finished before is kept.
     """
-    told = progress or Silence()
     chosen = (choice or EngineChoice()).checked()
     chosen.ready()
+    with store.hold():
+        return _carry_out(matrix, store, chosen, recordings, progress or Silence())
+
+
+def _carry_out(
+    matrix: MatrixSpec, store: Store, choice: EngineChoice, recordings: Path | None, told: Progress
+) -> Outcome:
     registry = installed()
     sources = SourceDigests(store.folder / "cache" / "sources.json")
-    cells, material = plan(matrix, registry, sources, store, recordings, chosen)
-    inherited = chosen.named(len(cells)) != "dask"
-    acquire_missing(material, chosen, told, (lambda: import_estimators(cells, chosen)) if inherited else None)
-    found = evaluate_all(cells, material, chosen, registry, sources, store, told)
+    cells, material = plan(matrix, registry, sources, store, recordings, choice)
+    provenance = {**gather(), "jobs": choice.jobs}
+    made_by = store.begin(provenance)
+    inherited = choice.named(len(cells)) != "dask"
+    acquire_missing(material, choice, told, (lambda: import_estimators(cells, choice)) if inherited else None)
+    found = evaluate_all(cells, material, choice, registry, sources, store, made_by, told)
     sources.save()
     rows = [found.rows[cell.name] for cell in cells]
     fill_baselines(rows)
-    provenance = {**gather(), "jobs": chosen.jobs}
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, found.computed, len(material.made), used)

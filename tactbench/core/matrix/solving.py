@@ -26,7 +26,7 @@ Job = tuple[Cell, tuple[Path, ...], "BaseException | None"]
 Wanted = tuple[str, tuple[Path, ...]]
 """A task and recordings."""
 
-_host = lru_cache(maxsize=1)(host_id)
+this_host = lru_cache(maxsize=1)(host_id)
 
 
 def prepare(cell: Cell) -> None:
@@ -90,7 +90,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
         return unanswered(cell, trouble), {}
     _seed_everything(cell.seed)
     row, sets = answer(cell, registry, recordings, DATASETS, working)
-    timed = {"wall_s": time.perf_counter() - began, "concurrency": company(concurrency), "host": _host()}
+    timed = {"wall_s": time.perf_counter() - began, "concurrency": company(concurrency), "host": this_host()}
     return {**row, **timed, "log": printed()}, sets
 
 

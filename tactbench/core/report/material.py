@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tactbench.core.errors import DataError
 from tactbench.core.matrix.leaving import fill_baselines
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.samples import Answers
@@ -38,8 +39,25 @@ class Material:
         return self.store.answers(str(row["key"]))
 
     def recordings(self, row: Mapping[str, Any]) -> list[Path]:
-        """Return the files of a cell's recordings, in the order that ``Answers.recording`` counts."""
-        return [self.store.folder / path for path in row["recordings"]]
+        """Return the files of a cell's recordings, in the order that ``Answers.recording`` counts.
+
+        Raises
+        ------
+        DataError
+            If one lies outside the folder, was not allowed and does not hold what the row tells of.
+        """
+        digests = row.get("digests") or [""] * len(row["recordings"])
+        found = []
+        for path, digest in zip(row["recordings"], digests, strict=False):
+            recording = self.store.recording(path, digest)
+            if recording is None:
+                raise DataError(
+                    f"The recording {path} lies outside {self.store.folder}, and is not there any more, or not the one "
+                    f"that {row['cell']} was answered from: it is not opened.",
+                    hint="If you trust these results, allow its folder with `tactbench report --recordings DIR`.",
+                )
+            found.append(recording)
+        return found
 
 
 def open_material(store: Store, registry: Registry) -> Material:

@@ -62,6 +62,8 @@ class MatrixSpec(Frozen):
     """MB (2**20 bytes) that one cell or one recording may take beyond what all share."""
     probe: bool = False
     """Also run the cells that show what recordings give away; see docs/real-recordings.md."""
+    latency: bool = True
+    """Measure how long one row takes, up to 0.3 s a cell; False: rows say nothing about it."""
     simulation: Simulation = Simulation()
     """How a simulated rig is asked to carry out every scene."""
     sensors: tuple[str, ...] = ()

@@ -5,6 +5,7 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -17,8 +18,8 @@ SECOND = "flat-validation"
 
 class Ramp:
     plan = ()
-    assumptions = {}
-    drawn = {}
+    assumptions = MappingProxyType({})
+    drawn = MappingProxyType({})
     reference = (FORCE,)
 
     def __init__(self, sensor, seed):

@@ -1,0 +1,144 @@
+"""kill -9 at random moments of a run, and what is left: nothing corrupt, nothing finished lost, the same bytes at last.
+
+A small matrix is run once undisturbed. Then it is run in other folders and killed at moments drawn evenly from its
+duration, the whole process group or the parent alone in turn, and started again at once, until it ends; the next folder
+follows, until there were as many kills as asked for. After every kill: each line of the ledger but the last can be
+parsed, each shard and each recording opens and holds what its digest says, and every cell that was finished before is
+still finished, with the same row. At the end of every folder: scores.json and the table without times are, byte by
+byte, those of the undisturbed run, and no half-written file is left.
+
+Usage: python benchmarks/kill_nine.py [--kills 100] [--matrix twin|trivial] [--jobs 2] [--seed 1]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import trivial
+
+from tactbench.core.matrix.store import Row, Store
+from tactbench.core.recording.reader import open_recording
+
+TWIN = ("--sensor", "icub", "--task", "curvature", "--estimator", "lda", "--repeats", "2")
+TRIVIAL = ("--task", "nothing-asked", "--estimator", "nothing", "--repeats", "200", "--no-latency")
+
+
+def started(arguments: list[str], folder: Path) -> subprocess.Popen[bytes]:
+    """Start the command line in a process group of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "tactbench", *arguments], cwd=folder, start_new_session=True,
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def table(folder: Path, name: str) -> bytes:
+    """Return the table without times, or nothing where the command line cannot leave them out."""
+    done = subprocess.run([sys.executable, "-m", "tactbench", "leaderboard", name, "--no-times", "--format", "csv"],
+                          cwd=folder, capture_output=True)  # fmt: skip
+    return done.stdout if done.returncode == 0 else b""
+
+
+def checked(folder: Path, before: dict[str, Row]) -> dict[str, Row]:
+    """Return the finished cells of a folder; AssertionError if anything is corrupt or lost."""
+    ledger = folder / "index.jsonl"
+    for line in ledger.read_bytes().split(b"\n")[:-1] if ledger.exists() else ():
+        json.loads(line)
+    store = Store(folder)
+    finished = {row["cell"]: row for row in store.rows() if row["status"] == "done"}
+    shards = {path.stem for path in (folder / "cells").glob("*.h5")} if (folder / "cells").exists() else set()
+    assert shards == {row["key"] for row in finished.values()}, "a shard without a finished cell, or the reverse"
+    for row in finished.values():
+        assert store.answers(row["key"]), (row["cell"], store.troubles)
+    for path in (folder / "recordings").rglob("*.h5"):
+        with open_recording(path) as recording:
+            recording.verify()
+    for name, row in before.items():
+        assert finished.get(name) == row, f"the finished cell {name} was lost or changed"
+    return finished
+
+
+def main() -> None:
+    """Kill, check, and print what was seen; exit code 1 at the first promise that is not kept."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kills", type=int, default=100)
+    parser.add_argument("--matrix", choices=("twin", "trivial"), default="twin")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    rng = random.Random(asked.seed)
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made)
+        arguments = ["run", *TWIN]
+        if asked.matrix == "trivial":
+            shelf = trivial.install(folder / "plugin")
+            trivial.use(folder / "plugin")
+            arguments = ["run", *TRIVIAL, "--recordings", str(shelf)]
+        arguments += ["--jobs", str(asked.jobs)]
+        began = time.monotonic()
+        whole = started([*arguments, "--out", "whole"], folder)
+        _, said = whole.communicate()
+        assert whole.returncode == 0, said.decode()
+        lasts = time.monotonic() - began
+        cells = len(checked(folder / "whole", {}))
+        wanted, shown = (folder / "whole" / "scores.json").read_bytes(), table(folder, "whole")
+        kills = {"group": 0, "parent": 0}
+        folders, kept, alive = 0, 0, None
+        while sum(kills.values()) < asked.kills:
+            folders += 1
+            name = f"out{folders}"
+            finished: dict[str, Row] = {}
+            while True:
+                process = started([*arguments, "--out", name], folder)
+                moment = rng.uniform(0, lasts)
+                if sum(kills.values()) >= asked.kills:
+                    moment = 1000 * lasts
+                try:
+                    _, said = process.communicate(timeout=moment)
+                except subprocess.TimeoutExpired:
+                    how = "group" if sum(kills.values()) % 2 == 0 else "parent"
+                    kill, which = (os.killpg, process.pid) if how == "group" else (os.kill, process.pid)
+                    kill(which, signal.SIGKILL)
+                    process.wait()
+                    kills[how] += 1
+                    finished = checked(folder / name, finished)
+                    kept += bool(finished)
+                    alive = process
+                    continue
+                finally:
+                    if process.stderr is not None:
+                        process.stderr.close()
+                assert process.returncode == 0, said.decode()
+                break
+            checked(folder / name, finished)
+            assert (folder / name / "scores.json").read_bytes() == wanted, "scores.json differs"
+            assert table(folder, name) == shown, "the table without times differs"
+            left = [path for path in (folder / name).rglob("*") if path.suffix in (".partial", ".completing")]
+            assert not left, f"left behind: {left}"
+        if alive is not None:
+            _end(alive.pid)
+    print(f"{sum(kills.values())} kills ({kills['group']} of the group, {kills['parent']} of the parent) of a run of "
+          f"{cells} cells and {lasts:.1f} s in {folders} folders; {kept} left finished cells, all of which were kept; "
+          "no corrupt file")  # fmt: skip
+    print(f"scores.json byte-equal to the undisturbed run's in every folder; table without times: "
+          f"{'byte-equal too' if shown else 'not compared, `leaderboard --no-times` is not there'}")  # fmt: skip
+
+
+def _end(group: int) -> None:
+    """End what a killed parent has left of its group; nothing, where workers end with it."""
+    try:
+        os.killpg(group, signal.SIGKILL)
+    except ProcessLookupError:
+        return
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,49 @@
+"""``tactbench merge``: the result folders of several machines become one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tactbench.core.matrix.store import Row
+
+
+@click.command(name="merge")
+@click.argument("folders", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="DIR…")
+@click.option("--out", type=click.Path(path_type=Path), required=True, metavar="DIR",
+              help="The merged folder; it must not exist yet.")  # fmt: skip
+@click.pass_context
+def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
+    """Make one result folder of several: the same in whatever order, however often.
+
+    Folders that contradict each other are refused, and the cells are named. Where two hosts have finished one cell with
+    the same scores, one host's row is kept whole: times of different hosts are never mixed.
+    """
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.matrix.merging import merge
+
+    merged = merge(folders, out, also=_tables)
+    done = sum(row["status"] == "done" for row in merged.rows)
+    hosts = len({row.get("host", "") for row in merged.rows})
+    remark(f"{len(merged.rows)} cells, {done} of them finished, on {hosts} host{'s' if hosts != 1 else ''}; "
+           f"{merged.recordings} recordings.")  # fmt: skip
+    for sentence in merged.left_out:
+        remark(f"Left out: {sentence}")
+    click.echo(out)
+    remark(f"Show it: tactbench leaderboard {out}")
+    ctx.exit(1 if merged.left_out else 0)
+
+
+def _tables(folder: Path, rows: Sequence[Row]) -> None:
+    """Write what `tactbench leaderboard` shows."""
+    from tactbench.core.leaderboard.formats import FORMATS
+    from tactbench.core.matrix.leaving import fill_baselines
+
+    fill_baselines(list(rows))
+    for ending in ("md", "csv", "json"):
+        (folder / f"leaderboard.{ending}").write_text(FORMATS[ending](rows), encoding="utf-8")

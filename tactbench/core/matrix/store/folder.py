@@ -1,0 +1,388 @@
+"""A result folder: what a run writes into it, and what is read from it, which may be a stranger's."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactbench.core.errors import FormatError, RecordingError
+from tactbench.core.matrix.files import replace_file
+from tactbench.core.matrix.store import leftovers, limits
+from tactbench.core.matrix.store.disk import refusal, removed, sync_all, sync_folder, writing
+from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
+from tactbench.core.matrix.store.lock import Lock
+from tactbench.core.matrix.store.rows import NAMING, Row
+from tactbench.core.matrix.store.sharing import canonical
+
+if TYPE_CHECKING:
+    from tactbench.core.samples import Answers
+    from tactbench.core.spec.scene import Role
+
+_PARTS = ("recordings", "cells", "provenance", "cache")
+_SYNC_EVERY_S = 0.1
+"""Cells that take longer are on the disk, bytes and name, before the next one begins. Where many end within this time
+they are synced together: each for itself would take longer than all else that is done for a small cell. A power cut may
+then leave files with a name and without their bytes; the next run, which sees that this one broke off, reads every
+shard again before it believes one. A process that is killed loses nothing either way."""
+
+
+class Store:
+    """A result folder. Making one reads and writes nothing; :meth:`hold` makes the folder.
+
+    Parameters
+    ----------
+    folder
+        Where results lie, or will lie.
+    recordings
+        Folders of recordings that may be opened although they lie elsewhere.
+    """
+
+    def __init__(self, folder: Path, *, recordings: tuple[Path, ...] = ()) -> None:
+        self.folder = folder
+        self._allowed = tuple(path.resolve() for path in recordings)
+        self._lock: Lock | None = None
+        self._ledger: Ledger | None = None
+        self._done: dict[str, Entry] = {}
+        self._latest: dict[str, Entry] = {}
+        self._orphans: list[Entry] = []
+        self._provenance = ("", "{}")
+        self._synced, self._unsynced = -_SYNC_EVERY_S, 0
+        self._followed: dict[tuple[str, str], bool] = {}
+
+    # One run at a time
+
+    @contextmanager
+    def hold(self) -> Iterator[Store]:
+        """Keep the folder to this run: made if it is not there, swept of what killed runs left, locked until the end.
+
+        May be entered again by who holds it. The kernel lets go of it when the process ends, however it ends.
+
+        Raises
+        ------
+        FolderError
+            If another run holds it, or it cannot be made or written.
+        """
+        if self._lock is not None:
+            yield self
+            return
+        try:
+            for part in _PARTS:
+                (self.folder / part).mkdir(parents=True, exist_ok=True)
+            self._lock = Lock(self.folder)
+        except OSError as error:
+            raise refusal(self.folder, error, begun=False) from error
+        try:
+            leftovers.sweep(self.folder)
+            if self._lock.broke_off:
+                self._distrust()
+            try:
+                yield self
+            finally:
+                if self._unsynced and self._lock.in_place():
+                    with suppress(OSError):
+                        self._sync()
+        finally:
+            self._lock.release()
+            self._lock = None
+
+    # What a run asks and writes
+
+    def recording_path(self, sensor: str, scene: str, key: str) -> Path:
+        """Return where the recording with this key lies, or will lie."""
+        return self.folder / "recordings" / sensor / f"{scene}-{key[:12]}.h5"
+
+    def begin(self, provenance: Mapping[str, Any]) -> str:
+        """Keep who computes from now on, with what, and return its id: equal provenances have equal ones."""
+        text = canonical(dict(provenance))
+        name = hashlib.sha256(text.encode()).hexdigest()[:16]
+        path = self.folder / "provenance" / f"{name}.json"
+        with self._written():
+            if not path.exists():
+                path.parent.mkdir(exist_ok=True)
+                replace_file(path, text.encode() + b"\n")
+        self._provenance = (name, text)
+        return name
+
+    def finished(self, key: str) -> Row | None:
+        """Return the row of a finished cell whose shard is there in full length, or None."""
+        self._read()
+        entry = self._done.get(key)
+        return dict(entry.row) if entry is not None and self._size(key) == _bytes(entry) else None
+
+    def keep(self, key: str, row: Row, sets: Mapping[Role, Answers]) -> None:
+        """Write a finished cell: its shard aside, synced; its line in the ledger; then the shard gets its name.
+
+        In this order a process that is killed leaves a line without a shard, which is no finished cell, and never a
+        shard beside a line that tells of another one.
+
+        Raises
+        ------
+        FolderError
+            If the disk refuses, or the folder is gone; what was finished before stays.
+        """
+        from tactbench.core.matrix.store import shard
+
+        if not limits.is_key(key) or row.get("status") != "done":
+            raise ValueError(f"a finished cell has the status 'done' and a key of 32 hexadecimal digits, not {key!r}")
+        ledger = self._read()
+        row = {**row, "key": key}
+        image = shard.build(row, self._provenance[1], sets)
+        entry = Entry(row, (shard.digest_of(image), len(image)))
+        path = self._shard(key)
+        aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
+        with self._written():
+            if self._lock is None:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            due = time.monotonic() - self._synced >= _SYNC_EVERY_S
+            try:
+                with aside.open("wb") as file:
+                    file.write(image)
+                    if due:
+                        file.flush()
+                        os.fsync(file.fileno())
+                ledger.append(entry)
+                aside.replace(path)
+            except BaseException:
+                with suppress(OSError):
+                    aside.unlink(missing_ok=True)
+                raise
+            self._unsynced += 1
+            if due:
+                self._sync()
+        self._place(entry)
+
+    def note(self, row: Row) -> None:
+        """Write how a cell ended that did not finish: failed, crashed, skipped.
+
+        Raises
+        ------
+        FolderError
+            If the disk refuses, or the folder is gone.
+        """
+        if row.get("status") == "done":
+            raise ValueError("a finished cell has answers: keep() it")
+        row = {
+            name: _clipped(value) if name in ("log", "traceback", "reason") else value for name, value in row.items()
+        }
+        ledger = self._read()
+        before = self._latest.get(str(row.get("cell")))
+        if before is not None and before.row == row:
+            return
+        with self._written():
+            if self._lock is None:
+                self.folder.mkdir(parents=True, exist_ok=True)
+            ledger.append(Entry(row))
+        self._place(Entry(row))
+
+    def reuse(self, row: Row) -> None:
+        """Say that a finished cell was found again, under the name it has in `row`.
+
+        Written only where the ledger's last word on this name is another: a cell that failed since, or had other data.
+        """
+        self._read()
+        entry = self._done.get(str(row.get("key", "")))
+        if entry is None:
+            raise ValueError(f"no cell with the key {row.get('key')!r} is finished here")
+        latest = self._latest.get(row["cell"])
+        again = Entry({**entry.row, **{name: row[name] for name in NAMING if name in row}}, entry.shard)
+        if latest is None or latest.shard != again.shard or any(latest.row.get(n) != again.row.get(n) for n in NAMING):
+            with self._written():
+                self._read().append(again)
+            self._latest[again.row["cell"]] = again
+
+    def write(self, name: str, text: str) -> Path:
+        """Write one of the result files whole."""
+        path = self.folder / name
+        with self._written():
+            replace_file(path, text.encode())
+        return path
+
+    # What is read
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What of this folder could not be used, in sentences."""
+        return tuple(self._read().troubles)
+
+    def rows(self) -> list[Row]:
+        """Return how every cell ended that ever did, the latest of each name, in the order of their first lines."""
+        return [dict(entry.row) for entry in self.entries()]
+
+    def entries(self) -> list[Entry]:
+        """Return the latest line of every cell; a finished cell whose shard is missing or cut is none."""
+        ledger = self._read()
+        sizes = self._sizes()
+        latest: dict[str, Entry] = {}
+        holes = set()
+        for entry in (*self._orphans, *ledger.entries):
+            if entry.shard is None or sizes.get(f"{entry.key}.h5") == entry.shard[1]:
+                latest[entry.row["cell"]] = entry
+            else:
+                holes.add(entry.row["cell"])
+        for name in sorted(holes - set(latest)):
+            told = f"{name!r} is left out: its shard is missing or cut; run it again"
+            if told not in ledger.troubles:
+                ledger.troubles.append(told)
+        return list(latest.values())
+
+    def answers(self, key: str) -> dict[str, Answers]:
+        """Return what a finished cell answered, by role; nothing for a cell that is not there or was changed since."""
+        from tactbench.core.matrix.store import shard
+
+        entry = self._read() and self._done.get(key)
+        if not entry or entry.shard is None:
+            return {}
+        path = self._shard(key)
+        try:
+            image = shard.read_image(path)
+            if (shard.digest_of(image), len(image)) != entry.shard:
+                raise FormatError(f"The shard {path} is not the one that was written.", hint="Run the cell again.")
+            return shard.answers_in(path, image)
+        except FormatError as error:
+            if str(error) not in self._read().troubles:
+                self._read().troubles.append(str(error))
+            return {}
+
+    def image(self, entry: Entry) -> bytes | None:
+        """Return the bytes of a cell's shard, or None if they are not those that the ledger tells of."""
+        from tactbench.core.matrix.store import shard
+
+        try:
+            image = shard.read_image(self._shard(entry.key))
+        except FormatError:
+            return None
+        return image if (shard.digest_of(image), len(image)) == entry.shard else None
+
+    def provenance(self, name: str) -> dict[str, Any]:
+        """Return who computed a cell, with what, by the id in ``row["made_by"]``; empty if not known."""
+        if not limits.is_provenance(name):
+            return {}
+        try:
+            with (self.folder / "provenance" / f"{name}.json").open("rb") as file:
+                content = file.read(limits.PROVENANCE_BYTES).strip()
+            said = json.loads(content)
+        except (OSError, ValueError, RecursionError):
+            return {}
+        whole = hashlib.sha256(content).hexdigest()[:16] == name and isinstance(said, dict)
+        return said if whole else {}
+
+    def recording(self, path: str, digest: str = "") -> Path | None:
+        """Return the file of a recording that a row names, or None if it may not be followed.
+
+        A row may be a stranger's, and a path in it may lead anywhere. Followed are files inside the folder; files in
+        the folders that the person has named; and elsewhere regular files that hold the very content the row tells of,
+        so that one's own runs on recordings elsewhere need no naming, while a stranger shows nothing to anybody that he
+        does not know himself.
+
+        Parameters
+        ----------
+        path
+            As it stands in ``row["recordings"]``: relative to the folder, or absolute.
+        digest
+            The content digest that stands beside it in ``row["digests"]``.
+        """
+        if "\0" in path:
+            return None
+        found = (self.folder / path).resolve()
+        if any(found.is_relative_to(root) for root in (self.folder.resolve(), *self._allowed)):
+            return found
+        asked = (str(found), digest)
+        if asked not in self._followed:
+            self._followed[asked] = bool(digest) and found.is_file() and _content(found) == digest
+        return found if self._followed[asked] else None
+
+    # The rest
+
+    def _read(self) -> Ledger:
+        if self._ledger is None:
+            self._ledger = read_ledger(self.folder)
+            for entry in self._ledger.entries:
+                self._place(entry)
+            known = {f"{key}.h5" for key in self._done}
+            for name in sorted(set(self._sizes()) - known):
+                self._adopt(name)
+        return self._ledger
+
+    def _adopt(self, name: str) -> None:
+        """Take in a shard that the ledger has lost."""
+        from tactbench.core.matrix.store import shard
+
+        key = name.removesuffix(".h5")
+        if not limits.is_key(key) or self._ledger is None:
+            return
+        try:
+            image = shard.read_image(self._shard(key))
+            entry = Entry(shard.row_in(self._shard(key), image), (shard.digest_of(image), len(image)))
+        except FormatError as error:
+            self._ledger.troubles.append(str(error))
+            return
+        self._orphans.append(entry)
+        self._done[key] = entry
+
+    def _place(self, entry: Entry) -> None:
+        self._latest[entry.row["cell"]] = entry
+        if entry.shard is not None:
+            self._done[entry.key] = entry
+
+    def _shard(self, key: str) -> Path:
+        return self.folder / "cells" / f"{key}.h5"
+
+    def _size(self, key: str) -> int:
+        try:
+            return os.lstat(self._shard(key)).st_size
+        except OSError:
+            return -1
+
+    def _sizes(self) -> dict[str, int]:
+        try:
+            with os.scandir(self.folder / "cells") as found:
+                return {one.name: one.stat(follow_symlinks=False).st_size for one in found if one.name.endswith(".h5")}
+        except OSError:
+            return {}
+
+    @contextmanager
+    def _written(self) -> Iterator[None]:
+        if self._lock is not None and not self._lock.in_place():
+            raise removed(self.folder)
+        with writing(self.folder):
+            yield
+
+    def _sync(self) -> None:
+        if self._unsynced > 1:
+            sync_all(self.folder / "cells")
+        else:
+            sync_folder(self.folder / "cells")
+        self._synced, self._unsynced = time.monotonic(), 0
+
+    def _distrust(self) -> None:
+        """Forget finished cells whose shards are not, byte by byte, what was written."""
+        self._read()
+        for key, entry in list(self._done.items()):
+            if self._size(key) == _bytes(entry) and self.image(entry) is None:
+                del self._done[key]
+                self._read().troubles.append(f"{entry.row['cell']!r} is computed again: its shard is damaged")
+
+
+def _bytes(entry: Entry) -> int:
+    return entry.shard[1] if entry.shard is not None else -2
+
+
+def _clipped(text: Any) -> Any:
+    if isinstance(text, str) and len(text) > limits.TEXT_CHARACTERS:
+        return f"… {text[-limits.TEXT_CHARACTERS :]}"
+    return text
+
+
+def _content(path: Path) -> str:
+    from tactbench.core.recording.reader import content_digest
+
+    try:
+        return content_digest(path)
+    except RecordingError:
+        return ""

@@ -1,0 +1,249 @@
+"""The ledger: how every cell ended, one a line, only ever appended to."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import FolderError
+from tactbench.core.matrix.store import limits
+from tactbench.core.matrix.store.rows import Row, row_checker, too_deep
+from tactbench.core.matrix.store.sharing import canonical, definition, joined, parted, shared_lines
+
+NAME = "index.jsonl"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One line."""
+
+    row: Row
+    shard: tuple[str, int] | None = None
+    """SHA-256 and bytes of the cell's shard; None for a cell that did not finish."""
+
+    @property
+    def key(self) -> str:
+        """Key of the cell; empty where none could be made."""
+        return str(self.row.get("key", ""))
+
+
+@dataclass
+class Ledger:
+    """What a ledger says, oldest line first."""
+
+    path: Path
+    entries: list[Entry] = field(default_factory=list)
+    troubles: list[str] = field(default_factory=list)
+    """What could not be used, in sentences."""
+    known: set[str] = field(default_factory=set)
+    """Digests of the values that have been written."""
+
+    def append(self, entry: Entry) -> None:
+        """Write one line, and before it what it shares with no earlier one, at once.
+
+        A line that a crash cut short is cut away first: nothing is ever glued to it.
+
+        Raises
+        ------
+        OSError
+            If the disk refuses; the ledger ends where it ended before.
+        """
+        lines, fresh = _lines(entry, self.known)
+        text = "".join(f"{line}\n" for line in lines).encode()
+        file = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
+        try:
+            with _alone(file):
+                end = _whole(file)
+                try:
+                    written = os.write(file, text)
+                    while written < len(text):  # the last bytes of a disk: the next write says why
+                        written += os.write(file, text[written:])
+                except BaseException:
+                    os.ftruncate(file, end)
+                    raise
+        finally:
+            os.close(file)
+        self.known |= fresh
+        self.entries.append(entry)
+
+
+def read_ledger(folder: Path) -> Ledger:
+    """Read the ledger of a result folder; a folder without one has an empty one.
+
+    Lines that make no sense, or are larger than `limits` allows, are left out and counted.
+
+    Raises
+    ------
+    FolderError
+        If it is larger than any ledger of ours, or the system refuses to read it.
+    """
+    path = folder / NAME
+    ledger = Ledger(path)
+    try:
+        with path.open("rb") as file:
+            content = file.read(limits.LEDGER_BYTES + 1)
+    except FileNotFoundError:
+        return ledger
+    except OSError as error:
+        raise FolderError(
+            f"{path} cannot be read: {error.strerror or error}.", hint="Check its permissions."
+        ) from error
+    if len(content) > limits.LEDGER_BYTES:
+        raise FolderError(
+            f"{path} is larger than {limits.LEDGER_BYTES // 2**20} MiB, more than any ledger that tactbench reads.",
+            hint="Split the matrix over several folders, or delete this one if it is not yours.",
+        )
+    broken = 0
+    waiting: list[tuple[dict[str, Any], int]] = []
+    shared: dict[str, Any] = {}
+    sizes: dict[str, int] = {}
+    for line, said in _parsed(content):
+        if isinstance(said, dict) and "shared" in said:
+            digest = definition(line)
+            if digest is None or _monstrous(line, said):
+                broken += 1
+            else:
+                shared.setdefault(digest, said["value"])
+                sizes[digest] = len(line)
+        elif isinstance(said, dict) and isinstance(said.get("row"), dict) and not _monstrous(line, said):
+            waiting.append((said, len(line)))
+        else:
+            broken += 1
+    ledger.known = set(shared)
+    _fill(ledger, waiting, shared, sizes)
+    if broken:
+        ledger.troubles.insert(0, f"{_lines_of(broken)} of {path} could not be read")
+    return ledger
+
+
+def whole_text(entries: Sequence[Entry]) -> str:
+    """Return a ledger with these lines: the same text for the same lines."""
+    known: set[str] = set()
+    lines: list[str] = []
+    for entry in entries:
+        some, fresh = _lines(entry, known)
+        lines += some
+        known |= fresh
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _lines(entry: Entry, known: set[str]) -> tuple[list[str], set[str]]:
+    slim, references, texts = parted(entry.row)
+    fresh = {digest: text for digest, text in texts.items() if digest not in known}
+    said: dict[str, Any] = {"row": slim}
+    if references:
+        said["refs"] = references
+    if entry.shard is not None:
+        said["shard"] = list(entry.shard)
+    return [*shared_lines(fresh), canonical(said)], set(fresh)
+
+
+def _parsed(content: bytes) -> Iterator[tuple[str, Any]]:
+    """Yield every line that is not empty with what it says, or None."""
+    at_most = limits.ENTRIES
+    for raw in content.split(b"\n"):
+        if not raw:
+            continue
+        at_most -= 1
+        if at_most < 0 or len(raw) > limits.LINE_BYTES:
+            yield "", None
+            continue
+        try:
+            line = raw.decode()
+            yield line, json.loads(line)
+        except (ValueError, RecursionError):
+            yield "", None
+
+
+def _monstrous(line: str, said: Any) -> bool:
+    """Return whether a line is nested without end, or holds half characters that cannot be printed."""
+    if line.count("[") + line.count("{") > limits.DEPTH and too_deep(said):
+        return True
+    if "\\ud" not in line and "\\uD" not in line:
+        return False
+    try:
+        json.dumps(said, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        return True
+    return False
+
+
+def _fill(
+    ledger: Ledger, waiting: Sequence[tuple[dict[str, Any], int]], shared: Mapping[str, Any], sizes: Mapping[str, int]
+) -> None:
+    """Turn lines into entries."""
+    wrong = row_checker()
+    characters, lost, over = 0, 0, 0
+    for said, size in waiting:
+        references, shard = said.get("refs", {}), said.get("shard")
+        try:
+            characters += size + sum(sizes[digest] for digest in references.values())
+            if characters > limits.SHARED_CHARACTERS:
+                over += 1
+                continue
+            row = joined(said["row"], references, shared)
+        except (KeyError, TypeError, AttributeError):
+            lost += 1
+            continue
+        fault = wrong(row)
+        done = not fault and row["status"] == "done"
+        if done and not (_is_shard(shard) and limits.is_key(row.get("key"))):
+            fault = "it names no shard: it is of another version"
+        elif not done and row.get("key") and not limits.is_key(row["key"]):
+            fault = "its key is none"
+        if fault:
+            name = row.get("cell")
+            ledger.troubles.append(
+                f"{str(name)[:200]!r} is left out: {fault}" if name else f"a row is left out: {fault}"
+            )
+            continue
+        ledger.entries.append(Entry(row, (shard[0], shard[1]) if done and shard else None))
+    if lost:
+        ledger.troubles.append(f"{_lines_of(lost)} of {ledger.path} refer to what is not there")
+    if over:
+        ledger.troubles.append(
+            f"{_lines_of(over)} of {ledger.path} are left out: written out, they would fill the memory"
+        )
+
+
+def _is_shard(said: Any) -> bool:
+    return (
+        isinstance(said, list) and len(said) == 2 and isinstance(said[0], str) and len(said[0]) == 64
+        and type(said[1]) is int and 0 < said[1] <= limits.SHARD_BYTES
+    )  # fmt: skip
+
+
+def _lines_of(count: int) -> str:
+    return f"{count} line{'s' if count > 1 else ''}"
+
+
+@contextmanager
+def _alone(file: int) -> Iterator[None]:
+    """Keep other writers of this ledger out for the length of a line."""
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    with suppress(OSError):  # some network disks know no locks
+        fcntl.flock(file, fcntl.LOCK_EX)
+    yield  # closing the file lets go
+
+
+def _whole(file: int) -> int:
+    """Cut away a last line that is not whole, and return where the ledger ends."""
+    end = os.fstat(file).st_size
+    if not end or os.pread(file, 1, end - 1) == b"\n":
+        return end
+    start, tail = end, b""
+    while start and b"\n" not in tail:
+        start = max(0, start - 65536)
+        tail = os.pread(file, end - start, start)
+    whole = start + tail.rfind(b"\n") + 1
+    os.ftruncate(file, whole)
+    return whole

@@ -1,0 +1,31 @@
+"""How much is read of a result folder: it may be a stranger's, and is data whatever it says."""
+
+import re
+
+LEDGER_BYTES = 2**29
+"""Half a gigabyte: some 200,000 cells."""
+LINE_BYTES = 2**24
+ENTRIES = 1_000_000
+DEPTH = 32
+"""Lists and mappings inside each other; ours have six."""
+SHARED_CHARACTERS = 2**31
+"""What all rows of a ledger amount to once what they share is written out in each."""
+SHARD_BYTES = 2**30
+ARRAY_BYTES = 2**30
+"""Of the answers of one role, in memory: compressed bytes may claim a thousand times what they hold."""
+PROVENANCE_BYTES = 2**20
+TEXT_CHARACTERS = 2**16
+"""Of a log or a traceback, when it is written."""
+
+_KEY = re.compile(r"[0-9a-f]{32}")
+_PROVENANCE = re.compile(r"[0-9a-f]{16}")
+
+
+def is_key(text: object) -> bool:
+    """Return whether `text` is the key of a cell: keys are names of files."""
+    return isinstance(text, str) and _KEY.fullmatch(text) is not None
+
+
+def is_provenance(text: object) -> bool:
+    """Return whether `text` is the id of a provenance."""
+    return isinstance(text, str) and _PROVENANCE.fullmatch(text) is not None

@@ -1,0 +1,116 @@
+"""One run at a time in a result folder: held by the kernel, which lets go however the run ends."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import platform
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from tactbench.core.errors import FolderError
+from tactbench.core.matrix.files import replace_file
+from tactbench.core.matrix.store.disk import sync_folder
+
+_HELD: set[int] = set()
+"""Descriptors that a child must let go: else an orphaned worker would hold the folder after its run was killed."""
+
+
+def _let_go_in_child() -> None:
+    for descriptor in _HELD:
+        with suppress(OSError):
+            os.close(descriptor)
+    _HELD.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_let_go_in_child)
+
+
+class Lock:
+    """The lock on one folder; taken when made.
+
+    Parameters
+    ----------
+    folder
+        A folder that exists and may be written.
+
+    Raises
+    ------
+    FolderError
+        If another run holds it; the message says who.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.works = True
+        """False where the file system knows no locks."""
+        self._note = folder / "cache" / "held.json"
+        self.broke_off = False
+        """Whether the last run here was killed, or the power was cut: it did not tidy up."""
+        self._descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            self.works = _flock(self._descriptor)
+        except BlockingIOError as error:
+            os.close(self._descriptor)
+            raise FolderError(
+                f"Another run is at work in {folder}: {self._holder()}.",
+                hint="Wait until it ends, or give another folder with --out DIR.",
+            ) from error
+        _HELD.add(self._descriptor)
+        self.broke_off = self._note.exists()
+        # For people only: nothing is decided by this clock.
+        since = time.strftime("%Y-%m-%d %H:%M:%S %z")
+        about = {"pid": os.getpid(), "host": platform.node(), "since": since}
+        try:
+            replace_file(self._note, json.dumps(about).encode())
+            sync_folder(self._note.parent)
+        except BaseException:
+            self._close()
+            raise
+
+    def in_place(self) -> bool:
+        """Return whether the folder still lies where it lay."""
+        try:
+            now, then = self.folder.stat(), os.fstat(self._descriptor)
+        except OSError:
+            return False
+        return (now.st_dev, now.st_ino) == (then.st_dev, then.st_ino)
+
+    def release(self) -> None:
+        """Let go; who held it is forgotten."""
+        with suppress(OSError):
+            self._note.unlink(missing_ok=True)
+        self._close()
+
+    def _close(self) -> None:
+        if self._descriptor in _HELD:
+            _HELD.discard(self._descriptor)
+            os.close(self._descriptor)
+
+    def _holder(self) -> str:
+        try:
+            with self._note.open("rb") as file:
+                said = json.loads(file.read(4096))
+            return f"process {int(said['pid'])} on {str(said['host'])[:100]!r} since {str(said['since'])[:40]}"
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            return "it has not said which"
+
+
+def _flock(descriptor: int) -> bool:
+    """Lock a descriptor; False where there are no locks, BlockingIOError where another has it."""
+    try:
+        import fcntl
+    except ImportError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError as error:
+        if error.errno in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EINVAL):
+            return False  # some network disks
+        raise
+    return True

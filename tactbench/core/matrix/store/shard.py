@@ -1,0 +1,249 @@
+"""The shard of a finished cell: its row, its provenance, and what it answered, in one HDF5 file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import fields
+from functools import lru_cache
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from tactbench.core.errors import FormatError
+from tactbench.core.matrix.store import limits
+from tactbench.core.matrix.store.rows import Row, row_checker, too_deep
+from tactbench.core.matrix.store.sharing import canonical
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from tactbench.core.samples import Answers
+    from tactbench.core.spec.scene import Role
+
+FORMAT = "tactbench-cell"
+VERSION = 3
+ENDING = ".h5"
+_COMPRESSED_BYTES = 2**15
+"""Tables of fewer bytes are stored as they are: compressing them takes longer than they take room."""
+_CHUNK_ROWS = 4096
+_GROWTH_BYTES = 2**14
+"""By how much the memory of a growing file grows."""
+_ATTRIBUTE_BYTES = 60_000
+"""An attribute of HDF5 holds 64 KiB with its name and type."""
+_NUMBERS = count(1)
+_FILTERS = {1, 2}
+"""Deflate and shuffle, which every HDF5 library has: no other is asked to run."""
+_SEE = "Delete it, and the next run computes the cell again."
+
+
+def build(row: Row, provenance: str, sets: Mapping[Role, Answers]) -> bytes:
+    """Return the bytes of a shard: a table of answers for each role; row and provenance as attributes.
+
+    Notes
+    -----
+    Built in memory: HDF5 cannot give up a file on a full disk without crashing the process, and what is written is
+    known, byte by byte, before any of it is. By h5py's low level, which takes half the time of the other one: a run may
+    have ten thousand of these.
+    """
+    from h5py import h5d, h5f, h5p, h5s, h5t
+
+    text = canonical(row)
+    content = _Content(text, provenance)
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fapl_core(_GROWTH_BYTES, False)
+    # The name is nobody's, but must be unique in the process.
+    file = h5f.create(f"cell-{next(_NUMBERS)}".encode(), h5f.ACC_TRUNC, fapl=access)
+    try:
+        for role in sorted(sets):
+            table = _table(sets[role])
+            content.add(role, table)
+            stored = h5p.create(h5p.DATASET_CREATE)
+            if table.nbytes >= _COMPRESSED_BYTES:
+                stored.set_chunk((min(len(table), _CHUNK_ROWS),))
+                stored.set_shuffle()
+                stored.set_deflate(4)
+            space = h5s.create_simple(table.shape)
+            dataset = h5d.create(file, role.encode(), h5t.py_create(table.dtype), space, stored)
+            if len(table):
+                dataset.write(h5s.ALL, h5s.ALL, table)
+        facts = {"format": f"{FORMAT} {VERSION}", "row": text, "provenance": provenance, "sha256": content.hexdigest()}
+        for name, fact in facts.items():
+            _write_text(file, name, fact)
+        h5f.flush(file)
+        image: bytes = file.get_file_image()
+    finally:
+        file.close()
+    return image
+
+
+def _write_text(file: Any, name: str, text: str) -> None:
+    """Write a text as an attribute, or as a dataset where it is longer than attributes of HDF5 may be."""
+    import numpy as np
+    from h5py import h5a, h5d, h5s, h5t
+
+    content = text.encode()
+    kind = h5t.C_S1.copy()
+    kind.set_size(len(content))
+    kind.set_cset(h5t.CSET_UTF8)
+    value = np.array(content, dtype=f"S{len(content)}")
+    if len(content) <= _ATTRIBUTE_BYTES:
+        h5a.create(file, name.encode(), kind, h5s.create(h5s.SCALAR)).write(value, mtype=kind)
+    else:
+        h5d.create(file, name.encode(), kind, h5s.create(h5s.SCALAR)).write(h5s.ALL, h5s.ALL, value, mtype=kind)
+
+
+def _table(answers: Answers) -> npt.NDArray[Any]:
+    """Return (n,) answers, a field for each column."""
+    import numpy as np
+
+    columns = {name: getattr(answers, name) for name in _columns()}
+    types = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
+    table = np.empty(len(answers), dtype=types)
+    for name, values in columns.items():
+        table[name] = values
+    return table
+
+
+def digest_of(image: bytes) -> str:
+    """Return the digest under which the ledger knows a shard."""
+    return hashlib.sha256(image).hexdigest()
+
+
+def read_image(path: Path) -> bytes:
+    """Return the bytes of a shard.
+
+    Raises
+    ------
+    FormatError
+        If there is no such file, it is a link or no file at all, or larger than any shard of ours.
+    """
+    try:
+        # Not through links: they may lead anywhere. Not blocking: it might be a pipe.
+        opened = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+        with open(opened, "rb") as file:  # noqa: PTH123  (a descriptor)
+            image = file.read(limits.SHARD_BYTES + 1)
+    except (OSError, TypeError) as error:
+        raise FormatError(f"The shard {path} cannot be read: {error}.", hint=_SEE) from error
+    if len(image) > limits.SHARD_BYTES:
+        raise FormatError(f"The shard {path} is larger than {limits.SHARD_BYTES // 2**20} MiB.", hint=_SEE)
+    return image
+
+
+def answers_in(path: Path, image: bytes) -> dict[str, Answers]:
+    """Return the answers of a shard whose bytes were compared with the ledger, by role.
+
+    Raises
+    ------
+    FormatError
+        If it is no shard, or declares more than it can hold.
+    """
+    return _opened(path, image)[1]
+
+
+def row_in(path: Path, image: bytes) -> Row:
+    """Return the row of a shard that no ledger vouches for; its own digest must.
+
+    Raises
+    ------
+    FormatError
+        If it is no shard, is damaged, or its row makes no sense.
+    """
+    text, _ = _opened(path, image)
+    try:
+        row = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise _damaged(path, error) from error
+    fault = "its row is none" if not isinstance(row, dict) or too_deep(row) else row_checker()(row)
+    if not fault and (row["status"] != "done" or row.get("key") != path.name.removesuffix(ENDING)):
+        fault = "its row is of another cell"
+    if fault:
+        raise _damaged(path, fault)
+    return dict(row)
+
+
+class _Content:
+    """Digest of what a shard says, whatever bytes HDF5 made of it."""
+
+    def __init__(self, row: str, provenance: str) -> None:
+        self._sha = hashlib.sha256(f"{FORMAT} {VERSION}\n{row}\n{provenance}\n".encode())
+
+    def add(self, role: str, table: npt.NDArray[Any]) -> None:
+        """Add a table by name, types, length and bytes."""
+        self._sha.update(f"{role} {table.dtype.descr} {table.shape}\n".encode())
+        self._sha.update(table.tobytes())
+
+    def hexdigest(self) -> str:
+        """Return the digest so far."""
+        return self._sha.hexdigest()
+
+
+def _opened(path: Path, image: bytes) -> tuple[str, dict[str, Answers]]:
+    """Return the text of the row, and the answers, after comparing them with the shard's own digest."""
+    import io
+
+    import h5py
+
+    from tactbench.core.recording.trust import READ_FAILURES
+    from tactbench.core.samples import Answers
+    from tactbench.core.spec.scene import Role
+
+    try:
+        with h5py.File(io.BytesIO(image), "r") as file:
+            if _text(path, file, "format") != f"{FORMAT} {VERSION}":
+                raise FormatError(f"{path} is no shard of this version.", hint=_SEE)
+            row = _text(path, file, "row")
+            content = _Content(row, _text(path, file, "provenance"))
+            found = {}
+            for role in sorted(set(get_args(Role)) & set(file)):
+                table = _read(path, file, role)
+                content.add(role, table)
+                found[role] = Answers(**{name: table[name].copy() for name in _columns()})
+            if content.hexdigest() != _text(path, file, "sha256"):
+                raise FormatError(f"{path} does not hold what was written: its digest differs.", hint=_SEE)
+    except FormatError:
+        raise
+    except (*READ_FAILURES, MemoryError) as error:
+        raise _damaged(path, error) from error
+    return row, found
+
+
+def _text(path: Path, file: Any, name: str) -> str:
+    """Return what `_write_text` wrote; empty if it is not there."""
+    from tactbench.core.recording import trust
+
+    value = file.attrs.get(name)
+    if value is None:
+        dataset = trust.numbers(path, file, name, "S", 0, strict=True)
+        value = b"" if dataset is None else dataset[()]
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def _read(path: Path, file: Any, role: str) -> npt.NDArray[Any]:
+    """Return the table of a role, looked at before it is read."""
+    from tactbench.core.recording import trust
+
+    dataset = trust.numbers(path, file, role, "V", 1, strict=True)
+    kinds = {dataset.dtype[name].kind for name in dataset.dtype.names or ()}
+    if dataset.dtype.names != _columns() or not kinds <= set("iuf"):
+        raise _damaged(path, f"{role} holds {dataset.dtype}")
+    if dataset.size * dataset.dtype.itemsize > limits.ARRAY_BYTES:
+        raise _damaged(path, f"{role} claims {dataset.size} rows")
+    stored = dataset.id.get_create_plist()
+    if not {stored.get_filter(place)[0] for place in range(stored.get_nfilters())} <= _FILTERS:
+        raise _damaged(path, f"{role} asks for a filter")
+    table: npt.NDArray[Any] = dataset[()]
+    return table
+
+
+@lru_cache(maxsize=1)
+def _columns() -> tuple[str, ...]:
+    from tactbench.core.samples import Answers
+
+    return tuple(column.name for column in fields(Answers))
+
+
+def _damaged(path: Path, why: object) -> FormatError:
+    return FormatError(f"The shard {path} is damaged: {why}.", hint=_SEE)

@@ -1,0 +1,129 @@
+"""Full disks and folders that refuse: a clear message, and everything finished before is kept and valid."""
+
+import os
+import subprocess
+import sys
+from contextlib import contextmanager, suppress
+
+import pytest
+
+from tactbench.core.errors import FolderError
+from tactbench.core.matrix.store import Store
+
+from .made import answers, done, ended, kept, key
+
+
+@contextmanager
+def small_disk(folder, *options):
+    """A real file system of 600 kB."""
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=600k", "tactbench-test", str(folder)], capture_output=True
+    )
+    if mounted.returncode:
+        pytest.skip("a file system can be mounted by root only")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def test_a_full_disk_keeps_what_was_finished_and_goes_on_when_there_is_room(tmp_path):
+    with small_disk(tmp_path / "disk") as disk:
+        store = Store(disk / "out")
+        finished = []
+
+        def fill():
+            for number in range(1000):
+                store.keep(key(number), done(f"c{number}", remarks=[f"{number} " * 99]), {"test": answers(200)})
+                finished.append(f"c{number}")
+
+        with store.hold(), pytest.raises(FolderError) as error:
+            fill()
+        assert "the disk is full" in str(error.value)
+        assert str(disk / "out") in str(error.value)
+        assert error.value.exit_code == 2
+        assert len(finished) > 5
+        assert not list(disk.rglob("*.partial"))
+        found = Store(disk / "out")
+        assert [row["cell"] for row in found.rows()] == finished
+        assert all(len(found.answers(row["key"])["test"]) == 200 for row in found.rows())
+        with suppress(OSError), (disk / "filler").open("wb", buffering=0) as filler:
+            while True:
+                filler.write(b"x" * 512)
+        with pytest.raises(FolderError, match="the disk is full"):
+            found.note(ended("d", log="x" * 30_000))
+        assert (disk / "out" / "index.jsonl").read_bytes().endswith(b"\n")
+        (disk / "filler").unlink()
+        for number in range(4):
+            (disk / "out" / "cells" / f"{key(number)}.h5").unlink()
+        with Store(disk / "out").hold() as again:
+            kept(again, "last")
+        assert Store(disk / "out").rows()[-1]["cell"] == "last"
+
+
+def test_a_read_only_folder_is_refused_before_anything_is_run_and_can_be_read(tmp_path):
+    with small_disk(tmp_path / "disk") as disk:
+        with Store(disk / "out").hold() as store:
+            kept(store, "a")
+        subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
+        with pytest.raises(FolderError, match="Read-only") as error, Store(disk / "out").hold():
+            pass
+        assert "--out DIR" in str(error.value)
+        found = Store(disk / "out")
+        assert [row["cell"] for row in found.rows()] == ["a"]
+        assert len(found.answers(key("a"))["test"]) == 3
+
+
+@pytest.mark.skipif(hasattr(os, "geteuid") and os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_permission_is_refused(tmp_path):
+    (tmp_path / "out").mkdir(mode=0o500)
+    with pytest.raises(FolderError, match="Permission denied"), Store(tmp_path / "out").hold():
+        pass
+
+
+def test_a_file_in_the_folders_place_is_refused(tmp_path):
+    (tmp_path / "out").write_text("")
+    with pytest.raises(FolderError, match="cannot be written"), Store(tmp_path / "out").hold():
+        pass
+
+
+def test_the_command_line_stops_with_a_clear_message_and_goes_on_later(tmp_path):
+    """The real run on a real disk that fills up: exit code 2, no traceback, and the same scores in the end."""
+    from tests.conftest import Shell
+
+    asked = ("run", "--sensor", "icub", "--task", "curvature", "--estimator", "lda")
+    plain = Shell(tmp_path)
+    plain(*asked, "--out", "plain")
+    size = sum(path.stat().st_size for path in (tmp_path / "plain" / "recordings").rglob("*.h5"))
+    with small_disk(tmp_path / "disk") as disk:
+        room = (size + 64 * 1024) // 1024 + 16
+        subprocess.run(["mount", "-o", f"remount,size={room + 400}k", str(disk)], check=True)
+        (disk / "filler").write_bytes(b"x" * 390 * 1024)
+        stopped = plain(*asked, "--out", str(disk / "out"), code=None)
+        assert stopped.returncode == 2, stopped.stderr
+        assert "the disk is full" in stopped.stderr or "No space left on device" in stopped.stderr
+        assert str(disk / "out") in stopped.stderr
+        assert "Traceback" not in stopped.stderr
+        (disk / "filler").unlink()
+        subprocess.run(["mount", "-o", f"remount,size={4 * room + 4000}k", str(disk)], check=True)
+        plain(*asked, "--out", str(disk / "out"))
+        assert (disk / "out" / "scores.json").read_bytes() == (tmp_path / "plain" / "scores.json").read_bytes()
+
+
+def test_a_limit_on_the_size_of_files_is_told(tmp_path):
+    code = (
+        "import resource, sys\nfrom pathlib import Path\nfrom tactbench.core.errors import FolderError\n"
+        "from tests.core.matrix.store.made import kept\nfrom tactbench.core.matrix.store import Store\n"
+        "store = Store(Path(sys.argv[1]))\nkept(store, 'a')\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500))\n"
+        "try:\n    kept(store, 'b')\nexcept FolderError as error:\n    print(error)\n"
+    )
+    from tests.conftest import ROOT
+
+    done_ = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path)], check=True, capture_output=True, text=True, cwd=ROOT
+    )
+    assert "larger than this process may write" in done_.stdout
+    assert [row["cell"] for row in Store(tmp_path).rows()] == ["a"]
+    assert not list(tmp_path.rglob("*.partial"))

@@ -1,0 +1,128 @@
+"""A folder that somebody else made: nothing outside it is opened, nothing of it is believed unseen."""
+
+import hashlib
+import io
+import json
+import os
+
+import h5py
+import numpy as np
+import pytest
+
+from tactbench.core.matrix.store import Store, limits, shard
+from tactbench.core.matrix.store.ledger import Entry, whole_text
+from tests.core.matrix.test_merging import record
+
+from .made import answers, done, kept, key
+
+
+def forged(folder, change):
+    """Write a folder whose ledger vouches for a shard that was made by hand."""
+    row = {**done("a"), "key": key("a")}
+    image = io.BytesIO(shard.build(row, "{}", {"test": answers(5)}))
+    with h5py.File(image, "r+") as file:
+        change(file)
+    (folder / "cells").mkdir(parents=True)
+    (folder / "cells" / f"{key('a')}.h5").write_bytes(image.getvalue())
+    digest = hashlib.sha256(image.getvalue()).hexdigest()
+    (folder / "index.jsonl").write_text(whole_text([Entry(row, (digest, len(image.getvalue())))]))
+    return Store(folder)
+
+
+def remade(file, **options):
+    del file["test/y_true"]
+    file["test"].create_dataset("y_true", **options)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda file: remade(file, shape=(2**40,), dtype="f8", chunks=(1024,)), "claims"),
+        (lambda file: remade(file, shape=(2**60,), dtype="f8", chunks=(1024,), compression="gzip"), "claims"),
+        (lambda file: remade(file, data=np.zeros((5, 5))), "2 dimensions"),
+        (lambda file: remade(file, data=np.zeros(7)), "differ in length"),
+        (lambda file: remade(file, data=["a"] * 5, dtype=h5py.string_dtype()), "holds object"),
+        (lambda file: remade(file, data=np.zeros(5), compression="lzf"), "asks for a filter"),
+        (lambda file: remade(file, data=np.ones(5)), "does not hold what was written"),
+        (lambda file: remade(file, shape=(5,), dtype="f8", external=[("/etc/passwd", 0, 40)]), "another file"),
+        (lambda file: file["test"].__delitem__("fold"), "has no fold"),
+        (lambda file: file.attrs.modify("format", "else"), "no shard of this version"),
+        (lambda file: file.attrs.__delitem__("row"), "damaged"),
+    ],
+)
+def test_a_shard_that_claims_what_cannot_be_answers_nothing(tmp_path, change, says):
+    store = forged(tmp_path, change)
+    assert store.finished(key("a")) is not None
+    assert store.answers(key("a")) == {}
+    assert says in store.troubles[0]
+
+
+@pytest.mark.parametrize("kind", [h5py.ExternalLink("/etc/hostname", "/x"), h5py.SoftLink("/elsewhere")])
+def test_links_in_a_shard_are_not_followed(tmp_path, kind):
+    def change(file):
+        del file["test"]
+        file["test"] = kind
+
+    store = forged(tmp_path, change)
+    assert store.answers(key("a")) == {}
+    assert "is a link to another place" in store.troubles[0]
+
+
+def test_an_untouched_shard_made_so_is_read(tmp_path):
+    assert len(forged(tmp_path, lambda file: None).answers(key("a"))["test"]) == 5
+
+
+def test_a_column_larger_than_the_limit_is_refused(tmp_path, monkeypatch):
+    kept(Store(tmp_path), "a")
+    monkeypatch.setattr(limits, "ARRAY_BYTES", 16)
+    store = Store(tmp_path)
+    assert store.answers(key("a")) == {}
+    assert "claims 3 values" in store.troubles[0]
+    monkeypatch.setattr(limits, "SHARD_BYTES", 100)
+    assert Store(tmp_path).rows() == []
+
+
+def test_a_pipe_in_a_shards_place_is_not_waited_for(tmp_path):
+    kept(Store(tmp_path), "a")
+    path = tmp_path / "cells" / f"{key('a')}.h5"
+    path.unlink()
+    os.mkfifo(path)
+    assert Store(tmp_path).answers(key("a")) == {}
+    assert Store(tmp_path).rows() == []
+
+
+def test_recordings_inside_are_followed_and_outside_only_with_leave(tmp_path):
+    inside = record(tmp_path / "out" / "recordings" / "made" / "scene.h5")
+    outside = record(tmp_path / "shelf" / "scene.h5")
+    store = Store(tmp_path / "out")
+    assert store.recording("recordings/made/scene.h5") == inside.resolve()
+    for path in (str(outside), "../shelf/scene.h5", "recordings/../../shelf/scene.h5", "/etc/passwd", "a\0b"):
+        assert store.recording(path) is None, path
+    allowed = Store(tmp_path / "out", recordings=(tmp_path / "shelf",))
+    assert allowed.recording(str(outside)) == outside.resolve()
+    assert allowed.recording("/etc/passwd") is None
+    (inside.parent / "link.h5").symlink_to(outside)
+    assert store.recording("recordings/made/link.h5") is None
+
+
+def test_ones_own_recordings_elsewhere_are_followed_as_long_as_they_are_the_same(tmp_path):
+    from tactbench.core.recording.reader import content_digest
+
+    outside = record(tmp_path / "shelf" / "scene.h5")
+    digest = content_digest(outside)
+    assert Store(tmp_path / "out").recording(str(outside), digest) == outside.resolve()
+    assert Store(tmp_path / "out").recording(str(outside), "0" * 64) is None
+    record(outside, reading=2.0)
+    assert Store(tmp_path / "out").recording(str(outside), digest) is None
+    os.mkfifo(tmp_path / "pipe")
+    assert Store(tmp_path / "out").recording(str(tmp_path / "pipe"), digest) is None
+
+
+def test_a_report_of_a_strangers_folder_names_what_it_left_out(shell):
+    store = Store(shell.folder / "tactbench-results")
+    kept(store, "a")
+    with (shell.folder / "tactbench-results" / "index.jsonl").open("a") as ledger:
+        ledger.write(json.dumps({"row": {**done("evil"), "score": "1"}}) + "\n")
+    said = shell("report", code=2).stderr
+    assert "'evil' is left out: 'score' is text" in said
+    assert "Traceback" not in said

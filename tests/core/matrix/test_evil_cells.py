@@ -1,0 +1,249 @@
+"""Cells, recordings and rigs that do the worst that has been seen, through the real command line, on every engine."""
+
+import json
+import os
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from tactbench.core.matrix.store import Store
+from tests.conftest import Shell
+from tests.core.cost.test_ladder import presses
+
+ENGINES = {
+    "in-process": ("--engine", "in-process"),
+    "isolated": ("--engine", "isolated"),
+    "isolated-2": ("--engine", "isolated", "--jobs", "2"),
+    "dask": ("--engine", "dask", "--jobs", "2"),
+}
+"""Every engine that the evil cells must survive under: one place for all of them."""
+
+LIMITS = ("--timeout", "3", "--memory", "60")
+ASKED = ("run", "--rig", "replay", "--recordings", "shelf", "--sensor", "made", "--task", "force", "--split", "session")
+HONEST = ("ols", "mean", "time-index")
+ENDS = {
+    "evil-raise": ("failed", None, "RuntimeError: out of breath"),
+    "evil-exit": ("failed", None, "SystemExit: I am off"),
+    "evil-interrupt": ("failed", None, "KeyboardInterrupt"),
+    "evil-abort": ("crashed", 6, "SIGABRT"),
+    "evil-vanish": ("crashed", None, "exit code 0"),
+    "evil-hang": ("timeout", None, "longer than 3 s"),
+    "evil-deaf": ("timeout", None, "longer than 3 s"),
+    "evil-eat": ("out-of-memory", None, "more than 60 MB"),
+    "evil-shape": ("failed", None, "answered 120 rows with shape (119,)"),
+    "evil-nan": ("failed", None, "120 values that are NaN or infinite"),
+    "evil-text": ("failed", None, "values of type <U"),
+    "evil-print": ("done", None, ""),
+    "evil-fork": ("done", None, ""),
+    "evil-daemon": ("done", None, ""),
+    "evil-scribble": ("done", None, ""),
+    "evil-kill": ("crashed", 9, "SIGKILL"),
+    "evil-import": ("crashed", 6, "SIGABRT"),
+}
+"""Status, signal and a part of the reason of every evil cell."""
+
+
+def run(shell, *arguments, out="out", code=1):
+    """Run and return the listed rows by estimator, and what the command printed."""
+    done = shell(*ASKED, *arguments, "--out", out, "--format", "json", plugins=("evil",), code=code)
+    listed = json.loads(done.stdout)
+    assert Counter(row["cell"] for row in listed).most_common(1)[0][1] == 1, "one row a cell"
+    return {row["estimator"]: row for row in listed}, done
+
+
+def whole_rows(folder):
+    """Return the rows by estimator, complete as the folder keeps them."""
+    return {row["estimator"]: row for row in Store(folder).rows()}
+
+
+def processes_in(folder):
+    """Return the processes that were started in `folder` and are still there."""
+    found = []
+    for process in Path("/proc").iterdir():
+        try:
+            if process.name.isdigit() and (process / "cwd").resolve() == folder.resolve():
+                found.append((process / "cmdline").read_text().replace("\0", " "))
+        except OSError:
+            continue
+    return found
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """The honest cells without any evil one beside them."""
+    shell = Shell(tmp_path_factory.mktemp("honest"))
+    presses(shell.folder / "shelf")
+    run(shell, "--estimator", "ols", code=0)
+    return (shell.folder / "out" / "scores.json").read_text(), shell.folder / "shelf"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_evil_cell_has_one_row_and_the_others_are_right(engine, alone, tmp_path):
+    shell = Shell(tmp_path)
+    honest, shelf = alone
+    (tmp_path / "shelf").symlink_to(shelf)
+    estimators = ["ols", *ENDS]
+    asked = [word for name in estimators for word in ("--estimator", name)]
+    rows, done = run(shell, *asked, *LIMITS, *ENGINES[engine])
+    assert set(rows) == {*HONEST, *ENDS}
+    for name, (status, _, says) in ENDS.items():
+        assert rows[name]["status"] == status, rows[name]
+        assert says in rows[name]["reason"]
+    kept = whole_rows(tmp_path / "out")
+    assert set(kept) == set(rows), "what was written over is computed again"
+    stopped = {name: row for name, row in kept.items() if row["status"] != "done"}
+    assert set(stopped) == {name for name, end in ENDS.items() if end[0] != "done"}
+    for name, row in stopped.items():
+        assert row["signal"] == ENDS[name][1]
+        assert f"  {row['status']:<13}  {row['cell']}: " in done.stderr
+    assert "in _raise" in stopped["evil-raise"]["traceback"]
+    assert "in _hang" in stopped["evil-hang"]["traceback"]
+    assert "tactbench why " in done.stderr
+    scores = json.loads((tmp_path / "out" / "scores.json").read_text())
+    beside = [score for score in scores if score["cell"].split("/")[4] in HONEST]
+    assert json.dumps(beside, indent=1, sort_keys=True) + "\n" == honest, "not a byte of an honest score has changed"
+    assert "said" not in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    assert processes_in(tmp_path) == []
+
+
+def test_what_a_cell_prints_is_in_its_row(alone, tmp_path):
+    (tmp_path / "shelf").symlink_to(alone[1])
+    for engine in ("in-process", "isolated"):
+        rows, _ = run(Shell(tmp_path), "--estimator", "evil-print", "--engine", engine, out=engine, code=0)
+        assert rows["evil-print"]["status"] == "done"
+        log = whole_rows(tmp_path / engine)["evil-print"]["log"]
+        for said in ("said by print", "said to stderr", "to descriptor 1", "said by a child"):
+            assert said in log
+
+
+def test_one_cell_that_ends_the_run_has_its_row_after_the_next_one(alone, tmp_path):
+    (tmp_path / "shelf").symlink_to(alone[1])
+    shell = Shell(tmp_path)
+    run(shell, "--estimator", "ols", code=0)  # the baselines are there: one cell is left
+    asked = (*ASKED, "--estimator", "evil-abort", "--out", "out", "--format", "json")
+    assert shell(*asked, plugins=("evil",), code=None).returncode < 0, "a single cell is carried out in the run itself"
+    rows, _ = run(shell, "--estimator", "evil-abort")
+    assert (rows["evil-abort"]["status"], rows["mean"]["status"]) == ("crashed", "done")
+    assert not list((tmp_path / "out").rglob("running"))
+
+
+def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
+    shell = Shell(tmp_path)
+    presses(tmp_path / "shelf")
+    (tmp_path / "shelf" / "icub").mkdir()
+    (tmp_path / "shelf" / "icub" / "flat.h5").write_bytes(b"no recording at all")
+    done = shell(*ASKED[:5], "--task", "force", "--estimator", "ols", "--split", "session", "--format", "json", code=1)
+    rows = json.loads(done.stdout)
+    assert {row["status"] for row in rows if row["sensor"] == "made"} == {"done"}
+    assert {(row["status"], "flat.h5" in row["reason"]) for row in rows if row["sensor"] == "icub"} == {
+        ("failed", True)
+    }
+
+
+@pytest.mark.parametrize("asked", [("--sensor", "made"), ()])
+def test_a_shelf_that_cannot_be_read_at_all_has_rows_as_well(tmp_path, asked):
+    (tmp_path / "shelf").mkdir()
+    (tmp_path / "shelf" / "a.h5").write_bytes(b"no recording at all")
+    done = Shell(tmp_path)(*ASKED[:5], *asked, "--task", "force", "--estimator", "ols", "--format", "json", code=1)
+    rows = json.loads(done.stdout)
+    assert len(rows) == 3
+    assert all(row["status"] == "failed" and "a.h5" in row["reason"] for row in rows)
+
+
+def recorded(tmp_path, rig, *options):
+    """Record the task `force` with the ideal sensor on an evil rig; return the rows and what was printed."""
+    asked = (
+        "run",
+        "--rig",
+        rig,
+        "--sensor",
+        "ideal",
+        "--task",
+        "force",
+        "--protocol",
+        "karl2016",
+        "--estimator",
+        "ols",
+    )
+    done = Shell(tmp_path)(*asked, *options, "--format", "json", plugins=("evil",), code=1)
+    return json.loads(done.stdout), done
+
+
+@pytest.mark.parametrize(
+    ("rig", "says"),
+    [
+        ("evil-unbuilt", "could not be built: OSError: no such port"),
+        ("evil-leaving", "could not be built: SystemExit: 0"),
+        ("evil-closed", "the door is locked"),
+        ("evil-dying", "signal 6 (SIGABRT)"),
+        ("evil-stuck", "longer than 3 s"),
+        ("evil-device", "longer than 3 s"),
+    ],
+)
+def test_a_rig_that_cannot_record_gives_rows_that_say_so(tmp_path, rig, says):
+    rows, done = recorded(tmp_path, rig, "--timeout", "3")
+    assert {row["estimator"] for row in rows} == {"ols", "mean", "time-index"}
+    assert all(says in row["reason"] for row in rows)
+    assert "good bye" not in done.stdout
+    kept = [path.name for path in (tmp_path / "tactbench-results" / "recordings").rglob("*.h5*")]
+    assert len(kept) == (2 if rig in ("evil-dying", "evil-stuck", "evil-device") else 0), "the other scenes are kept"
+    assert not any(name.endswith(".partial") for name in kept)
+    if rig == "evil-device":
+        assert (tmp_path / "let-go-of").read_text().splitlines().count("flat-validation") == 1
+    assert processes_in(tmp_path) == []
+
+
+def test_a_misspelt_split_is_refused_before_anything_is_recorded(tmp_path):
+    asked = ("run", "--sensor", "icub", "--task", "force", "--protocol", "deployable")
+    done = Shell(tmp_path)(*asked, "--split", "sesion", code=2)
+    assert "Did you mean 'session'" in done.stderr
+    assert not list(tmp_path.rglob("*.h5"))
+
+
+def test_options_that_do_not_go_together_are_refused(tmp_path):
+    shell = Shell(tmp_path)
+    assert "--jobs" in shell(*ASKED, "--engine", "in-process", "--jobs", "2", code=2).stderr
+    assert "--engine dask" in shell(*ASKED, "--scheduler", "tcp://127.0.0.1:1", code=2).stderr
+
+
+def test_engine_and_number_of_jobs_and_order_change_no_byte(alone, tmp_path):
+    (tmp_path / "shelf").symlink_to(alone[1])
+    shell = Shell(tmp_path)
+    texts = {}
+    for name, options in ENGINES.items():
+        run(shell, "--estimator", "forest-10", "--estimator", "ridge", "--repeats", "2", *options, out=name, code=0)
+        texts[name] = (tmp_path / name / "scores.json").read_text()
+    assert len(set(texts.values())) == 1
+    run(shell, "--estimator", "ridge", "--estimator", "forest-10", "--repeats", "2", out="turned", code=0)
+    turned = json.loads((tmp_path / "turned" / "scores.json").read_text())
+    assert {row["cell"]: row for row in turned} == {row["cell"]: row for row in json.loads(texts["isolated"])}
+
+
+def test_the_time_of_a_cell_says_where_and_beside_how_many(alone, tmp_path):
+    (tmp_path / "shelf").symlink_to(alone[1])
+    run(Shell(tmp_path), "--estimator", "ols", "--jobs", "2", code=0)
+    rows = whole_rows(tmp_path / "out").values()
+    assert {row["concurrency"] for row in rows} == {2}
+    assert len({row["host"] for row in rows}) == 1
+    assert all(row["wall_s"] >= row["fit_s"] > 0 for row in rows)
+
+
+def test_a_parent_that_is_killed_takes_its_cells_with_it(alone, tmp_path):
+    (tmp_path / "shelf").symlink_to(alone[1])
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2] / "third_party" / "evil")}
+    command = [sys.executable, "-m", "tactbench", *ASKED, "--estimator", "evil-hang", "--jobs", "2"]
+    with subprocess.Popen(command, cwd=tmp_path, env=env, stderr=subprocess.PIPE, text=True) as running:
+        for line in running.stderr:
+            if "evaluating: 2/3" in line:  # the baselines are done: the one that hangs is under way
+                break
+        assert len(processes_in(tmp_path)) == 2
+        running.kill()
+        running.stderr.read()  # closed once nobody holds it any more
+    for _ in range(1000):
+        if not processes_in(tmp_path):
+            break
+    assert processes_in(tmp_path) == []
