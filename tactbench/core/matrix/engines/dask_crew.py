@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Callable, Mapping
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import replace
 from queue import Empty, SimpleQueue
@@ -21,7 +22,6 @@ GATHER_S = 10.0
 """How long the first worker may take to appear."""
 EXAM_S = PATIENCE_S + 30.0
 """How long workers may take to be examined: one may be busy for somebody else."""
-
 MOST = 3
 """So many reasons are told."""
 
@@ -118,16 +118,18 @@ class Crew:
 
     def _judge(self) -> None:
         for address, (exam, threads) in list(self._exams.items()):
-            if exam.status == "finished":
-                against = exam.result()
-            elif exam.status == "error":
-                against = [f"it has another tactbench or none ({exam.exception()})"]
-            elif exam.status in ("cancelled", "lost"):
-                del self._exams[address]
-                continue
-            else:
+            if exam.status == "pending":
                 continue
             del self._exams[address]
+            if exam.status == "finished":
+                try:
+                    against = exam.result(timeout=EXAM_S)
+                except (OSError, TimeoutError, CancelledError):
+                    continue  # lost on its way: the worker is examined again
+            elif exam.status == "error":
+                against = [f"it has another tactbench or none ({exam.exception()})"]
+            else:
+                continue
             if against:
                 self._refused[address] = against
                 self._told(_refusal({address: against}))

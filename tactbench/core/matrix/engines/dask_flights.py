@@ -145,13 +145,12 @@ class Round(Generic[T]):
 def _outcome(flight: Flight[Any]) -> Any:
     """Return what came of a flight; None if that got lost with its worker or with the scheduler."""
     from distributed import KilledWorker
-    from distributed.scheduler import NoValidWorkerError
 
     if flight.future.status == "error":
         error = flight.future.exception()
         if isinstance(error, KilledWorker):
             return _killer(flight)
-        if isinstance(error, NoValidWorkerError):
+        if type(error).__name__ == "NoValidWorkerError":  # newer than the oldest version that serves
             return None
         return EngineError(f"The Dask worker at {flight.address} could not pass the cell on: {error!r}.")
     if flight.future.status != "finished":

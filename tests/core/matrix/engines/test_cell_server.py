@@ -15,7 +15,7 @@ from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.request import Request, Setting, pack, unpack_reply
 from tactbench.core.matrix.engines.served import Served
 from tests.core.matrix.engines.patience import gone, until
-from tests.core.matrix.engines.work import misbehave, process, read, square, what_is_loaded
+from tests.core.matrix.engines.remote_work import misbehave, process, read, square, what_is_loaded
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ from pathlib import Path
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.served import Served
 from tests.core.matrix.engines.patience import gone, until
-from tests.core.matrix.engines.work import wait_for
+from tests.core.matrix.engines.remote_work import wait_for
 for _ in Served(1, Limits()).each(wait_for, [(Path(sys.argv[1]), Path("/no/such/file"))], lambda: print(flush=True)):
     pass
 """

@@ -12,7 +12,7 @@ from tactbench.core.errors import Crashed, DataError, TimedOut, UsageError
 from tactbench.core.matrix.engines.dask import DaskEngine, open_dask
 from tactbench.core.matrix.engines.limits import Limits
 from tests.core.matrix.engines.patience import gone, until
-from tests.core.matrix.engines.work import kill_once, misbehave, process, square, wait_for
+from tests.core.matrix.engines.remote_work import kill_once, misbehave, process, square, wait_for
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from tactbench.core.matrix.engines.dask import open_dask
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.sight import fingerprints
 from tests.core.matrix.engines.patience import gone, until
+from tests.core.matrix.engines.remote_work import square, wait_for
 from tests.core.matrix.engines.started import posing_as, started
-from tests.core.matrix.engines.work import square, wait_for
 
 LIMITS = Limits(timeout_s=60)
 
@@ -62,7 +62,7 @@ import sys
 from pathlib import Path
 from tactbench.core.matrix.engines.dask import open_dask
 from tactbench.core.matrix.engines.limits import Limits
-from tests.core.matrix.engines.work import wait_for
+from tests.core.matrix.engines.remote_work import wait_for
 with open_dask(sys.argv[1], 1, Limits()) as engine:
     list(engine.each(wait_for, [(Path(sys.argv[2]), Path("/no/such/file"))]))
 """
