@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 import uuid
 from collections import deque
@@ -20,9 +19,8 @@ from tactbench.core.matrix.engines.engine import R, T
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.request import Setting
 from tactbench.core.matrix.engines.sight import fingerprints
-from tactbench.core.matrix.engines.surroundings import surroundings
+from tactbench.core.matrix.engines.surroundings import sources_remembered, surroundings
 from tactbench.core.matrix.installed import installed
-from tactbench.core.matrix.source import SourceDigests
 
 ALONE_S = 60.0
 """How long a run waits for a worker when the last one has gone."""
@@ -151,11 +149,11 @@ class DaskEngine:
             self._crew = None
 
     def _setting(self) -> Setting:
-        sources = SourceDigests(self._memory or Path(os.devnull))
+        memory = str(self._memory or "")
+        sources = sources_remembered(memory)
         agreed = surroundings(installed(), sources)
-        if self._memory is not None:
-            sources.save()
-        folder, memory, threads = str(Path.cwd()), str(self._memory or ""), dict(thread_bounds())
+        sources.save()
+        folder, threads = str(Path.cwd()), dict(thread_bounds())
         return Setting(uuid.uuid4().hex, folder, self._limits, agreed, memory, threads)
 
     def _gone(self) -> EngineError:

@@ -16,7 +16,6 @@ import sys
 from collections.abc import Callable, Hashable
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import EngineError
@@ -25,7 +24,7 @@ from tactbench.core.matrix.engines.isolated import Isolated
 from tactbench.core.matrix.engines.request import Request, Setting, pack, pack_reply
 from tactbench.core.matrix.engines.share import Share, shares_of
 from tactbench.core.matrix.engines.sight import unseen
-from tactbench.core.matrix.engines.surroundings import differences, surroundings
+from tactbench.core.matrix.engines.surroundings import differences, sources_remembered, surroundings
 
 IDLE_S = 600.0
 """A server that nobody has asked for so long ends: whoever started it may have forgotten it."""
@@ -77,10 +76,9 @@ def settle(setting: Setting) -> list[str]:
         against.append(f"it cannot enter {setting.folder} ({error.strerror or error})")
     if setting.surroundings:
         from tactbench.core.matrix.installed import installed
-        from tactbench.core.matrix.source import SourceDigests
 
         # A memory on another machine is not there, and costs half a second.
-        sources = SourceDigests(Path(setting.memory or os.devnull))
+        sources = sources_remembered(setting.memory)
         against += differences(setting.surroundings, surroundings(installed(), sources))
     return against
 

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from pathlib import Path
 
 from tactbench.core.matrix.keys import RELEVANT, versions
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.plugins.registry import Registry
+
+
+def sources_remembered(memory: str) -> SourceDigests:
+    """Return digests of sources that are remembered in the file `memory`; nowhere if that is ""."""
+    return SourceDigests(Path(memory) if memory else Path(os.devnull) / "nothing")
 
 
 def surroundings(registry: Registry, sources: SourceDigests) -> dict[str, str]:

@@ -10,12 +10,12 @@ from tactbench.core.matrix.engines.surroundings import differences
 from tests.conftest import THIRD_PARTY
 
 ASK = """
-import json, os
-from pathlib import Path
-from tactbench.core.matrix.engines.surroundings import surroundings
+import json
+from tactbench.core.matrix.engines.surroundings import sources_remembered, surroundings
 from tactbench.core.matrix.installed import installed
-from tactbench.core.matrix.source import SourceDigests
-print(json.dumps(surroundings(installed(), SourceDigests(Path(os.devnull)))))
+sources = sources_remembered("")
+print(json.dumps(surroundings(installed(), sources)))
+sources.save()  # nowhere
 """
 
 
