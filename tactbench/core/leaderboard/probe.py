@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.leaderboard.table import LOWER_IS_BETTER, answer_name, sensor_name
@@ -127,6 +125,8 @@ def _beyond_guessing(first: Row, trivial: float) -> bool | None:
     the guess. Numbers: the interval lies beyond the trivial score.
     """
     if first["confusion"] is not None:
+        import numpy as np
+
         table = np.asarray(first["confusion"])
         n, right = int(table.sum()), int(np.trace(table))
         guess = float(table.sum(axis=1).max()) / n

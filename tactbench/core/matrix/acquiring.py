@@ -7,22 +7,22 @@ import time
 from collections.abc import Callable
 from functools import lru_cache
 
-from tactbench.core.acquisition import acquire
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engines.choice import EngineChoice
-from tactbench.core.matrix.installed import installed, rig_of
+from tactbench.core.matrix.explanation import Book
+from tactbench.core.matrix.installed import built
 from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.interfaces import Rig
-from tactbench.core.recording.format import partial_path
+from tactbench.core.plugins.registry import installed
 
 GRACE_S = 5.0
 """Seconds that a real rig has to stand still and let go of its devices when its time is up."""
 
 
 def acquire_missing(
-    material: Material, choice: EngineChoice, told: Progress, meanwhile: Callable[[], None] | None = None
+    material: Material, book: Book, choice: EngineChoice, told: Progress, meanwhile: Callable[[], None] | None = None
 ) -> None:
     """Make the recordings that are missing, and note in `material` which were made and what went wrong.
 
@@ -43,6 +43,9 @@ def acquire_missing(
     missing = [order for path, order in unique.items() if not path.exists()]
     if not missing:
         return
+    book.note_recordings(missing)
+    from tactbench.core.recording.format import partial_path
+
     simulated = all(installed().rigs[order.rig].simulated for order in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     told.begin("recording", len(missing), alone=False)
@@ -56,7 +59,7 @@ def acquire_missing(
                 material.refused[order.path] = outcome
                 partial_path(order.path).unlink(missing_ok=True)
             else:
-                material.made[order.path] = outcome
+                material.recorded.made(order.path, outcome)
             told.advance(f"{order.sensor} {order.scene.name}", stopped=isinstance(outcome, BaseException))
     except BaseException:
         # Workers that were ended in the middle could not tidy up behind themselves.
@@ -67,11 +70,13 @@ def acquire_missing(
 
 @lru_cache(maxsize=4)
 def _rig(name: str) -> Rig:
-    return rig_of(name, installed())  # type: ignore[return-value]
+    return built(name, installed())  # type: ignore[return-value]
 
 
 def record(order: Order) -> str:
     """Make one recording and return its content digest. Raises whatever the rig raises."""
+    from tactbench.core.acquisition import acquire
+
     registry = installed()
     rig = registry.rigs[order.rig]
     made = acquire(

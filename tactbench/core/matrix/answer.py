@@ -6,10 +6,9 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tactbench.core.errors import CellStopped, NotApplicable, TactbenchError
-from tactbench.core.evaluation.cell import CellResult, evaluate
-from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import Registry
@@ -17,6 +16,10 @@ from tactbench.core.samples import Answers
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
+
+if TYPE_CHECKING:
+    from tactbench.core.evaluation.cell import CellResult
+    from tactbench.core.evaluation.dataset import Dataset
 
 Answer = tuple[Row, Mapping[Role, Answers]]
 """A row, and the answers that go into its shard, by role."""
@@ -36,6 +39,8 @@ def answer(
     MemoryError
         It is the engine that knows whether the cell took too much or there was too little.
     """
+    from tactbench.core.evaluation.cell import evaluate
+
     task = registry.tasks[cell.task].spec
     row = opening(cell, task)
     try:
@@ -84,6 +89,7 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "repeat": cell.repeat,
         "repeats": cell.repeats,
         "seed": cell.seed,
+        "simulation": cell.simulation.model_dump(exclude_defaults=True),
         "status": "planned",
         "reason": "",
         "traceback": "",
@@ -131,6 +137,15 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "classes": [],
         "replicates": {},
     }
+
+
+def reused(known: Row, cell: Cell, task: TaskSpec) -> Row:
+    """Return the row of a finished cell as `cell` names it today, beside what is published today.
+
+    Its key covers neither: they change no number of ours.
+    """
+    named = {"cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
+    return {**known, **named, **_published(cell, task, known["split"])}
 
 
 def _published(cell: Cell, task: TaskSpec, split: str | None) -> Row:

@@ -7,23 +7,24 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import CellStopped, PluginContractError
-from tactbench.core.matrix.checking import fault_in
+from tactbench.core.matrix.answer import reused
 from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.explanation import Book, beside
 from tactbench.core.matrix.in_flight import InFlight
-from tactbench.core.matrix.keys import cell_key
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material
-from tactbench.core.matrix.preloading import import_estimators, shared
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.reading import read_apart
-from tactbench.core.matrix.solving import Job, solve, this_host, unanswered
-from tactbench.core.matrix.source import SourceDigests
+from tactbench.core.matrix.recorded import read_digest
 from tactbench.core.matrix.store import Row, Store
-from tactbench.core.plugins.registry import Registry
+from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.status import STOPPED
+
+if TYPE_CHECKING:
+    from tactbench.core.matrix.solving import Job
 
 
 @dataclass
@@ -39,9 +40,8 @@ class Evaluated:
 def evaluate_all(
     cells: Sequence[Cell],
     material: Material,
+    book: Book,
     choice: EngineChoice,
-    registry: Registry,
-    sources: SourceDigests,
     store: Store,
     made_by: str,
     told: Progress,
@@ -51,26 +51,27 @@ def evaluate_all(
     `made_by` is the id of this run's provenance.
     """
     done = Evaluated()
-    keys: dict[str, str] = {}
+    known = _Known({}, material, made_by)
     waiting: list[Job] = []
-    digests = _digests(cells, material, choice)
+    unreadable = _unreadable(cells, material, choice)
     for cell in cells:
         paths = material.paths(cell)
-        trouble = material.trouble(cell) or next((d for p in paths if isinstance(d := digests[p], BaseException)), None)
+        trouble = material.trouble(cell) or next((unreadable[path] for path in paths if path in unreadable), None)
         if trouble is None:
             try:
-                keys[cell.name] = cell_key(cell, [str(digests[path]) for path in paths], registry, sources)
+                known.keys[cell.name] = book.keys.of_cell(cell, [material.recorded.digest(path) for path in paths])
             except Exception as error:
                 trouble = error
-        found = store.finished(keys[cell.name]) if trouble is None else None
+        found = store.finished(known.keys[cell.name]) if trouble is None else None
         if found is not None and found["status"] == "done":
-            done.rows[cell.name] = {**found, "cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
+            done.rows[cell.name] = reused(found, cell, installed().tasks[cell.task].spec)
             store.reuse(done.rows[cell.name])
         else:
             waiting.append((cell, tuple(paths), trouble))
     done.computed = len(waiting)
     if waiting:
-        known = _Known(keys, digests, made_by)
+        keyed = ((cell, known.keys[cell.name], paths) for cell, paths, _ in waiting if cell.name in known.keys)
+        book.note_cells(keyed, material.recorded, store.folder)
         _compute(waiting, known, choice, store, told, done)
         spoilt = [job for job in waiting if _spoilt(done.rows[job[0].name], store)]
         if spoilt:
@@ -87,40 +88,46 @@ def _spoilt(row: Row, store: Store) -> bool:
 class _Known:
     """What rows say that the run knows, and their cells do not."""
 
-    keys: Mapping[str, str]
-    digests: Mapping[Path, str | BaseException]
+    keys: dict[str, str]
+    """By name of the cell."""
+    material: Material
     made_by: str
 
     def told(self, row: Row, folder: Path) -> Row:
         """Return `row` with all of it."""
-        found = [self.digests.get(Path(path), "") for path in row["recordings"]]
+        from tactbench.core.matrix.solving import this_host
+
+        paths = [Path(path) for path in row["recordings"]]
         return {
             **row,
             "key": self.keys.get(row["cell"], ""),
-            "digests": [digest for digest in found if isinstance(digest, str)],
-            "recordings": [_beside(path, folder) for path in row["recordings"]],
+            "digests": [self.material.recorded.digest(path) for path in paths],
+            "recordings": [_beside(path, folder) for path in paths],
             "made_by": self.made_by,
             "host": row["host"] or this_host(),
         }
 
 
-def _digests(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> dict[Path, str | BaseException]:
-    """Return the content digest of every recording, or why it has none; those made now are known already."""
+_beside = lru_cache(maxsize=4096)(beside)
+
+
+def _unreadable(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> dict[Path, BaseException]:
+    """Have the digest of every recording at hand; return why some have none."""
     wanted = {path: None for cell in cells if material.trouble(cell) is None for path in material.paths(cell)}
-    found: dict[Path, str | BaseException] = dict(material.made)
-    found |= read_apart(_digest, [path for path in wanted if path not in found], choice)
-    return {**{path: "" for cell in cells for path in material.paths(cell)}, **found}
-
-
-def _digest(path: Path) -> str:
-    from tactbench.core.recording.reader import content_digest
-
-    return content_digest(path)
+    found: dict[Path, BaseException] = {}
+    for path, read in read_apart(read_digest, material.recorded.unread(wanted, "digest"), choice).items():
+        if isinstance(read, BaseException):
+            found[path] = read
+        else:
+            material.recorded.learn(path, read)
+    return found
 
 
 def _compute(
     waiting: list[Job], known: _Known, choice: EngineChoice, store: Store, told: Progress, done: Evaluated
 ) -> None:
+    from tactbench.core.matrix.solving import solve, unanswered
+
     jobs = [job for job in waiting if job[2] is None]
     marks = InFlight(store.folder)
     if len(jobs) == 1 and choice.here(1) and marks.ended_a_run(known.keys[jobs[0][0].name]):
@@ -158,6 +165,8 @@ def _each(*several: Iterable[tuple[Job, Any]]) -> Generator[tuple[Job, Any], Non
 
 def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
     """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
+    from tactbench.core.matrix.preloading import import_estimators, shared
+
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
         groups.setdefault((job[0].task, job[1]), []).append(job)
@@ -178,6 +187,9 @@ def _marked(jobs: Iterable[Job], marks: InFlight, keys: Mapping[str, str], here:
 
 def _judged(cell: Cell, outcome: Any) -> tuple[Row, Any]:
     """Return the row and answers of a cell; what stopped it, or what is wrong with them, makes the row."""
+    from tactbench.core.matrix.checking import fault_in
+    from tactbench.core.matrix.solving import unanswered
+
     if isinstance(outcome, BaseException):
         return unanswered(cell, outcome), {}
     fault = fault_in(outcome, unanswered(cell, CellStopped("")))
@@ -188,10 +200,3 @@ def _judged(cell: Cell, outcome: Any) -> tuple[Row, Any]:
         return unanswered(cell, error), {}
     row, sets = outcome
     return row, sets
-
-
-@lru_cache(maxsize=4096)
-def _beside(path: str, folder: Path) -> str:
-    """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
-    inside = Path(path).is_relative_to(folder)
-    return str(Path(path).relative_to(folder)) if inside else str(Path(path).resolve())

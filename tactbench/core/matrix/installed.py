@@ -1,19 +1,15 @@
-"""What is installed in this process: the registry, and rigs built from it."""
+"""Rigs built from what is installed."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from tactbench.core.errors import RigError
+from tactbench.core.errors import RigError, TactbenchError
 from tactbench.core.plugins.interfaces import Rig, RigContext, Shelf
-from tactbench.core.plugins.registry import Registry, load_object, load_registry
-
-
-@lru_cache(maxsize=1)
-def installed() -> Registry:
-    """Return the registry of this process."""
-    return load_registry()
+from tactbench.core.plugins.registry import Registry, load_object
+from tactbench.core.plugins.registry import installed as installed
 
 
 def rig_of(name: str, registry: Registry, recordings: Path | None = None) -> Rig | Shelf:
@@ -25,3 +21,26 @@ def rig_of(name: str, registry: Registry, recordings: Path | None = None) -> Rig
             f"The rig {name!r} has neither open() nor recordings().", hint="See docs/plugins.md: a Rig or a Shelf."
         )
     return built  # type: ignore[no-any-return]
+
+
+def built(name: str, registry: Registry, recordings: Path | None = None) -> Rig | Shelf:
+    """Build the rig called `name`; raises RigError where its own code fails, whatever that raises."""
+    with _its_own_code(f"The rig {name!r} could not be built"):
+        return rig_of(name, registry, recordings)
+
+
+def listed(name: str, shelf: Shelf) -> list[Path]:
+    """Return the recordings of the shelf called `name`; raises RigError where its own code fails."""
+    with _its_own_code(f"The recordings of rig {name!r} cannot be listed"):
+        return list(shelf.recordings())
+
+
+@contextmanager
+def _its_own_code(what: str) -> Iterator[None]:
+    try:
+        yield
+    except TactbenchError:
+        raise
+    except (Exception, SystemExit) as error:
+        said = f"{what}: {type(error).__name__}: {error}".rstrip(": ")
+        raise RigError(said + ".", hint="See `tactbench plugins` for who brings it.") from error

@@ -8,14 +8,17 @@ from itertools import product
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called
-from tactbench.core.evaluation.splits import shots
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import TaskSpec
 
 FEW_SHOT = "few-shot"
 """Asks for all of a task's splits `few-shot-N`."""
+
+_AS_PLANNED = Simulation()
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,8 @@ class Cell:
     """Seed of this repeat: of the scenes it records and of its estimators."""
     latency: bool = True
     """Whether the latency of single rows is measured."""
+    simulation: Simulation = _AS_PLANNED
+    """How a simulated rig is asked to carry out its scenes."""
 
     @property
     def name(self) -> str:
@@ -85,6 +90,7 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                         repeats=matrix.repeats,
                         seed=matrix.seed + repeat - 1,
                         latency=matrix.latency,
+                        simulation=matrix.simulation,
                     )
                     cells[cell] = None  # once, in the order in which they were asked for
     return with_probes(list(cells), registry) if matrix.probe else list(cells)

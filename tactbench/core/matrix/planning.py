@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar, cast
 
-from tactbench.core.errors import NotApplicable, RigError, TactbenchError, UnknownNameError, UsageError
-from tactbench.core.evaluation.splits import shots
+from tactbench.core.errors import NotApplicable, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.engines.in_process import InProcess
-from tactbench.core.matrix.installed import rig_of
+from tactbench.core.matrix.installed import built, listed
 from tactbench.core.matrix.material import Need, Order, need_of, orders_for
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells
+from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.shelf import holdings, sensors_on, serving
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
@@ -31,14 +32,14 @@ ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuff
 class Material:
     """Where the recordings of cells come from."""
 
+    recorded: Recorded
+    """What is known of recordings, those made now among them."""
     orders: dict[Need, list[Order]] = field(default_factory=dict)
     """What a rig has to record."""
     shelf: dict[Need, list[Path]] = field(default_factory=dict)
     """What exists already."""
     troubles: dict[Need, BaseException] = field(default_factory=dict)
     """Why there are no recordings, or not all of them."""
-    made: dict[Path, str] = field(default_factory=dict)
-    """Content digests of the recordings made now."""
     refused: dict[Path, BaseException] = field(default_factory=dict)
     """Recordings that could not be made, and why."""
 
@@ -67,7 +68,8 @@ def plan(
     sources: SourceDigests,
     store: Store,
     recordings: Path | None,
-    choice: EngineChoice,
+    recorded: Recorded,
+    choice: EngineChoice | None = None,
 ) -> tuple[list[Cell], Material]:
     """Return the cells of `matrix`, and where their recordings come from.
 
@@ -78,27 +80,28 @@ def plan(
     UsageError
         If the matrix asks for something that is not there.
     """
-    name = registry.rigs[matrix.rig].name
-    rig = _greeted(lambda: rig_of(name, registry, recordings), f"The rig {name!r} could not be built", choice)
-    if isinstance(rig, BaseException):
-        return _in_vain(matrix, registry, rig)
-    if hasattr(rig, "recordings"):
-        return _from_shelf(matrix, registry, cast(Shelf, rig), choice)
+    chosen = choice or EngineChoice()
+    if not registry.rigs[matrix.rig].simulated:  # a simulated one is no shelf: it is built when it has to record
+        rig = _greeted(lambda: built(matrix.rig, registry, recordings), chosen)
+        if isinstance(rig, BaseException):
+            return _in_vain(matrix, registry, recorded, rig)
+        if hasattr(rig, "recordings"):
+            return _from_shelf(matrix, registry, cast(Shelf, rig), recorded, chosen)
     cells = plan_cells(matrix, _named(matrix, registry), registry)
     for task in {cell.task for cell in cells}:
         _known_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
-    return cells, Material(orders_for(cells, registry, sources, store, matrix.simulation))
+    return cells, Material(recorded, orders_for(cells, registry, sources, store, matrix.simulation))
 
 
 def _from_shelf(
-    matrix: MatrixSpec, registry: Registry, shelf: Shelf, choice: EngineChoice
+    matrix: MatrixSpec, registry: Registry, shelf: Shelf, recorded: Recorded, choice: EngineChoice
 ) -> tuple[list[Cell], Material]:
-    paths = _greeted(lambda: list(shelf.recordings()), f"The recordings of rig {matrix.rig!r} cannot be listed", choice)
+    paths = _greeted(lambda: listed(matrix.rig, shelf), choice)
     if isinstance(paths, BaseException):
-        return _in_vain(matrix, registry, paths)
-    found = holdings(paths, matrix.sensors, registry, choice)
+        return _in_vain(matrix, registry, recorded, paths)
+    found = holdings(paths, matrix.sensors, registry, recorded, choice)
     cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
-    material = Material()
+    material = Material(recorded)
     for wanted in dict.fromkeys(need_of(cell) for cell in cells):
         sensor, task, split, _ = wanted
         material.shelf[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
@@ -107,25 +110,22 @@ def _from_shelf(
     return cells, material
 
 
-def _in_vain(matrix: MatrixSpec, registry: Registry, trouble: BaseException) -> tuple[list[Cell], Material]:
+def _in_vain(
+    matrix: MatrixSpec, registry: Registry, recorded: Recorded, trouble: BaseException
+) -> tuple[list[Cell], Material]:
     """Return the cells of a rig that cannot be used; every one of them says why."""
     if not matrix.sensors:
         raise trouble
     cells = plan_cells(matrix, matrix.sensors, registry)
-    return cells, Material(troubles={need_of(cell): trouble for cell in cells})
+    return cells, Material(recorded, troubles={need_of(cell): trouble for cell in cells})
 
 
-def _greeted(ask: Callable[[], R], what: str, choice: EngineChoice) -> R | BaseException:
+def _greeted(ask: Callable[[], R], choice: EngineChoice) -> R | BaseException:
     """Return what a rig says, or why it does not; raises what is the user's to mend."""
     ((_, outcome),) = InProcess(choice.limits).each(lambda _: ask(), [None])
-    if not isinstance(outcome, BaseException):
-        return outcome
     if isinstance(outcome, TactbenchError) and outcome.exit_code == UsageError.exit_code:
         raise outcome
-    said = str(outcome) if isinstance(outcome, TactbenchError) else f"{type(outcome).__name__}: {outcome}"
-    error = RigError(f"{what}: {said.rstrip(': ')}", hint="See `tactbench plugins` for who brings it.")
-    error.__cause__ = outcome
-    return error.with_traceback(outcome.__traceback__)
+    return outcome
 
 
 def _named(matrix: MatrixSpec, registry: Registry) -> list[str]:

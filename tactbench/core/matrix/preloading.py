@@ -5,12 +5,15 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.engines.in_process import InProcess
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.solving import DATASETS, Job, our_own, prepare
+
+if TYPE_CHECKING:
+    from tactbench.core.evaluation.dataset import Dataset
 
 Groups = Mapping[tuple[str, tuple[Path, ...]], Sequence[Job]]
 """Cells by task and recordings."""

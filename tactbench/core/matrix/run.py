@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,14 +11,18 @@ from typing import Any
 from tactbench.core.matrix.acquiring import acquire_missing
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.evaluating import evaluate_all
-from tactbench.core.matrix.installed import installed
+from tactbench.core.matrix.explanation import Book
+from tactbench.core.matrix.key_book import KeyBook
+from tactbench.core.matrix.keys import keys_of
 from tactbench.core.matrix.leaving import fill_baselines, scores_text
+from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import plan
-from tactbench.core.matrix.preloading import import_estimators
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.provenance import gather
+from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
 
@@ -102,14 +106,23 @@ def _carry_out(
 ) -> Outcome:
     registry = installed()
     sources = SourceDigests(store.folder / "cache" / "sources.json")
-    cells, material = plan(matrix, registry, sources, store, recordings, choice)
-    provenance = {**gather(), "jobs": choice.jobs}
+    recorded = Recorded(store.folder / "cache" / "recordings.json")
+    book = Book(KeyBook(store.folder / "cache" / "keys"), keys_of(registry, sources))
+    cells, material = plan(matrix, registry, sources, store, recordings, recorded, choice)
+    provenance = gather(sources, seed=matrix.seed, jobs=choice.jobs)
     made_by = store.begin(provenance)
     inherited = choice.named(len(cells)) != "dask"
-    acquire_missing(material, choice, told, (lambda: import_estimators(cells, choice)) if inherited else None)
-    found = evaluate_all(cells, material, choice, registry, sources, store, made_by, told)
+    acquire_missing(material, book, choice, told, (lambda: _import_estimators(cells, choice)) if inherited else None)
+    found = evaluate_all(cells, material, book, choice, store, made_by, told)
     sources.save()
+    recorded.save()
     rows = [found.rows[cell.name] for cell in cells]
     fill_baselines(rows)
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
-    return Outcome(tuple(rows), provenance, found.computed, len(material.made), used)
+    return Outcome(tuple(rows), provenance, found.computed, recorded.number_made, used)
+
+
+def _import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
+    from tactbench.core.matrix.preloading import import_estimators
+
+    import_estimators(cells, choice)

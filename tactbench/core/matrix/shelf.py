@@ -9,8 +9,8 @@ from pathlib import Path
 from tactbench.core.errors import MissingRecordingError, UnknownNameError
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.reading import read_apart
+from tactbench.core.matrix.recorded import Recorded, Subject, read_subject
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import TaskSpec
 
 UNKNOWN = "unknown"
@@ -21,7 +21,7 @@ UNKNOWN = "unknown"
 class Holdings:
     """What a shelf holds."""
 
-    recordings: Mapping[str, Mapping[Path, RecordingMeta]]
+    recordings: Mapping[str, Mapping[Path, Subject]]
     """By name of sensor."""
     unreadable: Mapping[str, Mapping[Path, BaseException]] = field(default_factory=dict)
     """What could not be read, and why, by name of the sensor that it seems to be of."""
@@ -32,7 +32,9 @@ class Holdings:
         return sorted({*self.recordings, *self.unreadable})
 
 
-def holdings(paths: Sequence[Path], asked: Sequence[str], registry: Registry, choice: EngineChoice) -> Holdings:
+def holdings(
+    paths: Sequence[Path], asked: Sequence[str], registry: Registry, recorded: Recorded, choice: EngineChoice
+) -> Holdings:
     """Look at the recordings of a shelf, in a process of its own: one that breaks the reader breaks nothing else.
 
     Raises
@@ -42,25 +44,21 @@ def holdings(paths: Sequence[Path], asked: Sequence[str], registry: Registry, ch
     """
     if not paths:
         raise MissingRecordingError("The shelf is empty.", hint="Import recordings with `tactbench import`.")
-    found: dict[str, dict[Path, RecordingMeta]] = {}
+    found: dict[str, dict[Path, Subject]] = {}
     broken: dict[Path, BaseException] = {}
-    looked = read_apart(_meta, paths, choice)
-    for path in paths:
-        meta = looked[path]
-        if isinstance(meta, BaseException):
-            broken[path] = meta
+    for path, read in read_apart(read_subject, recorded.unread(paths, "sensor"), choice).items():
+        if isinstance(read, BaseException):
+            broken[path] = read
         else:
-            found.setdefault(meta.sensor.name, {})[path] = meta
+            recorded.learn(path, read)
+    for path in paths:
+        if path not in broken:
+            subject = recorded.subject(path)
+            found.setdefault(subject.sensor, {})[path] = subject
     unreadable: dict[str, dict[Path, BaseException]] = {}
     for path, error in broken.items():
         unreadable.setdefault(_owner(path, list(asked) or list(found), registry), {})[path] = error
     return Holdings(found, unreadable)
-
-
-def _meta(path: Path) -> RecordingMeta:
-    from tactbench.core.recording.reader import read_meta
-
-    return read_meta(path)
 
 
 def _owner(path: Path, sensors: Sequence[str], registry: Registry) -> str:
@@ -92,8 +90,8 @@ def serving(
     names = {planned.scene.name for planned in task.scenes_for(split)}
     readable = [
         path
-        for path, meta in shelf.recordings.get(sensor, {}).items()
-        if meta.scene is None or not names or meta.scene.name in names
+        for path, (_, scene) in shelf.recordings.get(sensor, {}).items()
+        if scene is None or not names or scene in names
     ]
     others = {planned.scene.name for known in registry.tasks for planned in known.spec.scenes_for(split)} - names
     for path, error in shelf.unreadable.get(sensor, {}).items():

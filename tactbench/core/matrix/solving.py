@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import importlib
 import random
 import time
 from collections import OrderedDict
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.matrix.answer import Answer, answer, opening, stopped
 from tactbench.core.matrix.engines.company import company
 from tactbench.core.matrix.engines.log import printed
 from tactbench.core.matrix.engines.share import Share
-from tactbench.core.matrix.installed import installed
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.provenance import host_id
-from tactbench.core.plugins.registry import load_object
+from tactbench.core.plugins.registry import installed, load_object
+
+if TYPE_CHECKING:
+    from tactbench.core.evaluation.dataset import Dataset
 
 Job = tuple[Cell, tuple[Path, ...], "BaseException | None"]
 """A cell, its recordings, and why there are none if the rig could not make them."""
@@ -55,6 +58,8 @@ class Datasets:
 
     def __call__(self, task: str, recordings: tuple[Path, ...]) -> Dataset:
         """Return `recordings` as `task` needs them; raises as `load_dataset` does."""
+        from tactbench.core.evaluation.dataset import load_dataset
+
         wanted = (task, recordings)
         if wanted not in self._kept:
             self.keep(wanted, load_dataset(installed().tasks[task].spec, recordings))
@@ -103,6 +108,8 @@ def _shares(job: Job) -> list[Share]:
     """Return what other cells need as well, so that a process may load it for its children."""
     cell, recordings, _ = job
     return [
+        # Every cell holds its threads with it.
+        Share("threadpoolctl", lambda: importlib.import_module("threadpoolctl"), trusted=True),
         Share(("estimator", cell.task, cell.estimator), lambda: prepare(cell), trusted=our_own(cell.estimator)),
         Share(("recordings", cell.task, recordings), lambda: DATASETS(cell.task, recordings)),
     ]

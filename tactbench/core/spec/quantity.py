@@ -15,7 +15,7 @@ Tag = Literal["sourced", "measured", "derived", "assumed"]
 class Frozen(BaseModel):
     """A value object: immutable, no unknown fields."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
 class Source(Frozen):

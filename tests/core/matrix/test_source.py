@@ -1,45 +1,134 @@
+"""Real packages, edited: what does not change a number keeps the digest, what may change one does not."""
+
+import ast
 import importlib
+import shutil
 import sys
+import tomllib
+import zipfile
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tactbench.core.matrix.source import SourceDigests
+from tactbench.core.matrix.meaning import imports_of, meaning_of
+from tactbench.core.matrix.source import SHOWING, SourceDigests
+from tests.conftest import ROOT
+from tests.core.matrix.plugin_packages import ANSWERS, write_metadata, write_package
+
+SOURCE = ANSWERS["answers.py"]
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory):
+    """A memory that has seen tactbench: parsing it for every test would take most of the time."""
+    path = tmp_path_factory.mktemp("warm") / "memory.json"
+    sources = SourceDigests(path)
+    sources.behind(["tactbench.sensors.biotac", "tactbench.tasks.force"], "answer")
+    sources.save()
+    return path
+
+
+@pytest.fixture(autouse=True)
+def _warmed(warm, tmp_path):
+    shutil.copy(warm, tmp_path / "memory.json")
 
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    folder = tmp_path / "some_plugin"
-    folder.mkdir()
-    (folder / "__init__.py").write_text("from some_plugin.law import LAW\n")
-    (folder / "law.py").write_text("LAW = 3\n")
+    folder = write_package(
+        tmp_path, "some_plugin", {"__init__.py": "from some_plugin.law import LAW\n", "law.py": "LAW = 3\n"}
+    )
     monkeypatch.syspath_prepend(str(tmp_path))
     importlib.invalidate_caches()
     yield folder
     sys.modules.pop("some_plugin", None)
 
 
-def digest(tmp_path):
+def digest(tmp_path, module="some_plugin.anything:at_all", purpose="answer"):
+    importlib.invalidate_caches()
     sources = SourceDigests(tmp_path / "memory.json")
-    found = sources.package("some_plugin.anything:at_all")
+    found = sources.behind([module], purpose)
     sources.save()
-    return found
+    return {name: files for name, files in found.packages.items() if name != "tactbench"}, found.versions
 
 
-def test_comments_and_formatting_do_not_count(package, tmp_path):
+@pytest.mark.parametrize(
+    "text",
+    ["# why three\nLAW = (\n    3\n)\n", "\n\nLAW=3", '"""The law."""\nLAW = 3\n', "LAW = 3 \\\n\n", "LAW = 0x3\n"],
+)
+def test_comments_docstrings_and_formatting_do_not_count(package, tmp_path, text):
     before = digest(tmp_path)
-    (package / "law.py").write_text("# why three\nLAW = (\n    3\n)\n")
+    (package / "law.py").write_text(text)
     assert digest(tmp_path) == before
 
 
-def test_a_changed_module_beside_the_plugin_counts(package, tmp_path):
+@pytest.mark.parametrize("text", ["LAW = 4\n", "LAW = 3.0\n", "LAW = '3'\n", "LAW = 3\nLAW += 0\n", "LAW = ("])
+def test_a_changed_module_beside_the_plugin_counts(package, tmp_path, text):
     before = digest(tmp_path)
-    (package / "law.py").write_text("LAW = 4\n")
+    (package / "law.py").write_text(text)
     assert digest(tmp_path) != before
 
 
-def test_a_new_module_counts(package, tmp_path):
+@given(st.lists(st.tuples(st.integers(0, 40), st.sampled_from(["", "# note", "    # note", "\t"])), max_size=12))
+def test_blank_lines_and_comments_anywhere_mean_nothing(insertions):
+    lines = SOURCE.splitlines()
+    for place, line in insertions:
+        lines.insert(min(place, len(lines)), line)
+    assert meaning_of("\n".join(lines).encode()) == meaning_of(SOURCE.encode())
+
+
+def test_another_layout_of_the_same_tree_means_the_same():
+    assert meaning_of(ast.unparse(ast.parse(SOURCE)).encode()) == meaning_of(SOURCE.encode())
+
+
+@given(st.data())
+def test_every_changed_constant_or_name_means_something_else(data):
+    tree = ast.parse('"""Doc."""\ndef f(x, k=2):\n    """Doc."""\n    return x * 3.5 if x > k else [1, "a", None]\n')
+    places = [
+        node for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and not (isinstance(node.value, str) and node.value == "Doc.")
+    ]  # fmt: skip
+    before = meaning_of(ast.unparse(tree).encode())
+    chosen = data.draw(st.sampled_from(places))
+    value = data.draw(st.integers(0, 9) | st.floats(0, 9) | st.booleans() | st.text("ab", max_size=2))
+    same = type(value) is type(chosen.value) and value == chosen.value
+    chosen.value = value
+    assert (meaning_of(ast.unparse(tree).encode()) == before) == same
+
+
+@pytest.mark.parametrize(
+    "name", ["more.py", "gains.npz", "deep/er/table.yaml", "_fast.cpython-311-x86_64-linux-gnu.so"]
+)
+def test_every_file_of_the_package_counts(package, tmp_path, name):
     before = digest(tmp_path)
-    (package / "more.py").write_text("")
+    path = package / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"1")
+    added = digest(tmp_path)
+    assert added != before
+    path.write_bytes(b"2")
+    assert digest(tmp_path) not in (before, added)
+    path.unlink()
+    assert digest(tmp_path) == before
+
+
+def test_byte_code_and_hidden_files_do_not_count(package, tmp_path):
+    before = digest(tmp_path)
+    for name in ("__pycache__/law.cpython-311.pyc", ".law.py.swp", ".git/HEAD"):
+        (package / name).parent.mkdir(exist_ok=True)
+        (package / name).write_bytes(b"x")
+    assert digest(tmp_path) == before
+
+
+def test_a_linked_folder_counts_and_a_loop_of_links_ends(package, tmp_path):
+    (package / "loop").symlink_to(package, target_is_directory=True)
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / "table.csv").write_text("1")
+    (package / "tables").symlink_to(outside, target_is_directory=True)
+    before = digest(tmp_path)
+    (outside / "table.csv").write_text("2")
     assert digest(tmp_path) != before
 
 
@@ -50,9 +139,127 @@ def test_the_memory_changes_nothing_and_may_be_rubbish(package, tmp_path):
     assert digest(tmp_path) == before
 
 
-def test_tables_do_not_belong_to_what_decides_a_score():
-    from tactbench.core.matrix.source import _files
+def test_all_portions_of_a_namespace_count(tmp_path, monkeypatch):
+    for place in ("one", "two"):
+        write_package(tmp_path / place, "shared_name", {f"{place}/__init__.py": "LAW = 3\n"})
+        monkeypatch.syspath_prepend(str(tmp_path / place))
+    before, _ = digest(tmp_path, "shared_name.one:at_all")
+    assert set(before["shared_name"]) == {"one/__init__.py", "two/__init__.py"}
+    (tmp_path / "two" / "shared_name" / "two" / "__init__.py").write_text("LAW = 4\n")
+    assert digest(tmp_path, "shared_name.one:at_all")[0] != before
 
-    names = {name for name, _ in _files("tactbench")}
-    assert "core/evaluation/__init__.py" in names
-    assert not any(name.startswith(("core/cli", "core/leaderboard")) for name in names)
+
+def test_two_portions_may_have_a_file_of_one_name(tmp_path, monkeypatch):
+    for place in ("one", "two"):
+        write_package(tmp_path / place, "shared_name", {"law.py": f"LAW = '{place}'\n"})
+        monkeypatch.syspath_prepend(str(tmp_path / place))
+    assert len(digest(tmp_path, "shared_name.law:at_all")[0]["shared_name"]) == 2
+
+
+def test_a_single_module_counts_and_so_does_the_module_it_imports(tmp_path, monkeypatch):
+    (tmp_path / "lone_plugin.py").write_text("from lone_filters import LAW\n")
+    (tmp_path / "lone_filters.py").write_text("LAW = 3\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before, _ = digest(tmp_path, "lone_plugin:at_all")
+    assert set(before) == {"lone_plugin", "lone_filters"}
+    (tmp_path / "lone_filters.py").write_text("LAW = 4\n")
+    assert digest(tmp_path, "lone_plugin:at_all")[0] != before
+
+
+def test_an_archive_counts_as_a_whole(tmp_path, monkeypatch):
+    archive = tmp_path / "zipped.zip"
+
+    def write(law):
+        with zipfile.ZipFile(archive, "w") as file:
+            file.writestr("zipped_plugin/__init__.py", "")
+            file.writestr("zipped_plugin/law.py", f"LAW = {law}\n")
+
+    write(3)
+    monkeypatch.syspath_prepend(str(archive))
+    before = digest(tmp_path, "zipped_plugin:at_all")[0]
+    assert digest(tmp_path, "zipped_plugin:at_all")[0] == before
+    write(4)
+    assert digest(tmp_path, "zipped_plugin:at_all")[0] != before
+
+
+def test_what_was_installed_and_is_imported_counts_by_its_version(package, tmp_path, monkeypatch):
+    site = tmp_path / "site-packages"
+    write_package(site, "vendor_maths", {"__init__.py": "PI = 3\n"})
+    write_metadata(site, "Vendor.Maths-Lib", "1.0", record="vendor_maths/__init__.py,,\n")
+    monkeypatch.syspath_prepend(str(site))
+    (package / "law.py").write_text("import vendor_maths\nLAW = vendor_maths.PI\n")
+    before = digest(tmp_path)
+    assert before[1] == {"vendor_maths": "vendor-maths-lib 1.0"}
+    (site / "vendor_maths" / "__init__.py").write_text("PI = 4\n")
+    assert digest(tmp_path) == before
+    (site / "Vendor.Maths_Lib-1.0.dist-info").rename(site / "Vendor.Maths_Lib-1.1.dist-info")
+    assert digest(tmp_path)[1] == {"vendor_maths": "vendor-maths-lib 1.1"}
+
+
+def test_a_file_that_nobody_installed_counts_by_its_source_even_there(package, tmp_path, monkeypatch):
+    site = tmp_path / "site-packages"
+    write_package(site, "dropped_in", {"__init__.py": "PI = 3\n"})
+    monkeypatch.syspath_prepend(str(site))
+    (package / "law.py").write_text("import dropped_in\n")
+    assert set(digest(tmp_path)[0]) == {"some_plugin", "dropped_in"}
+
+
+def test_an_import_that_is_missing_counts_once_it_is_there(package, tmp_path):
+    (package / "law.py").write_text("try:\n    import perhaps_installed\nexcept ImportError:\n    pass\n")
+    before = digest(tmp_path)
+    assert before[1] == {"perhaps_installed": "absent"}
+    (tmp_path / "perhaps_installed.py").write_text("")
+    assert digest(tmp_path) != before
+
+
+def test_a_package_that_nobody_can_find_never_has_the_same_digest(tmp_path):
+    assert digest(tmp_path, "nowhere_at_all:x") != digest(tmp_path, "nowhere_at_all:x")
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("import a.b, c", ["a", "c"]),
+        ("from a.b import c", ["a"]),
+        ("from . import a\nfrom .b import c", []),
+        ("def f():\n    import a", ["a"]),
+        ("import importlib\nimportlib.import_module('a.b')", ["a", "importlib"]),
+        ("from tactbench.plugin import hookimpl", ["tactbench.plugin"]),
+        ("from tactbench import rigs", ["tactbench.rigs"]),
+        ("import tactbench.core.evaluation.cell", ["tactbench.core.evaluation"]),
+        ("this is no Python", []),
+    ],
+)
+def test_imports_are_read_off_the_source(text, found):
+    assert imports_of(text.encode()) == found
+
+
+@pytest.mark.parametrize(
+    ("purpose", "module", "not_counted"),
+    [("answer", "tactbench.tasks.force", ("sensors/", "rigs/")),
+     ("recording", "tactbench.sensors.biotac", ("tasks/", "estimators/", "core/evaluation/", "core/matrix/"))],
+)  # fmt: skip
+def test_what_shows_results_or_serves_another_purpose_does_not_count(tmp_path, purpose, module, not_counted):
+    names = SourceDigests(tmp_path / "memory.json").behind([module], purpose).packages["tactbench"]
+    assert {"core/recording/reader.py", "core/samples.py", "plugin.py"} <= set(names)
+    assert not any(name.startswith(("core/cli", "core/leaderboard", *not_counted)) for name in names)
+
+
+def test_a_strangers_estimator_that_looks_into_our_rigs_is_made_by_them_too(package, tmp_path):
+    def ours():
+        sources = SourceDigests(tmp_path / "memory.json")
+        return sources.behind(["some_plugin"], "answer").packages["tactbench"]
+
+    assert not any(name.startswith("rigs/") for name in ours())
+    (package / "law.py").write_text("from tactbench.rigs.twin.geometry import anything\n")
+    assert any(name.startswith("rigs/") for name in ours())
+
+
+def test_what_only_shows_is_what_stands_above_the_matrix():
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    (floors,) = [contract["layers"] for contract in contracts if contract["name"] == "The floors of the core"]
+    above = {room.strip(" ()") for floor in floors[: floors.index("matrix")] for room in floor.split("|")}
+    shown = {name.split("/")[1] for name in SHOWING if name.startswith("core/") and "matrix" not in name}
+    assert above <= shown
+    # `statistics` is on its way up there: it ranks rows and makes none.
+    assert shown - above <= {"statistics"}

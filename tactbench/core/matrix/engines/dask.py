@@ -20,7 +20,7 @@ from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.request import Setting
 from tactbench.core.matrix.engines.sight import fingerprints
 from tactbench.core.matrix.engines.surroundings import sources_remembered, surroundings
-from tactbench.core.matrix.installed import installed
+from tactbench.core.plugins.registry import installed
 
 ALONE_S = 60.0
 """How long a run waits for a worker when the last one has gone."""

@@ -75,7 +75,7 @@ def settle(setting: Setting) -> list[str]:
     except OSError as error:
         against.append(f"it cannot enter {setting.folder} ({error.strerror or error})")
     if setting.surroundings:
-        from tactbench.core.matrix.installed import installed
+        from tactbench.core.plugins.registry import installed
 
         # A memory on another machine is not there, and costs half a second.
         sources = sources_remembered(setting.memory)

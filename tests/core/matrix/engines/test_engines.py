@@ -250,3 +250,57 @@ def test_an_iteration_given_up_ends_everybody():
     os.close(reading)
     os.close(writing)
     assert not any(alive(int(pid)) for pid in pids)
+
+
+def test_in_process_the_users_ctrl_c_ends_the_iteration_and_a_plugins_does_not():
+    def presses(item):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(60)
+
+    def swallows(item):
+        try:
+            presses(item)
+        except BaseException:
+            return "never mind"
+
+    for work_here in (presses, swallows):
+        with pytest.raises(KeyboardInterrupt):
+            list(InProcess().each(work_here, ["item"]))
+    ((_, outcome),) = InProcess().each(work, ["interrupts"])
+    assert type(outcome) is KeyboardInterrupt
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_in_process_leaves_streams_limits_and_alarm_as_they_were(capfd):
+    import resource
+
+    before = (sys.stdout, sys.stderr, resource.getrlimit(resource.RLIMIT_DATA), signal.getsignal(signal.SIGALRM))
+    outcomes(EVERY["in-process"], "hangs", "eats", "prints", "raises")
+    assert (
+        sys.stdout,
+        sys.stderr,
+        resource.getrlimit(resource.RLIMIT_DATA),
+        signal.getsignal(signal.SIGALRM),
+    ) == before
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    os.write(1, b"still ours\n")
+    assert capfd.readouterr().out == "still ours\n"
+
+
+def test_children_hear_no_ctrl_c_of_the_terminal(guarded):
+    def pressed(item):
+        os.kill(os.getpid(), signal.SIGINT)
+        return "deaf to it"
+
+    assert dict(guarded.each(pressed, ["item"])) == {"item": "deaf to it"}
+
+
+def test_errors_of_engines_survive_another_journey():
+    import pickle
+
+    error = Crashed("gone", hint="look", signal=6, log="said", traceback_text="where")
+    error.spent_s = 2.0
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.signal, again.log, again.traceback_text, again.spent_s, again.status) == (
+        "gone look", 6, "said", "where", 2.0, "crashed",
+    )  # fmt: skip

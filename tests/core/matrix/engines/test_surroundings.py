@@ -12,7 +12,7 @@ from tests.conftest import THIRD_PARTY
 ASK = """
 import json
 from tactbench.core.matrix.engines.surroundings import sources_remembered, surroundings
-from tactbench.core.matrix.installed import installed
+from tactbench.core.plugins.registry import installed
 sources = sources_remembered("")
 print(json.dumps(surroundings(installed(), sources)))
 sources.save()  # nowhere

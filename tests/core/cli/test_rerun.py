@@ -1,0 +1,101 @@
+"""``tactbench rerun``: every cell comes out the same bit for bit, and what was changed by hand is found."""
+
+import json
+import shutil
+
+import h5py
+import pytest
+
+from tests.conftest import Shell
+from tests.core.matrix.plugin_packages import write_acme
+
+RUN = (
+    "run", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator", "ols",
+    "--effects", "-drift", "--seed", "3",
+)  # fmt: skip
+CELLS = [f"ideal/force/twin/karl2016/{name}/1" for name in ("acme", "ols", "mean", "time-index")]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rerun")
+    write_acme(folder / "site")
+    shell = Shell(folder)
+    shell(*RUN, "--out", "results", plugins=(str(folder / "site"),))
+    shell("run", "--rig", "replay", "--recordings", "results/recordings/ideal", "--task", "force", "--estimator", "ols",
+          "--protocol", "karl2016", "--out", "replayed")  # fmt: skip
+    return folder
+
+
+@pytest.fixture
+def here(made, tmp_path):
+    shutil.copytree(made, tmp_path / "copy")
+    shell = Shell(tmp_path / "copy")
+
+    def rerun(cell, out="results", code=0):
+        done = shell("rerun", cell, "--out", out, "--format", "json", plugins=(str(shell.folder / "site"),), code=code)
+        return json.loads(done.stdout)
+
+    rerun.folder, rerun.shell = shell.folder, shell
+    return rerun
+
+
+def every_file(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_every_cell_comes_out_the_same_and_nothing_in_the_folder_changes(here, cell):
+    before = every_file(here.folder / "results")
+    found = here(cell)
+    assert (found["answer"], found["differences"], found["recordings_made"]) == ("identical", [], 3)
+    assert every_file(here.folder / "results") == before
+
+
+def test_a_replayed_cell_is_answered_from_the_same_recordings(here):
+    (row,) = [row for row in json.loads((here.folder / "replayed" / "leaderboard.json").read_text())
+              if row["estimator"] == "ols"]  # fmt: skip
+    found = here(row["cell"], out="replayed")
+    assert (found["answer"], found["recordings_made"]) == ("identical", 0)
+
+
+def test_a_prediction_changed_by_hand_is_found(here):
+    key = {row["cell"]: row["key"] for row in rows(here)}[CELLS[0]]
+    with h5py.File(here.folder / "results" / "cells" / f"{key}.h5", "r+") as shard:
+        shard["test/y_pred"][3] += 1e-12
+    found = here(CELLS[0], code=1)
+    assert found["answer"] == "different"
+    assert any("answers" in difference for difference in found["differences"])
+
+
+def test_a_recording_changed_by_hand_is_found(here):
+    folder = here.folder / "results" / "recordings" / "ideal"
+    (test,), (train,) = folder.glob("flat-test-*.h5"), folder.glob("flat-train-*.h5")
+    shutil.copy(train, test)
+    found = here("mean/1", code=1)
+    assert (found["answer"], found["differences"]) == ("different", ["recording flat-test: other bytes"])
+
+
+def test_changed_code_is_named_beside_what_came_out(here):
+    (here.folder / "site" / "acme" / "filters.py").write_text("LAW = 0.5\n")
+    found = here(CELLS[0], code=1)
+    assert any(difference.startswith("score: ") for difference in found["differences"])
+    assert found["circumstances"] == ["acme/filters.py changed"]
+    done = here.shell("rerun", CELLS[0], "--out", "results", plugins=(str(here.folder / "site"),), code=1)
+    assert "Since the cell was made, this has changed:\n  acme/filters.py changed" in done.stdout
+
+
+def test_a_cell_that_fails_fails_again_and_shows_where(here):
+    plugins = (str(here.folder / "site"),)
+    here.shell(*RUN, "--estimator", "acme-raises", "--out", "results", plugins=plugins, code=1)
+    found = here("acme-raises", code=1)
+    assert (found["status"], found["differences"]) == ("failed", [])
+    assert "the pad came off" in found["traceback"]
+
+
+def test_an_unknown_cell_is_refused(here):
+    here.shell("rerun", "nobody", "--out", "results", code=2)
+
+
+def rows(here):
+    return json.loads((here.folder / "results" / "leaderboard.json").read_text())

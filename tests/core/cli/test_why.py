@@ -1,0 +1,160 @@
+"""``tactbench why``: hit or miss, what changed in words, and how a stopped cell ended."""
+
+import json
+import shutil
+
+import pytest
+
+from tests.conftest import Shell
+from tests.core.matrix.plugin_packages import write_acme
+
+RUN = ("run", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator", "acme-raises")
+ACME = "ideal/force/twin/karl2016/acme/1"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a plugin and the results of a run with it; one cell of it failed."""
+    folder = tmp_path_factory.mktemp("why")
+    write_acme(folder / "site")
+    Shell(folder)(*RUN, "--out", "results", plugins=(str(folder / "site"),), code=1)
+    return folder
+
+
+@pytest.fixture
+def here(made, tmp_path):
+    """A copy to be changed, and its shell with the plugin on the path."""
+    shutil.copytree(made, tmp_path / "copy")
+    shell = Shell(tmp_path / "copy")
+
+    def call(*arguments, code=0):
+        return shell(*arguments, "--out", "results", plugins=(str(shell.folder / "site"),), code=code)
+
+    call.folder = shell.folder
+    call.acme = shell.folder / "site" / "acme"
+    return call
+
+
+def why(here, cell="acme/1", *options):
+    return json.loads(here("why", cell, *options, "--format", "json").stdout)
+
+
+def test_a_finished_cell_is_a_hit_and_says_where_it_lies(here):
+    found = why(here)
+    assert (found["cell"], found["answer"], found["reasons"], found["status"]) == (ACME, "hit", [], "done")
+    assert (here.folder / found["shard"]).is_file()
+    assert all((here.folder / "results" / path).is_file() for path in found["recordings"])
+    assert found["try"] == f"tactbench rerun '{ACME}' --out results"
+    text = here("why", ACME).stdout
+    assert text.startswith(f"{ACME}\nhit: ")
+    assert found["shard"] in text
+
+
+def test_the_words_and_the_run_agree(here):
+    assert "2 of 4 cells were found finished" not in here(*RUN, code=1).stderr
+    (here.acme / "filters.py").write_text("LAW = (\n    0.75  # as it was\n)\n")
+    assert why(here)["answer"] == "hit"
+    assert "3 of 4 cells were found finished" in here(*RUN, code=1).stderr
+    (here.acme / "filters.py").write_text("LAW = 0.5\n")
+    found = why(here)
+    assert (found["answer"], found["reasons"]) == ("miss", ["acme/filters.py changed"])
+    assert "2 of 4 cells were found finished" in here(*RUN, code=1).stderr
+    assert why(here)["answer"] == "hit"
+    # Back as it was: the first result is still there.
+    (here.acme / "filters.py").write_text("LAW = 0.75\n")
+    assert why(here)["answer"] == "hit"
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (lambda acme: (acme / "table.csv").write_text("1"), "acme/table.csv is new"),
+        (lambda acme: (acme / "answers.py").write_text((acme / "answers.py").read_text() + "\nimport json5x\n"),
+         "import json5x nothing -> absent"),
+        (lambda acme: (acme / "__init__.py").write_text(
+            (acme / "__init__.py").read_text().replace('"gain": 1.0', '"gain": 2.0')),
+         "estimator: params.gain 1.0 -> 2.0"),
+    ],
+    ids=["a table", "an import", "a default"],
+)  # fmt: skip
+def test_what_changed_is_said_in_words(here, change, reason):
+    change(here.acme)
+    found = why(here)
+    assert found["answer"] == "miss"
+    assert reason in found["reasons"]
+    assert f"  {reason}\n" in here("why", "acme/1").stdout
+
+
+def test_options_ask_for_it_otherwise(here):
+    assert "seed 1 -> 2" in why(here, "acme/1", "--seed", "2", "--estimator", "acme")["reasons"]
+    found = why(here, "acme/1", "--rung", "reference", "--estimator", "acme")
+    assert found["answer"] == "miss"
+    assert any("rung" in reason and "reference" in reason for reason in found["reasons"])
+    found = why(here, "ideal/force/twin/deployable/acme", "--sensor", "ideal", "--task", "force", "--protocol",
+                "deployable", "--estimator", "acme")  # fmt: skip
+    assert (found["answer"], found["status"]) == ("miss", "never run")
+
+
+def test_a_recording_that_was_removed_or_replaced_is_named(here):
+    (flat,) = (here.folder / "results" / "recordings" / "ideal").glob("flat-test-*.h5")
+    (other,) = (here.folder / "results" / "recordings" / "ideal").glob("flat-train-*.h5")
+    flat.unlink()
+    assert why(here)["reasons"] == ["recording flat-test was removed"]
+    shutil.copy(other, flat)
+    assert why(here)["reasons"] == ["recording flat-test has other bytes"]
+
+
+def test_a_stopped_cell_shows_its_reason_its_traceback_and_what_to_try(here):
+    found = why(here, "acme-raises")
+    assert (found["answer"], found["status"]) == ("miss", "failed")
+    assert "the pad came off" in found["reason"]
+    assert "acme/answers.py" in found["traceback"]
+    text = here("why", "acme-raises").stdout
+    assert "failed: RuntimeError: the pad came off" in text
+    assert "raise RuntimeError" in text
+    assert "Try: tactbench rerun 'ideal/force/twin/karl2016/acme-raises/1' --out results" in text
+
+
+def test_a_key_or_a_part_of_the_name_will_do_and_what_is_unclear_is_refused(here):
+    key = why(here)["key"]
+    assert why(here, key[:8])["cell"] == ACME
+    several = here("why", "ideal/force", code=2).stderr
+    assert "part of the names of 4 cells" in several
+    assert ACME in several
+    assert "Did you mean" in here("why", ACME.replace("karl", "carl"), code=2).stderr
+
+
+def test_without_the_book_nothing_is_made_up(here):
+    shutil.rmtree(here.folder / "results" / "cache")
+    assert why(here)["answer"] == "hit"
+    (here.acme / "filters.py").write_text("LAW = 0.5\n")
+    found = why(here)
+    assert (found["answer"], found["reasons"]) == ("miss", [])
+    assert "not recorded" in found["unknown"]
+
+
+def test_a_folder_that_is_not_there_is_refused(here):
+    assert "There is no folder" in Shell(here.folder)("why", "acme", "--out", "nowhere", code=2).stderr
+    assert not (here.folder / "nowhere").exists()
+
+
+def test_a_cached_run_loads_no_numerical_library(here):
+    text = (
+        "import sys\nfrom tactbench.core.cli import main\n"
+        f"sys.argv = ['tactbench', *{RUN[:-2]!r}, '--out', 'results', '--format', 'csv']\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert end.code == 0\n"
+        "print(sorted({'numpy', 'h5py', 'scipy', 'sklearn', 'matplotlib', 'pandas'} & set(sys.modules)))\n"
+    )
+    import os
+    import subprocess
+    import sys
+
+    env = {**os.environ, "PYTHONPATH": str(here.folder / "site")}
+
+    def loaded():
+        done = subprocess.run([sys.executable, "-c", text], cwd=here.folder, env=env, capture_output=True, text=True,
+                              check=True)  # fmt: skip
+        return done.stdout.splitlines()[-1]
+
+    loaded()  # the copied recordings are read once: they are other files than those that the run remembered
+    assert loaded() == "[]"
