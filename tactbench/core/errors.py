@@ -18,6 +18,7 @@
     ├── RigError                      a rig cannot carry out a scene
     ├── DataError                     (also ValueError) recordings cannot become X and y
     │   └── NotApplicable             the cell is skipped, with this reason
+    ├── EngineError                   where cells are computed is gone, or computes with something else
     └── CellStopped                   a cell or a recording ended without a result (carries status, signal and log)
         ├── Raised                    something of no kind of ours was raised in another process
         ├── Crashed                   its process was ended by a signal, or ended itself
@@ -164,6 +165,10 @@ class DataError(TactbenchError, ValueError):
 
 class NotApplicable(DataError):  # noqa: N818  (a result, not a failure)
     """The cell does not apply: its row says ``skipped`` and this reason."""
+
+
+class EngineError(TactbenchError):
+    """Where cells are computed is gone, or computes with something else than this process."""
 
 
 class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)

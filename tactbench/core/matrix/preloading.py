@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.engines.in_process import InProcess
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.solving import DATASETS, Job, prepare
-from tactbench.core.plugins.registry import installed
+from tactbench.core.matrix.solving import DATASETS, Job, our_own, prepare
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset
@@ -45,21 +44,15 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
     What others bring is built in a process of its own first: only what that process survives is done here as well.
     """
     importlib.import_module("threadpoolctl")  # every cell holds its threads with it
-    registry = installed()
     several = {(cell.task, cell.estimator): cell for cell in cells if (cell.task, cell.estimator) not in _prepared}
     _prepared.update(several)
-    foreign = [cell for cell in several.values() if not _our_own(registry.estimators.owned(cell.estimator).module)]
+    foreign = [cell for cell in several.values() if not our_own(cell.estimator)]
     survived = [cell for cell, outcome in choice.pool(1).each(prepare, foreign) if outcome is None] if foreign else []
     for _ in InProcess(choice.limits).each(prepare, [*(set(several.values()) - set(foreign)), *survived]):
         pass
 
 
 _prepared: set[tuple[str, str]] = set()
-
-
-def _our_own(module: str) -> bool:
-    """Return whether a plugin comes with this package: tested with it, and trusted not to end this process."""
-    return module.partition(".")[0] == __name__.partition(".")[0]
 
 
 def _read(wanted: tuple[str, tuple[Path, ...]]) -> Dataset:

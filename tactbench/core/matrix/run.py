@@ -96,6 +96,7 @@ def carry_out(
         If another run holds the folder, or the disk refuses; what was finished before is kept.
     """
     chosen = (choice or EngineChoice()).checked()
+    chosen.ready()
     with store.hold():
         return _carry_out(matrix, store, chosen, recordings, progress or Silence())
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import random
 import time
 from collections import OrderedDict
@@ -12,7 +13,9 @@ from typing import TYPE_CHECKING
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.matrix.answer import Answer, answer, opening, stopped
+from tactbench.core.matrix.engines.company import company
 from tactbench.core.matrix.engines.log import printed
+from tactbench.core.matrix.engines.share import Share
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.provenance import host_id
 from tactbench.core.plugins.registry import installed, load_object
@@ -83,7 +86,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     Parameters
     ----------
     concurrency
-        Cells that may be at work at once while this one is timed.
+        Cells that may be at work at once while this one is timed, where the engine does not know better.
     """
     began = time.perf_counter()
     cell, recordings, trouble = job
@@ -92,8 +95,27 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
         return unanswered(cell, trouble), {}
     _seed_everything(cell.seed)
     row, sets = answer(cell, registry, recordings, DATASETS, working)
-    timed = {"wall_s": time.perf_counter() - began, "concurrency": concurrency, "host": this_host()}
+    timed = {"wall_s": time.perf_counter() - began, "concurrency": company(concurrency), "host": this_host()}
     return {**row, **timed, "log": printed()}, sets
+
+
+def our_own(estimator: str) -> bool:
+    """Return whether an estimator comes with this package: tested with it, and trusted not to end whoever builds it."""
+    return installed().estimators.owned(estimator).module.partition(".")[0] == __name__.partition(".")[0]
+
+
+def _shares(job: Job) -> list[Share]:
+    """Return what other cells need as well, so that a process may load it for its children."""
+    cell, recordings, _ = job
+    return [
+        # Every cell holds its threads with it.
+        Share("threadpoolctl", lambda: importlib.import_module("threadpoolctl"), trusted=True),
+        Share(("estimator", cell.task, cell.estimator), lambda: prepare(cell), trusted=our_own(cell.estimator)),
+        Share(("recordings", cell.task, recordings), lambda: DATASETS(cell.task, recordings)),
+    ]
+
+
+setattr(solve, "shares", _shares)  # noqa: B010  (type checkers know no attributes of functions)
 
 
 def unanswered(cell: Cell, trouble: BaseException) -> dict[str, object]:

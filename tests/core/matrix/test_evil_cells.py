@@ -17,6 +17,7 @@ ENGINES = {
     "in-process": ("--engine", "in-process"),
     "isolated": ("--engine", "isolated"),
     "isolated-2": ("--engine", "isolated", "--jobs", "2"),
+    "dask": ("--engine", "dask", "--jobs", "2"),
 }
 """Every engine that the evil cells must survive under: one place for all of them."""
 

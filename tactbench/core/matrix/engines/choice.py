@@ -40,6 +40,19 @@ class EngineChoice:
             raise UsageError("--scheduler is for --engine dask.", hint="Add --engine dask, or leave it out.")
         return self
 
+    def ready(self) -> None:
+        """Make sure that the engine can be opened, before anything is recorded.
+
+        Raises
+        ------
+        UsageError
+            If the library of the Dask engine is missing, or nobody answers at the scheduler's address.
+        """
+        if self.name == "dask":
+            from tactbench.core.matrix.engines.dask_cluster import check_scheduler
+
+            check_scheduler(self.scheduler)
+
     def named(self, cells: int) -> EngineName:
         """Return the name of the engine for so many cells."""
         if self.name is not None:
@@ -86,21 +99,13 @@ class EngineChoice:
 
 
 def _dask(choice: EngineChoice) -> Engine:
-    try:
-        from tactbench.core.matrix.engines.dask import Dask  # type: ignore[import-untyped,unused-ignore]
-    except ImportError as error:
-        raise UsageError(
-            f"The engine dask cannot be loaded: {error}.", hint="Install it: pip install 'tactbench[dask]'."
-        ) from error
-    engine: Engine = Dask(choice.jobs, choice.limits, choice.scheduler)
-    return engine
+    from tactbench.core.matrix.engines.dask import Dask
+
+    return Dask(choice.jobs, choice.limits, choice.scheduler)
 
 
 def _served(choice: EngineChoice) -> Engine:
     """Return an engine for a process that must not fork."""
-    try:
-        from tactbench.core.matrix.engines.served import Served  # type: ignore[import-untyped,unused-ignore]
-    except ImportError:
-        return InProcess(choice.limits)
-    engine: Engine = Served(choice.jobs, choice.limits)
-    return engine
+    from tactbench.core.matrix.engines.served import Served
+
+    return Served(choice.jobs, choice.limits)

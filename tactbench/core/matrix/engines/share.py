@@ -1,0 +1,28 @@
+"""What several items of work need: loaded once by a process, for the children that it forks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Share:
+    """One thing that may be loaded before an item is begun, so that others find it there."""
+
+    what: Hashable
+    """What it is: loaded once"""
+    load: Callable[[], object]
+    """Loads it into this process"""
+    trusted: bool = False
+    """Whether loading it does nothing to this process that is not meant; else a child tries first"""
+
+
+def shares_of(work: Any, item: Any) -> list[Share]:
+    """Return what `work` needs for `item` beside others: a function says it in its attribute ``shares``."""
+    while isinstance(work, partial):
+        work = work.func
+    shares = getattr(work, "shares", None)
+    return [] if shares is None else list(shares(item))

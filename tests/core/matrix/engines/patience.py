@@ -1,0 +1,24 @@
+"""Waiting for other processes, with patience for a slow machine and no longer than needed."""
+
+import threading
+import time
+from pathlib import Path
+
+
+def gone(pid):
+    """Whether a process has ended, or is only waiting to be buried."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except OSError:
+        return True
+
+
+pause = threading.Event()
+
+
+def until(true, seconds=30.0):
+    """Wait until something is true, with patience for a slow machine."""
+    ends = time.monotonic() + seconds
+    while not true() and time.monotonic() < ends:
+        pause.wait(0.01)
+    return true()

@@ -1,0 +1,84 @@
+"""Work for other processes: they find these functions by name."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from tactbench.core.errors import DataError
+from tactbench.core.matrix.engines.share import Share
+
+
+def square(number):
+    return number * number
+
+
+def process(_):
+    """The process, its parent, and its grandparent."""
+    return os.getpid(), os.getppid(), parent_of(os.getppid())
+
+
+def parent_of(pid):
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+
+
+def misbehave(what):
+    if what == "raise":
+        raise DataError("Nothing fits.", hint="Try again.")
+    if what == "abort":
+        os.abort()
+    if what == "hang":
+        time.sleep(1000)
+    if what == "lambda":
+        return lambda: None
+    if what == "kill-parent":
+        os.kill(os.getppid(), signal.SIGKILL)
+        time.sleep(1000)
+    if what == "kill-worker":
+        os.kill(parent_of(os.getppid()), signal.SIGKILL)
+        time.sleep(1000)
+    return f"{what} is well"
+
+
+def kill_once(job):
+    """Kill the worker the first time anybody asks, as a power cut would; `marks` remembers."""
+    number, marks = job
+    if number == 3:
+        try:
+            (marks / "killed").touch(exist_ok=False)
+        except FileExistsError:
+            pass
+        else:
+            os.kill(parent_of(os.getppid()), signal.SIGKILL)
+            time.sleep(1000)
+    return number * number
+
+
+def read(path):
+    return path.read_text()
+
+
+def wait_for(job):
+    """Tell that it has begun, then wait to be let go."""
+    begun, go = job
+    begun.write_text(str(os.getpid()))
+    while not go.exists():
+        time.sleep(0.02)
+    return "went"
+
+
+loaded = []
+
+
+def what_is_loaded(item):
+    """What this process has inherited and what it has loaded itself."""
+    return list(loaded)
+
+
+def _load(item):
+    if item == "bomb":
+        os.abort()
+    loaded.append(item)
+
+
+what_is_loaded.shares = lambda item: [Share(item, lambda: _load(item), trusted=item == "trusted")]
