@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -37,7 +38,7 @@ class Cell:
     latency: bool = True
     """Whether the latency of single rows is measured."""
 
-    @property
+    @cached_property
     def name(self) -> str:
         """A readable name, unique in a matrix."""
         options = "".join(f",{key}={value}" for key, value in self.params)

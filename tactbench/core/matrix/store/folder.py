@@ -143,7 +143,7 @@ class Store:
             try:
                 with aside.open("wb") as file:
                     file.write(image)
-                    if due:
+                    if due and not self._unsynced:  # else all are synced together below
                         file.flush()
                         os.fsync(file.fileno())
                 ledger.append(entry)
