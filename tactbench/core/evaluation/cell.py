@@ -21,6 +21,7 @@ from tactbench.core.evaluation.interval import LEVEL, score_interval
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
 from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
+from tactbench.core.evaluation.replicate_sums import summed
 from tactbench.core.evaluation.replication import replicates
 from tactbench.core.evaluation.selection import Build, Choice, features_of, select
 from tactbench.core.evaluation.splits import (
@@ -75,6 +76,8 @@ class CellResult:
     """every candidate that was compared on validation data: its parameters, k, score and fold"""
     sets: Mapping[Role, Answers]
     """answers by role: test always; validation, and for regression train, where the split has one fold"""
+    replicates: Mapping[str, Any]
+    """the primary metric's sums over each replicate; see replicate_sums"""
 
 
 @dataclass
@@ -259,14 +262,14 @@ def _result(
     tested = sets["test"]
     y, predicted, recording, row = tested.y_true, tested.y_pred, tested.recording, tested.row
     n_classes = len(data.classes)
-    cluster, cluster_name = replicates(data, task, split, y, recording, row)
+    unit = replicates(data, task, split, y, recording, row)
     score = metric.of(y, predicted, n_classes)
     if not np.isfinite(score):
         raise DataError(
             f"The {metric.name} of {len(y)} test rows is undefined: their labels never change.",
             hint="Choose another --split.",
         )
-    interval = score_interval(metric, y, predicted, recording, cluster, cluster_name, n_classes, seed)
+    interval = score_interval(metric, y, predicted, recording, unit.codes, unit.name, n_classes, seed)
     scores = dict(total.scores)
     for other in METRICS.values():
         if other.kind == task.kind and other is not metric:
@@ -310,6 +313,7 @@ def _result(
         peak_rss_mb=peak_rss_mb(),
         search=_search(total.chosen, total.names),
         sets=sets,
+        replicates=summed(metric, tested, unit, data),
     )
 
 

@@ -82,6 +82,8 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "log": "",
         "metric": task.metric,
         "unit": task.unit,
+        "equivalence": task.equivalence,
+        "reference_score": task.reference_score,
         "score": None,
         "ci_low": None,
         "ci_high": None,
@@ -180,4 +182,5 @@ def _scored(result: CellResult) -> Row:
         "scores": dict(result.scores),
         "confusion": None if result.confusion is None else result.confusion.tolist(),
         "classes": list(result.classes),
+        "replicates": dict(result.replicates),
     }
