@@ -50,6 +50,8 @@ class CellResult:
     ci_method: str
     scores: Mapping[str, float]
     """other metrics, the score on validation data, of each fold and each class"""
+    fold_sizes: Mapping[str, tuple[int, int]]
+    """training and test rows of each fold, by its name in `scores`"""
     confusion: npt.NDArray[np.int64] | None
     """(true class, predicted class)"""
     classes: tuple[Any, ...]
@@ -86,6 +88,7 @@ class _Sum:
 
     sets: dict[Role, list[Answers]] = field(default_factory=dict)
     scores: dict[str, float] = field(default_factory=dict)
+    fold_sizes: dict[str, tuple[int, int]] = field(default_factory=dict)
     chosen: list[Choice] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
     folds: int = 0
@@ -194,6 +197,7 @@ def _fold(
     predicted = answers_of(model, X_test, estimator.name, n_classes)
     total.predict_s += clock() - began
     total.scores[f"fold {fold.name}"] = metric.of(fold.test.y, predicted, n_classes)
+    total.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(fold.test))
     _add(total, "test", fold.test, predicted, number, data)
     if alone and not n_classes:
         fitted = answers_of(model, X_train, estimator.name, n_classes)
@@ -290,6 +294,7 @@ def _result(
         ci_level=LEVEL,
         ci_method=interval.method,
         scores=scores,
+        fold_sizes=total.fold_sizes,
         confusion=table,
         classes=data.classes,
         split=split,
