@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -50,13 +51,13 @@ def reference_of(row: Row) -> float:
     return 1.0 if METRICS[row["metric"]].higher_is_better else 0.0
 
 
-def aggregate(rows: Sequence[Row]) -> tuple[Aggregate, FloatArray] | None:
-    """Return the interquartile mean over tasks and replicates, and (resamples,) what it might have been.
+def aggregate(rows: Sequence[Row]) -> Aggregate | None:
+    """Return the interquartile mean over tasks and replicates; None if no task could be normalised.
 
     Parameters
     ----------
     rows
-        Finished rows of one sensor or estimator, one a task.
+        Finished rows of one sensor or estimator, under one protocol. Several of one task share its weight.
 
     Notes
     -----
@@ -65,11 +66,9 @@ def aggregate(rows: Sequence[Row]) -> tuple[Aggregate, FloatArray] | None:
     weigh the same, however many replicates they have. Where a replicate has no score of its own (classes live in
     replicates of their own, or replicates are blocks of time), the task enters with its one score, which varies as the
     resampled replicates make it.
-
-    Equal replicates are resampled alike, so that two aggregates over the same replicates may be subtracted resample by
-    resample. None if no task could be normalised.
     """
     left_out: list[str] = []
+    tasks: list[str] = []
     values: list[FloatArray] = []
     drawn: list[FloatArray] = []
     fewest = 10**9
@@ -78,19 +77,23 @@ def aggregate(rows: Sequence[Row]) -> tuple[Aggregate, FloatArray] | None:
         if why:
             left_out.append(f"{row['task']}: {why}")
             continue
+        tasks.append(row["task"])
         own, sampled, clusters = _entries(row)
         values.append(normalised(row, own))
         drawn.append(normalised(row, sampled))
         fewest = min(fewest, clusters)
     if not values:
         return None
-    weights = np.concatenate([np.full(len(own), 1 / len(own)) for own in values])
+    cells = Counter(tasks)
+    weights = np.concatenate(
+        [np.full(len(own), 1 / len(own) / cells[task]) for task, own in zip(tasks, values, strict=True)]
+    )
     value = float(interquartile_mean(np.concatenate(values)[None, :], weights)[0])
     resampled = interquartile_mean(np.concatenate(drawn, axis=1), weights)
     resampled = resampled[np.isfinite(resampled)]
     tail = widened_tail(fewest - 1, fewest) if 2 <= fewest < 10**9 else (1 - LEVEL) / 2
     low, high = np.quantile(resampled, [tail, 1 - tail])
-    return Aggregate(value, float(low), float(high), len(values), len(weights), tuple(left_out)), resampled
+    return Aggregate(value, float(low), float(high), len(cells), len(weights), tuple(left_out))
 
 
 def _why_not(row: Row) -> str:
