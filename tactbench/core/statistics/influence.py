@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tactbench.core.evaluation.jackknife import influences
 from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
@@ -43,11 +44,9 @@ def together(rows: Sequence[Row]) -> list[Together]:
 
     Notes
     -----
-    The influence of a replicate is what leaving it out changes (the jackknife of Quenouille and Tukey, within strata as
-    in Shao and Tu 1995, section 6.2): for a mean over replicates this gives the usual standard error exactly, and no
-    derivative of a metric is needed. Where the replicates are blocks of time that depend on their neighbours,
-    influences are smoothed so that the sums of squares become those of Bartlett's window (Künsch 1989), to which a
-    circular block bootstrap converges.
+    The influence of a replicate is what leaving it out changes (:func:`influences`). Where the replicates are blocks of
+    time that depend on their neighbours, influences are smoothed so that the sums of squares become those of Bartlett's
+    window (Künsch 1989), to which a circular block bootstrap converges.
     """
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, row in enumerate(rows):
@@ -96,11 +95,9 @@ def _group(
         return _one_by_one(kept, metric, n_classes, strata, replicates)
     if sums.shape[1] != replicates:
         return None
-    influence = np.zeros_like(without)
+    influence = influences(without, codes)
     for one in np.unique(codes):
-        mine = without[:, codes == one]
-        n = mine.shape[1]
-        influence[:, codes == one] = _smoothed(np.sqrt((n - 1) / n) * (mine.mean(axis=1, keepdims=True) - mine), runs)
+        influence[:, codes == one] = _smoothed(influence[:, codes == one], runs)
     freedom = np.maximum(replicates / runs - len(sizes), 1.0)
     return np.isfinite(influence).all(axis=1), influence, freedom
 
