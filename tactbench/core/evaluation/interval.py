@@ -11,13 +11,15 @@ import numpy.typing as npt
 
 from tactbench.core.evaluation.jackknife import influences
 from tactbench.core.evaluation.metrics import Metric
-from tactbench.core.evaluation.scales import scale_of
+from tactbench.core.evaluation.scales import Scale, scale_of
 from tactbench.core.samples import FloatArray, IntArray
 
 LEVEL = 0.95
 RESAMPLES = 2000
 ENOUGH_CLUSTERS = 5
 """Fewer than this cannot be resampled: the interval would be their range."""
+NOT_ONE = float(np.sqrt(2.0))
+"""Standard error of the log-odds of half an error in n rows: where not one was wrong, more may not be known."""
 
 
 @dataclass(frozen=True)
@@ -75,17 +77,24 @@ def score_interval(
     if len(np.unique(recording)) == len(recording):
         return _of_too_few(metric, rows, n_classes)
     total = np.zeros((RESAMPLES, rows.shape[1]))
-    lengths = []
+    lengths, sizes = [], []
     for one in np.unique(recording):
         mine = rows[recording == one]
         loss = loss_of(metric, y[recording == one], predicted[recording == one])
         length = block_length(loss)
         lengths.append(length)
+        sizes.append(len(mine) / length)
         total += _circular_blocks(mine, length, rng)
     spread = f"{min(lengths)}" if min(lengths) == max(lengths) else f"{min(lengths)}–{max(lengths)}"
     many = f"{len(lengths)} recording" + ("s" if len(lengths) > 1 else "")
     method = f"block bootstrap in time within {many} (blocks of {spread} rows): spread between sessions is not in it"
-    return _percentiles(metric.score(total, n_classes), method)
+    score = float(metric.score(rows.sum(axis=0), n_classes))
+    scale = scale_of(metric.name, score, len(y))
+    resampled = scale.there(metric.score(total, n_classes))
+    resampled = resampled[np.isfinite(resampled)]  # R² of a resample whose labels are all alike
+    freedom = max(sum(sizes) - len(lengths), 1.0)
+    widened = np.sqrt(sum(sizes) / freedom)  # a variance of so many blocks is that much too small
+    return _student(score, float(resampled.std()) * widened, freedom, scale, method)
 
 
 def _of_clusters(
@@ -102,8 +111,16 @@ def _of_clusters(
     freedom = len(sums) - len(strata)
     plural = cluster_name + ("es" if cluster_name.endswith("s") else "s")
     method = f"jackknife over {len(sums)} {plural} (Student's t, {freedom} degrees of freedom, {scale.name})"
+    deviation = float(np.sqrt((influences(without, code) ** 2).sum()))
+    if metric.kind == "classification" and score in (0.0, 1.0):
+        deviation = NOT_ONE
+    return _student(score, deviation, freedom, scale, method)
+
+
+def _student(score: float, deviation: float, freedom: float, scale: Scale, method: str) -> Interval:
+    """Return Student's interval of a score whose standard error on `scale` is `deviation`."""
     quantile = float(importlib.import_module("scipy.special").stdtrit(freedom, 0.5 + LEVEL / 2))
-    reach = quantile * float(np.sqrt((influences(without, code) ** 2).sum()))
+    reach = quantile * deviation
     ends = [float(scale.back(scale.there(score) + one * reach)) for one in (-1.0, 1.0)]
     return Interval(min(*ends, score), max(*ends, score), method)
 
@@ -214,10 +231,3 @@ def _autocovariance(centred: FloatArray, lags: int) -> FloatArray:
     size = 1 << int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.rfft(centred, size)
     return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size)[: min(lags, n - 1) + 1] / n)
-
-
-def _percentiles(scores: FloatArray, method: str) -> Interval:
-    tail = (1 - LEVEL) / 2
-    scores = scores[np.isfinite(scores)]  # R² of a resample whose labels are all alike
-    low, high = np.quantile(scores, [tail, 1 - tail])
-    return Interval(float(low), float(high), method)

@@ -15,6 +15,7 @@ column, count …``. Scores follow exactly: :attr:`Metric.score` of the sum of a
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -58,12 +59,18 @@ def summed(metric: Metric, tested: Answers, unit: Units, data: Dataset) -> dict[
             "run": 1,
             "sums": _lines(summands, unit.codes, len(unit.labels), n_classes),
         }
-    return _of_blocks(metric, tested, summands, data)
+    return summed_in_time(metric, tested, _recording_names(data), n_classes)
 
 
-def _of_blocks(metric: Metric, tested: Answers, summands: FloatArray, data: Dataset) -> dict[str, Any]:
-    n_classes = len(data.classes)
-    names = _recording_names(data)
+def summed_in_time(metric: Metric, tested: Answers, names: Sequence[str], n_classes: int) -> dict[str, Any]:
+    """Return what a row keeps where time is all there is to resample: sums over blocks of each recording.
+
+    Parameters
+    ----------
+    names
+        What each recording is called, by its number.
+    """
+    summands = metric.rows(tested.y_true, tested.y_pred, n_classes)
     order = sorted(np.unique(tested.recording).tolist(), key=lambda place: names[place])
     most = int(np.clip(BLOCKS_IN_ALL // len(order), FEWEST, BLOCKS))
     code = np.zeros(len(tested), dtype=np.int64)
