@@ -7,9 +7,11 @@
 A synthetic sensor's error has a part that stays for a session (another in the next one; "session sd" is its deviation,
 that of the rest is 1) and a part that moves slowly within it, first order with memory 0.9. The truth is the score over
 infinitely many sessions: exact for numbers, from a million rows for classes. Every interval is nominally 95 %, every
-test nominally 5 %; a binomial deviation of 1,000 trials is 0.7 %. The intervals and tests are tactbench's own, called as
-a run and `tactbench compare` call them; what they are held against (percentiles of resampled sessions, ranks resampled,
-rows taken as independent, folds taken as independent) is a few lines here.
+test nominally 5 %; a binomial deviation of 1,000 trials is 0.7 %.
+
+The intervals and tests are tactbench's own, called as a run and `tactbench compare` call them; what they are held
+against (percentiles of resampled sessions, ranks resampled, rows taken as independent, folds taken as independent) is a
+few lines here.
 """
 
 from __future__ import annotations
