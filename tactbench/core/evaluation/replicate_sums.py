@@ -143,8 +143,12 @@ def tables_of(several: list[dict[str, Any]], metric: str, n_classes: int) -> Flo
         if dense.ndim != 3:
             raise ValueError(f"sums of shape {dense.shape} are not (rows, replicates, summands)")
         return dense
-    out = np.zeros((len(several), len(several[0]["names"]), n_classes * n_classes))
-    for place, one in enumerate(several):
-        for replicate, line in enumerate(one["sums"]):
-            out[place, replicate, line[::2]] = line[1::2]
-    return out
+    replicates, columns = len(several[0]["names"]), n_classes * n_classes
+    lines = [line for one in several for line in one["sums"]]
+    pairs = np.array([value for line in lines for value in line], dtype=np.float64).reshape(-1, 2)
+    column = pairs[:, 0].astype(np.int64)
+    if len(lines) != len(several) * replicates or ((column < 0) | (column >= columns)).any():
+        raise ValueError(f"sums are not of {replicates} replicates and {n_classes} classes")
+    out = np.zeros((len(lines), columns))
+    out[np.repeat(np.arange(len(lines)), [len(line) // 2 for line in lines]), column] = pairs[:, 1]
+    return out.reshape(len(several), replicates, columns)

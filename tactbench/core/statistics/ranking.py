@@ -106,7 +106,8 @@ def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray
         clear = ahead > 0
         clear &= np.square(ahead) > bound
         if same > 0:
-            clear &= ahead + np.sqrt(bound) > same
+            near = np.nonzero(clear & (ahead <= same))
+            clear[near] = ahead[near] + np.sqrt(bound[near]) > same
         better[lines] = clear.sum(axis=1)
         worse[columns] += clear.sum(axis=0)
     return better, worse
