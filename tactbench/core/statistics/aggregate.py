@@ -112,7 +112,7 @@ def _entries(row: Row) -> tuple[FloatArray, FloatArray, int]:
     metric, n_classes, kept = METRICS[row["metric"]], len(row["classes"]), row["replicates"]
     group = together([row])[0]
     sums = tables_of([kept], row["metric"], n_classes)[0]
-    run = int(kept.get("run", 1))
+    run = int(group.runs[0])
     sizes = np.unique(group.strata, return_counts=True)[1]
     with np.errstate(divide="ignore", invalid="ignore"):
         own = metric.score(sums, n_classes)
