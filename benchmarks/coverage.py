@@ -204,7 +204,7 @@ def ranking(trials: int, seed: int) -> None:
         for sessions in SESSIONS:
             rng = np.random.default_rng([seed, sessions, int(100 * step)])
             ours = resampled = first = 0.0
-            for _ in range(max(trials // 5, 1)):
+            for _ in range(max(trials // 5, 1)):  # ten ranks each
                 shared = rng.normal(size=(sessions, 1))
                 sums = [sums_of("rmse", *numbers(rng, sessions, 0.5, 1 + step * place, shared)) for place in range(k)]
                 found = ranks([row_of(str(place), "rmse", one) for place, one in enumerate(sums)])

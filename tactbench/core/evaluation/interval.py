@@ -94,7 +94,7 @@ def score_interval(
     resampled = resampled[np.isfinite(resampled)]  # R² of a resample whose labels are all alike
     freedom = max(sum(sizes) - len(lengths), 1.0)
     widened = np.sqrt(sum(sizes) / freedom)  # a variance of so many blocks is that much too small
-    return _student(score, float(resampled.std()) * widened, freedom, scale, method)
+    return _student(metric, score, float(resampled.std()) * widened, freedom, scale, method)
 
 
 def _of_clusters(
@@ -112,13 +112,13 @@ def _of_clusters(
     plural = cluster_name + ("es" if cluster_name.endswith("s") else "s")
     method = f"jackknife over {len(sums)} {plural} (Student's t, {freedom} degrees of freedom, {scale.name})"
     deviation = float(np.sqrt((influences(without, code) ** 2).sum()))
+    return _student(metric, score, deviation, freedom, scale, method)
+
+
+def _student(metric: Metric, score: float, deviation: float, freedom: float, scale: Scale, method: str) -> Interval:
+    """Return Student's interval of a score whose standard error on `scale` is `deviation`."""
     if metric.kind == "classification" and score in (0.0, 1.0):
         deviation = NOT_ONE
-    return _student(score, deviation, freedom, scale, method)
-
-
-def _student(score: float, deviation: float, freedom: float, scale: Scale, method: str) -> Interval:
-    """Return Student's interval of a score whose standard error on `scale` is `deviation`."""
     quantile = float(importlib.import_module("scipy.special").stdtrit(freedom, 0.5 + LEVEL / 2))
     reach = quantile * deviation
     ends = [float(scale.back(scale.there(score) + one * reach)) for one in (-1.0, 1.0)]
