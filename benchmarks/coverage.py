@@ -121,7 +121,7 @@ def scores(trials: int, seed: int) -> None:
             cells = [metric, f"{truth:.3f}", f"{spread:g}"]
             for sessions in SESSIONS:
                 rng = np.random.default_rng([seed, sessions, int(10 * spread), int(level)])
-                hits = np.zeros(2)
+                hits, wider = np.zeros(2), []
                 for _ in range(trials):
                     y, answered = draw(rng, sessions, spread, level)
                     code = np.repeat(np.arange(sessions), ROWS)
@@ -129,10 +129,15 @@ def scores(trials: int, seed: int) -> None:
                     found = score_interval(METRICS[metric], y.ravel(), answered.ravel(), code, code, "session", k, 0)
                     low, high = percentile(metric, sums_of(metric, y, answered), rng)
                     hits += found.low <= truth <= found.high, low <= truth <= high
-                cells.append(" / ".join(f"{100 * hit / trials:.1f}" for hit in hits))
+                    wider.append((found.high - found.low) / max(high - low, 1e-9))
+                shares = " / ".join(f"{100 * hit / trials:.1f}" for hit in hits)
+                cells.append(f"{shares} x{np.median(wider):.1f}")
             lines.append(cells)
     columns = ["metric", "truth", "session sd", *(f"{n} sessions" for n in SESSIONS)]
-    table("Coverage [%] of a score's interval: ours / widened percentiles of resampled sessions", columns, lines)
+    title = (
+        "Coverage [%] of a score's interval: ours / widened percentiles of resampled sessions, x how much wider ours is"
+    )
+    table(title, columns, lines)
 
 
 def in_time(trials: int, seed: int) -> None:
@@ -218,7 +223,7 @@ def ranking(trials: int, seed: int) -> None:
             share = [f"{100 * n / max(trials // 5, 1):.1f}" for n in (ours, resampled, first)]
             lines.append([f"{100 * step:g} %", str(sessions), *share])
     columns = ["step", "sessions", "ours", "ranks resampled", "best has place 1"]
-    table(f"Coverage [%] of the ranks of {k} sensors, each worse than the next by a step", columns, lines)
+    table(f"Coverage [%] of the ranks of {k} sensors, each worse by a step; a fifth of the trials", columns, lines)
 
 
 def errors(trials: int, seed: int) -> None:
