@@ -15,11 +15,12 @@ Row = Mapping[str, Any]
 
 JSON_KEYS = (
     "cell", "sensor", "task", "rig", "protocol", "split", "estimator", "params", "is_baseline", "repeat", "repeats",
-    "seed", "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method", "baseline",
-    "published", "published_reference", "published_remark", "n_recordings", "n_sessions", "n_train", "n_test", "sim_s",
-    "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95", "latency_n", "threads",
-    "peak_rss_mb", "wall_s", "concurrency", "host", "made_by", "simulated", "dagger", "stamps", "remarks",
-    "assumptions", "counts", "chosen", "search", "scores", "confusion", "classes", "recordings", "key", "replicates",
+    "seed", "status", "reason", "signal", "metric", "unit", "equivalence", "reference_score", "score", "ci_low",
+    "ci_high", "ci_method", "baseline", "published", "published_reference", "published_remark", "n_recordings",
+    "n_sessions", "n_train", "n_test", "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50",
+    "latency_ms_p95", "latency_n", "threads", "peak_rss_mb", "wall_s", "concurrency", "host", "made_by", "simulated",
+    "dagger", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "fold_sizes", "confusion",
+    "classes", "recordings", "key", "replicates",
 )  # fmt: skip
 """Keys of a JSON row, in order."""
 
@@ -33,6 +34,7 @@ _NESTED = frozenset(
         "chosen",
         "search",
         "scores",
+        "fold_sizes",
         "confusion",
         "classes",
         "recordings",
