@@ -13,6 +13,8 @@ Row = dict[str, Any]
 
 _TABLES = frozenset({"params", "assumptions", "counts", "chosen", "scores", "replicates"})
 _LISTS = frozenset({"stamps", "remarks", "search", "classes", "recordings"})
+_LARGEST = 2**63
+"""Whole numbers from here on have no place in a table; a seed may be any."""
 _NEVER_ABSENT = frozenset({
     "cell", "sensor", "task", "rig", "protocol", "estimator", "is_baseline", "repeat", "repeats", "status", "metric",
     "unit", "simulated", "dagger",
@@ -62,6 +64,8 @@ def _fits(key: str, value: Any) -> bool:
     if value is None:
         return key not in _NEVER_ABSENT
     expected = _EXPECTED[key]
+    if type(value) is int and abs(value) >= _LARGEST and key != "seed":
+        return False
     if expected == "a number":
         return type(value) in (int, float)
     if expected == "a whole number":
