@@ -1,7 +1,7 @@
-"""What ranking came to, kept by a digest of everything that decided it: in this process, and in a result folder.
+"""What statistics came to, kept by a digest of everything that decided it: in this process, and in a result folder.
 
-The file is a convenience: it may be damaged, foreign or gone, and is then made anew. Nothing is taken from it but whole
-numbers in their ranges.
+The file is a convenience: it may be damaged, foreign or gone, and is then made anew. Who recalls something from it
+checks that it can be what was asked for.
 """
 
 from __future__ import annotations
@@ -10,24 +10,20 @@ import hashlib
 import importlib.util
 import json
 import marshal
-from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from tactbench.core.matrix.files import replace_file
 
-Places = Mapping[str, tuple[int, int, int, bool]]
-"""By cell: place, lowest and highest place, whether it is shared."""
-
 FILE = Path("cache") / "ranks.json"
 """Inside a result folder."""
 LARGEST_BYTES = 64_000_000
 """A larger file is not read."""
-MOST_BLOCKS = 4096
-"""Blocks that a file remembers, the latest."""
+MOST = 4096
+"""Answers that a file remembers, the latest."""
 
-_known: dict[str, Places] = {}
+_known: dict[str, Any] = {}
 _added: set[str] = set()
 
 
@@ -50,19 +46,19 @@ def source_digest(package: str) -> bytes:
     return total.digest()
 
 
-def recall(digest: str) -> Places | None:
-    """Return what ranking came to, or None."""
+def recall(digest: str) -> Any:
+    """Return what is remembered, fit for JSON and possibly from a file that anybody may have written; or None."""
     return _known.get(digest)
 
 
-def remember(digest: str, places: Places) -> None:
-    """Keep what ranking came to."""
-    _known[digest] = dict(places)
+def remember(digest: str, answer: Any) -> None:
+    """Keep an answer, which is fit for JSON."""
+    _known[digest] = answer
     _added.add(digest)
 
 
 def load(folder: Path) -> None:
-    """Recall what a result folder remembers; entries that cannot be ranks are passed over."""
+    """Recall what a result folder remembers."""
     path = folder / FILE
     try:
         if path.stat().st_size > LARGEST_BYTES:
@@ -71,31 +67,16 @@ def load(folder: Path) -> None:
     except (OSError, ValueError, RecursionError):
         return
     if isinstance(entries, dict):
-        for digest, entry in entries.items():
-            places = dict(_checked(entry))
-            if places:
-                _known.setdefault(digest, places)
+        for digest, answer in entries.items():
+            _known.setdefault(digest, answer)
 
 
 def save(folder: Path) -> None:
     """Write what has been added since; a folder that cannot be written costs the next reader the time, no more."""
     if not _added:
         return
-    latest = list(_known.items())[-MOST_BLOCKS:]
-    text = json.dumps({digest: [[cell, *place] for cell, place in places.items()] for digest, places in latest})
     try:
-        replace_file(folder / FILE, text.encode())
+        replace_file(folder / FILE, json.dumps(dict(list(_known.items())[-MOST:])).encode())
     except OSError:
         return
     _added.clear()
-
-
-def _checked(entry: Any) -> Iterator[tuple[str, tuple[int, int, int, bool]]]:
-    """Yield the places of an entry from disk; nothing at all if one of them cannot be."""
-    if not isinstance(entry, list):
-        return
-    read = [one for one in entry if isinstance(one, list) and len(one) == 5 and isinstance(one[0], str)
-            and all(type(number) is int for number in one[1:4]) and type(one[4]) is bool]  # fmt: skip
-    if len(read) == len(entry):
-        for cell, place, low, high, tied in read:
-            yield cell, (place, low, high, tied)

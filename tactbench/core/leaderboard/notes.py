@@ -17,8 +17,8 @@ from tactbench.core.leaderboard.text import visible
 Row = Mapping[str, Any]
 
 RANKS = (
-    "A place with = is shared: the data do not tell these answers apart. The rank 95 % is the interval that bootstrap "
-    "puts the place in (docs/statistics.md)."
+    "A place with = is shared: the data do not tell these answers apart. Rank 95 % holds the places that the data do "
+    "not exclude (docs/statistics.md)."
 )
 
 

@@ -10,7 +10,7 @@ import importlib
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 from tactbench.core.leaderboard import memo
@@ -20,8 +20,8 @@ Row = Mapping[str, Any]
 _DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
 """Packages whose code ranks."""
 _DECIDES = ("cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes", "replicates")
-MOST_RANKED = 4000
-"""Answers of one block beyond which their pairs take too much memory."""
+MOST_RANKED = 20_000
+"""Answers of one block beyond which comparing all pairs takes too long."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +51,15 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Placing], str]:
     facts = [[row.get(key) for key in _DECIDES] for row in results]
     try:
         digest = memo.digest_of(*map(memo.source_digest, _DECIDING), facts)
-        found = memo.recall(digest)
-        if found is None or not _believable(found, results):
+        found = _believed(memo.recall(digest), results)
+        if found is None:
             ranks = importlib.import_module(f"{_DECIDING[0]}.ranking").ranks(results)
-            found = {cell: (rank.place, rank.low, rank.high, rank.tied) for cell, rank in ranks.items()}
-            memo.remember(digest, found)
+            found = {cell: Placing(rank.place, rank.low, rank.high, rank.tied) for cell, rank in ranks.items()}
+            memo.remember(digest, [[cell, *astuple(placing)] for cell, placing in found.items()])
     except (ImportError, ArithmeticError, LookupError, TypeError, ValueError) as error:
         # Rows of a stranger's folder: their replicates may be anything.
         return _by_score(results), f"their replicates cannot be used ({type(error).__name__})"
-    return {cell: Placing(*place) for cell, place in found.items()}, ""
+    return found, ""
 
 
 def _unrankable(results: Sequence[Row]) -> str:
@@ -82,10 +82,19 @@ def _by_score(results: Sequence[Row]) -> dict[str, Placing]:
     return found
 
 
-def _believable(found: memo.Places, results: Sequence[Row]) -> bool:
-    """Tell whether remembered places can be those of `results`, the best first: a file on disk may say anything."""
-    last = len(results)
+def _believed(told: Any, results: Sequence[Row]) -> dict[str, Placing] | None:
+    """Return remembered places if they can be those of `results`, the best first: a file on disk may say anything."""
+    if not isinstance(told, list) or len(told) != len(results):
+        return None
+    found = {}
+    for entry in told:
+        if not (isinstance(entry, list) and [type(one) for one in entry] == [str, int, int, int, bool]):
+            return None
+        cell, place, low, high, tied = entry
+        if not 1 <= low <= place <= high <= len(results):
+            return None
+        found[cell] = Placing(place, low, high, tied)
     if set(found) != {row["cell"] for row in results}:
-        return False
-    places = [found[row["cell"]][0] for row in results]
-    return places == sorted(places) and all(1 <= low <= place <= high <= last for place, low, high, _ in found.values())
+        return None
+    places = [found[row["cell"]].place for row in results]
+    return found if places == sorted(places) else None

@@ -17,6 +17,7 @@ from tactbench.core.leaderboard.hosts import host_letters, timing_notes
 from tactbench.core.leaderboard.lines import ABSENT, Line
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.leaderboard.notes import notes_of
+from tactbench.core.leaderboard.over_tasks import over_tasks
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.published import published_section
 from tactbench.core.leaderboard.sections import Section
@@ -47,7 +48,7 @@ class Table:
     notes: tuple[str, ...]
     columns: tuple[str, ...] = COLUMNS
     sections: tuple[Section, ...] = ()
-    """Tables below the blocks: published figures, what was probed."""
+    """Tables below the blocks: averages over tasks, published figures, what was probed."""
     foot: tuple[str, ...] = ()
     """Who computed this, with what, where."""
     provenance: tuple[Row, ...] = ()
@@ -80,13 +81,13 @@ def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: b
     notes = notes_of(blocks)
     if times:
         notes += timing_notes(ordered, letters, known)
-    sections = (published_section(ordered), build_probe(ordered))
+    sections = (over_tasks(ordered), published_section(ordered), build_probe(ordered))
     return Table(
         blocks,
         tuple(notes),
         columns(times),
         tuple(section for section in sections if section is not None),
-        foot_of(known) if times else ("Times, memory and hosts are left out: a seed decides all that stands here.",),
+        foot_of(ordered, known, times),
         known,
         times,
     )
