@@ -25,6 +25,7 @@ VERBS = {
     "calibrate": ("calibrate", "Draw what no source states, and hold simulations against published numbers."),
     "report": ("report", "Make one page of all results, with figures and the published numbers beside ours."),
     "leaderboard": ("leaderboard", "Show the last run's table again, in any format."),
+    "compare": ("compare", "Compare two sensors, two estimators or two result folders, replicate by replicate."),
 }
 
 

@@ -11,7 +11,7 @@ from tactbench.core.spec.status import STATUSES
 
 Row = dict[str, Any]
 
-_TABLES = frozenset({"params", "assumptions", "counts", "chosen", "scores", "replicates"})
+_TABLES = frozenset({"params", "assumptions", "counts", "chosen", "scores", "fold_sizes", "replicates"})
 _LISTS = frozenset({"stamps", "remarks", "search", "classes", "recordings"})
 _LARGEST = 2**63
 """Whole numbers from here on have no place in a table; a seed may be any."""

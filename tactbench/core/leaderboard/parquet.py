@@ -21,7 +21,7 @@ _WHOLE = frozenset({
 _BOOLEAN = frozenset({"is_baseline", "simulated", "dagger", "rank_tied"})
 _FLOAT = frozenset({
     "score", "ci_low", "ci_high", "baseline", "published", "sim_s", "search_s", "fit_s", "predict_s", "latency_ms_p50",
-    "latency_ms_p95", "peak_rss_mb", "wall_s",
+    "latency_ms_p95", "peak_rss_mb", "wall_s", "equivalence", "reference_score",
 })  # fmt: skip
 
 

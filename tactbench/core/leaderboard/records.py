@@ -13,11 +13,12 @@ from tactbench.core.leaderboard.table import Line, Table
 
 JSON_KEYS = (
     "cell", "sensor", "task", "rig", "protocol", "split", "estimator", "params", "is_baseline", "repeat", "repeats",
-    "seed", "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method", "baseline",
-    "published", "published_reference", "published_remark", "n_recordings", "n_sessions", "n_train", "n_test", "sim_s",
-    "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95", "latency_n", "threads",
-    "peak_rss_mb", "wall_s", "concurrency", "host", "made_by", "simulated", "dagger", "stamps", "remarks",
-    "assumptions", "counts", "chosen", "search", "scores", "confusion", "classes", "recordings", "key", "replicates",
+    "seed", "status", "reason", "signal", "metric", "unit", "equivalence", "reference_score", "score", "ci_low",
+    "ci_high", "ci_method", "baseline", "published", "published_reference", "published_remark", "n_recordings",
+    "n_sessions", "n_train", "n_test", "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50",
+    "latency_ms_p95", "latency_n", "threads", "peak_rss_mb", "wall_s", "concurrency", "host", "made_by", "simulated",
+    "dagger", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "fold_sizes", "confusion",
+    "classes", "recordings", "key", "replicates",
 )  # fmt: skip
 """Keys of a JSON row, in order."""
 
@@ -25,8 +26,8 @@ RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
 NESTED = frozenset({
-    "params", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "confusion", "classes",
-    "recordings", "replicates",
+    "params", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "fold_sizes", "confusion",
+    "classes", "recordings", "replicates",
 })  # fmt: skip
 """Keys whose values are lists or tables: JSON inside a cell of CSV and Parquet."""
 

@@ -18,7 +18,7 @@ from tactbench.core.spec.scene import Role, Scene
 RELEVANT = ("numpy", "scipy", "scikit-learn")
 """Distributions whose version may change a number."""
 
-_TOLD_OTHERWISE = {"published", "title", "question", "scenes", "campaigns"}
+_TOLD_OTHERWISE = {"published", "equivalence", "reference_score", "title", "question", "scenes", "campaigns"}
 """Of a task: what changes no number, and what its recordings say themselves, by their content."""
 
 
