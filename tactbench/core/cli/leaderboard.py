@@ -75,7 +75,7 @@ def _rows(store: Store) -> list[dict[str, Any]]:
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.checked import checked
     from tactbench.core.leaderboard.text import cut, visible
-    from tactbench.core.matrix.baselines import fill_baselines
+    from tactbench.core.matrix.leaving import fill_baselines
 
     rows, wrong = checked(store.rows())
     told = [cut(visible(one), 300) for one in wrong]

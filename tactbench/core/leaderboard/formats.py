@@ -31,6 +31,11 @@ __all__ = [
 Row = Mapping[str, Any]
 
 
+def json_array(table: Table) -> str:
+    """Return a table's records as a JSON array, every key in every one, and the text of its columns in ``shown``."""
+    return json_text([values | {"shown": shown} for values, shown in records(table)], indent=1) + "\n"
+
+
 TEXTS: dict[str, Callable[[Table], str]] = {
     "json": json_array,
     "csv": csv_text,

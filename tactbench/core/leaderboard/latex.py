@@ -34,19 +34,20 @@ def latex(table: Table) -> str:
     for place, block in enumerate(table.blocks):
         lines = [line.cells for line in block.lines]
         notes = (*table.notes, *table.foot) if place == last else ()
-        parts += _grid(block.title, table.columns, NUMERIC, lines, notes)
+        parts += latex_grid(block.title, table.columns, NUMERIC, lines, notes)
     for section in table.sections:
-        parts += _grid(section.title, section.columns, section.numeric, section.lines, section.notes)
+        parts += latex_grid(section.title, section.columns, section.numeric, section.lines, section.notes)
     return "\n".join(parts) + "\n"
 
 
-def _grid(
+def latex_grid(
     title: str,
     columns: Iterable[str],
     numeric: Collection[str],
     lines: Iterable[Iterable[str]],
     notes: Iterable[str],
 ) -> list[str]:
+    """Return a table as lines of LaTeX, columns of numbers to the right, notes below."""
     names = list(columns)
     return [
         r"\begin{table}",

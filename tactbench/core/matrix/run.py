@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, cast
 
 from tactbench.core.errors import NotApplicable, UsageError
-from tactbench.core.matrix.baselines import fill_baselines
 from tactbench.core.matrix.execution import InProcess, Job, Workers, installed, prepare, record, rig_of, solve, workers
 from tactbench.core.matrix.keys import cell_key
 from tactbench.core.matrix.material import Need, Order, need_of, on_the_shelf, orders_for, sensors_on, serving
@@ -249,6 +248,20 @@ class _Digests(dict[Path, str]):
 
         self[path] = content_digest(path)
         return self[path]
+
+
+def fill_baselines(rows: Sequence[Row]) -> None:
+    """Write the score of the first baseline of each group beside every row of the group."""
+    by_group: dict[tuple[Any, ...], float] = {}
+    for row in rows:
+        if row["is_baseline"] and row["status"] == "done":
+            by_group.setdefault(_group(row), row["score"])
+    for row in rows:
+        row["baseline"] = by_group.get(_group(row))
+
+
+def _group(row: Row) -> tuple[Any, ...]:
+    return tuple(row[key] for key in ("sensor", "task", "rig", "protocol", "split", "repeat"))
 
 
 def scores_text(rows: Sequence[Row]) -> str:

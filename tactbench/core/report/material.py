@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.matrix.baselines import fill_baselines
+from tactbench.core.matrix.run import fill_baselines
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.samples import Answers
 
