@@ -9,7 +9,7 @@ from .rows import row
 
 
 def stamps(paths):
-    return [(path.stat().st_ino, path.read_bytes()) for path in paths]
+    return [((path.stat().st_ino, path.stat().st_mtime_ns), path.read_bytes()) for path in paths]
 
 
 @pytest.fixture
