@@ -112,7 +112,7 @@ def test_a_memo_that_lies_is_not_believed(rows, tmp_path, forge):
     assert build_table(rows).blocks == first
 
 
-@pytest.mark.parametrize("content", [b"", b"[]", b"\xff", b"{", b"[" * 100_000, b'{"a": [[1, 1, 1, 1, true]]}'])
+@pytest.mark.parametrize("content", [b"", b"[]", b"\xff", b"{", b"[" * 100_000])
 def test_a_damaged_memo_is_no_memo(tmp_path, content):
     (tmp_path / "cache").mkdir()
     (tmp_path / memo.FILE).write_bytes(content)
