@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,8 +37,8 @@ def command(folder: Path, shape: str | None, to: Path | None, by: str | None, ti
     store = _opened(folder)
     rows = _rows(store)
     if by is None:
-        made_by = dict.fromkeys(str(row["made_by"]) for row in rows if row["made_by"])
-        provenance = _provenance(store, made_by) if times else []
+        made_by = sorted({row["made_by"] for row in rows if row["made_by"]})
+        provenance = [known for known in map(store.provenance, made_by) if known]
         print_rows(rows, shape, provenance, times=times, to=to, folder=folder)
     elif to is not None or not times:
         raise UsageError("A comparison is printed, and has no times.", hint="Leave out --to and --no-times.")
@@ -62,11 +61,6 @@ def _opened(folder: Path) -> Store:
     if not (folder / "cells").is_dir():
         raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
     return Store(folder)
-
-
-def _provenance(store: Store, made_by: Iterable[str]) -> list[Mapping[str, Any]]:
-    look = getattr(store, "provenance", None)
-    return [known for known in map(look, sorted(made_by)) if known] if look else []
 
 
 def _rows(store: Store) -> list[dict[str, Any]]:

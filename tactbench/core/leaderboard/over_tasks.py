@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,7 +24,8 @@ NOTE = (
 )
 MOST_ROWS = 2000
 """Rows beyond which resampling all of them takes too long for a table."""
-_STATISTICS = "tactbench.core.statistics"
+_DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
+"""Packages whose code averages."""
 _DECIDES = (
     "task", "score", "baseline", "reference_score", "ci_low", "ci_high", "metric", "classes", "replicates",
 )  # fmt: skip
@@ -77,17 +77,15 @@ def _mean(members: Sequence[Row]) -> tuple[float, float, float, tuple[str, ...]]
     """Return mean, interval and what is left out; None where fewer than two tasks are in it, or nothing can be told."""
     facts = [[row.get(key) for key in _DECIDES] for row in members]
     try:
-        sources = (memo.source_digest(package) for package in (_STATISTICS, "tactbench.core.evaluation"))
-        digest = memo.digest_of("over tasks", *sources, facts)
+        digest = memo.digest_of("over tasks", *map(memo.source_digest, _DECIDING), facts)
         told = memo.recall(digest)
         if not _believable(told):
-            found = importlib.import_module(f"{_STATISTICS}.aggregate").aggregate(members)
-            if found is None:
-                return None
-            one = found[0]
-            told = [one.value, one.low, one.high, one.tasks, list(one.left_out)]
+            from tactbench.core.statistics.aggregate import aggregate
+
+            one = aggregate(members)
+            told = [0.0, 0.0, 0.0, 0, []] if one is None else [one.value, one.low, one.high, one.tasks, [*one.left_out]]
             memo.remember(digest, told)
-    except (ImportError, ArithmeticError, LookupError, TypeError, ValueError):
+    except (ArithmeticError, LookupError, TypeError, ValueError):
         return None  # rows of a stranger's folder: their replicates may be anything
     value, low, high, tasks, left_out = told
     return (value, low, high, tuple(left_out)) if tasks > 1 else None

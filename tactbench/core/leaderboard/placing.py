@@ -6,7 +6,6 @@ Rank intervals take a bootstrap and numpy; what they came to is remembered by a 
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -53,10 +52,11 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Placing], str]:
         digest = memo.digest_of(*map(memo.source_digest, _DECIDING), facts)
         found = _believed(memo.recall(digest), results)
         if found is None:
-            ranks = importlib.import_module(f"{_DECIDING[0]}.ranking").ranks(results)
-            found = {cell: Placing(rank.place, rank.low, rank.high, rank.tied) for cell, rank in ranks.items()}
+            from tactbench.core.statistics.ranking import ranks
+
+            found = {cell: Placing(rank.place, rank.low, rank.high, rank.tied) for cell, rank in ranks(results).items()}
             memo.remember(digest, [[cell, *astuple(placing)] for cell, placing in found.items()])
-    except (ImportError, ArithmeticError, LookupError, TypeError, ValueError) as error:
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         # Rows of a stranger's folder: their replicates may be anything.
         return _by_score(results), f"their replicates cannot be used ({type(error).__name__})"
     return found, ""

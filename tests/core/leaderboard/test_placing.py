@@ -6,29 +6,19 @@ import sys
 
 import numpy as np
 import pytest
-from tactbench.core.statistics.ranking import ranks
 
 from tactbench.core.leaderboard import memo
 from tactbench.core.leaderboard.placing import Placing, places
 from tactbench.core.leaderboard.table import build_table
+from tactbench.core.statistics.ranking import ranks
 
-from .rows import row
+from .rows import resampled, row
 
 
 @pytest.fixture(autouse=True)
 def _forgetful(monkeypatch):
     monkeypatch.setattr(memo, "_known", {})
     monkeypatch.setattr(memo, "_added", set())
-
-
-def resampled(name, shift, rng, sessions=12):
-    """A row whose squared errors are kept by session: metric `rmse`."""
-    squares = (1.0 + shift + 0.3 * rng.standard_normal(sessions)) ** 2
-    sums = [[10.0, 10.0 * float(square)] for square in squares]
-    score = float(np.sqrt(squares.mean()))
-    names = [f"session {place}" for place in range(sessions)]
-    return row(name, score=score, ci_low=score - 0.2, ci_high=score + 0.2, key="k",
-               replicates={"unit": "session", "names": names, "strata": None, "sums": sums})  # fmt: skip
 
 
 @pytest.fixture
