@@ -72,7 +72,7 @@ def _rows(store: Store) -> list[dict[str, Any]]:
     from tactbench.core.matrix.leaving import fill_baselines
 
     rows, wrong = checked(store.rows())
-    told = [cut(visible(one), 300) for one in wrong]
+    told = [cut(visible(one), 300) for one in (*getattr(store, "troubles", ()), *wrong)]
     if not rows:
         raise UsageError(
             f"{store.folder} has no row that can be shown" + (f": {told[0]}." if told else "."),

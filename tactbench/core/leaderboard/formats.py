@@ -32,8 +32,9 @@ Row = Mapping[str, Any]
 
 
 def json_array(table: Table) -> str:
-    """Return a table's records as a JSON array, every key in every one, and the text of its columns in ``shown``."""
-    return json_text([values | {"shown": shown} for values, shown in records(table)], indent=1) + "\n"
+    """Return a table's records as a JSON array, one a line: every key, and the text of its columns in ``shown``."""
+    lines = (json_text(values | {"shown": shown}) for values, shown in records(table))
+    return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
 TEXTS: dict[str, Callable[[Table], str]] = {

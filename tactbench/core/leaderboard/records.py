@@ -47,11 +47,11 @@ def keys(table: Table) -> tuple[str, ...]:
 
 
 def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
-    """Yield each line's row, ranks among it, and its text by column; numbers that JSON has none of are None."""
+    """Yield each line's row, ranks among it, and its text by column."""
     chosen = keys(table)
     for block in table.blocks:
         for line in block.lines:
-            values = {key: finite(line.row.get(key)) for key in chosen}
+            values = {key: line.row.get(key) for key in chosen}
             yield values | _ranks(line), shown(table, line)
 
 
@@ -72,8 +72,13 @@ def finite(value: Any) -> Any:
 
 
 def json_text(value: Any, **how: Any) -> str:
-    """Return `value` as JSON; what would act on a terminal, and what is no UTF-8, is escaped as JSON escapes it."""
-    text = json.dumps(value, ensure_ascii=False, allow_nan=False, **how)
+    """Return `value` as JSON: what acts on a terminal or is no UTF-8 is escaped; a number that is none is null."""
+    try:
+        text = json.dumps(value, ensure_ascii=False, allow_nan=False, **how)
+    except ValueError:
+        text = json.dumps(finite(value), ensure_ascii=False, allow_nan=False, **how)
+    if text.isascii() and "\x7f" not in text:
+        return text
     return _ACTS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
