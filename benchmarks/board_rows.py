@@ -15,7 +15,7 @@ Row = dict[str, Any]
 
 PLAN = [
     {"effect": name, "included": number % 2 == 0,
-     "reason": f"the scene {'asks' if number % 2 == 0 else 'does not ask'} for {name}: its estimate is {number + 1} % of the range"}
+     "reason": f"{name} {'is' if number % 2 == 0 else 'is not'} called for: estimated {number + 1} % of the range"}
     for number, name in enumerate(("contact", "fluid", "creep", "thermal", "drift", "friction", "vibration", "noise"))
 ]  # fmt: skip
 TRACEBACK = """Traceback (most recent call last):

@@ -1,0 +1,118 @@
+"""What the page knows of each cell beside its line: everything while that fits, else the most telling first."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tactbench.core.leaderboard.board.digits import write_digits
+from tactbench.core.leaderboard.board.pack import Column, Pack
+from tactbench.core.leaderboard.board.words import LONGEST, write_words
+from tactbench.core.leaderboard.numbers import duration
+
+Row = Mapping[str, Any]
+
+MANY = 5_000
+"""Cells beyond which what every cell has of its own is told shortly, or left to its shard."""
+KEY_DIGITS = 12
+"""Of a key, where there are many: 48 bits, that two of 50,000 cells share with a probability of 4e-6."""
+
+_ALWAYS = (
+    "status", "reason", "sensor", "task", "estimator", "params", "is_baseline", "rig", "protocol", "split", "repeat",
+    "repeats", "seed", "simulated", "dagger", "stamps", "metric", "unit", "ci_method", "host", "made_by", "concurrency",
+    "threads", "signal", "n_recordings", "n_train",
+)  # fmt: skip
+_OFTEN = (
+    "traceback", "remarks", "assumptions", "plan", "chosen", "counts", "published_reference", "published_remark",
+    "batch_rows", "latency_n", "search_s", "wall_s", "peak_rss_mb", "classes", "log", "recordings",
+)  # fmt: skip
+_IN_THE_LINE = (
+    "score", "ci_low", "ci_high", "baseline", "published", "n_sessions", "n_test", "sim_s", "fit_s", "predict_s",
+    "latency_ms_p50", "latency_ms_p95",
+)  # fmt: skip
+"""Where there are many cells, these are told as the line shows them."""
+_OWN = ("scores", "confusion", "search", "replicates")
+"""What is large and every cell's own, the most telling first."""
+_LENGTHS = (LONGEST, 8_192, 1_024, 200)
+"""Characters that a text is cut to, one after the other, until the column fits."""
+_HEX = re.compile(f"[0-9a-f]{{{KEY_DIGITS}}}")
+
+
+def write_fields(pack: Pack, rows: Sequence[Row], room: int) -> tuple[dict[str, Column], tuple[str, ...]]:
+    """Write what is known of the cells into `pack`.
+
+    Parameters
+    ----------
+    room
+        Characters that the pack may hold in the end.
+
+    Returns
+    -------
+    dict, tuple
+        The columns by key, and the keys that were left out for want of room.
+    """
+    many = len(rows) > MANY
+    columns: dict[str, Column] = {"cell": _names(pack, [row["cell"] for row in rows]), "key": _keys(pack, rows, many)}
+    left_out: list[str] = []
+    for key in (*_ALWAYS, *_OFTEN):
+        _write(pack, rows, key, room, columns, left_out, many)
+    others = [*_IN_THE_LINE, *_OWN]
+    known = {*columns, *left_out, *others}
+    more = list(dict.fromkeys(key for row in rows for key in row if key not in known))
+    if many:
+        left_out += [key for key in (*_OWN, *more) if any(row.get(key) for row in rows)]
+    else:
+        for key in (*others[: len(_IN_THE_LINE)], *more, *_OWN):
+            _write(pack, rows, key, room, columns, left_out, many)
+    return columns, tuple(dict.fromkeys(map(str, left_out)))
+
+
+def _write(
+    pack: Pack, rows: Sequence[Row], key: str, room: int, columns: dict[str, Column], left_out: list[str], many: bool
+) -> None:
+    """Write one column, cut as far as it must be, or not at all; a column that says nothing is not written."""
+    values = [row.get(key) for row in rows]
+    if not any(value or value == 0 for value in values):
+        return
+    before = len(pack.blobs)
+    if many and {type(value) for value in values} <= {float, int, type(None)} and float in set(map(type, values)):
+        texts = [_shortly(key, value) for value in values]
+        column = write_digits(pack, texts)
+        if column is not None and pack.size <= room:
+            columns[key] = column
+            return
+        pack.forget_from(before)
+        left_out.append(key)
+        return
+    for longest in _LENGTHS:
+        column = write_words(pack, values, longest)
+        if pack.size <= room:
+            columns[key] = column
+            return
+        pack.forget_from(before)
+        if not any(isinstance(value, str) for value in values):
+            break
+    left_out.append(key)
+
+
+def _shortly(key: str, value: float | None) -> str:
+    if value is None:
+        return ""
+    return duration(value) if key.endswith("_s") else f"{value:.4g}"
+
+
+def _names(pack: Pack, names: Sequence[str]) -> Column:
+    """Write names of cells part by part: what stands between their strokes is shared by many."""
+    parts = [name.split("/") for name in names]
+    if not parts or len({len(one) for one in parts}) > 1:
+        return write_words(pack, names)
+    return {"kind": "joined", "by": "/", "parts": [write_words(pack, part) for part in zip(*parts, strict=True)]}
+
+
+def _keys(pack: Pack, rows: Sequence[Row], many: bool) -> Column:
+    keys = [str(row.get("key") or "") for row in rows]
+    if not many or not all(_HEX.match(key) or not key for key in keys):
+        return write_words(pack, keys)
+    whole = [int(key[:KEY_DIGITS], 16) if key else 0 for key in keys]
+    return {"kind": "hex", "digits": KEY_DIGITS, "at": pack.planes(whole)}

@@ -1,0 +1,145 @@
+"""The page: a table and its rows, laid into one HTML text that needs nothing from anywhere."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict, deque
+from collections.abc import Mapping, Sequence
+from html import escape
+from string import Template
+from typing import Any
+
+import tactbench
+from tactbench.core.leaderboard.board.digits import write_digits
+from tactbench.core.leaderboard.board.fields import write_fields
+from tactbench.core.leaderboard.board.pack import Column, Pack
+from tactbench.core.leaderboard.board.sound import sound, table_of
+from tactbench.core.leaderboard.board.still import still
+from tactbench.core.leaderboard.board.words import cut, tame, write_words
+from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
+from tactbench.core.leaderboard.particulars import GROUPS, TITLES
+from tactbench.core.leaderboard.table import LOWER_IS_BETTER, NUMERIC, Table
+from tactbench.core.leaderboard.values import VALUES
+
+Row = Mapping[str, Any]
+
+TITLE = "tactbench leaderboard"
+LARGEST = 2_000_000
+"""Bytes of a page: what does not fit is left to the shards, and the page says so."""
+MOST_STILL = 500
+"""Lines up to which the page also holds its tables as plain HTML, for readers without scripts."""
+LONGEST_NOTE = 4_000
+MOST_NOTES = 2_000
+_SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
+_HOME = "tactbench.core.leaderboard.board"
+
+
+def to_html(rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]] = ()) -> str:
+    """Return the leaderboard of `rows` as one HTML page; the same rows give the same page.
+
+    Parameters
+    ----------
+    rows
+        As a run writes them. What is odd in them is set right or left out, and the page says so.
+    provenance
+        What made them, one entry a run.
+    """
+    kept, remarks = sound(rows)
+    kept, table = table_of(kept)
+    order = _places(kept, table)
+    pack = Pack()
+    head = _head(pack, kept, table, order, remarks, provenance)
+    shown = still(table, kept, order) if len(kept) <= MOST_STILL else ""
+    frame = _frame(kept, shown)
+    head["fields"], head["leftOut"] = write_fields(pack, kept, LARGEST - len(frame.encode()) - _ROOM_FOR_HEAD)
+    written = pack.add(json.dumps(head, separators=(",", ":")).encode())
+    data = json.dumps({"head": written, "blobs": pack.blobs}, separators=(",", ":"))
+    return frame.replace(_DATA_HERE, data, 1)
+
+
+_ROOM_FOR_HEAD = 60_000
+"""Characters kept for what describes the columns."""
+_DATA_HERE = "{the data}"
+
+
+def _places(rows: Sequence[Row], table: Table) -> list[list[int]]:
+    """Return the places in `rows` of each block's lines, in the table's order."""
+    places: dict[str, deque[int]] = defaultdict(deque)
+    for place, row in enumerate(rows):
+        places[row["cell"]].append(place)
+    return [[places[line.cell].popleft() for line in block.lines if places[line.cell]] for block in table.blocks]
+
+
+def _head(
+    pack: Pack,
+    rows: Sequence[Row],
+    table: Table,
+    order: Sequence[Sequence[int]],
+    remarks: Sequence[str],
+    provenance: Sequence[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """Return all that the page's script must know, the blobs that it is in aside."""
+    lines = [line for block in table.blocks for line in block.lines]
+    flat = [place for block in order for place in block]
+    empty = ("",) * len(table.columns)
+    cells: list[tuple[str, ...]] = [empty] * len(rows)
+    kinds = [""] * len(rows)
+    for place, line in zip(flat, lines, strict=True):
+        cells[place] = line.cells
+        kinds[place] = line.kind
+    texts = list(zip(*cells, strict=True)) if cells else [()] * len(table.columns)
+    firsts = [rows[block[0]] for block in order]
+    notes = [cut(note, LONGEST_NOTE) for note in (*remarks, *table.notes)]
+    if len(notes) > MOST_NOTES:
+        notes = [*notes[:MOST_NOTES], f"{len(notes) - MOST_NOTES} more notes are not in this page."]
+    return {
+        "version": tactbench.__version__,
+        "rows": len(rows),
+        "order": pack.planes(flat),
+        "kinds": write_words(pack, kinds),
+        "blocks": [
+            {"title": block.title, "size": len(block.lines), "lower": first["metric"] in LOWER_IS_BETTER}
+            | {key: first[key] for key in ("task", "metric", "unit", "simulated", "rig")}
+            for block, first in zip(table.blocks, firsts, strict=True)
+        ],
+        "columns": [
+            {"name": name, "numeric": name in NUMERIC, "column": _column(pack, name, shown, rows)}
+            for name, shown in zip(table.columns, texts, strict=True)
+        ],
+        "groups": GROUPS,
+        "titles": TITLES,
+        "notes": notes,
+        "provenance": [tame(entry) for entry in provenance],
+    }
+
+
+def _column(pack: Pack, name: str, texts: Sequence[str], rows: Sequence[Row]) -> Column:
+    if name in NUMERIC:
+        found = VALUES.get(name)
+        values = [found(row) for row in rows] if found else None
+        column = write_digits(pack, texts, values)
+        if column is not None:
+            return column
+    return write_words(pack, texts)
+
+
+def _frame(rows: Sequence[Row], shown: str) -> str:
+    """Return the page but for its data."""
+    style = house_style() + own(_HOME, "board.css")
+    script = '\n"use strict";\n(() => {\n' + own(_HOME, *_SCRIPTS) + "})();\n"
+    if not shown:
+        shown = (
+            f"<p class='missing'>This board has {len(rows):,} cells: a script of its own draws them, and needs a "
+            "browser that allows it. Nothing is fetched from anywhere. Without scripts, read "
+            "<code>leaderboard.md</code> or <code>leaderboard.csv</code> in the result folder.</p>"
+        )
+    return Template(own(_HOME, "board.html")).substitute(
+        title=escape(TITLE),
+        version=escape(tactbench.__version__),
+        style=style,
+        script=script,
+        style_hash=policy_hash(style),
+        script_hash=policy_hash(script),
+        shown=shown,
+        data=_DATA_HERE,
+    )

@@ -1,0 +1,89 @@
+"""Values that many rows share: each written once, and where it stands.
+
+What a page is handed may be anything: values that JSON has no word for become text, endless ones are cut, and so is
+what is longer than anybody reads; each says so in its place.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tactbench.core.leaderboard.board.pack import Column, Pack
+
+LONGEST = 65_536
+"""Characters of a text: what a cell may print is kept to as many bytes."""
+DEEPEST = 12
+"""Levels of lists in lists."""
+MOST_FIGURES = 100
+_PLAIN = frozenset({str, int, bool, float, type(None)})
+
+
+def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Column:
+    """Write a column of any values."""
+    known: dict[str, int] = {}
+    seen: dict[Any, int] = {}
+    places: list[int] = []
+    for value in values:
+        kind = type(value)
+        # By value where that is safe (1, 1.0 and True are equal), else by identity: the rows outlive this call.
+        key = (kind, value) if kind in _PLAIN else id(value)
+        place = seen.get(key)
+        if place is None:
+            place = seen[key] = known.setdefault(written(value, longest), len(known))
+        places.append(place)
+    words = "[" + ",".join(known) + "]"
+    return {"kind": "words", "words": pack.add(words.encode()), "at": pack.planes(places)}
+
+
+def written(value: Any, longest: int = LONGEST) -> str:
+    """Return a value as JSON of ASCII only, whatever it is."""
+    if isinstance(value, str) and len(value) <= longest:
+        return json.dumps(value)
+    try:
+        text = json.dumps(value, allow_nan=False)
+        if len(text) <= longest:
+            return text
+    except (TypeError, ValueError, RecursionError):
+        pass
+    return json.dumps(tame(value, longest))
+
+
+def tame(value: Any, longest: int = LONGEST, depth: int = 0) -> Any:
+    """Return a value that JSON has words for, cut where it is too long or too deep, saying so."""
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int):
+        if abs(value) < 2**53:  # beyond that a browser rounds
+            return int(value)
+        return str(value) if abs(value) < 10**MOST_FIGURES else f"a whole number of more than {MOST_FIGURES} digits"
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else str(value)
+    if isinstance(value, str):
+        return cut(str(value), longest)
+    if depth >= DEEPEST:
+        return "[cut: too deep]"
+    if isinstance(value, Mapping):
+        most = max(1, longest // 16)
+        found = {tame_text(name): tame(one, longest, depth + 1) for name, one in list(value.items())[:most]}
+        return found | {"[cut]": f"{len(value) - most} more"} if len(value) > most else found
+    if isinstance(value, Sequence) and not isinstance(value, bytes | bytearray):
+        most = max(1, longest // 4)
+        listed = [tame(one, longest, depth + 1) for one in value[:most]]
+        return [*listed, f"[cut: {len(value) - most} more]"] if len(value) > most else listed
+    return cut(tame_text(value), longest)
+
+
+def tame_text(value: Any) -> str:
+    """Return what a value calls itself, even if that fails."""
+    try:
+        return value if type(value) is str else str(value)
+    except Exception as error:
+        return f"[a {type(value).__name__} that cannot be shown: {type(error).__name__}]"
+
+
+def cut(text: str, longest: int) -> str:
+    """Return the end of a text that is too long, with a remark; the end is where a traceback says what happened."""
+    return text if len(text) <= longest else f"[cut: the last {longest} of {len(text)} characters] {text[-longest:]}"
