@@ -84,23 +84,16 @@ def write_digits(pack: Pack, texts: Sequence[str], values: Sequence[float | None
         return None
     encoded = joined.encode()
     masked = encoded.translate(_MASKED).decode().split("\n")
-    digits = encoded.translate(None, _NO_DIGIT).split(b"\n")
-    patterns: list[Pattern] = []
-    known: dict[str, int] = {}
-    places: list[int] = []
-    whole: list[int] = []
-    for text, shape, number in zip(texts, masked, digits, strict=True):
-        place = known.get(shape)
-        if place is None:
-            pattern = read_pattern(shape)
-            if pattern is None:  # a text of its own
-                shape, number = text, b""
-                place, pattern = known.get(text), Pattern(text)
-            if place is None:
-                place = known[shape] = len(patterns)
-                patterns.append(pattern)
-        places.append(place)
-        whole.append(int(number) if number else 0)
+    digits = (b"0" + encoded.translate(None, _NO_DIGIT).replace(b"\n", b"\n0")).split(b"\n")
+    known = {shape: read_pattern(shape) for shape in dict.fromkeys(masked)}
+    if None in known.values():  # texts of their own
+        for place, shape in enumerate(masked):
+            if known[shape] is None:
+                masked[place], digits[place] = texts[place], b"0"
+        known = {shape: known.get(shape) or Pattern(shape) for shape in dict.fromkeys(masked)}
+    patterns = [pattern for pattern in known.values() if pattern is not None]
+    places = list(map(dict(zip(known, range(len(known)), strict=True)).__getitem__, masked))
+    whole = list(map(int, digits))
     numbers, shown, last = _numbers(patterns, np.array(places), np.array(whole, dtype=np.int64))
     column: Column = {
         "kind": "digits",

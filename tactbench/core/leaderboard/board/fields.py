@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
 from tactbench.core.leaderboard.board.digits import write_digits
@@ -36,6 +37,8 @@ _OWN = ("scores", "confusion", "search", "replicates")
 """What is large and every cell's own, the most telling first."""
 _LENGTHS = (LONGEST, 8_192, 1_024, 200)
 """Characters that a text is cut to, one after the other, until the column fits."""
+NOTHING: Column = {"kind": "nothing"}
+"""A column of empty texts."""
 _HEX = re.compile(f"[0-9a-f]{{{KEY_DIGITS}}}")
 
 
@@ -59,7 +62,7 @@ def write_fields(pack: Pack, rows: Sequence[Row], room: int) -> tuple[dict[str, 
         _write(pack, rows, key, room, columns, left_out, many)
     others = [*_IN_THE_LINE, *_OWN]
     known = {*columns, *left_out, *others}
-    more = list(dict.fromkeys(key for row in rows for key in row if key not in known))
+    more = sorted(set().union(*rows) - known, key=str)
     if many:
         left_out += [key for key in (*_OWN, *more) if any(row.get(key) for row in rows)]
     else:
@@ -72,28 +75,32 @@ def _write(
     pack: Pack, rows: Sequence[Row], key: str, room: int, columns: dict[str, Column], left_out: list[str], many: bool
 ) -> None:
     """Write one column, cut as far as it must be, or not at all; a column that says nothing is not written."""
-    values = [row.get(key) for row in rows]
-    if not any(value or value == 0 for value in values):
-        return
+    values = _values(rows, key)
+    types = set(map(type, values))
     before = len(pack.blobs)
-    if many and {type(value) for value in values} <= {float, int, type(None)} and float in set(map(type, values)):
-        texts = [_shortly(key, value) for value in values]
-        column = write_digits(pack, texts)
+    if many and float in types and types <= {float, int, type(None)}:
+        column = write_digits(pack, [_shortly(key, value) for value in values])
         if column is not None and pack.size <= room:
             columns[key] = column
             return
-        pack.forget_from(before)
-        left_out.append(key)
-        return
-    for longest in _LENGTHS:
-        column = write_words(pack, values, longest)
-        if pack.size <= room:
-            columns[key] = column
-            return
-        pack.forget_from(before)
-        if not any(isinstance(value, str) for value in values):
-            break
+    else:
+        for longest in _LENGTHS if str in types else _LENGTHS[:1]:
+            column = write_words(pack, values, longest)
+            if column is None:
+                return
+            if pack.size <= room:
+                columns[key] = column
+                return
+            pack.forget_from(before)
+    pack.forget_from(before)
     left_out.append(key)
+
+
+def _values(rows: Sequence[Row], key: str) -> list[Any]:
+    try:
+        return list(map(itemgetter(key), rows))
+    except KeyError:
+        return [row.get(key) for row in rows]
 
 
 def _shortly(key: str, value: float | None) -> str:
@@ -106,13 +113,17 @@ def _names(pack: Pack, names: Sequence[str]) -> Column:
     """Write names of cells part by part: what stands between their strokes is shared by many."""
     parts = [name.split("/") for name in names]
     if not parts or len({len(one) for one in parts}) > 1:
-        return write_words(pack, names)
-    return {"kind": "joined", "by": "/", "parts": [write_words(pack, part) for part in zip(*parts, strict=True)]}
+        return write_words(pack, names) or NOTHING
+    return {
+        "kind": "joined",
+        "by": "/",
+        "parts": [write_words(pack, part) or NOTHING for part in zip(*parts, strict=True)],
+    }
 
 
 def _keys(pack: Pack, rows: Sequence[Row], many: bool) -> Column:
     keys = [str(row.get("key") or "") for row in rows]
     if not many or not all(_HEX.match(key) or not key for key in keys):
-        return write_words(pack, keys)
+        return write_words(pack, keys) or NOTHING
     whole = [int(key[:KEY_DIGITS], 16) if key else 0 for key in keys]
     return {"kind": "hex", "digits": KEY_DIGITS, "at": pack.planes(whole)}

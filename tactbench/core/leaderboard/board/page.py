@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections import defaultdict, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Mapping, Sequence
 from html import escape
 from string import Template
@@ -11,10 +11,10 @@ from typing import Any
 
 import tactbench
 from tactbench.core.leaderboard.board.digits import write_digits
-from tactbench.core.leaderboard.board.fields import write_fields
+from tactbench.core.leaderboard.board.fields import NOTHING, write_fields
 from tactbench.core.leaderboard.board.pack import Column, Pack
 from tactbench.core.leaderboard.board.sound import sound, table_of
-from tactbench.core.leaderboard.board.still import still
+from tactbench.core.leaderboard.board.still import still, visible
 from tactbench.core.leaderboard.board.words import cut, tame, write_words
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.particulars import GROUPS, TITLES
@@ -31,6 +31,8 @@ MOST_STILL = 500
 LONGEST_NOTE = 4_000
 MOST_NOTES = 2_000
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
+DURATIONS = ("latency p50", "p95", "fit", "sim", "batch/row")
+"""Columns that a score can be drawn against."""
 _HOME = "tactbench.core.leaderboard.board"
 
 
@@ -54,7 +56,9 @@ def to_html(rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]] = ()) -
     head["fields"], head["leftOut"] = write_fields(pack, kept, LARGEST - len(frame.encode()) - _ROOM_FOR_HEAD)
     written = pack.add(json.dumps(head, separators=(",", ":")).encode())
     data = json.dumps({"head": written, "blobs": pack.blobs}, separators=(",", ":"))
-    return frame.replace(_DATA_HERE, data, 1)
+    # The last one: a name may say the same.
+    before, _, after = frame.rpartition(_DATA_HERE)
+    return before + data + after
 
 
 _ROOM_FOR_HEAD = 60_000
@@ -96,7 +100,7 @@ def _head(
         "version": tactbench.__version__,
         "rows": len(rows),
         "order": pack.planes(flat),
-        "kinds": write_words(pack, kinds),
+        "kinds": write_words(pack, kinds) or NOTHING,
         "blocks": [
             {"title": block.title, "size": len(block.lines), "lower": first["metric"] in LOWER_IS_BETTER}
             | {key: first[key] for key in ("task", "metric", "unit", "simulated", "rig")}
@@ -106,11 +110,19 @@ def _head(
             {"name": name, "numeric": name in NUMERIC, "column": _column(pack, name, shown, rows)}
             for name, shown in zip(table.columns, texts, strict=True)
         ],
+        "roles": _roles(table.columns),
         "groups": GROUPS,
         "titles": TITLES,
         "notes": notes,
         "provenance": [tame(entry) for entry in provenance],
     }
+
+
+def _roles(columns: Sequence[str]) -> dict[str, Any]:
+    """Return which columns the page's script needs by what they are."""
+    first = next((name for name in columns if name in ("#", "rank")), "")
+    named = {"rank": first, "sensor": "sensor", "estimator": "estimator", "score": "score", "interval": "95 % interval"}
+    return {**named, "times": [name for name in DURATIONS if name in columns]}
 
 
 def _column(pack: Pack, name: str, texts: Sequence[str], rows: Sequence[Row]) -> Column:
@@ -120,7 +132,7 @@ def _column(pack: Pack, name: str, texts: Sequence[str], rows: Sequence[Row]) ->
         column = write_digits(pack, texts, values)
         if column is not None:
             return column
-    return write_words(pack, texts)
+    return write_words(pack, texts) or NOTHING
 
 
 def _frame(rows: Sequence[Row], shown: str) -> str:
@@ -140,6 +152,15 @@ def _frame(rows: Sequence[Row], shown: str) -> str:
         script=script,
         style_hash=policy_hash(style),
         script_hash=policy_hash(script),
+        summary=escape(_summary(rows)),
         shown=shown,
         data=_DATA_HERE,
     )
+
+
+def _summary(rows: Sequence[Row]) -> str:
+    """Return how many cells there are, and how they ended."""
+    ends = Counter(visible(str(row["status"])) for row in rows)
+    told = ", ".join(f"{count:,} {status}" for status, count in ends.most_common())
+    sensors, tasks = (len({row[key] for row in rows}) for key in ("sensor", "task"))
+    return f"{len(rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {told}." if rows else "No cells."

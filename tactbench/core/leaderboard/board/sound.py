@@ -91,9 +91,9 @@ def _limited(values: Sequence[Any], key: str, types: Collection[type]) -> bool:
     if key in _NAMES:
         return any(value is not None and len(value) > LONGEST_NAME for value in set(values))
     if float in types:
-        return not all(value is None or math.isfinite(value) for value in values)
+        return not math.isfinite(sum(filter(None, values)))
     if key in ("counts", "chosen", "stamps", "remarks"):
-        return not all(_fits(value, key, types) for value in {id(value): value for value in values}.values())
+        return not all(_fits(value, key, types) for value in dict(zip(map(id, values), values, strict=True)).values())
     return False
 
 

@@ -18,32 +18,39 @@ LONGEST = 65_536
 DEEPEST = 12
 """Levels of lists in lists."""
 MOST_FIGURES = 100
-_PLAIN = frozenset({str, int, bool, float, type(None)})
+_ENCODER = json.JSONEncoder(allow_nan=False)
+_EMPTY: dict[type, str] = {list: "[]", tuple: "[]", dict: "{}"}
+_NOTHING = type(None)
+_PLAIN = frozenset({str, int, bool, float, _NOTHING})
+_SILENT = frozenset({"null", '""', "[]", "{}"})
 
 
-def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Column:
-    """Write a column of any values."""
-    known: dict[str, int] = {}
-    seen: dict[Any, int] = {}
-    places: list[int] = []
-    for value in values:
-        kind = type(value)
-        # By value where that is safe (1, 1.0 and True are equal), else by identity: the rows outlive this call.
-        key = (kind, value) if kind in _PLAIN else id(value)
-        place = seen.get(key)
-        if place is None:
-            place = seen[key] = known.setdefault(written(value, longest), len(known))
-        places.append(place)
-    words = "[" + ",".join(known) + "]"
-    return {"kind": "words", "words": pack.add(words.encode()), "at": pack.planes(places)}
+def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Column | None:
+    """Write a column of any values; None if none of them says anything."""
+    types = set(map(type, values))
+    # By value where that is safe (1, 1.0 and True are equal), else by identity: the values outlive this call.
+    alike = len(types - {_NOTHING}) <= 1 and types <= _PLAIN
+    keys: Sequence[Any] = values if alike else list(map(id, values))
+    texts: dict[str, int] = {}
+    places = {
+        key: texts.setdefault(written(value, longest), len(texts))
+        for key, value in dict(zip(keys, values, strict=True)).items()
+    }
+    if texts.keys() <= _SILENT:
+        return None
+    words = "[" + ",".join(texts) + "]"
+    at = pack.planes(list(map(places.__getitem__, keys)))
+    return {"kind": "words", "words": pack.add(words.encode()), "at": at}
 
 
 def written(value: Any, longest: int = LONGEST) -> str:
     """Return a value as JSON of ASCII only, whatever it is."""
     if isinstance(value, str) and len(value) <= longest:
         return json.dumps(value)
+    if type(value) in _EMPTY and not value:
+        return _EMPTY[type(value)]
     try:
-        text = json.dumps(value, allow_nan=False)
+        text = _ENCODER.encode(value)
         if len(text) <= longest:
             return text
     except (TypeError, ValueError, RecursionError):
