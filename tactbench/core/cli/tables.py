@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-TABLE_FORMATS = ("table", "json", "md", "latex", "csv")
+TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "html")
 
 
 def print_rows(rows: Sequence[Mapping[str, Any]], shape: str) -> None:

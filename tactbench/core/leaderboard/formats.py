@@ -143,10 +143,18 @@ def _tex(text: str) -> str:
     return "".join(_TEX.get(character, character) for character in text)
 
 
+def to_page(rows: Sequence[Row]) -> str:
+    """Return the leaderboard as one HTML file, every cell behind its numbers."""
+    from tactbench.core.leaderboard.board.page import to_html
+
+    return to_html(rows)
+
+
 FORMATS: dict[str, Callable[[Sequence[Row]], str]] = {
     "json": to_json,
     "csv": to_csv,
     "md": to_markdown,
     "latex": to_latex,
+    "html": to_page,
 }
 """Formats that are plain text, by their name on the command line."""

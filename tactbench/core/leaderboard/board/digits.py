@@ -24,8 +24,10 @@ STEPS = 254
 NO_VALUE = 255
 MOST_DIGITS = 15
 """Digits that a float64 holds for sure, which is what the page's script counts in."""
-MOST_NUMBERS = 2
-"""An interval has two."""
+MOST_NUMBERS = 3
+"""An interval has two, and a mark behind it may be a third."""
+BETWEEN = ("…", "–")
+"""What stands between the two ends of an interval."""
 FEW = 20
 """One value in so many may be written out because it is not what its text shows; if more are, all are."""
 
@@ -33,7 +35,7 @@ _SECONDS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 _MASKED = bytes.maketrans(b"0123456789", MASK.encode() * 10)
 _NO_DIGIT = bytes(byte for byte in range(256) if byte not in b"0123456789\n")
 _NUMBER = re.compile(r"([-−]?)(#[#\u202f]*(?:\.(#+))?)")
-_UNIT = re.compile(r"\s*(\S+)")
+_UNIT = re.compile(r"\s*(min|ms|µs|s|h)(?![A-Za-z])")
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Pattern:
     """Digits of each number in it."""
     scales: tuple[float, ...] = ()
     """What one in the last digit of each number is worth; negative after a minus."""
+    shares: tuple[float, ...] = ()
+    """How much of each number is the value that the text shows: an interval's middle, else the first number."""
 
 
 def read_pattern(masked: str) -> Pattern | None:
@@ -55,10 +59,12 @@ def read_pattern(masked: str) -> Pattern | None:
         return None
     if re.search(r"#[eE][-+]?#", masked):
         return None
-    unit = _UNIT.match(masked, found[-1].end()) if found else None
-    factor = _SECONDS.get(unit[1], 1.0) if unit else 1.0
+    ranged = len(found) > 1 and masked[found[0].end() : found[1].start()].strip() in BETWEEN
+    unit = _UNIT.match(masked, found[1 if ranged else 0].end()) if found else None
+    factor = _SECONDS[unit[1]] if unit else 1.0
     scales = tuple((-factor if one[1] else factor) / 10 ** len(one[3] or "") for one in found)
-    return Pattern(masked, counts, scales)
+    shares = ((0.5, 0.5, 0.0) if ranged else (1.0, 0.0, 0.0))[: len(found)]
+    return Pattern(masked, counts, scales, shares)
 
 
 def write_digits(pack: Pack, texts: Sequence[str], values: Sequence[float | None] | None = None) -> Column | None:
@@ -70,17 +76,17 @@ def write_digits(pack: Pack, texts: Sequence[str], values: Sequence[float | None
         What is shown, one a row.
     values
         What each was rounded from, in seconds where it is a duration; None: what is shown is all there is. Of a text
-        with two numbers it is the one midway.
+        that is an interval it is the middle.
 
     Returns
     -------
     Column or None
-        None if the texts cannot be written so: one has a line break, or a ``#``.
+        None if the texts cannot be written so: there are none, or one has a line break, a ``#`` or half a character.
     """
     import numpy as np
 
     joined = "\n".join(texts)
-    if MASK in joined or joined.count("\n") != max(0, len(texts) - 1) or _unwritable(joined):
+    if not texts or MASK in joined or joined.count("\n") != max(0, len(texts) - 1) or _unwritable(joined):
         return None
     encoded = joined.encode()
     masked = encoded.translate(_MASKED).decode().split("\n")
@@ -97,7 +103,7 @@ def write_digits(pack: Pack, texts: Sequence[str], values: Sequence[float | None
     numbers, shown, last = _numbers(patterns, np.array(places), np.array(whole, dtype=np.int64))
     column: Column = {
         "kind": "digits",
-        "patterns": [[one.text, one.counts, one.scales] for one in patterns],
+        "patterns": [[one.text, one.counts, one.scales, one.shares] for one in patterns],
         "at": pack.planes(places),
         "numbers": [pack.planes(one) for one in numbers],
     }
@@ -118,7 +124,7 @@ def _unwritable(text: str) -> bool:
 def _numbers(
     patterns: Sequence[Pattern], places: NDArray[np.int64], whole: NDArray[np.int64]
 ) -> tuple[list[NDArray[np.uint64]], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the numbers of each text, the mean of what they show (NaN: none), and what its last digit is worth."""
+    """Return the numbers of each text, the value that it shows (NaN: none), and what its last digit is worth."""
     import numpy as np
 
     count = max((len(pattern.counts) for pattern in patterns), default=0)
@@ -138,8 +144,8 @@ def _numbers(
             parts.insert(0, part)
         for target, part in zip(numbers, parts, strict=False):
             target[here] = part
-        mean = sum(part * scale for part, scale in zip(parts, pattern.scales, strict=True)) / len(parts)
-        shown[here] = mean
+        told = zip(parts, pattern.scales, pattern.shares, strict=True)
+        shown[here] = sum(part * scale * share for part, scale, share in told)
         last[here] = abs(pattern.scales[0])
     return numbers, shown, last
 

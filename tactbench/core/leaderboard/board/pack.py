@@ -20,6 +20,11 @@ Column = dict[str, Any]
 """What the page's script needs to read a column: its kind, and the numbers of its blobs."""
 
 
+def deflated(content: bytes) -> str:
+    """Return bytes as a zlib stream in base64."""
+    return base64.b64encode(zlib.compress(content, 9)).decode()
+
+
 class Pack:
     """Blobs by number; equal ones are kept once."""
 
@@ -33,7 +38,7 @@ class Pack:
         """Return the number of a blob with this content."""
         number = self._numbers.get(content)
         if number is None:
-            blob = base64.b64encode(zlib.compress(content, 9)).decode()
+            blob = deflated(content)
             number = self._numbers[content] = len(self._blobs)
             self._blobs.append(blob)
             self.size += len(blob)

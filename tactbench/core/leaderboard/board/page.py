@@ -6,13 +6,14 @@ import json
 from collections import Counter, defaultdict, deque
 from collections.abc import Mapping, Sequence
 from html import escape
+from operator import itemgetter
 from string import Template
 from typing import Any
 
 import tactbench
 from tactbench.core.leaderboard.board.digits import write_digits
 from tactbench.core.leaderboard.board.fields import NOTHING, write_fields
-from tactbench.core.leaderboard.board.pack import Column, Pack
+from tactbench.core.leaderboard.board.pack import Column, Pack, deflated
 from tactbench.core.leaderboard.board.sound import sound, table_of
 from tactbench.core.leaderboard.board.still import still, visible
 from tactbench.core.leaderboard.board.words import cut, tame, write_words
@@ -30,6 +31,8 @@ MOST_STILL = 500
 """Lines up to which the page also holds its tables as plain HTML, for readers without scripts."""
 LONGEST_NOTE = 4_000
 MOST_NOTES = 2_000
+MOST_LINES = 500
+"""Lines of a table below the blocks."""
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
 DURATIONS = ("latency p50", "p95", "fit", "sim", "batch/row")
 """Columns that a score can be drawn against."""
@@ -47,23 +50,46 @@ def to_html(rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]] = ()) -
         What made them, one entry a run.
     """
     kept, remarks = sound(rows)
-    kept, table = table_of(kept)
-    order = _places(kept, table)
+    kept, table = table_of(sorted(kept, key=itemgetter("cell")))
+    return page_of(table, kept, provenance, remarks)
+
+
+def page_of(
+    table: Table, rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]] = (), remarks: Sequence[str] = ()
+) -> str:
+    """Return the page of a table.
+
+    Parameters
+    ----------
+    table
+        Of `rows`: each row has a line, which names its cell.
+    rows
+        In the order of their cells' names, in which what they share lies together.
+    provenance
+        What made them.
+    remarks
+        What a reader must know first.
+    """
+    order = _places(rows, table)
     pack = Pack()
-    head = _head(pack, kept, table, order, remarks, provenance)
-    shown = still(table, kept, order) if len(kept) <= MOST_STILL else ""
-    frame = _frame(kept, shown)
-    head["fields"], head["leftOut"] = write_fields(pack, kept, LARGEST - len(frame.encode()) - _ROOM_FOR_HEAD)
-    written = pack.add(json.dumps(head, separators=(",", ":")).encode())
+    head = _head(pack, rows, table, order, remarks, provenance)
+    frame = _frame(rows, still(table, rows, order, remarks) if len(rows) <= MOST_STILL else "")
+    taken = len(frame.encode()) + len(deflated(_json(head))) + _ROOM_FOR_FIELDS
+    head["fields"], head["leftOut"] = write_fields(pack, rows, LARGEST - taken)
+    written = pack.add(_json(head))
     data = json.dumps({"head": written, "blobs": pack.blobs}, separators=(",", ":"))
     # The last one: a name may say the same.
     before, _, after = frame.rpartition(_DATA_HERE)
     return before + data + after
 
 
-_ROOM_FOR_HEAD = 60_000
-"""Characters kept for what describes the columns."""
+_ROOM_FOR_FIELDS = 12_000
+"""Characters kept for what describes the columns of details, and for what stands between the blobs."""
 _DATA_HERE = "{the data}"
+
+
+def _json(value: Any) -> bytes:
+    return json.dumps(value, separators=(",", ":")).encode()
 
 
 def _places(rows: Sequence[Row], table: Table) -> list[list[int]]:
@@ -110,11 +136,26 @@ def _head(
             {"name": name, "numeric": name in NUMERIC, "column": _column(pack, name, shown, rows)}
             for name, shown in zip(table.columns, texts, strict=True)
         ],
+        "sections": [_section(section) for section in getattr(table, "sections", ())],
+        "foot": [cut(text, LONGEST_NOTE) for text in getattr(table, "foot", ())],
         "roles": _roles(table.columns),
         "groups": GROUPS,
         "titles": TITLES,
         "notes": notes,
         "provenance": [tame(entry) for entry in provenance],
+    }
+
+
+def _section(section: Any) -> dict[str, Any]:
+    """Return a table below the blocks, which no cell is behind."""
+    lines = [list(line) for line in section.lines[:MOST_LINES]]
+    more = len(section.lines) - len(lines)
+    notes = [*section.notes, *([f"{more} more lines are in the tables, not in this page."] if more else [])]
+    return {
+        "title": section.title,
+        "columns": [[name, name in section.numeric] for name in section.columns],
+        "lines": lines,
+        "notes": [cut(note, LONGEST_NOTE) for note in notes],
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -10,18 +10,22 @@ from typing import Any
 from tactbench.core.leaderboard.one_file import prose
 from tactbench.core.leaderboard.table import NUMERIC, Table
 
-_UNSEEN = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff]"
-)
-"""What a reader cannot see, or what makes the rest read backwards; joiners, which some scripts need, stay."""
-
 
 def visible(text: str) -> str:
-    r"""Return text with what cannot be seen written out, as ``\u202e``."""
-    return _UNSEEN.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    r"""Return text with what cannot be seen, or turns the rest round, written out, as ``\u202e``."""
+    return text if text.isprintable() else "".join(map(_shown, text))
 
 
-def still(table: Table, rows: Sequence[Mapping[str, Any]], order: Sequence[Sequence[int]]) -> str:
+def _shown(character: str) -> str:
+    if character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs":
+        return character
+    code = ord(character)
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def still(
+    table: Table, rows: Sequence[Mapping[str, Any]], order: Sequence[Sequence[int]], remarks: Sequence[str]
+) -> str:
     """Return every block of `table` as HTML, and its notes; everything in them is escaped."""
     parts: list[str] = []
     for block, places in zip(table.blocks, order, strict=True):
@@ -41,7 +45,7 @@ def still(table: Table, rows: Sequence[Mapping[str, Any]], order: Sequence[Seque
             f'<div class="box"><table><caption>{_text(block.title)}</caption>\n'
             f"<thead><tr>{heads}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
         )
-    notes = "\n".join(f"<li>{prose(visible(note))}</li>" for note in table.notes)
+    notes = "\n".join(f"<li>{prose(visible(note))}</li>" for note in (*remarks, *table.notes))
     return "\n".join(parts) + f'\n<ul class="notes">\n{notes}\n</ul>'
 
 

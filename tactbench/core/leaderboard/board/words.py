@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -18,6 +19,8 @@ LONGEST = 65_536
 DEEPEST = 12
 """Levels of lists in lists."""
 MOST_FIGURES = 100
+_LONG_WHOLE = re.compile(r"(?<![\d.])\d{16}")
+"""What may be a whole number that a browser rounds."""
 _ENCODER = json.JSONEncoder(allow_nan=False)
 _EMPTY: dict[type, str] = {list: "[]", tuple: "[]", dict: "{}"}
 _NOTHING = type(None)
@@ -51,7 +54,7 @@ def written(value: Any, longest: int = LONGEST) -> str:
         return _EMPTY[type(value)]
     try:
         text = _ENCODER.encode(value)
-        if len(text) <= longest:
+        if len(text) <= longest and not _LONG_WHOLE.search(text):
             return text
     except (TypeError, ValueError, RecursionError):
         pass

@@ -78,7 +78,7 @@ const cellBody = (row) => {
   const grouped = new Set(Object.values(head.groups).flat());
   const apart = new Set(["traceback", "log", "classes", ...Object.keys(head.titles)]);
   const others = Object.keys(head.fields).filter((name) => !grouped.has(name) && !apart.has(name));
-  const parts = [...pairs("As the table shows it", [["block", head.blocks[board.blockOf[row]]?.title ?? ""], ...line])];
+  const parts = [...pairs("As the table shows it", line)];
   for (const [title, names] of Object.entries(head.groups)) parts.push(...pairs(title, names.flatMap(single)));
   parts.push(...pairs("Also", others.flatMap(single)));
   const classes = board.raw("classes", row);
@@ -111,6 +111,7 @@ const openCell = (row) => {
     make("header", {},
       make("h2", { id: "cell-title" }, name),
       make("button", { type: "button", class: "close", "aria-label": "Close", onclick: () => dialog.close() }, "×")),
+    make("p", { class: "note" }, head.blocks[board.blockOf[row]]?.title ?? ""),
     make("div", { class: `ended ${status === "done" ? "good" : "bad"}` }, make("strong", {}, status || "?"),
       status === "done" ? "" : `: ${board.field("reason", row)}`),
     ...commands(name),

@@ -50,12 +50,16 @@ const drawMatrix = () => {
     state.matrixPage = 0;
     drawMatrix();
   };
+  const titles = columns.map((place) => head.blocks[place].title.split(" · "));
+  const alike = titles.length > 1 ? titles[0].slice(1).filter((part) => titles.every((one) => one.includes(part))) : [];
+  byId("matrix-note").textContent = visible("One line a sensor and estimator, one column a block of the tables; the best " +
+    "of a column in bold. Scores are compared down a column only." + (alike.length ? ` All columns: ${alike.join(" · ")}.` : ""));
   table.tHead.replaceChildren(make("tr", {},
     heading("sensor", false, "sensor", sort, again), heading("estimator", false, "estimator", sort, again),
-    ...columns.map((place) => {
-      const [task, ...rest] = head.blocks[place].title.split(" · ");
+    ...columns.map((place, at) => {
+      const [task, ...rest] = titles[at];
       const one = heading(task, true, place, sort, again);
-      one.append(make("small", {}, rest.join(" · ")));
+      one.append(make("small", {}, rest.filter((part) => !alike.includes(part)).join(" · ")));
       return one;
     })));
   table.tBodies[0].replaceChildren(...lines.slice(from, from + MATRIX_PAGE).map((line) => make("tr", {},
@@ -67,8 +71,9 @@ const drawMatrix = () => {
       const best = kind === "result" && rank && parseInt(rank.column.text(row), 10) === 1;
       const text = score.column.text(row);
       return make("td", { class: `number ${kind}${best ? " best" : ""}` },
-        link(row, kind === "failed" && !/\d/.test(text) ? board.field("status", row) : text, true));
+        link(row, isStopped(kind) && !/\d/.test(text) ? board.field("status", row) : text, true));
     }))));
+  table.style.setProperty("--first", `${table.tHead.rows[0].cells[0].offsetWidth}px`);
   drawPager("matrix-pager", "lines", state.matrixPage, MATRIX_PAGE, lines.length, (page) => {
     state.matrixPage = page;
     drawMatrix();

@@ -44,7 +44,7 @@ const steps = (low, high, most) => {
 const decades = (low, high) => {
   const found = [];
   for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power += 1) {
-    for (const part of Math.log10(high / low) < 1.5 ? [1, 2, 5] : [1]) {
+    for (const part of Math.log10(high / low) < 2.5 ? [1, 2, 5] : [1]) {
       const value = part * 10 ** power;
       if (value >= low * 0.999 && value <= high * 1.001) found.push(value);
     }
@@ -71,7 +71,8 @@ const fillPicker = (select, entries, wanted) => {
 const drawTime = () => {
   const { head } = board;
   const figure = byId("pareto");
-  const axes = board.columns.filter((one) => head.roles.times.includes(one.name) && !board.silent(one));
+  const axes = head.roles.times.map((name) => board.columns.find((one) => one.name === name))
+    .filter((one) => !board.silent(one));
   const blocks = head.blocks.map((block, place) => [String(place), block.title])
     .filter(([place]) => board.anyShown(Number(place)));
   fillPicker(byId("time-block"), blocks, byId("time-block").value);
@@ -122,6 +123,7 @@ const frontTable = (front, axis) => {
         one.numeric ? link(row, one.column.text(row), one.name === board.head.roles.score) : one.column.text(row))))))));
 };
 
+const MANY_POINTS = 250;
 const drawFigure = (width, points, front, block, axis) => {
   const height = Math.max(300, Math.min(520, width * 0.6));
   const left = 64, right = 16, top = 12, bottom = 44;
@@ -162,12 +164,13 @@ const drawFigure = (width, points, front, block, axis) => {
   }
   const tip = make("div", { class: "tip", hidden: true, "aria-hidden": "true" });
   const onFront = new Set(front);
+  const small = points.length > MANY_POINTS ? 2.4 : 3.8;
   const drawn = points.map((one) => {
     const kind = `point ${one.kind}${onFront.has(one) ? " on-front" : ""}`;
     const shared = { class: kind, tabindex: -1, role: "link", "aria-label": tellPoint(one, axis).join(", ") };
-    const size = onFront.has(one) ? 5.5 : 3.8;
+    const size = onFront.has(one) ? 5.5 : small;
     const mark = one.kind === "baseline"
-      ? draw("rect", { ...shared, x: x(one.time) - 3.5, y: y(one.score) - 3.5, width: 7, height: 7 })
+      ? draw("rect", { ...shared, x: x(one.time) - small, y: y(one.score) - small, width: 2 * small, height: 2 * small })
       : draw("circle", { ...shared, cx: x(one.time), cy: y(one.score), r: size });
     mark.point = one;
     return mark;

@@ -55,11 +55,12 @@ const digitsColumn = (blobs, told) => {
     }
     const rest = told.rest === undefined ? null : blobs[told.rest];
     for (let row = 0; row < values.length; row += 1) {
-      const scales = told.patterns[at[row]][2];
+      const [, , scales, shares] = told.patterns[at[row]];
       if (!scales.length || (rest && rest[row] === NO_VALUE)) continue;
-      let sum = 0;
-      for (let place = 0; place < scales.length; place += 1) sum += numbers[place][row] * scales[place];
-      values[row] = sum / scales.length;
+      values[row] = 0;
+      for (let place = 0; place < scales.length; place += 1) {
+        values[row] += numbers[place][row] * scales[place] * shares[place];
+      }
       if (rest) values[row] += ((rest[row] - STEPS / 2) / STEPS) * Math.abs(scales[0]);
     }
     for (const [row, value] of told.odd ?? []) values[row] = value;

@@ -115,8 +115,21 @@ const drawNotes = (most) => {
   if (!notes.length) byId("notes").append(make("li", {}, "Nothing to note."));
 };
 
+const drawSections = () => {
+  byId("sections").replaceChildren(...board.head.sections.flatMap(({ title, columns, lines, notes }) => [
+    make("h2", {}, title),
+    make("div", { class: "box" }, make("table", { "aria-label": title },
+      make("thead", {}, make("tr", {}, ...columns.map(([name, numeric]) =>
+        make("th", { scope: "col", class: numeric ? "number" : "" }, name)))),
+      make("tbody", {}, ...lines.map((line) => make("tr", {}, ...line.map((text, place) =>
+        make("td", { class: columns[place][1] ? "number" : "" }, text))))))),
+    make("ul", { class: "notes" }, ...notes.map((note) => make("li", {}, ...prose(note)))),
+  ]));
+};
+
 const drawProvenance = () => {
   const all = board.head.provenance;
+  byId("foot").replaceChildren(...board.head.foot.map((text) => make("p", { class: "note" }, ...prose(text))));
   byId("provenance").replaceChildren(...(all.length ? all.map((entry) => make("details", {},
     make("summary", {}, Object.entries(entry).filter(([, value]) => !isEmpty(value) && !isRecord(value)).slice(0, 6)
       .map(([name, value]) => `${name} ${asText(value)}`).join(" · ")), ...provenanceTables(entry)))
@@ -162,6 +175,7 @@ const start = async () => {
     board = await readBoard();
     fillFilters();
     drawNotes(NOTES_AT_FIRST);
+    drawSections();
     drawProvenance();
     byId("app").hidden = false;
     byId("still").remove();

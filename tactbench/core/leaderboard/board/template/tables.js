@@ -50,6 +50,8 @@ const linesOfBlocks = () => {
   return found;
 };
 
+const isStopped = (kind) => kind !== "result" && kind !== "baseline";
+
 const drawLine = (row) => {
   const kind = board.kinds.text(row);
   const line = make("tr", { class: kind });
@@ -57,7 +59,7 @@ const drawLine = (row) => {
   for (let place = 0; place < board.visibleColumns.length; place += 1) {
     const { name, numeric, column } = board.visibleColumns[place];
     const text = column.text(row);
-    if (kind === "failed" && numeric && (text === ABSENT || text === "") && place > 0) {
+    if (isStopped(kind) && numeric && (text === ABSENT || text === "") && place > 0) {
       const why = board.field("reason", row) || board.field("status", row);
       line.append(make("td", { class: "reason", colspan: board.visibleColumns.length - place }, link(row, why, onTheWay)));
       break;

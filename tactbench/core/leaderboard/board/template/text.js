@@ -1,9 +1,9 @@
 // Text is only ever put in as text; what cannot be seen, or turns the rest round, is written out.
-const UNSEEN = new RegExp(
-  "[\\u0000-\\u0008\\u000b-\\u001f\\u007f-\\u009f\\u061c\\u200b\\u200e\\u200f\\u2028-\\u202e\\u2060-\\u206f\\ufeff" +
-  "\\ufff9-\\ufffb]|\\p{Surrogate}", "gu");
-const visible = (text) =>
-  text.replace(UNSEEN, (one) => `\\u${one.charCodeAt(0).toString(16).padStart(4, "0")}`);
+const UNSEEN = /(?![\n\t])[\p{C}\p{Zl}\p{Zp}]/gu;
+const visible = (text) => text.replace(UNSEEN, (one) => {
+  const code = one.codePointAt(0), hex = code.toString(16);
+  return code < 0x100 ? `\\x${hex.padStart(2, "0")}` : code < 0x10000 ? `\\u${hex.padStart(4, "0")}` : `\\U${hex.padStart(8, "0")}`;
+});
 
 const asText = (value) => {
   if (value === null || value === undefined) return "";
