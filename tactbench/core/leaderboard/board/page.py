@@ -36,6 +36,7 @@ MOST_LINES = 500
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
 DURATIONS = ("latency p50", "p95", "fit", "sim", "batch/row")
 """Columns that a score can be drawn against."""
+_NOTHING = frozenset({"", "–"})
 _HOME = "tactbench.core.leaderboard.board"
 
 
@@ -169,7 +170,10 @@ def _roles(columns: Sequence[str]) -> dict[str, Any]:
 def _column(pack: Pack, name: str, texts: Sequence[str], rows: Sequence[Row]) -> Column:
     if name in NUMERIC:
         found = VALUES.get(name)
-        values = [found(row) for row in rows] if found else None
+        # A stopped cell may know a number that the table does not show: it is not sorted by it either.
+        values = (
+            [None if text in _NOTHING else found(row) for row, text in zip(rows, texts, strict=True)] if found else None
+        )
         column = write_digits(pack, texts, values)
         if column is not None:
             return column
