@@ -1,7 +1,7 @@
 """Numbers as they are shown, written small and read back letter by letter; beside them what they are sorted by.
 
 ``12.3 ms`` is the pattern ``##.# ms`` and the whole number 123. The pattern also says what the number shown is worth
-(123e-4 s), so that the value it was rounded from takes one byte more: how far it is from the shown one, in 254ths of
+(123e-4 s), so that the value it was rounded from takes one byte more: how far it is from the shown one, in parts of
 the last digit. Texts that are no such thing are patterns of their own, without digits.
 """
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 MASK = "#"
 STEPS = 254
 """Parts of the last digit shown that a value is told to. One byte holds them and a sign for no value."""
+FEW_STEPS = 14
+"""The same where room is short: half a byte, once deflated."""
 NO_VALUE = 255
 MOST_DIGITS = 15
 """Digits that a float64 holds for sure, which is what the page's script counts in."""
@@ -67,7 +69,9 @@ def read_pattern(masked: str) -> Pattern | None:
     return Pattern(masked, counts, scales, shares)
 
 
-def write_digits(pack: Pack, texts: Sequence[str], values: Sequence[float | None] | None = None) -> Column | None:
+def write_digits(
+    pack: Pack, texts: Sequence[str], values: Sequence[float | None] | None = None, steps: int = STEPS
+) -> Column | None:
     """Write a column of texts, and what they are sorted by.
 
     Parameters
@@ -77,6 +81,8 @@ def write_digits(pack: Pack, texts: Sequence[str], values: Sequence[float | None
     values
         What each was rounded from, in seconds where it is a duration; None: what is shown is all there is. Of a text
         that is an interval it is the middle.
+    steps
+        Parts of the last digit that it is told to.
 
     Returns
     -------
@@ -108,7 +114,7 @@ def write_digits(pack: Pack, texts: Sequence[str], values: Sequence[float | None
         "numbers": [pack.planes(one) for one in numbers],
     }
     if values is not None:
-        column |= _write_values(pack, shown, last, np.array(values, dtype=np.float64))
+        column |= _write_values(pack, shown, last, np.array(values, dtype=np.float64), steps)
     return column
 
 
@@ -151,21 +157,21 @@ def _numbers(
 
 
 def _write_values(
-    pack: Pack, shown: NDArray[np.float64], last: NDArray[np.float64], values: NDArray[np.float64]
+    pack: Pack, shown: NDArray[np.float64], last: NDArray[np.float64], values: NDArray[np.float64], steps: int
 ) -> Column:
     """Return the keys of a column that say what its rows are sorted by."""
     import numpy as np
 
     with np.errstate(invalid="ignore", over="ignore"):
-        parts = np.round((values - shown) / last * STEPS)
+        parts = np.round((values - shown) / last * steps)
         there = np.isfinite(values)
-        near = there & (np.abs(parts) <= STEPS // 2)
+        near = there & (np.abs(parts) <= steps // 2)
         odd = np.flatnonzero(there & ~near)
         if len(odd) * FEW > len(values):
             # 32 bits: seven digits.
             return {"values": pack.add(np.where(there, values, np.nan).astype("<f4").tobytes())}
-    rest = np.where(near, parts + STEPS // 2, NO_VALUE).astype(np.uint8)
-    written: Column = {"rest": pack.add(rest.tobytes())}
+    rest = np.where(near, parts + steps // 2, NO_VALUE).astype(np.uint8)
+    written: Column = {"rest": pack.add(rest.tobytes()), "steps": steps}
     if len(odd):
         written["odd"] = [[int(place), float(values[place])] for place in odd]
     return written

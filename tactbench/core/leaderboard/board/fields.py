@@ -16,8 +16,8 @@ Row = Mapping[str, Any]
 
 MANY = 5_000
 """Cells beyond which what every cell has of its own is told shortly, or left to its shard."""
-KEY_DIGITS = 12
-"""Of a key, where there are many: 48 bits, that two of 50,000 cells share with a probability of 4e-6."""
+KEY_DIGITS = 8
+"""Of a key, where there are many: enough to find its file by; one of 50,000 others shares them once in 86,000 times."""
 
 _ALWAYS = (
     "status", "reason", "sensor", "task", "estimator", "params", "is_baseline", "rig", "protocol", "split", "repeat",

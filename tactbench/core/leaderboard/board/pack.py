@@ -56,6 +56,10 @@ class Pack:
         """The blobs in order: zlib streams in base64, whose alphabet cannot end a script."""
         return self._blobs
 
+    def zeros(self, count: int) -> list[int]:
+        """Return the same as `planes` of zeros."""
+        return [self.add(bytes(count)), 1]
+
     def planes(self, values: Sequence[int] | NDArray[np.uint64]) -> list[int]:
         """Return the blob of whole numbers from 0 to 2^53, and the bytes that each of them takes."""
         import numpy as np

@@ -31,6 +31,8 @@ _SILENT = frozenset({"null", '""', "[]", "{}"})
 def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Column | None:
     """Write a column of any values; None if none of them says anything."""
     types = set(map(type, values))
+    if types <= _EMPTY.keys() and not any(values):
+        return None
     # By value where that is safe (1, 1.0 and True are equal), else by identity: the values outlive this call.
     alike = len(types - {_NOTHING}) <= 1 and types <= _PLAIN
     keys: Sequence[Any] = values if alike else list(map(id, values))
@@ -42,7 +44,7 @@ def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Co
     if texts.keys() <= _SILENT:
         return None
     words = "[" + ",".join(texts) + "]"
-    at = pack.planes(list(map(places.__getitem__, keys)))
+    at = pack.zeros(len(values)) if len(texts) == 1 else pack.planes(list(map(places.__getitem__, keys)))
     return {"kind": "words", "words": pack.add(words.encode()), "at": at}
 
 

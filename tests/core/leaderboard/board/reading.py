@@ -6,7 +6,7 @@ import re
 import struct
 import zlib
 
-from tactbench.core.leaderboard.board.digits import NO_VALUE, STEPS
+from tactbench.core.leaderboard.board.digits import NO_VALUE
 
 
 def planes(blobs, told):
@@ -51,7 +51,9 @@ def values(blobs, column):
             told.append(None)
             continue
         value = sum(numbers[place][row] * scale * shares[place] for place, scale in enumerate(scales))
-        told.append(value + (0 if rest is None else (rest[row] - STEPS / 2) / STEPS * abs(scales[0])))
+        if rest is not None:
+            value += (rest[row] - column["steps"] / 2) / column["steps"] * abs(scales[0])
+        told.append(value)
     for row, value in column.get("odd", []):
         told[row] = value
     return told

@@ -25,7 +25,6 @@ const planes = (blobs, [blob, width]) => {
   return whole;
 };
 
-const STEPS = 254;
 const NO_VALUE = 255;
 
 const wordsColumn = (blobs, told) => {
@@ -61,7 +60,7 @@ const digitsColumn = (blobs, told) => {
       for (let place = 0; place < scales.length; place += 1) {
         values[row] += numbers[place][row] * scales[place] * shares[place];
       }
-      if (rest) values[row] += ((rest[row] - STEPS / 2) / STEPS) * Math.abs(scales[0]);
+      if (rest) values[row] += ((rest[row] - told.steps / 2) / told.steps) * Math.abs(scales[0]);
     }
     for (const [row, value] of told.odd ?? []) values[row] = value;
     return values;
