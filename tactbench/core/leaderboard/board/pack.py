@@ -16,13 +16,15 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+LEVEL = 6
+"""Of zlib: 9 saves one part in two hundred and takes four times as long."""
 Column = dict[str, Any]
 """What the page's script needs to read a column: its kind, and the numbers of its blobs."""
 
 
 def deflated(content: bytes) -> str:
     """Return bytes as a zlib stream in base64."""
-    return base64.b64encode(zlib.compress(content, 9)).decode()
+    return base64.b64encode(zlib.compress(content, LEVEL)).decode()
 
 
 class Pack:

@@ -50,6 +50,8 @@ _KINDS: dict[str, tuple[frozenset[type], Callable[[Any], Any]]] = {
     **dict.fromkeys(_TABLE, (frozenset({dict}), lambda value: {})),
     "confusion": (frozenset({list, tuple, _NOTHING}), lambda value: None),
 }
+_LIMITED = frozenset({*_NAMES, *_NUMBER, "counts", "chosen", "stamps", "remarks"})
+"""Keys of which a value of the right type may still be odd."""
 _FALLBACK = {"repeat": 1, "repeats": 1}
 
 
@@ -58,7 +60,10 @@ def sound(rows: Sequence[Any]) -> tuple[list[Row], tuple[str, ...]]:
     kept: list[Row] = [row for row in rows if isinstance(row, Mapping)]
     told = [f"{len(rows) - len(kept)} entries are no rows and are left out."] if len(kept) < len(rows) else []
     odd: Counter[str] = Counter()
+    alike = _of_sound_types(kept)
     for key, (kinds, mend) in _KINDS.items():
+        if alike and key not in _LIMITED:
+            continue
         places = _odd_places(kept, key, kinds)
         for place in places:
             kept[place] = {**kept[place], key: _mended(kept[place], key, kinds, mend)}
@@ -72,6 +77,16 @@ def sound(rows: Sequence[Any]) -> tuple[list[Row], tuple[str, ...]]:
         listed = ", ".join(f"{key} ({count} rows)" for key, count in odd.items())
         told.append(f"Not as a run writes them, set right or left out here: {listed}.")
     return kept, tuple(told)
+
+
+def _of_sound_types(rows: Sequence[Row]) -> bool:
+    """Tell whether every row has every key, and nothing in it that is of a wrong type."""
+    shapes = {(tuple(row), tuple(map(type, row.values()))) for row in rows}
+    return all(
+        _KINDS.keys() <= set(keys)
+        and all(kind in _KINDS[key][0] for key, kind in zip(keys, types, strict=True) if key in _KINDS)
+        for keys, types in shapes
+    )
 
 
 def _odd_places(rows: Sequence[Row], key: str, kinds: frozenset[type]) -> list[int]:
@@ -93,7 +108,9 @@ def _limited(values: Sequence[Any], key: str, types: Collection[type]) -> bool:
     if float in types:
         return not math.isfinite(sum(filter(None, values)))
     if key in ("counts", "chosen", "stamps", "remarks"):
-        return not all(_fits(value, key, types) for value in dict(zip(map(id, values), values, strict=True)).values())
+        return not all(
+            _fits(value, key, types) for value in {id(value): value for value in filter(None, values)}.values()
+        )
     return False
 
 
