@@ -23,7 +23,7 @@ _MOST_TOLD = 5
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
               help="How it is shown; default: table, or what the name of the file given with --to says.")  # fmt: skip
 @click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-              help="Write a file: .md, .csv, .json, .tex, .parquet.")  # fmt: skip
+              help="Write a file: .md, .csv, .json, .tex, .html, .parquet.")  # fmt: skip
 @click.option("--compare", "by", type=click.Choice(AXES), help="Show these side by side instead.")
 @click.option("--no-times", "times", flag_value=False, default=True, type=bool,
               help="Only what a seed decides, no times and hosts: the same bytes on every machine.")  # fmt: skip
@@ -33,7 +33,7 @@ def command(folder: Path, shape: str | None, to: Path | None, by: str | None, ti
     from tactbench.core.errors import UsageError
 
     shape = shape or _meant(to)
-    check_destination(shape, to)
+    check_destination(shape, to, times=times)
     store = _opened(folder)
     rows = _rows(store)
     if by is None:

@@ -9,21 +9,23 @@ from typing import Any
 
 import click
 
-TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet")
+TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet", "html")
 
 Row = Mapping[str, Any]
 
 
-def check_destination(shape: str, to: Path | None = None) -> None:
-    """Refuse to write bytes to a terminal.
+def check_destination(shape: str, to: Path | None = None, *, times: bool = True) -> None:
+    """Refuse to write bytes to a terminal, and a page without times.
 
     Raises
     ------
     UsageError
-        If `shape` is no text and stdout is a terminal.
+        If `shape` is no text and stdout is a terminal, or `shape` is the page and `times` is false.
     """
     from tactbench.core.errors import UsageError
 
+    if shape == "html" and not times:
+        raise UsageError("The page shows every cell in full, times too.", hint="Use another --format.")
     if shape == "parquet" and to is None and sys.stdout.isatty():
         raise UsageError(
             "Parquet is no text for a terminal.",
@@ -56,12 +58,12 @@ def print_rows(
     Raises
     ------
     UsageError
-        If a terminal is asked to show bytes, or the file cannot be written.
+        If a terminal is asked to show bytes, the page to have no times, or the file cannot be written.
     """
     from tactbench.core.leaderboard import memo
     from tactbench.core.leaderboard.table import build_table
 
-    check_destination(shape, to)
+    check_destination(shape, to, times=times)
     if folder is not None:
         memo.load(folder)
     table = build_table(rows, provenance, times=times)
@@ -83,7 +85,7 @@ def print_rows(
     else:
         from tactbench.core.leaderboard.formats import TEXTS
 
-        _put(TEXTS[shape](table).encode(), to)
+        _put(TEXTS[shape](table).encode("utf-8", "replace"), to)
 
 
 def _put(content: bytes, to: Path | None) -> None:

@@ -78,7 +78,7 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
 def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, str, int]:
     known = kinds.get(row["rig"], set())
     kind = next(iter(known)) if row["status"] != "done" and len(known) == 1 else _kind(row)
-    return row["task"], row["protocol"], kind, row["repeat"]
+    return row["task"], row["protocol"], kind, row["repeat"] or 0
 
 
 def _kind(row: Row) -> str:

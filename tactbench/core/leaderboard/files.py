@@ -17,7 +17,7 @@ from tactbench.core.matrix.files import replace_file
 
 Row = Mapping[str, Any]
 
-ENDINGS = ("md", "csv", "json")
+ENDINGS = ("md", "csv", "json", "html")
 """The files are ``leaderboard.ENDING``; LaTeX and Parquet are made when asked for: `leaderboard --to FILE`."""
 STATE = Path("cache") / "tables.json"
 """What decided the files that lie there, and their digests."""
@@ -49,7 +49,7 @@ def write_tables(rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = 
     try:
         made = {}
         for ending, path in zip(ENDINGS, paths, strict=True):
-            content = TEXTS[ending](table).encode()
+            content = TEXTS[ending](table).encode("utf-8", "replace")
             replace_file(path, content)
             made[path.name] = hashlib.sha256(content).hexdigest()
         memo.save(folder)

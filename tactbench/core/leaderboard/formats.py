@@ -21,10 +21,12 @@ __all__ = [
     "markdown_grid",
     "markdown_note",
     "markdown_text",
+    "page",
     "to_csv",
     "to_json",
     "to_latex",
     "to_markdown",
+    "to_page",
     "to_parquet",
 ]
 
@@ -37,15 +39,23 @@ def json_array(table: Table) -> str:
     return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
+def page(table: Table) -> str:
+    """Return the page of a table: one HTML file, every cell behind its numbers, times among them."""
+    from tactbench.core.leaderboard.board.page import to_html
+
+    return to_html(table.rows, table.provenance)
+
+
 TEXTS: dict[str, Callable[[Table], str]] = {
     "json": json_array,
     "csv": csv_text,
     "md": markdown,
     "latex": latex,
+    "html": page,
 }
 """How a table is written, by the name of the format on the command line; all but Parquet, which is no text."""
 
-SUFFIXES = {".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".parquet": "parquet"}
+SUFFIXES = {".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".html": "html", ".parquet": "parquet"}
 """The format that a file is meant to have, by how its name ends."""
 
 
@@ -74,5 +84,16 @@ def to_parquet(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bo
     return parquet(build_table(rows, provenance, times=times))
 
 
-FORMATS: dict[str, Callable[..., str]] = {"json": to_json, "csv": to_csv, "md": to_markdown, "latex": to_latex}
+def to_page(rows: Sequence[Row], provenance: Sequence[Row] = ()) -> str:
+    """Return the leaderboard as one HTML file, every cell behind its numbers."""
+    return page(build_table(rows, provenance))
+
+
+FORMATS: dict[str, Callable[..., str]] = {
+    "json": to_json,
+    "csv": to_csv,
+    "md": to_markdown,
+    "latex": to_latex,
+    "html": to_page,
+}
 """From rows (and their provenance) to text, by the name of the format on the command line."""

@@ -29,7 +29,14 @@ def test_a_folder_shows_the_same_table_as_its_run(ran):
 
 
 def test_every_format_goes_to_a_file_named_for_it(ran):
-    for suffix, shape in ((".md", "md"), (".csv", "csv"), (".json", "json"), (".tex", "latex"), (".txt", "table")):
+    for suffix, shape in (
+        (".md", "md"),
+        (".csv", "csv"),
+        (".json", "json"),
+        (".tex", "latex"),
+        (".html", "html"),
+        (".txt", "table"),
+    ):
         ran("leaderboard", "out", "--to", f"table{suffix}")
         assert (ran.folder / f"table{suffix}").read_text() == ran("leaderboard", "out", "--format", shape).stdout
     refused = ran("leaderboard", "out", "--to", "nowhere/table.md", code=2)
@@ -90,6 +97,10 @@ def test_what_is_no_result_folder_is_told_in_a_sentence(shell, content):
     assert "Traceback" not in refused.stderr
     assert "tactbench run" in refused.stderr
     assert not (shell.folder / "there" / "recordings").exists()
+
+
+def test_the_page_has_no_form_without_times(ran):
+    assert "Use another --format" in ran("leaderboard", "out", "--format", "html", "--no-times", code=2).stderr
 
 
 def test_a_comparison_is_not_written_to_files(ran):
