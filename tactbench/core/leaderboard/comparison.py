@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.evaluation.few_shot import shots
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.table import METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.statistics.paired import difference
 
 Row = Mapping[str, Any]

@@ -5,41 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from tactbench.core.leaderboard.particulars import APART, GROUPS, TITLES
 from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
 from tactbench.core.report.section import Details, Section, Subject
 
 Row = Mapping[str, Any]
-
-# Groups of the row's single values, in order; what nobody has named comes last, so that no key is ever left out.
-_GROUPS: dict[str, tuple[str, ...]] = {
-    "Configuration": (
-        "cell", "key", "sensor", "task", "rig", "simulated", "protocol", "dagger", "split", "estimator", "is_baseline",
-        "repeat", "repeats", "seed", "threads",
-    ),
-    "Answer": (
-        "status", "reason", "metric", "unit", "score", "ci_low", "ci_high", "ci_method", "baseline", "published",
-        "published_reference", "published_remark", "n_recordings", "n_sessions", "n_train", "n_test",
-    ),
-    "Times and memory": (
-        "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95", "latency_n",
-        "peak_rss_mb",
-    ),
-}  # fmt: skip
-_TITLES = {
-    "params": "Parameters other than the defaults",
-    "chosen": "Chosen on validation data",
-    "search": "Every candidate that was compared",
-    "scores": "Other scores: by class, by fold, by other metrics",
-    "counts": "What was counted",
-    "assumptions": "Assumed by the simulation",
-    "plan": "Effects of the first recording: included and left out, with reasons",
-    "confusion": "Confusion: true class down, answer across [rows]",
-    "recordings": "Recordings",
-    "remarks": "Remarks of the recordings",
-    "stamps": "Stamps",
-}
-_APART = ("traceback", "classes")
-"""Shown in places of their own."""
 
 
 def cells_section(subject: Subject) -> Section:
@@ -51,13 +21,13 @@ def cells_section(subject: Subject) -> Section:
 
 
 def _details(row: Row, anchors: Mapping[str, str]) -> Details:
-    single = {name for name, value in row.items() if not isinstance(value, Mapping | list | tuple)} - set(_APART)
-    grouped = {name for names in _GROUPS.values() for name in names} | set(_TITLES)
-    groups = {**_GROUPS, "Also": tuple(sorted(single - grouped))}
+    single = {name for name, value in row.items() if not isinstance(value, Mapping | list | tuple)} - set(APART)
+    grouped = {name for names in GROUPS.values() for name in names} | set(TITLES)
+    groups = {**GROUPS, "Also": tuple(sorted(single - grouped))}
     tables = [_pairs(title, ((name, row[name]) for name in names if name in single)) for title, names in groups.items()]
     lists = []
-    for name in (*_TITLES, *sorted(set(row) - set(_TITLES) - single - set(_APART))):
-        value, title = row.get(name), _TITLES.get(name, name)
+    for name in (*TITLES, *sorted(set(row) - set(TITLES) - single - set(APART))):
+        value, title = row.get(name), TITLES.get(name, name)
         if name == "confusion" and value:
             tables.append(_confusion(title, value, row["classes"]))
         elif isinstance(value, Mapping) and value:

@@ -2,34 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from tactbench.core.leaderboard.table import NUMERIC, Block, Line, build_table
-from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, number, plain
+from tactbench.core.leaderboard.values import VALUES
+from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
 from tactbench.core.report.section import Section, Subject
 
 Row = Mapping[str, Any]
-
-
-def _per_row(row: Row) -> object:
-    return row["predict_s"] / row["batch_rows"] if row["batch_rows"] else None
-
-
-# What a column is sorted by: the text has units of its own line by line.
-VALUES: dict[str, Callable[[Row], object]] = {
-    "score": lambda row: row["score"],
-    "95 % interval": lambda row: row["ci_low"],
-    "published": lambda row: row["published"],
-    "baseline": lambda row: row["baseline"],
-    "n test": lambda row: row["n_test"],
-    "sessions": lambda row: row["n_sessions"],
-    "sim": lambda row: row["sim_s"],
-    "fit": lambda row: row["fit_s"],
-    "latency p50": lambda row: row["latency_ms_p50"],
-    "p95": lambda row: row["latency_ms_p95"],
-    "batch/row": _per_row,
-}
 
 
 def leaderboards_section(subject: Subject) -> Section:
@@ -59,6 +40,7 @@ def _entries(line: Line, columns: tuple[str, ...], row: Row, anchor: str) -> lis
         if name not in NUMERIC or text in ("", ABSENT):
             entries.append(Entry(text))
         else:
-            value = finite(VALUES[name](row)) if name in VALUES else number(text)
+            place = line.placing.place if line.placing else None
+            value = finite(VALUES[name](row)) if name in VALUES else place
             entries.append(Entry(text, value, anchor))
     return entries

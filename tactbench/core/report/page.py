@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import resources
-from typing import TYPE_CHECKING, Any
 
 import tactbench
+from tactbench.core.leaderboard.one_file import house_style, own, policy_hash, prose
 from tactbench.core.report.cells import cells_section
 from tactbench.core.report.compared import compared_section
 from tactbench.core.report.costs import costs_section
@@ -20,9 +18,6 @@ from tactbench.core.report.pictures import pictures_section
 from tactbench.core.report.published import published_section
 from tactbench.core.report.section import Maker, Section, Subject
 from tactbench.core.report.sensors import sensors_section
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 
@@ -78,34 +73,15 @@ def _render(sections: Sequence[Section]) -> str:
     )
     environment.filters["prose"] = prose
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode()
-    style, script = _own("page.css"), _own("page.js")
+    style = house_style() + own("tactbench.core.report", "page.css")
+    script = own("tactbench.core.report", "page.js")
     html = environment.get_template("page.html").render(
         title=TITLE,
         version=tactbench.__version__,
         style=Markup(style),
         script=Markup(script),
-        style_hash=_hash(style),
-        script_hash=_hash(script),
+        style_hash=policy_hash(style),
+        script_hash=policy_hash(script),
         sections=sections,
     )
     return html + "\n"
-
-
-def prose(text: Any) -> Markup:
-    """Return text with what stands between backticks as code; everything in it is escaped."""
-    from markupsafe import Markup, escape
-
-    parts = str(text).split("`")
-    if len(parts) % 2 == 0:  # a backtick without its partner is a backtick
-        return escape(str(text))
-    shown = [Markup("<code>{}</code>").format(part) if place % 2 else escape(part) for place, part in enumerate(parts)]
-    return Markup("").join(shown)
-
-
-def _own(name: str) -> str:
-    return (resources.files("tactbench.core.report") / "template" / name).read_text(encoding="utf-8")
-
-
-def _hash(text: str) -> str:
-    """Return what a Content-Security-Policy calls the text by."""
-    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

@@ -1,0 +1,129 @@
+"""What the page knows of each cell beside its line: everything while that fits, else the most telling first."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from operator import itemgetter
+from typing import Any
+
+from tactbench.core.leaderboard.board.digits import write_digits
+from tactbench.core.leaderboard.board.pack import Column, Pack
+from tactbench.core.leaderboard.board.words import LONGEST, write_words
+from tactbench.core.leaderboard.numbers import duration
+
+Row = Mapping[str, Any]
+
+MANY = 5_000
+"""Cells beyond which what every cell has of its own is told shortly, or left to its shard."""
+KEY_DIGITS = 8
+"""Of a key, where there are many: enough to find its file by; one of 50,000 others shares them once in 86,000 times."""
+
+_ALWAYS = (
+    "status", "reason", "sensor", "task", "estimator", "params", "is_baseline", "rig", "protocol", "split", "repeat",
+    "repeats", "seed", "simulated", "dagger", "stamps", "metric", "unit", "ci_method", "host", "made_by", "concurrency",
+    "threads", "signal", "n_recordings", "n_train",
+)  # fmt: skip
+_OFTEN = (
+    "traceback", "remarks", "assumptions", "plan", "chosen", "counts", "published_reference", "published_remark",
+    "batch_rows", "latency_n", "search_s", "wall_s", "peak_rss_mb", "classes", "log", "recordings",
+)  # fmt: skip
+_IN_THE_LINE = (
+    "score", "ci_low", "ci_high", "baseline", "published", "n_sessions", "n_test", "sim_s", "fit_s", "predict_s",
+    "latency_ms_p50", "latency_ms_p95",
+)  # fmt: skip
+"""Where there are many cells, these are told as the line shows them."""
+_OWN = ("scores", "confusion", "search", "replicates")
+"""What is large and every cell's own, the most telling first."""
+_LENGTHS = (LONGEST, 8_192, 1_024, 200)
+"""Characters that a text is cut to, one after the other, until the column fits."""
+NOTHING: Column = {"kind": "nothing"}
+"""A column of empty texts."""
+_HEX = re.compile(f"[0-9a-f]{{{KEY_DIGITS}}}")
+
+
+def write_fields(pack: Pack, rows: Sequence[Row], room: int) -> tuple[dict[str, Column], tuple[str, ...]]:
+    """Write what is known of the cells into `pack`.
+
+    Parameters
+    ----------
+    room
+        Characters that the pack may hold in the end.
+
+    Returns
+    -------
+    dict, tuple
+        The columns by key, and the keys that were left out for want of room.
+    """
+    many = len(rows) > MANY
+    columns: dict[str, Column] = {"cell": _names(pack, [row["cell"] for row in rows]), "key": _keys(pack, rows, many)}
+    left_out: list[str] = []
+    for key in (*_ALWAYS, *_OFTEN):
+        _write(pack, rows, key, room, columns, left_out, many)
+    others = [*_IN_THE_LINE, *_OWN]
+    known = {*columns, *left_out, *others}
+    more = sorted(set().union(*rows) - known, key=str)
+    if many:
+        left_out += [key for key in (*_OWN, *more) if any(row.get(key) for row in rows)]
+    else:
+        for key in (*others[: len(_IN_THE_LINE)], *more, *_OWN):
+            _write(pack, rows, key, room, columns, left_out, many)
+    return columns, tuple(dict.fromkeys(map(str, left_out)))
+
+
+def _write(
+    pack: Pack, rows: Sequence[Row], key: str, room: int, columns: dict[str, Column], left_out: list[str], many: bool
+) -> None:
+    """Write one column, cut as far as it must be, or not at all; a column that says nothing is not written."""
+    values = _values(rows, key)
+    types = set(map(type, values))
+    before = len(pack.blobs)
+    if many and float in types and types <= {float, int, type(None)}:
+        column = write_digits(pack, [_shortly(key, value) for value in values])
+        if column is not None and pack.size <= room:
+            columns[key] = column
+            return
+    else:
+        for longest in _LENGTHS if str in types else _LENGTHS[:1]:
+            column = write_words(pack, values, longest)
+            if column is None:
+                return
+            if pack.size <= room:
+                columns[key] = column
+                return
+            pack.forget_from(before)
+    pack.forget_from(before)
+    left_out.append(key)
+
+
+def _values(rows: Sequence[Row], key: str) -> list[Any]:
+    try:
+        return list(map(itemgetter(key), rows))
+    except KeyError:
+        return [row.get(key) for row in rows]
+
+
+def _shortly(key: str, value: float | None) -> str:
+    if value is None:
+        return ""
+    return duration(value) if key.endswith("_s") else f"{value:.4g}"
+
+
+def _names(pack: Pack, names: Sequence[str]) -> Column:
+    """Write names of cells part by part: what stands between their strokes is shared by many."""
+    parts = [name.split("/") for name in names]
+    if not parts or len({len(one) for one in parts}) > 1:
+        return write_words(pack, names) or NOTHING
+    return {
+        "kind": "joined",
+        "by": "/",
+        "parts": [write_words(pack, part) or NOTHING for part in zip(*parts, strict=True)],
+    }
+
+
+def _keys(pack: Pack, rows: Sequence[Row], many: bool) -> Column:
+    keys = [str(row.get("key") or "") for row in rows]
+    if not many or not all(_HEX.match(key) or not key for key in keys):
+        return write_words(pack, keys) or NOTHING
+    whole = [int(key[:KEY_DIGITS], 16) if key else 0 for key in keys]
+    return {"kind": "hex", "digits": KEY_DIGITS, "at": pack.planes(whole)}

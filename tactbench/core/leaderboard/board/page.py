@@ -1,0 +1,230 @@
+"""The page: a table and its rows, laid into one HTML text that needs nothing from anywhere."""
+
+from __future__ import annotations
+
+import gc
+import json
+from collections import Counter, defaultdict, deque
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from html import escape
+from operator import itemgetter
+from string import Template
+from typing import Any
+
+import tactbench
+from tactbench.core.leaderboard.board.digits import FEW_STEPS, STEPS, write_digits
+from tactbench.core.leaderboard.board.fields import MANY, NOTHING, write_fields
+from tactbench.core.leaderboard.board.pack import Column, Pack, deflated
+from tactbench.core.leaderboard.board.sound import sound, table_of
+from tactbench.core.leaderboard.board.still import still, visible
+from tactbench.core.leaderboard.board.words import cut, tame, write_words
+from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
+from tactbench.core.leaderboard.particulars import GROUPS, TITLES
+from tactbench.core.leaderboard.table import LOWER_IS_BETTER, NUMERIC, Table
+from tactbench.core.leaderboard.values import VALUES
+
+Row = Mapping[str, Any]
+
+TITLE = "tactbench leaderboard"
+LARGEST = 2_000_000
+"""Bytes of a page: what does not fit is left to the shards, and the page says so."""
+MOST_STILL = 500
+"""Lines up to which the page also holds its tables as plain HTML, for readers without scripts."""
+LONGEST_NOTE = 4_000
+MOST_NOTES = 2_000
+MOST_LINES = 500
+"""Lines of a table below the blocks."""
+_SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
+DURATIONS = ("latency p50", "p95", "fit", "sim", "batch/row")
+"""Columns that a score can be drawn against."""
+_NOTHING = frozenset({"", "–"})
+_HOME = "tactbench.core.leaderboard.board"
+
+
+def to_html(rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]] = ()) -> str:
+    """Return the leaderboard of `rows` as one HTML page; the same rows give the same page.
+
+    Parameters
+    ----------
+    rows
+        As a run writes them. What is odd in them is set right or left out, and the page says so.
+    provenance
+        What made them, one entry a run.
+    """
+    with _collector_at_rest():
+        return _to_html(rows, provenance)
+
+
+@contextmanager
+def _collector_at_rest() -> Iterator[None]:
+    """Keep Python from looking for garbage among a million objects of which none is: a fifth of the time."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
+
+
+def _to_html(rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]]) -> str:
+    kept, remarks = sound(rows)
+    kept, table = table_of(sorted(kept, key=itemgetter("cell")))
+    return page_of(table, kept, provenance, remarks)
+
+
+def page_of(
+    table: Table, rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]] = (), remarks: Sequence[str] = ()
+) -> str:
+    """Return the page of a table.
+
+    Parameters
+    ----------
+    table
+        Of `rows`: each row has a line, which names its cell.
+    rows
+        In the order of their cells' names, in which what they share lies together.
+    provenance
+        What made them.
+    remarks
+        What a reader must know first.
+    """
+    order = _places(rows, table)
+    pack = Pack()
+    head = _head(pack, rows, table, order, remarks, provenance)
+    frame = _frame(rows, still(table, rows, order, remarks) if len(rows) <= MOST_STILL else "")
+    taken = len(frame.encode()) + len(deflated(_json(head))) + _ROOM_FOR_FIELDS
+    head["fields"], head["leftOut"] = write_fields(pack, rows, LARGEST - taken)
+    written = pack.add(_json(head))
+    data = json.dumps({"head": written, "blobs": pack.blobs}, separators=(",", ":"))
+    # The last one: a name may say the same.
+    before, _, after = frame.rpartition(_DATA_HERE)
+    return before + data + after
+
+
+_ROOM_FOR_FIELDS = 12_000
+"""Characters kept for what describes the columns of details, and for what stands between the blobs."""
+_DATA_HERE = "{the data}"
+
+
+def _json(value: Any) -> bytes:
+    return json.dumps(value, separators=(",", ":")).encode()
+
+
+def _places(rows: Sequence[Row], table: Table) -> list[list[int]]:
+    """Return the places in `rows` of each block's lines, in the table's order."""
+    places: dict[str, deque[int]] = defaultdict(deque)
+    for place, row in enumerate(rows):
+        places[row["cell"]].append(place)
+    return [[places[line.cell].popleft() for line in block.lines if places[line.cell]] for block in table.blocks]
+
+
+def _head(
+    pack: Pack,
+    rows: Sequence[Row],
+    table: Table,
+    order: Sequence[Sequence[int]],
+    remarks: Sequence[str],
+    provenance: Sequence[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """Return all that the page's script must know, the blobs that it is in aside."""
+    lines = [line for block in table.blocks for line in block.lines]
+    flat = [place for block in order for place in block]
+    empty = ("",) * len(table.columns)
+    cells: list[tuple[str, ...]] = [empty] * len(rows)
+    kinds = [""] * len(rows)
+    for place, line in zip(flat, lines, strict=True):
+        cells[place] = line.cells
+        kinds[place] = line.kind
+    texts = list(zip(*cells, strict=True)) if cells else [()] * len(table.columns)
+    firsts = [rows[block[0]] for block in order]
+    notes = [cut(note, LONGEST_NOTE) for note in (*remarks, *table.notes)]
+    if len(notes) > MOST_NOTES:
+        notes = [*notes[:MOST_NOTES], f"{len(notes) - MOST_NOTES} more notes are not in this page."]
+    return {
+        "version": tactbench.__version__,
+        "rows": len(rows),
+        "order": pack.planes(flat),
+        "kinds": write_words(pack, kinds) or NOTHING,
+        "blocks": [
+            {"title": block.title, "size": len(block.lines), "lower": first["metric"] in LOWER_IS_BETTER}
+            | {key: first[key] for key in ("task", "metric", "unit", "simulated", "rig")}
+            for block, first in zip(table.blocks, firsts, strict=True)
+        ],
+        "columns": [
+            {"name": name, "numeric": name in NUMERIC, "column": _column(pack, name, shown, rows)}
+            for name, shown in zip(table.columns, texts, strict=True)
+        ],
+        "sections": [_section(section) for section in getattr(table, "sections", ())],
+        "foot": [cut(text, LONGEST_NOTE) for text in getattr(table, "foot", ())],
+        "roles": _roles(table.columns),
+        "groups": GROUPS,
+        "titles": TITLES,
+        "notes": notes,
+        "provenance": [tame(entry) for entry in provenance],
+    }
+
+
+def _section(section: Any) -> dict[str, Any]:
+    """Return a table below the blocks, which no cell is behind."""
+    lines = [list(line) for line in section.lines[:MOST_LINES]]
+    more = len(section.lines) - len(lines)
+    notes = [*section.notes, *([f"{more} more lines are in the tables, not in this page."] if more else [])]
+    return {
+        "title": section.title,
+        "columns": [[name, name in section.numeric] for name in section.columns],
+        "lines": lines,
+        "notes": [cut(note, LONGEST_NOTE) for note in notes],
+    }
+
+
+def _roles(columns: Sequence[str]) -> dict[str, Any]:
+    """Return which columns the page's script needs by what they are."""
+    first = next((name for name in columns if name in ("#", "rank")), "")
+    named = {"rank": first, "sensor": "sensor", "estimator": "estimator", "score": "score", "interval": "95 % interval"}
+    return {**named, "times": [name for name in DURATIONS if name in columns]}
+
+
+def _column(pack: Pack, name: str, texts: Sequence[str], rows: Sequence[Row]) -> Column:
+    if name in NUMERIC:
+        found = VALUES.get(name)
+        # A stopped cell may know a number that the table does not show: it is not sorted by it either.
+        values = (
+            [None if text in _NOTHING else found(row) for row, text in zip(rows, texts, strict=True)] if found else None
+        )
+        column = write_digits(pack, texts, values, FEW_STEPS if len(rows) > MANY else STEPS)
+        if column is not None:
+            return column
+    return write_words(pack, texts) or NOTHING
+
+
+def _frame(rows: Sequence[Row], shown: str) -> str:
+    """Return the page but for its data."""
+    style = house_style() + own(_HOME, "board.css")
+    script = '\n"use strict";\n(() => {\n' + own(_HOME, *_SCRIPTS) + "})();\n"
+    if not shown:
+        shown = (
+            f"<p class='missing'>This board has {len(rows):,} cells: a script of its own draws them, and needs a "
+            "browser that allows it. Nothing is fetched from anywhere. Without scripts, read "
+            "<code>leaderboard.md</code> or <code>leaderboard.csv</code> in the result folder.</p>"
+        )
+    return Template(own(_HOME, "board.html")).substitute(
+        title=escape(TITLE),
+        version=escape(tactbench.__version__),
+        style=style,
+        script=script,
+        style_hash=policy_hash(style),
+        script_hash=policy_hash(script),
+        summary=escape(_summary(rows)),
+        shown=shown,
+        data=_DATA_HERE,
+    )
+
+
+def _summary(rows: Sequence[Row]) -> str:
+    """Return how many cells there are, and how they ended."""
+    ends = Counter(visible(str(row["status"])) for row in rows)
+    told = ", ".join(f"{count:,} {status}" for status, count in ends.most_common())
+    sensors, tasks = (len({row[key] for row in rows}) for key in ("sensor", "task"))
+    return f"{len(rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {told}." if rows else "No cells."

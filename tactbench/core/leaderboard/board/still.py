@@ -1,0 +1,57 @@
+"""The tables as plain HTML, for a reader without scripts, and for a search or a printer that knows none."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from tactbench.core.leaderboard.one_file import prose
+from tactbench.core.leaderboard.table import NUMERIC, Table
+
+
+def visible(text: str) -> str:
+    r"""Return text with what cannot be seen, or turns the rest round, written out, as ``\u202e``."""
+    return text if text.isprintable() else "".join(map(_shown, text))
+
+
+def _shown(character: str) -> str:
+    if character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs":
+        return character
+    code = ord(character)
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def still(
+    table: Table, rows: Sequence[Mapping[str, Any]], order: Sequence[Sequence[int]], remarks: Sequence[str]
+) -> str:
+    """Return every block of `table` as HTML, and its notes; everything in them is escaped."""
+    parts: list[str] = []
+    for block, places in zip(table.blocks, order, strict=True):
+        heads = "".join(
+            f'<th scope="col"{_class(name)}>{_text(name)}</th>' for name in (*table.columns, "status and reason")
+        )
+        lines = []
+        for line, place in zip(block.lines, places, strict=True):
+            row = rows[place]
+            why = "" if row["status"] == "done" else f"{row['status']}: {row['reason']}"
+            cells = "".join(
+                f"<td{_class(name)}>{_text(text)}</td>" for name, text in zip(table.columns, line.cells, strict=True)
+            )
+            lines.append(f'<tr class="{line.kind}">{cells}<td>{_text(why)}</td></tr>')
+        body = "\n".join(lines)
+        parts.append(
+            f'<div class="box"><table><caption>{_text(block.title)}</caption>\n'
+            f"<thead><tr>{heads}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
+        )
+    notes = "\n".join(f"<li>{prose(visible(note))}</li>" for note in (*remarks, *table.notes))
+    return "\n".join(parts) + f'\n<ul class="notes">\n{notes}\n</ul>'
+
+
+def _class(name: str) -> str:
+    return ' class="number"' if name in NUMERIC else ""
+
+
+def _text(text: str) -> str:
+    return f"<bdi>{escape(visible(text))}</bdi>"

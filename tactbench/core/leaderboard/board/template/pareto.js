@@ -1,0 +1,221 @@
+// Score against time: one block, one host, and the front of what nothing else beats in both.
+const TIME_UNITS = [[1, "s"], [1e-3, "ms"], [1e-6, "µs"]];
+const timeText = (seconds) => {
+  const [worth, unit] = TIME_UNITS.find(([one]) => seconds >= one * 0.9999) ?? TIME_UNITS.at(-1);
+  return `${Number((seconds / worth).toPrecision(3))} ${unit}`;
+};
+
+const UNKNOWN = "a host that is not known";
+const pointsOf = (place, axis) => {
+  const { order, starts, shown } = board;
+  const score = board.role("score"), times = axis.column.values(), scores = score.column.values();
+  const points = [];
+  let untimed = 0;
+  for (let at = starts[place]; at < starts[place + 1]; at += 1) {
+    const row = order[at];
+    if (!shown[row] || Number.isNaN(scores[row])) continue;
+    if (!(times[row] > 0)) untimed += 1;
+    else points.push({ row, time: times[row], score: scores[row], kind: board.kinds.text(row),
+      host: board.field("host", row) || UNKNOWN });
+  }
+  return { points, untimed };
+};
+
+// In the order of time, each of the front scores better than all before it.
+const frontOf = (points, lower) => {
+  const better = (one, other) => (lower ? one < other : one > other);
+  const inOrder = points.filter((one) => one.kind === "result")
+    .sort((one, other) => one.time - other.time || (lower ? one.score - other.score : other.score - one.score));
+  const front = [];
+  for (const one of inOrder) if (!front.length || better(one.score, front.at(-1).score)) front.push(one);
+  return front;
+};
+
+const steps = (low, high, most) => {
+  const rough = (high - low) / most;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((one) => one * power).find((one) => one >= rough * 0.999);
+  const first = Math.ceil(low / step - 1e-9);
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, at) => (first + at) * step)
+    .map((value) => [value, value.toFixed(digits)]);
+};
+
+const decades = (low, high) => {
+  const found = [];
+  for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power += 1) {
+    for (const part of Math.log10(high / low) < 2.5 ? [1, 2, 5] : [1]) {
+      const value = part * 10 ** power;
+      if (value >= low * 0.999 && value <= high * 1.001) found.push(value);
+    }
+  }
+  return found;
+};
+
+const nameOf = (row) => `${board.role("sensor").column.text(row)} · ${board.role("estimator").column.text(row)}`;
+
+const tellPoint = (point, axis) => {
+  const interval = board.role("interval"), rank = board.role("rank");
+  const parts = [nameOf(point.row), `score ${board.role("score").column.text(point.row)}`];
+  const between = interval?.column.text(point.row);
+  if (between && between !== ABSENT) parts.push(`${interval.name} ${between}`);
+  if (rank) parts.push(point.kind === "result" ? `rank ${rank.column.text(point.row)}` : "trivial answer");
+  return [...parts, `${axis.name} ${axis.column.text(point.row)}`];
+};
+
+const fillPicker = (select, entries, wanted) => {
+  select.replaceChildren(...entries.map(([value, text]) => make("option", { value }, text)));
+  if (entries.some(([value]) => value === wanted)) select.value = wanted;
+};
+
+const drawTime = () => {
+  const { head } = board;
+  const figure = byId("pareto");
+  const axes = head.roles.times.map((name) => board.columns.find((one) => one.name === name))
+    .filter((one) => !board.silent(one));
+  const blocks = head.blocks.map((block, place) => [String(place), block.title])
+    .filter(([place]) => board.anyShown(Number(place)));
+  fillPicker(byId("time-block"), blocks, byId("time-block").value);
+  fillPicker(byId("time-axis"), axes.map((one) => [one.name, one.name]), byId("time-axis").value);
+  if (!blocks.length || !axes.length) {
+    byId("time-host-label").hidden = true;
+    figure.replaceChildren(make("p", { class: "missing" }, blocks.length ? "No cell has a time." : "No cell is left by the filter."));
+    return;
+  }
+  const place = Number(byId("time-block").value);
+  const block = head.blocks[place];
+  const axis = axes.find((one) => one.name === byId("time-axis").value);
+  const { points: all, untimed } = pointsOf(place, axis);
+  const counts = new Map();
+  for (const one of all) counts.set(one.host, (counts.get(one.host) ?? 0) + 1);
+  const hosts = [...counts].sort((one, other) => other[1] - one[1] || words.compare(one[0], other[0]));
+  fillPicker(byId("time-host"), hosts.map(([host, count]) => [host, `${host} (${whole(count)} cells)`]), byId("time-host").value);
+  byId("time-host-label").hidden = hosts.length < 2;
+  if (!all.length) {
+    figure.replaceChildren(make("p", { class: "missing" }, "No cell of this block has both a score and this time."));
+    return;
+  }
+  const host = byId("time-host").value;
+  const points = all.filter((one) => one.host === host).sort((one, other) => one.time - other.time);
+  const front = frontOf(points, block.lower);
+  const elsewhere = all.length - points.length;
+  const atOnce = [...new Set(points.map((one) => board.field("concurrency", one.row)).filter((text) => text))].sort(words.compare);
+  const told = [
+    `${block.lower ? "Lower" : "Higher"} and further left is better. Filled: answers; joined: the front, which no other answer beats in both; its 95 % intervals are the upright lines. Hollow: trivial answers, which are not part of it.`,
+    `All times of this figure were taken on ${host === UNKNOWN ? UNKNOWN : `host ${host}`}${atOnce.length ? `, with ${
+      atOnce.length > 1 ? `${atOnce[0]} to ${atOnce.at(-1)} cells` : atOnce[0] === "1" ? "one cell" : `${atOnce[0]} cells`} at once` : ""}.`,
+  ];
+  if (elsewhere) told.push(`${whole(elsewhere)} cells timed on other hosts are not drawn: times of two hosts are not comparable.`);
+  if (untimed) told.push(`${whole(untimed)} cells have no such time.`);
+  figure.replaceChildren(
+    ...drawFigure(figure.clientWidth || 800, points, front, block, axis),
+    make("figcaption", {}, told.join(" ")),
+    frontTable(front, axis));
+};
+
+const frontTable = (front, axis) => {
+  const names = ["rank", "sensor", "estimator", "score", "interval"].map(board.role).filter((one) => one);
+  const columns = [axis, ...names];
+  return make("div", { class: "box" }, make("table", {}, make("caption", {}, "The front, the quickest first"),
+    make("thead", {}, make("tr", {}, ...columns.map((one) => make("th", { scope: "col", class: one.numeric ? "number" : "" }, one.name)))),
+    make("tbody", {}, ...front.map(({ row }) => make("tr", {}, ...columns.map((one) =>
+      make("td", { class: one.numeric ? "number" : "" },
+        one.numeric ? link(row, one.column.text(row), one.name === board.head.roles.score) : one.column.text(row))))))));
+};
+
+const MANY_POINTS = 250;
+const drawFigure = (width, points, front, block, axis) => {
+  const height = Math.max(300, Math.min(520, width * 0.6));
+  const left = 64, right = 16, top = 12, bottom = 44;
+  const interval = board.role("interval");
+  const ends = new Map(front.map((one) => [one, interval?.column.ends ? interval.column.ends(one.row) : []]));
+  const all = points.map((one) => one.score).concat(...ends.values());
+  let low = Math.min(...all), high = Math.max(...all);
+  const spare = (high - low || Math.abs(high) || 1) * 0.06;
+  low -= spare; high += spare;
+  const quick = points[0].time / 1.25, slow = points.at(-1).time * 1.25;
+  const x = (time) => left + (Math.log(time / quick) / Math.log(slow / quick)) * (width - left - right);
+  const y = (score) => top + ((high - score) / (high - low)) * (height - top - bottom);
+  const unit = block.unit && block.unit !== "1" ? ` [${block.unit}]` : "";
+  const metric = block.title.split(" · ")[1]?.split(",")[0] ?? `${block.metric}${unit}`;
+  const picture = draw("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "group",
+    "aria-label": `${block.title}: score against ${axis.name}. Arrow keys go from point to point, Enter opens the cell.` });
+  for (const [value, text] of steps(low, high, 6)) {
+    picture.append(draw("line", { class: "rule", x1: left, x2: width - right, y1: y(value), y2: y(value) }),
+      draw("text", { class: "tick", x: left - 8, y: y(value) + 4, "text-anchor": "end" }, text));
+  }
+  let taken = -Infinity;
+  for (const value of decades(quick, slow)) {
+    picture.append(draw("line", { class: "rule", x1: x(value), x2: x(value), y1: top, y2: height - bottom }));
+    if (x(value) - taken < 48) continue;
+    taken = x(value);
+    picture.append(draw("text", { class: "tick", x: x(value), y: height - bottom + 18, "text-anchor": "middle" }, timeText(value)));
+  }
+  picture.append(
+    draw("text", { class: "axis", x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, `${axis.name}, logarithmic`),
+    draw("text", { class: "axis", x: 0, y: 0, "text-anchor": "middle", transform: `translate(14 ${(top + height - bottom) / 2}) rotate(-90)` }, metric));
+  for (const [one, [from, to]] of ends) {
+    if (to !== undefined) picture.append(draw("line", { class: "interval", x1: x(one.time), x2: x(one.time), y1: y(from), y2: y(to) }));
+  }
+  if (front.length) {
+    const path = front.map((one, at) => (at ? `H${x(one.time).toFixed(1)}V${y(one.score).toFixed(1)}`
+      : `M${x(one.time).toFixed(1)} ${y(one.score).toFixed(1)}`)).join("") + `H${width - right}`;
+    picture.append(draw("path", { class: "front", d: path }));
+  }
+  const tip = make("div", { class: "tip", hidden: true, "aria-hidden": "true" });
+  const onFront = new Set(front);
+  const small = points.length > MANY_POINTS ? 2.4 : 3.8;
+  const drawn = points.map((one) => {
+    const kind = `point ${one.kind}${onFront.has(one) ? " on-front" : ""}`;
+    const shared = { class: kind, tabindex: -1, role: "link", "aria-label": tellPoint(one, axis).join(", ") };
+    const size = onFront.has(one) ? 5.5 : small;
+    const mark = one.kind === "baseline"
+      ? draw("rect", { ...shared, x: x(one.time) - small, y: y(one.score) - small, width: 2 * small, height: 2 * small })
+      : draw("circle", { ...shared, cx: x(one.time), cy: y(one.score), r: size });
+    mark.point = one;
+    return mark;
+  });
+  picture.append(...drawn.filter((one) => !onFront.has(one.point)), ...drawn.filter((one) => onFront.has(one.point)));
+  const labelled = [];
+  for (const one of front) {
+    const text = nameOf(one.row).slice(0, 48);
+    const wide = text.length * 6.3, at = { x: x(one.time) + 8, y: y(one.score) - 8 };
+    if (at.x + wide > width - right) at.x = x(one.time) - 8 - wide;
+    if (at.x < left || labelled.some((other) => Math.abs(other.y - at.y) < 14 && other.x < at.x + wide && at.x < other.x + other.wide)) continue;
+    labelled.push({ ...at, wide });
+    picture.append(draw("text", { class: "label", x: at.x, y: Math.max(at.y, 12) }, text));
+  }
+  const open = (mark) => { location.hash = `cell=${address(board.field("cell", mark.point.row))}`; };
+  const tell = (mark) => {
+    tip.replaceChildren(...tellPoint(mark.point, axis).map((text, at) => make("div", at ? {} : { class: "who" }, text)));
+    tip.hidden = false;
+    const middle = x(mark.point.time);
+    tip.style.left = `${Math.max(0, Math.min(middle + 12, width - tip.offsetWidth - 4))}px`;
+    const below = y(mark.point.score) + 12;
+    tip.style.top = `${below + tip.offsetHeight > height ? Math.max(0, below - tip.offsetHeight - 24) : below}px`;
+  };
+  const first = drawn.find((one) => onFront.has(one.point)) ?? drawn[0];
+  first.setAttribute("tabindex", 0);
+  const markOf = (event) => (event.target.point ? event.target : null);
+  picture.addEventListener("pointerover", (event) => { const mark = markOf(event); if (mark) tell(mark); else tip.hidden = true; });
+  picture.addEventListener("pointerleave", () => { tip.hidden = true; });
+  picture.addEventListener("focusin", (event) => { const mark = markOf(event); if (mark) tell(mark); });
+  picture.addEventListener("focusout", () => { tip.hidden = true; });
+  picture.addEventListener("click", (event) => { const mark = markOf(event); if (mark) open(mark); });
+  picture.addEventListener("keydown", (event) => {
+    const mark = markOf(event);
+    if (!mark) return;
+    const at = drawn.indexOf(mark);
+    const next = { ArrowRight: at + 1, ArrowUp: at + 1, ArrowLeft: at - 1, ArrowDown: at - 1, Home: 0, End: drawn.length - 1 }[event.key];
+    if (event.key === "Enter" || event.key === " ") open(mark);
+    else if (event.key === "Escape") tip.hidden = true;
+    else if (next === undefined) return;
+    else if (drawn[next]) {
+      mark.setAttribute("tabindex", -1);
+      drawn[next].setAttribute("tabindex", 0);
+      drawn[next].focus({ preventScroll: true });
+    }
+    event.preventDefault();
+  });
+  return [make("div", { class: "canvas" }, picture, tip)];
+};

@@ -1,0 +1,38 @@
+"""What a row's keys are about: in which order, and under which titles, a page tells them."""
+
+from __future__ import annotations
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "Configuration": (
+        "cell", "key", "sensor", "task", "rig", "simulated", "protocol", "dagger", "split", "estimator", "is_baseline",
+        "repeat", "repeats", "seed", "threads",
+    ),
+    "Answer": (
+        "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method", "baseline",
+        "published", "published_reference", "published_remark", "n_recordings", "n_sessions", "n_train", "n_test",
+    ),
+    "Times and memory": (
+        "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95", "latency_n",
+        "wall_s", "peak_rss_mb", "host", "concurrency", "made_by",
+    ),
+}  # fmt: skip
+"""Single values; a key that is in no group comes last, so that none is ever left out."""
+
+TITLES = {
+    "params": "Parameters other than the defaults",
+    "chosen": "Chosen on validation data",
+    "search": "Every candidate that was compared",
+    "scores": "Other scores: by class, by fold, by other metrics",
+    "counts": "What was counted",
+    "assumptions": "Assumed by the simulation",
+    "plan": "Effects of the first recording: included and left out, with reasons",
+    "confusion": "Confusion: true class down, answer across [rows]",
+    "recordings": "Recordings",
+    "remarks": "Remarks of the recordings",
+    "stamps": "Stamps",
+    "replicates": "What the interval was resampled over",
+}
+"""Lists and tables."""
+
+APART = ("traceback", "classes")
+"""Shown in places of their own."""
