@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import hashlib
 import json
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -162,8 +163,16 @@ def _head(
         "groups": GROUPS,
         "titles": TITLES,
         "notes": notes,
-        "provenance": [tame(entry) for entry in provenance],
+        "provenance": [[_id(entry), tame(entry)] for entry in provenance],
     }
+
+
+def _id(entry: Mapping[str, Any]) -> str:
+    """Return what rows call their provenance by (`made_by`): the digest that a store names its file with."""
+    try:
+        return hashlib.sha256(json.dumps(dict(entry), sort_keys=True).encode()).hexdigest()[:16]
+    except (TypeError, ValueError, RecursionError):
+        return ""
 
 
 def _section(section: Any) -> dict[str, Any]:

@@ -130,7 +130,7 @@ const drawSections = () => {
 const drawProvenance = () => {
   const all = board.head.provenance;
   byId("foot").replaceChildren(...board.head.foot.map((text) => make("p", { class: "note" }, ...prose(text))));
-  byId("provenance").replaceChildren(...(all.length ? all.map((entry) => make("details", {},
+  byId("provenance").replaceChildren(...(all.length ? all.map(([, entry]) => make("details", {},
     make("summary", {}, Object.entries(entry).filter(([, value]) => !isEmpty(value) && !isRecord(value)).slice(0, 6)
       .map(([name, value]) => `${name} ${asText(value)}`).join(" · ")), ...provenanceTables(entry)))
     : [make("p", { class: "note" }, "This page was given no provenance.")]));
