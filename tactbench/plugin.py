@@ -4,6 +4,9 @@ A plugin is a module, named by an entry point of group ``tactbench``, that state
 one or more of the five hooks. See ``docs/plugins.md``.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from tactbench.core.errors import (
     DataError,
     MissingRecordingError,
@@ -28,8 +31,7 @@ from tactbench.core.plugins.interfaces import (
     TransducerFactory,
 )
 from tactbench.core.plugins.registry import load_object, load_registry
-from tactbench.core.recording.reader import Recording, open_recording
-from tactbench.core.samples import Block, FloatArray, Quality, SkinGrid, SkinState
+from tactbench.core.samples import Block, Quality, SkinGrid, SkinState
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
@@ -63,6 +65,10 @@ from tactbench.core.spec.sensor import (
 )
 from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPad, Skin, SkinSheet
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
+
+if TYPE_CHECKING:
+    from tactbench.core.recording.reader import Recording, open_recording
+    from tactbench.core.samples import FloatArray
 
 __all__ = [
     "API_VERSION",
@@ -140,3 +146,17 @@ __all__ = [
     "open_recording",
     "sourced",
 ]
+
+_NEED_NUMPY = {
+    "FloatArray": "tactbench.core.samples",
+    "Recording": "tactbench.core.recording.reader",
+    "open_recording": "tactbench.core.recording.reader",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what stands on numpy when somebody asks for it: a plugin that is only listed need not."""
+    if name not in _NEED_NUMPY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = found = getattr(import_module(_NEED_NUMPY[name]), name)
+    return found

@@ -9,15 +9,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntFlag
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.spec.sensor import StreamSpec
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    FloatArray = npt.NDArray[np.float64]
+    IntArray = npt.NDArray[np.int64]
+
+
+def __getattr__(name: str) -> Any:
+    """Import numpy for the aliases when somebody asks for one: listings and cached runs do without."""
+    if name not in ("FloatArray", "IntArray"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import numpy as np
+    import numpy.typing as npt
+
+    found = {"FloatArray": npt.NDArray[np.float64], "IntArray": npt.NDArray[np.int64]}
+    globals().update(found)
+    return found[name]
 
 
 class Quality(IntFlag):

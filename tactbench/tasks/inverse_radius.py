@@ -12,6 +12,9 @@ from tactbench.tasks.surfaces import RADII_MM, SLOT_S, at_places, few_shots, in_
 
 TACTBENCH_API = 1
 
+# Assumed: a tenth of the least step between two of the surfaces, from flat to a radius of 40 mm.
+SAME_PER_M = 2.5
+
 ROLES = ("train", "validation", "test")
 
 # The paper's caps as they are, so that their recordings are shared; then flat, once a role, in a fourth round.
@@ -37,6 +40,7 @@ SPEC = TaskSpec(
     target=LabelTarget(name="inverse_radius_per_m", unit="1/m"),
     metric="rmse",
     unit="1/m",
+    equivalence=SAME_PER_M,
     scenes=(*papers_caps(), *FLATS),
     campaigns={"cap_radius_mm": in_sessions(5), "placement": at_places(), "unit": on_units(), **few_shots()},
     protocols=("deployable", "karl2016", "karl2016-training-scale"),

@@ -18,9 +18,9 @@ from tactbench.core.calibration.readoff import read_off, thinned
 from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.evaluation.cell import CellResult, evaluate
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
-from tactbench.core.matrix.execution import installed, rig_of
+from tactbench.core.matrix.execution import rig_of
 from tactbench.core.plugins.interfaces import Rig
-from tactbench.core.plugins.registry import Registry
+from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.spec.calibration import CalibrationSpec, Output
 from tactbench.core.spec.scene import Scene, Simulation
 from tactbench.core.spec.task import TaskSpec

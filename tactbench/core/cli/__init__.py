@@ -24,7 +24,10 @@ VERBS = {
     "cost": ("cost", "Show what accuracy costs in time."),
     "calibrate": ("calibrate", "Draw what no source states, and hold simulations against published numbers."),
     "report": ("report", "Make one page of all results, with figures and the published numbers beside ours."),
+    "why": ("why", "Say why a cell would be reused or computed again, and how it ended."),
+    "rerun": ("rerun", "Compute one cell again and say whether it comes out the same, bit for bit."),
     "leaderboard": ("leaderboard", "Show the last run's table again, in any format."),
+    "compare": ("compare", "Compare two sensors, two estimators or two result folders, replicate by replicate."),
 }
 
 

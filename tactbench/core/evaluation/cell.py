@@ -21,6 +21,7 @@ from tactbench.core.evaluation.interval import LEVEL, score_interval
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
 from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
+from tactbench.core.evaluation.replicate_sums import summed
 from tactbench.core.evaluation.replication import replicates
 from tactbench.core.evaluation.selection import Build, Choice, features_of, select
 from tactbench.core.evaluation.splits import (
@@ -49,6 +50,8 @@ class CellResult:
     ci_method: str
     scores: Mapping[str, float]
     """other metrics, the score on validation data, of each fold and each class"""
+    fold_sizes: Mapping[str, tuple[int, int]]
+    """training and test rows of each fold, by its name in `scores`"""
     confusion: npt.NDArray[np.int64] | None
     """(true class, predicted class)"""
     classes: tuple[Any, ...]
@@ -75,6 +78,8 @@ class CellResult:
     """every candidate that was compared on validation data: its parameters, k, score and fold"""
     sets: Mapping[Role, Answers]
     """answers by role: test always; validation, and for regression train, where the split has one fold"""
+    replicates: Mapping[str, Any]
+    """the primary metric's sums over each replicate; see replicate_sums"""
 
 
 @dataclass
@@ -83,6 +88,7 @@ class _Sum:
 
     sets: dict[Role, list[Answers]] = field(default_factory=dict)
     scores: dict[str, float] = field(default_factory=dict)
+    fold_sizes: dict[str, tuple[int, int]] = field(default_factory=dict)
     chosen: list[Choice] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
     folds: int = 0
@@ -191,6 +197,7 @@ def _fold(
     predicted = answers_of(model, X_test, estimator.name, n_classes)
     total.predict_s += clock() - began
     total.scores[f"fold {fold.name}"] = metric.of(fold.test.y, predicted, n_classes)
+    total.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(fold.test))
     _add(total, "test", fold.test, predicted, number, data)
     if alone and not n_classes:
         fitted = answers_of(model, X_train, estimator.name, n_classes)
@@ -259,14 +266,14 @@ def _result(
     tested = sets["test"]
     y, predicted, recording, row = tested.y_true, tested.y_pred, tested.recording, tested.row
     n_classes = len(data.classes)
-    cluster, cluster_name = replicates(data, task, split, y, recording, row)
+    unit = replicates(data, task, split, y, recording, row)
     score = metric.of(y, predicted, n_classes)
     if not np.isfinite(score):
         raise DataError(
             f"The {metric.name} of {len(y)} test rows is undefined: their labels never change.",
             hint="Choose another --split.",
         )
-    interval = score_interval(metric, y, predicted, recording, cluster, cluster_name, n_classes, seed)
+    interval = score_interval(metric, y, predicted, recording, unit.codes, unit.name, n_classes, seed)
     scores = dict(total.scores)
     for other in METRICS.values():
         if other.kind == task.kind and other is not metric:
@@ -287,6 +294,7 @@ def _result(
         ci_level=LEVEL,
         ci_method=interval.method,
         scores=scores,
+        fold_sizes=total.fold_sizes,
         confusion=table,
         classes=data.classes,
         split=split,
@@ -310,6 +318,7 @@ def _result(
         peak_rss_mb=peak_rss_mb(),
         search=_search(total.chosen, total.names),
         sets=sets,
+        replicates=summed(metric, tested, unit, data),
     )
 
 

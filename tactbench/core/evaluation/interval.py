@@ -67,12 +67,12 @@ def score_interval(
     if enough(y, number, n_classes):
         sums = np.zeros((len(names), rows.shape[1]))
         np.add.at(sums, number, rows)
-        strata = _strata(y, number, n_classes)
+        strata = strata_of(y, number, n_classes)
         times = np.zeros((RESAMPLES, len(names)))
         for one in strata:
             times[:, one] = rng.multinomial(len(one), np.full(len(one), 1 / len(one)), size=RESAMPLES)
         scores = metric.score(times @ sums, n_classes)
-        tail = _widened_tail(len(names) - len(strata), min(len(one) for one in strata))
+        tail = widened_tail(len(names) - len(strata), min(len(one) for one in strata))
         plural = cluster_name + ("es" if cluster_name.endswith("s") else "s")
         return _percentiles(scores, f"bootstrap over {len(names)} {plural}", tail)
     if len(np.unique(recording)) == len(recording):
@@ -81,7 +81,7 @@ def score_interval(
     lengths = []
     for one in np.unique(recording):
         mine = rows[recording == one]
-        loss = _loss(metric, y[recording == one], predicted[recording == one])
+        loss = loss_of(metric, y[recording == one], predicted[recording == one])
         length = block_length(loss)
         lengths.append(length)
         total += _circular_blocks(mine, length, rng)
@@ -109,7 +109,7 @@ def enough(y: npt.NDArray[Any], cluster: npt.NDArray[Any], n_classes: int) -> bo
     return all(len(np.unique(cluster[y == one])) >= ENOUGH_CLUSTERS for one in range(n_classes) if (y == one).any())
 
 
-def _strata(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> list[IntArray]:
+def strata_of(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> list[IntArray]:
     """Return the clusters that may stand in for each other: all, or class by class where each has one class only.
 
     Without it a resample could lose a class, and its score would be that of another question.
@@ -125,14 +125,15 @@ def _strata(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> list[IntA
     return [every[own == one] for one in np.unique(own)]
 
 
-def _widened_tail(freedom: int, n: int) -> float:
+def widened_tail(freedom: int, n: int) -> float:
     """Return the normal tail beyond ``sqrt(n / (n - 1)) t(freedom)``, where n clusters are drawn from the fewest."""
     special = importlib.import_module("scipy.special")
     quantile = special.stdtrit(freedom, 0.5 + LEVEL / 2)
     return float(special.ndtr(-quantile * np.sqrt(n / (n - 1))))
 
 
-def _loss(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
+def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
+    """Return (n,) what each row adds to the error: its square, or whether the class is wrong."""
     if metric.kind == "classification":
         return np.asarray(y != predicted, dtype=np.float64)
     return np.asarray((predicted - y) ** 2)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.few_shot import shots as shots
 from tactbench.core.evaluation.first_frame import require_first_rows
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.spec.task import TaskSpec
@@ -25,7 +26,6 @@ SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
 """Splits whose unit of replication is the session; few-shot-N is another."""
 MOST_ONE_BY_ONE = 12
 """Up to so many groups of a task's own campaign are left out one by one; more are dealt into folds."""
-_FEW_SHOT = re.compile(r"few-shot-([1-9][0-9]*)")
 SHUFFLED_STAMP = "leaks: split shuffled puts neighbouring rows of one recording or object on both sides."
 
 
@@ -100,12 +100,6 @@ def _can(name: str, data: Dataset) -> bool:
     if any(name not in table.groups for table in tables):
         return False  # rows of no known group could be related to either side
     return len({value for table in tables for value in np.unique(table.groups[name][table.labelled])}) >= 2
-
-
-def shots(split: str) -> int | None:
-    """Return how many training sessions a split named `few-shot-N` has; None if it is another."""
-    found = _FEW_SHOT.fullmatch(split)
-    return int(found[1]) if found else None
 
 
 def training_sessions(data: Dataset) -> list[str]:

@@ -10,9 +10,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tactbench.core.evaluation.splits import shots
+from tactbench.core.evaluation.few_shot import shots
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.table import METRIC_NAMES, answer_name, sensor_name
 
 Row = Mapping[str, Any]
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import importlib
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, sensor_name
 from tactbench.core.leaderboard.numbers import interval, score, suffix
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER, answer_name, sensor_name
+from tactbench.core.leaderboard.sections import Section
+from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
 
@@ -30,18 +30,11 @@ COLUMNS = (
 NUMERIC = frozenset({"repeat", "score", "95 % interval", "shuffled", "first frame alone", "trivial"})
 
 
-@dataclass(frozen=True)
-class ProbeTable:
-    """Plain text, ready to be shown."""
-
-    title: str
-    columns: tuple[str, ...]
-    lines: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...]
-
-
-def build_probe(rows: Sequence[Row]) -> ProbeTable | None:
+def build_probe(rows: Sequence[Row]) -> Section | None:
     """Put each finished answer under `deployable` beside its probes; None if nothing was probed."""
+    probes = _Probes(rows)
+    if not probes:
+        return None
     lines: list[tuple[str, ...]] = []
     skipped: list[str] = []
     for row in rows:
@@ -49,36 +42,53 @@ def build_probe(rows: Sequence[Row]) -> ProbeTable | None:
             continue
         if row["split"] in ("shuffled", "in-session"):
             continue  # neither keeps recordings or groups apart: there is nothing to compare with
-        first = _partner(row, rows, protocol=FIRST_FRAME.name, split=row["split"])
-        shuffled = _partner(row, rows, protocol=DEPLOYABLE.name, split="shuffled")
+        first = probes.of(row, FIRST_FRAME.name, row["split"])
+        shuffled = probes.of(row, DEPLOYABLE.name, "shuffled")
         if first is None and shuffled is None:
             continue
-        lines.append(_line(row, shuffled, first))
+        lines.append(tuple(map(visible, _line(row, shuffled, first))))
         if first is not None and first["status"] == "skipped":
-            skipped.append(f"{row['sensor']}/{row['task']}: {first['reason']}")
+            skipped.append(visible(f"{row['sensor']}/{row['task']}: {first['reason']}"))
     if not lines:
         return None
     used = [place for place in range(len(COLUMNS)) if any(line[place] for line in lines)]
-    return ProbeTable(
+    return Section(
         title="Probe · does the score come from the contact?",
         columns=tuple(COLUMNS[place] for place in used),
+        numeric=NUMERIC,
         lines=tuple(tuple(line[place] for place in used) for line in lines),
         notes=(
             f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer). "
             "Optimistic: shuffled rows score beyond the interval of the split. See docs/real-recordings.md.",
             *dict.fromkeys(skipped),
         ),
+        alarms=frozenset(place for place, line in enumerate(lines) if line[-1].startswith("LEAK")),
     )
 
 
-def _partner(row: Row, rows: Sequence[Row], *, protocol: str, split: str) -> Row | None:
-    """Return the same answer under another protocol or split. A cell that was never begun may not know its split."""
-    same = ("sensor", "task", "rig", "estimator", "params", "repeat")
-    for other in rows:
-        splits = (split,) if other["status"] == "done" else (split, None)
-        if other["protocol"] == protocol and other["split"] in splits and all(other[key] == row[key] for key in same):
-            return other
-    return None
+class _Probes:
+    """The rows that are probes, found by the answer they probe."""
+
+    def __init__(self, rows: Sequence[Row]) -> None:
+        self._rows: dict[tuple[Any, ...], list[Row]] = {}
+        for row in rows:
+            if row["protocol"] == FIRST_FRAME.name or row["split"] in ("shuffled", None):
+                self._rows.setdefault(self._key(row, row["protocol"]), []).append(row)
+
+    def __bool__(self) -> bool:
+        return bool(self._rows)
+
+    def of(self, row: Row, protocol: str, split: str) -> Row | None:
+        """Return the same answer under a protocol and split. A cell that was never begun may not know its split."""
+        for other in self._rows.get(self._key(row, protocol), ()):
+            if other["split"] == split or (other["split"] is None and other["status"] != "done"):
+                return other
+        return None
+
+    @staticmethod
+    def _key(row: Row, protocol: str) -> tuple[Any, ...]:
+        same = (row[key] for key in ("sensor", "task", "rig", "estimator", "repeat"))
+        return (protocol, *same, json.dumps(row["params"], sort_keys=True))
 
 
 def _line(row: Row, shuffled: Row | None, first: Row | None) -> tuple[str, ...]:
@@ -127,9 +137,9 @@ def _beyond_guessing(first: Row, trivial: float) -> bool | None:
     the guess. Numbers: the interval lies beyond the trivial score.
     """
     if first["confusion"] is not None:
-        table = np.asarray(first["confusion"])
-        n, right = int(table.sum()), int(np.trace(table))
-        guess = float(table.sum(axis=1).max()) / n
+        table = first["confusion"]
+        n, right = sum(map(sum, table)), sum(table[place][place] for place in range(len(table)))
+        guess = max(map(sum, table), default=0) / max(n, 1)
         if guess == 1.0 or right == 0:
             return False
         return float(importlib.import_module("scipy.special").bdtrc(right - 1, n, guess)) <= TAIL

@@ -3,82 +3,122 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from tactbench.core.leaderboard import probe
-from tactbench.core.leaderboard.table import NUMERIC, Block, build_table
+from tactbench.core.leaderboard.columns import NUMERIC
+from tactbench.core.leaderboard.sections import Section
+from tactbench.core.leaderboard.table import ABSENT, Block, Table
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-_STYLE = {"result": "bold", "baseline": "dim", "failed": "red"}
-_FIRST_TO_GO = ("batch/row", "p95", "sessions", "n test", "sim", "baseline", "fit", "published", "latency p50")
+_STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim"}
+_FIRST_TO_GO = (
+    "batch/row", "p95", "sessions", "n test", "sim", "baseline", "fit", "published", "latency p50", "rank 95 %",
+)  # fmt: skip
 """Columns that a narrow terminal does without, in this order; the files have them all."""
 _AROUND_A_CELL = 3
+_WITHOUT_EDGE = 240
+"""Wide enough for every column of names of ordinary length."""
 
 
-def show(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
-    """Print the leaderboard of `rows` on `console`; text from plugins is never read as markup."""
-    from rich import box
-    from rich.padding import Padding
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    table = build_table(rows)
+def show(table: Table, console: Console) -> None:
+    """Print a leaderboard on `console`; text from plugins is never read as markup."""
     left_out: set[str] = set()
     for block in table.blocks:
-        console.print(Text(block.title, style="bold"))  # not the grid's own title: that is folded to the grid's width
-        grid = RichTable(box=box.SIMPLE_HEAD)
-        places, gone = _fitting(table.columns, block, console.width)
-        left_out |= gone
-        for place in places:
-            name = table.columns[place]
-            grid.add_column(Text(name), justify="right" if name in NUMERIC else "left", no_wrap=True)
-        for line in block.lines:
-            grid.add_row(*(Text(line.cells[place]) for place in places), style=_STYLE[line.kind])
-        console.print(grid)
+        left_out |= _show_block(table.columns, block, console)
     notes = list(table.notes)
     if left_out:
         names = ", ".join(name for name in table.columns if name in left_out)
         notes.append(f"This terminal is too narrow for: {names}. They are in the files.")
-    for note in notes:
-        console.print(Padding(Text(note, style="dim"), (0, 0, 0, 1), expand=False))
-    _show_probe(rows, console)
+    _show_notes(notes, console)
+    for section in table.sections:
+        _show_section(section, console)
+    if table.foot:
+        console.print()
+        _show_notes(table.foot, console)
 
 
-def _show_probe(rows: Sequence[Mapping[str, Any]], console: Console) -> None:
-    """Print what the recordings give away, if it was asked."""
+def _show_block(columns: Sequence[str], block: Block, console: Console) -> set[str]:
+    """Print a block; return the columns that there was no room for.
+
+    The lines are padded here and printed as one text: a grid of rich takes a second for a thousand of them.
+    """
+    from rich.text import Text
+
+    widths, gone = _fitting(columns, block, console.width)
+    console.print(Text(f"{block.title}\n", style="bold"))
+    told = Text(no_wrap=True, overflow="ellipsis")
+    told.append(_padded(columns, columns, widths), style="bold")
+    told.append(f"\n {'─' * (sum(widths.values()) + _AROUND_A_CELL * len(widths) - 1)}\n")
+    for line in block.lines:
+        told.append(f"{_padded(line.cells, columns, widths)}\n", style=_STYLE[line.kind])
+    console.print(told)
+    return gone
+
+
+def _padded(cells: Sequence[str], columns: Sequence[str], widths: Mapping[int, int]) -> str:
+    """Return one line of a block, columns of numbers to the right."""
+    from rich.cells import cell_len
+
+    parts = []
+    for place, width in widths.items():
+        blank = " " * (width - cell_len(cells[place]))
+        parts.append(blank + cells[place] if columns[place] in NUMERIC else cells[place] + blank)
+    return f"  {(' ' * _AROUND_A_CELL).join(parts)}".rstrip()
+
+
+def _show_section(section: Section, console: Console) -> None:
     from rich import box
-    from rich.padding import Padding
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    table = probe.build_probe(rows)
-    if table is None:
-        return
-    console.print(Text(f"\n{table.title}", style="bold"))
+    console.print(Text(f"\n{section.title}", style="bold"))
     grid = RichTable(box=box.SIMPLE_HEAD)
-    for name in table.columns:
-        grid.add_column(Text(name), justify="right" if name in probe.NUMERIC else "left", overflow="fold")
-    for line in table.lines:
-        grid.add_row(*(Text(cell) for cell in line), style="yellow" if line[-1].startswith("LEAK") else "")
+    for name in section.columns:
+        grid.add_column(Text(name), justify="right" if name in section.numeric else "left", overflow="fold")
+    for place, line in enumerate(section.lines):
+        grid.add_row(*map(Text, line), style="yellow" if place in section.alarms else "")
     console.print(grid)
-    for note in table.notes:
+    _show_notes(section.notes, console)
+
+
+def _show_notes(notes: Sequence[str], console: Console) -> None:
+    from rich.padding import Padding
+    from rich.text import Text
+
+    for note in notes:
         console.print(Padding(Text(note, style="dim"), (0, 0, 0, 1), expand=False))
 
 
-def _fitting(columns: Sequence[str], block: Block, width: int) -> tuple[list[int], set[str]]:
-    """Return the columns to show, and the names of those that there is no room for; empty columns are never shown."""
+def _fitting(columns: Sequence[str], block: Block, width: int) -> tuple[dict[int, int], set[str]]:
+    """Return the places of the columns to show with their widths, and the names of those that there is no room for.
+
+    Empty columns are never shown.
+    """
+    from rich.cells import cell_len
+
     widths = {
-        place: max(len(columns[place]), *(len(line.cells[place]) for line in block.lines)) + _AROUND_A_CELL
+        place: max(cell_len(columns[place]), *(cell_len(line.cells[place]) for line in block.lines))
         for place in range(len(columns))
-        if any(line.cells[place].strip("–") for line in block.lines)
+        if any(line.cells[place].strip(ABSENT) for line in block.lines)
     }
     gone: set[str] = set()
     for name in _FIRST_TO_GO:
-        if sum(widths.values()) + _AROUND_A_CELL <= width:
+        if sum(widths.values()) + _AROUND_A_CELL * len(widths) <= width:
             break
-        place = columns.index(name)
+        place = columns.index(name) if name in columns else -1
         if widths.pop(place, None) is not None:
             gone.add(name)
-    return list(widths), gone
+    return widths, gone
+
+
+def plain_text(table: Table) -> str:
+    """Return what a terminal without edge and colours shows."""
+    import io
+
+    from rich.console import Console
+
+    out = io.StringIO()
+    show(table, Console(file=out, width=_WITHOUT_EDGE, highlight=False, color_system=None))
+    return out.getvalue()

@@ -6,10 +6,9 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tactbench.core.errors import NotApplicable, TactbenchError
-from tactbench.core.evaluation.cell import CellResult, evaluate
-from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import Registry
@@ -17,6 +16,10 @@ from tactbench.core.samples import Answers
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
+
+if TYPE_CHECKING:
+    from tactbench.core.evaluation.cell import CellResult
+    from tactbench.core.evaluation.dataset import Dataset
 
 Answer = tuple[Row, Mapping[Role, Answers]]
 """A row, and the answers that go into its shard, by role."""
@@ -30,6 +33,8 @@ def answer(
     working: Callable[[str], None] | None = None,
 ) -> Answer:
     """Evaluate one cell; an exception becomes a row that says ``failed`` or ``skipped``."""
+    from tactbench.core.evaluation.cell import evaluate
+
     task = registry.tasks[cell.task].spec
     row = opening(cell, task)
     try:
@@ -75,6 +80,7 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "repeat": cell.repeat,
         "repeats": cell.repeats,
         "seed": cell.seed,
+        "simulation": cell.simulation.model_dump(exclude_defaults=True),
         "status": "planned",
         "reason": "",
         "traceback": "",
@@ -82,6 +88,8 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "log": "",
         "metric": task.metric,
         "unit": task.unit,
+        "equivalence": task.equivalence,
+        "reference_score": task.reference_score,
         "score": None,
         "ci_low": None,
         "ci_high": None,
@@ -117,6 +125,7 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "search": [],
         "recordings": [],
         "scores": {},
+        "fold_sizes": {},
         "confusion": None,
         "classes": [],
         "replicates": {},
@@ -178,6 +187,8 @@ def _scored(result: CellResult) -> Row:
         "chosen": dict(result.chosen),
         "search": [dict(candidate) for candidate in result.search],
         "scores": dict(result.scores),
+        "fold_sizes": {name: list(sizes) for name, sizes in result.fold_sizes.items()},
         "confusion": None if result.confusion is None else result.confusion.tolist(),
         "classes": list(result.classes),
+        "replicates": dict(result.replicates),
     }

@@ -10,16 +10,17 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from tactbench.core.acquisition import acquire
 from tactbench.core.errors import NotApplicable, RigError
-from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.matrix.answer import Answer, answer, failed, opening
 from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.interfaces import Rig, RigContext, Shelf
-from tactbench.core.plugins.registry import Registry, load_object, load_registry
+from tactbench.core.plugins.registry import Registry, installed, load_object
+
+if TYPE_CHECKING:
+    from tactbench.core.evaluation.dataset import Dataset
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -117,12 +118,6 @@ def _interrupts_held_back() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-@lru_cache(maxsize=1)
-def installed() -> Registry:
-    """Return the registry of this process."""
-    return load_registry()
-
-
 def rig_of(name: str, registry: Registry, recordings: Path | None = None) -> Rig | Shelf:
     """Build the rig called `name`."""
     descriptor = registry.rigs[name]
@@ -141,6 +136,8 @@ def _rig(name: str) -> Rig:
 
 def record(order: Order) -> str:
     """Make one recording and return its content digest. Raises whatever the rig raises."""
+    from tactbench.core.acquisition import acquire
+
     registry = installed()
     rig = registry.rigs[order.rig]
     made = acquire(
@@ -169,6 +166,8 @@ def prepare(cell: Cell) -> None:
 
 @lru_cache(maxsize=2)
 def _dataset(task: str, recordings: tuple[Path, ...]) -> Dataset:
+    from tactbench.core.evaluation.dataset import load_dataset
+
     return load_dataset(installed().tasks[task].spec, recordings)
 
 

@@ -1,4 +1,8 @@
-"""Keys: what decides a recording or a result, and nothing else, in one digest."""
+"""Keys: what decides a recording or a result, and nothing else, in one digest.
+
+What decides is listed in sections: the configuration, the descriptors, the versions, the source of each package, the
+data. A key is a digest of the sections' digests; the sections themselves are what ``tactbench why`` compares.
+"""
 
 from __future__ import annotations
 
@@ -7,78 +11,146 @@ import json
 import sys
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
+from tactbench.core.matrix.distributions import installed_distributions, normal
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.source import SourceDigests
+from tactbench.core.matrix.source import Source, SourceDigests
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.scene import Role, Scene
 
 RELEVANT = ("numpy", "scipy", "scikit-learn")
 """Distributions whose version may change a number."""
 
-_TOLD_OTHERWISE = {"published", "title", "question", "scenes", "campaigns"}
+_TOLD_OTHERWISE = {"published", "equivalence", "reference_score", "title", "question", "scenes", "campaigns"}
 """Of a task: what changes no number, and what its recordings say themselves, by their content."""
+
+Section = Mapping[str, Any]
+
+
+class Fixed(NamedTuple):
+    """Sections that many keys share."""
+
+    digest: str
+    sections: Mapping[str, Section]
+
+
+_canonical = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=True, default=repr).encode
+
+
+class Keys:
+    """The keys of one run: what does not change from cell to cell is worked out once.
+
+    Parameters
+    ----------
+    registry
+        Where descriptors and their owners are looked up.
+    sources
+        Digests of the owners' packages.
+    """
+
+    def __init__(self, registry: Registry, sources: SourceDigests) -> None:
+        self._registry = registry
+        self._sources = sources
+        self._answers: dict[tuple[str, str], Fixed] = {}
+        self._makers: dict[tuple[str, str], Fixed] = {}
+        self._data: dict[tuple[str, ...], str] = {}
+
+    def of_cell(self, cell: Cell, data: Sequence[str]) -> str:
+        """Return the key of a cell's result; `data` are the content digests of its recordings, in order."""
+        several = tuple(data)
+        if several not in self._data:
+            self._data[several] = _digest("\n".join(several))
+        return _digest(f"{self.answer(cell).digest} {self._data[several]} {_canonical(configuration_of(cell))}")
+
+    def answer(self, cell: Cell) -> Fixed:
+        """Return what all cells of one task and one estimator share."""
+        pair = cell.task, cell.estimator
+        if pair not in self._answers:
+            task, estimator = self._registry.tasks.owned(cell.task), self._registry.estimators.owned(cell.estimator)
+            source = self._sources.behind([task.module, estimator.module, estimator.descriptor.where], "answer")
+            self._answers[pair] = _fixed(
+                source,
+                estimator.descriptor.distributions,
+                task=task.descriptor.spec.model_dump(exclude=_TOLD_OTHERWISE),
+                estimator=estimator.descriptor.model_dump(exclude={"title", "linear"}),
+            )
+        return self._answers[pair]
+
+    def of_recording(self, sensor: str, rig: str, scene: Scene, role: Role, seed: int) -> str:
+        """Return the key of a recording that `rig` is to make of `scene`."""
+        own = [scene.model_dump(), role, seed]
+        return _digest(f"{self.maker(sensor, rig).digest} {_canonical(own)}")
+
+    def maker(self, sensor: str, rig: str) -> Fixed:
+        """Return what all recordings by one rig of one sensor share."""
+        if (sensor, rig) not in self._makers:
+            maker, carrier = self._registry.sensors.owned(sensor), self._registry.rigs.owned(rig)
+            effects = [self._registry.effects.owned(effect.name) for effect in self._registry.effects]
+            modules = [maker.module, carrier.module, carrier.descriptor.where]
+            modules += [where for where in (maker.descriptor.transducer, maker.descriptor.driver) if where]
+            for effect in effects:
+                modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
+            self._makers[sensor, rig] = _fixed(
+                self._sources.behind(modules, "recording"),
+                (),
+                sensor=maker.descriptor.model_dump(),
+                rig=carrier.descriptor.model_dump(),
+                effects={owner.descriptor.name: owner.descriptor.model_dump() for owner in effects},
+            )
+        return self._makers[sensor, rig]
+
+
+_ALL: WeakKeyDictionary[SourceDigests, Keys] = WeakKeyDictionary()
+
+
+def keys_of(registry: Registry, sources: SourceDigests) -> Keys:
+    """Return the keys that go with `registry` and `sources`, the same ones every time."""
+    found = _ALL.get(sources)
+    if found is None or found._registry is not registry:
+        found = _ALL[sources] = Keys(registry, sources)
+    return found
 
 
 def recording_key(
     sensor: str, rig: str, scene: Scene, role: Role, seed: int, registry: Registry, sources: SourceDigests
 ) -> str:
     """Return the key of a recording that `rig` is to make of `scene`."""
-    maker, carrier = registry.sensors.owned(sensor), registry.rigs.owned(rig)
-    effects = [registry.effects.owned(effect.name) for effect in registry.effects]
-    return _digest(
-        {
-            "sensor": maker.descriptor.model_dump(mode="json"),
-            "rig": carrier.descriptor.model_dump(mode="json"),
-            "effects": [owner.descriptor.model_dump(mode="json") for owner in effects],
-            "scene": scene.model_dump(mode="json"),
-            "role": role,
-            "seed": seed,
-            "source": _sources([maker.module, carrier.module, *(owner.module for owner in effects)], sources),
-            "versions": versions(),
-        }
-    )
+    return keys_of(registry, sources).of_recording(sensor, rig, scene, role, seed)
 
 
 def cell_key(cell: Cell, data: Sequence[str], registry: Registry, sources: SourceDigests) -> str:
     """Return the key of a cell's result; `data` are the content digests of its recordings, in order."""
-    task = registry.tasks.owned(cell.task)
-    estimator = registry.estimators.owned(cell.estimator)
-    return _digest(
-        {
-            "sensor": cell.sensor,
-            "task": task.descriptor.model_dump(mode="json", exclude={"spec": _TOLD_OTHERWISE}),
-            "protocol": cell.protocol,
-            "split": cell.split,
-            "estimator": estimator.descriptor.model_dump(mode="json", exclude={"title", "linear"}),
-            "params": dict(cell.params),
-            "seed": cell.seed,
-            "data": list(data),
-            "source": _sources([task.module, estimator.module, estimator.descriptor.where], sources),
-            "versions": versions(estimator.descriptor.distributions),
-        }
-    )
+    return keys_of(registry, sources).of_cell(cell, data)
 
 
-def _sources(modules: Sequence[str], sources: SourceDigests) -> Mapping[str, str]:
-    packages = sorted({module.partition(":")[0].partition(".")[0] for module in modules} | {"tactbench"})
-    return {package: sources.package(package) for package in packages}
+def configuration_of(cell: Cell) -> Section:
+    """Return what a cell's key covers of its configuration. Its number among the repeats is not: the seed is."""
+    return {
+        "sensor": cell.sensor,
+        "protocol": cell.protocol,
+        "split": cell.split,
+        "params": dict(cell.params),
+        "seed": cell.seed,
+    }
 
 
 @lru_cache(maxsize=8)
 def versions(more: tuple[str, ...] = ()) -> dict[str, str]:
     """Return the versions that may change a number: Python's, those of `RELEVANT` and of the distributions `more`."""
+    installed = installed_distributions(sys.path)
     found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    for name in (*RELEVANT, *more):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "missing"
-    return found
+    return found | {name: installed.get(normal(name), "missing") for name in (*RELEVANT, *more)}
 
 
-def _digest(facts: Mapping[str, Any]) -> str:
-    canonical = json.dumps(facts, sort_keys=True, separators=(",", ":"), allow_nan=True)
-    return hashlib.sha256(canonical.encode()).hexdigest()[:32]
+def _fixed(source: Source, distributions: tuple[str, ...], **descriptors: Section) -> Fixed:
+    sections: dict[str, Section] = dict(descriptors)
+    imported = {f"import {name}": found for name, found in source.versions.items()}
+    sections["versions"] = {**versions(distributions), **imported}
+    sections.update({f"source of {package}": files for package, files in source.packages.items()})
+    return Fixed(_digest(_canonical(sections)), sections)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:32]

@@ -9,11 +9,11 @@ from pathlib import Path
 from tactbench.core.errors import MissingRecordingError, UnknownNameError
 from tactbench.core.matrix.keys import recording_key
 from tactbench.core.matrix.plan import Cell, serves
+from tactbench.core.matrix.recorded import Recorded, Subject
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.scene import Role, Scene, Simulation
 from tactbench.core.spec.task import TaskSpec
 
@@ -61,20 +61,18 @@ def orders_for(
     return orders
 
 
-def on_the_shelf(shelf: Shelf) -> dict[str, dict[Path, RecordingMeta]]:
+def on_the_shelf(shelf: Shelf, recorded: Recorded) -> dict[str, dict[Path, Subject]]:
     """Return what a shelf holds, by name of sensor; raises MissingRecordingError if it holds nothing."""
-    from tactbench.core.recording.reader import read_meta
-
-    found: dict[str, dict[Path, RecordingMeta]] = {}
+    found: dict[str, dict[Path, Subject]] = {}
     for path in shelf.recordings():
-        meta = read_meta(path)
-        found.setdefault(meta.sensor.name, {})[path] = meta
+        subject = recorded.subject(path)
+        found.setdefault(subject.sensor, {})[path] = subject
     if not found:
         raise MissingRecordingError("The shelf is empty.", hint="Import recordings with `tactbench import`.")
     return found
 
 
-def sensors_on(shelf: Mapping[str, Mapping[Path, RecordingMeta]], asked: Iterable[str]) -> list[str]:
+def sensors_on(shelf: Mapping[str, Mapping[Path, Subject]], asked: Iterable[str]) -> list[str]:
     """Return the sensors to run: those asked for, or all that the shelf has recordings of."""
     names = list(asked)
     for name in names:
@@ -83,11 +81,11 @@ def sensors_on(shelf: Mapping[str, Mapping[Path, RecordingMeta]], asked: Iterabl
     return names or sorted(shelf)
 
 
-def serving(task: TaskSpec, split: str | None, recordings: Mapping[Path, RecordingMeta]) -> list[Path]:
+def serving(task: TaskSpec, split: str | None, recordings: Mapping[Path, Subject]) -> list[Path]:
     """Return the recordings of a shelf that belong to `task` under `split`.
 
     A recording of a scene that some task planned serves the campaigns that plan a scene of this name; a recording whose
     scene nobody planned (an imported table) may serve any task.
     """
     names = {planned.scene.name for planned in task.scenes_for(split)}
-    return [path for path, meta in recordings.items() if meta.scene is None or not names or meta.scene.name in names]
+    return [path for path, (_, scene) in recordings.items() if scene is None or not names or scene in names]

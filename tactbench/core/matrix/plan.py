@@ -8,14 +8,17 @@ from itertools import product
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called
-from tactbench.core.evaluation.splits import shots
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import TaskSpec
 
 FEW_SHOT = "few-shot"
 """Asks for all of a task's splits `few-shot-N`."""
+
+_AS_PLANNED = Simulation()
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,8 @@ class Cell:
     repeats: int
     seed: int
     """Seed of this repeat: of the scenes it records and of its estimators."""
+    simulation: Simulation = _AS_PLANNED
+    """How a simulated rig is asked to carry out its scenes."""
 
     @property
     def name(self) -> str:
@@ -82,6 +87,7 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                         repeat=repeat,
                         repeats=matrix.repeats,
                         seed=matrix.seed + repeat - 1,
+                        simulation=matrix.simulation,
                     )
                     if cell not in cells:
                         cells.append(cell)

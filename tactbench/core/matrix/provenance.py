@@ -1,68 +1,123 @@
-"""Who computed this, with what, where: gathered once a run."""
+"""Who computed this, with what, where: gathered once a run, and said in a few sentences under a table.
+
+There is no clock in it, no name of a person or host and no path: equal circumstances give equal provenance.
+"""
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
-import subprocess
 import sys
-from importlib.metadata import distributions
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import tactbench
+from tactbench.core.matrix.checkout import checkout_of
+from tactbench.core.matrix.distributions import installed_distributions, is_installed
+from tactbench.core.matrix.keys import RELEVANT
+from tactbench.core.matrix.machine import blas, container, cpu_model, host_id, memory_mb
+from tactbench.core.matrix.packages import location_of, package_of
+from tactbench.core.matrix.source import OURS, SourceDigests
+from tactbench.core.plugins.registry import Registry, installed
+
+__all__ = ["foot", "gather", "host_id"]
 
 
-def host_id() -> str:
-    """Return a digest that tells hosts apart without naming them."""
-    parts = (platform.node(), platform.machine(), _cpu_model(), str(os.cpu_count()))
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:12]
+def gather(sources: SourceDigests | None = None, **circumstances: Any) -> dict[str, Any]:
+    """Return versions, machine, state of the code, and the `circumstances` of the run, such as seed and jobs.
 
-
-def gather() -> dict[str, Any]:
-    """Return versions, machine and commit.
+    Parameters
+    ----------
+    sources
+        Digests of the plugins' packages, if somebody has them already.
 
     Notes
     -----
-    The versions of all distributions take about 30 ms and the commit two calls of git: once a run, never once a cell.
+    About 20 ms, most of it three calls of git a checkout: once a run, never once a cell.
     """
+    digests = sources or SourceDigests(Path(os.devnull))
     return {
         "tactbench": tactbench.__version__,
-        "python": sys.version.split()[0],
+        "commit": _state(Path(tactbench.__file__).parent),
+        "python": platform.python_version(),
+        "implementation": platform.python_implementation(),
         "platform": platform.platform(),
         "machine": platform.machine(),
-        "cpu": _cpu_model(),
+        "cpu": cpu_model(),
         "cores": os.cpu_count(),
+        "memory_mb": memory_mb(),
+        "container": container(),
         "host": host_id(),
-        "commit": _commit(),
-        "distributions": dict(sorted((dist.name, dist.version) for dist in distributions() if dist.name)),
+        "blas": blas(),
+        "plugins": list(_plugins(installed(), digests)),
+        "distributions": installed_distributions(sys.path),
+        **circumstances,
     }
 
 
-def _cpu_model() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or "unknown"
+def _plugins(registry: Registry, digests: SourceDigests) -> Iterator[dict[str, str]]:
+    """Yield every package of a plugin that is not ours: who brought it, its version, its source and its commit."""
+    packages = {package_of(row.module): row for row in registry.plugins}
+    for package, row in sorted(packages.items()):
+        if package == OURS:
+            continue
+        place = location_of(package)
+        yield {
+            "distribution": row.distribution,
+            "version": row.version,
+            "package": package,
+            "source": digests.package(package),
+            "commit": _state(place) if place is not None and not is_installed(place) else "",
+        }
 
 
-def _commit() -> str:
-    """Return the commit of the checkout that tactbench runs from, with ``+`` for uncommitted changes."""
-    package = Path(tactbench.__file__).parent
-    if not (package.parent / ".git").exists():
+def _state(folder: Path) -> str:
+    checkout = checkout_of(folder)
+    return "" if checkout is None else str(checkout)
+
+
+def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Return what stands under a table: which software made it on which machine, each said once.
+
+    Parameters
+    ----------
+    several
+        What `gather` returned for each of the runs that the rows come from; keys may be missing.
+    """
+    said = [*map(_software, several), *(text for one in several for text in _strangers(one)), *map(_place, several)]
+    hosts = {str(one["host"]) for one in several if one.get("host")}
+    if len(hosts) > 1:
+        said.append(f"{len(hosts)} hosts: times of one are not to be compared with times of another.")
+    return tuple(dict.fromkeys(text for text in said if text))
+
+
+def _software(one: Mapping[str, Any]) -> str:
+    if "tactbench" not in one:
         return ""
-    try:
-        head = _git(package, "rev-parse", "HEAD")
-        dirty = _git(package, "status", "--porcelain", "--untracked-files=no", "--", ".")
-    except (OSError, subprocess.SubprocessError):
+    state, _, changes = str(one.get("commit", "")).partition("+")
+    commit = f" ({state}{f', with changes {changes}' if changes else ''})" if state else ""
+    installed_versions = one.get("distributions", {})
+    libraries = [f"{name} {installed_versions[name]}" for name in RELEVANT if name in installed_versions]
+    algebra = one.get("blas", {})
+    if algebra.get("version"):
+        libraries.append(f"BLAS {algebra.get('name')} {algebra['version']} (threads: {algebra.get('threads')})")
+    return f"tactbench {one['tactbench']}{commit}, Python {one.get('python', '?')}, {', '.join(libraries)}."
+
+
+def _strangers(one: Mapping[str, Any]) -> Iterator[str]:
+    for plugin in one.get("plugins", ()):
+        state = plugin.get("commit") or f"source {str(plugin.get('source', ''))[:12]}"
+        yield f"Plugin {plugin.get('distribution')} {plugin.get('version')} ({state})."
+
+
+def _place(one: Mapping[str, Any]) -> str:
+    if not one.get("host"):
         return ""
-    return head[:12] + ("+" if dirty else "")
-
-
-def _git(folder: Path, *arguments: str) -> str:
-    done = subprocess.run(["git", "-C", str(folder), *arguments], capture_output=True, text=True, timeout=5, check=True)
-    return done.stdout.strip()
+    facts = [str(one.get("cpu", "unknown processor")), f"{one.get('cores')} cores"]
+    if one.get("memory_mb"):
+        facts.append(f"{one['memory_mb'] / 1024:.0f} GiB")
+    if one.get("container"):
+        facts.append(f"in a container ({one['container']})")
+    together = f"; {one['jobs']} cells at once" if one.get("jobs", 1) != 1 else ""
+    return f"Host {one['host']}: {', '.join(facts)}{together}."

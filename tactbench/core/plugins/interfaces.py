@@ -6,15 +6,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-import numpy.typing as npt
-
-from tactbench.core.samples import Block, FloatArray, SkinGrid, SkinState
+from tactbench.core.samples import Block, SkinGrid, SkinState
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import EffectDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from tactbench.core.samples import FloatArray
 
 
 class Acquisition(Protocol):

@@ -9,7 +9,9 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
+from operator import itemgetter
 from types import ModuleType
 from typing import Any, Generic, Literal, TypeVar, cast
 
@@ -158,14 +160,27 @@ def load_registry(points: Iterable[EntryPoint] | None = None) -> Registry:
     """
     registry = Registry()
     found = entry_points(group=hookspecs.GROUP) if points is None else points
-    unique = {(point.name, point.value, _owner(point)[0]): point for point in found}
-    for _, point in sorted(unique.items()):
-        _greet(registry, point)
+    owners: dict[int, tuple[str, str]] = {}
+    unique = {}
+    for point in found:
+        # Reading who owns an entry point parses a file, and a distribution has many of them.
+        if id(point.dist) not in owners:
+            owners[id(point.dist)] = _owner(point)
+        owner = owners[id(point.dist)]
+        unique[point.name, point.value, owner[0]] = point, owner
+    for _, (point, owner) in sorted(unique.items(), key=itemgetter(0)):
+        _greet(registry, point, owner)
     return registry
 
 
-def _greet(registry: Registry, point: EntryPoint) -> None:
-    distribution, version = _owner(point)
+@lru_cache(maxsize=1)
+def installed() -> Registry:
+    """Return the registry of this process, loaded once."""
+    return load_registry()
+
+
+def _greet(registry: Registry, point: EntryPoint, owner: tuple[str, str]) -> None:
+    distribution, version = owner
     brings: list[str] = []
     try:
         offered = _ask(point)

@@ -7,7 +7,7 @@ from typing import Any
 
 from tactbench.core.leaderboard.table import NUMERIC, Block, Line, build_table
 from tactbench.core.leaderboard.values import VALUES
-from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, number, plain
+from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
 from tactbench.core.report.section import Section, Subject
 
 Row = Mapping[str, Any]
@@ -40,6 +40,7 @@ def _entries(line: Line, columns: tuple[str, ...], row: Row, anchor: str) -> lis
         if name not in NUMERIC or text in ("", ABSENT):
             entries.append(Entry(text))
         else:
-            value = finite(VALUES[name](row)) if name in VALUES else number(text)
+            place = line.placing.place if line.placing else None
+            value = finite(VALUES[name](row)) if name in VALUES else place
             entries.append(Entry(text, value, anchor))
     return entries

@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
-from tactbench.core.leaderboard.formats import markdown_grid, markdown_text
+from tactbench.core.leaderboard.markdown import markdown_grid, markdown_note
 
 ABSENT = "–"
 _DIGITS = r"[-+−]?[\d\u202f]+(?:\.\d+)?(?:[eE][-+]?\d+)?"
@@ -91,5 +91,5 @@ def markdown(table: PlainTable) -> str:
     """Return the table as Markdown, its notes as a list below."""
     lines = [[entry.text for entry in line] for line in table.lines]
     parts = markdown_grid(table.title, table.columns, table.numeric, lines)
-    parts += ["", *(f"- {markdown_text(note)}" for note in table.notes)] if table.notes else []
+    parts += ["", *(f"- {markdown_note(note)}" for note in table.notes)] if table.notes else []
     return "\n".join(parts) + "\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Simulation
@@ -46,6 +46,24 @@ class TaskChoice(Frozen):
     """Empty: the task's own. Its baselines are always run."""
 
 
+class ComparisonChoice(Frozen):
+    """Two sensors or two estimators that the matrix is run to compare."""
+
+    sensors: tuple[str, str] | None = None
+    estimators: tuple[str, str] | None = None
+    task: str | None = None
+    """None: with every task that both have answered."""
+
+    @model_validator(mode="after")
+    def _one_kind_of_two(self) -> ComparisonChoice:
+        pair = self.sensors or self.estimators
+        if pair is None or (self.sensors and self.estimators):
+            raise ValueError("a comparison is of two sensors or of two estimators: give one of them")
+        if pair[0] == pair[1]:
+            raise ValueError(f"{pair[0]!r} is compared with itself")
+        return self
+
+
 class MatrixSpec(Frozen):
     """The matrix: every sensor with every task."""
 
@@ -63,3 +81,5 @@ class MatrixSpec(Frozen):
     sensors: tuple[str, ...] = ()
     """Empty: all that the rig's recordings hold."""
     tasks: tuple[Annotated[TaskChoice, BeforeValidator(_by_name)], ...] = Field(min_length=1)
+    comparisons: tuple[ComparisonChoice, ...] = ()
+    """What is to be compared, said beforehand: p-values are corrected for being so many. All else is exploratory."""

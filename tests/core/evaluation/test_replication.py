@@ -48,8 +48,7 @@ def test_a_unit_is_found_for_each_row_by_its_number(tmp_path):
     notes = {"press": np.repeat(np.arange(6), 10)}
     data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, annotations=notes)])
     table = data.tables[0]
-    codes, name = replicates(
-        data, force_task(splits=("press",)), "press", table.y, np.zeros(50, dtype=np.int64), table.row
-    )
-    assert name == "press"
-    assert codes.tolist() == (table.row // 10).tolist()
+    unit = replicates(data, force_task(splits=("press",)), "press", table.y, np.zeros(50, dtype=np.int64), table.row)
+    assert unit.name == "press"
+    assert unit.codes.tolist() == (table.row // 10).tolist()
+    assert unit.labels == tuple(f"1/{number}" for number in range(6))

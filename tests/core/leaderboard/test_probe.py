@@ -128,7 +128,7 @@ def test_a_first_frame_that_tells_nothing_is_not_held_against_the_sensor():
 def test_simulated_rows_say_so_and_every_text_format_has_the_table():
     rows = [classed(0.95), classed(0.90, "first-frame")]
     out = io.StringIO()
-    show(rows, Console(file=out, width=200))
+    show(build_table(rows), Console(file=out, width=200))
     for text in (out.getvalue(), to_markdown(rows), to_latex(rows)):
         assert "does the score come from the contact?" in text
         assert "LEAK: the first frame alone scores 0.900 of 0.950" in text

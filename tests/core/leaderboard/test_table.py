@@ -8,6 +8,7 @@ from rich.console import Console
 from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.formats import JSON_KEYS, to_csv, to_json, to_latex, to_markdown
 from tactbench.core.leaderboard.numbers import duration, score
+from tactbench.core.leaderboard.records import RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.terminal import show
 
@@ -29,7 +30,7 @@ def test_higher_is_better_is_ranked_downwards():
 
 def test_equal_scores_share_a_rank():
     lines = build_table([row("a"), row("b"), row("c", score=0.9)]).blocks[0].lines
-    assert [line.cells[0] for line in lines] == ["1", "1", "3"]
+    assert [line.cells[0] for line in lines] == ["1=", "1=", "3"]
 
 
 def test_sim_and_hardware_protocols_and_splits_never_share_a_block():
@@ -58,7 +59,8 @@ def test_marks_are_explained():
 
 def test_json_and_csv_hold_every_key_of_every_row():
     rows = [row(), row("b", status="failed", score=None)]
-    assert [tuple(entry) for entry in json.loads(to_json(rows))] == [JSON_KEYS, JSON_KEYS]
+    keys = (*JSON_KEYS, *RANK_KEYS, "shown")
+    assert [tuple(entry) for entry in json.loads(to_json(rows))] == [keys, keys]
     read = list(csv.DictReader(io.StringIO(to_csv(rows))))
     assert float(read[0]["score"]) == 0.5
     assert read[1]["score"] == ""
@@ -76,7 +78,7 @@ def test_names_from_plugins_cannot_break_a_table(text):
 
 def test_markup_in_a_name_is_text_on_the_terminal():
     out = io.StringIO()
-    show([row("[bold red]a[/]")], Console(file=out, width=200))
+    show(build_table([row("[bold red]a[/]")]), Console(file=out, width=200))
     assert "[bold red]a[/]" in out.getvalue()
 
 
@@ -95,7 +97,7 @@ def test_scores_with_a_unit_have_four_decimals():
 
 def test_a_narrow_terminal_drops_columns_and_says_so_and_never_breaks_a_word():
     out = io.StringIO()
-    show([row("a-sensor-of-some-name", sim_s=1.0)], Console(file=out, width=80))
+    show(build_table([row("a-sensor-of-some-name", sim_s=1.0)]), Console(file=out, width=80))
     lines = out.getvalue().splitlines()
     (line,) = [line for line in lines if "a-sensor-of-some-name SIM" in line]
     assert "0.5000" in line
@@ -103,7 +105,7 @@ def test_a_narrow_terminal_drops_columns_and_says_so_and_never_breaks_a_word():
     assert "batch/row" in out.getvalue()
     assert max(len(line.rstrip()) for line in lines) <= 80
     wide = io.StringIO()
-    show([row("a-sensor-of-some-name", sim_s=1.0)], Console(file=wide, width=200))
+    show(build_table([row("a-sensor-of-some-name", sim_s=1.0)]), Console(file=wide, width=200))
     assert "too narrow" not in wide.getvalue()
 
 
@@ -125,11 +127,11 @@ def test_latex_keeps_ordinary_spaces_and_sets_thin_ones_in_numbers():
 
 
 def test_notes_that_say_the_same_of_several_answers_are_one():
-    from tactbench.core.leaderboard.table import _interval_notes
+    from tactbench.core.leaderboard.notes import interval_notes
 
     method = "block bootstrap in time within 5 recordings (blocks of {} rows): spread between sessions is not in it"
     rows = [{"task": "curvature", "is_baseline": False, "ci_method": method.format(blocks)} for blocks in (17, 198)]
-    (told,) = _interval_notes(rows)
+    (told,) = interval_notes(rows)
     assert told.endswith("within 5 recordings: spread between sessions is not in it.")
-    (alone,) = _interval_notes(rows[:1])
+    (alone,) = interval_notes(rows[:1])
     assert "(blocks of 17 rows)" in alone

@@ -50,9 +50,12 @@ def test_the_memory_changes_nothing_and_may_be_rubbish(package, tmp_path):
     assert digest(tmp_path) == before
 
 
-def test_tables_do_not_belong_to_what_decides_a_score():
-    from tactbench.core.matrix.source import _files
-
-    names = {name for name, _ in _files("tactbench")}
-    assert "core/evaluation/__init__.py" in names
-    assert not any(name.startswith(("core/cli", "core/leaderboard")) for name in names)
+@pytest.mark.parametrize(
+    ("purpose", "module", "not_counted"),
+    [("answer", "tactbench.tasks.force", ("sensors/", "rigs/")),
+     ("recording", "tactbench.sensors.biotac", ("tasks/", "estimators/", "core/evaluation/", "core/matrix/"))],
+)  # fmt: skip
+def test_what_shows_results_or_serves_another_purpose_does_not_count(tmp_path, purpose, module, not_counted):
+    names = SourceDigests(tmp_path / "memory.json").behind([module], purpose).packages["tactbench"]
+    assert {"core/recording/reader.py", "core/samples.py", "plugin.py"} <= set(names)
+    assert not any(name.startswith(("core/cli", "core/leaderboard", *not_counted)) for name in names)

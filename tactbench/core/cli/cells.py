@@ -1,0 +1,137 @@
+"""Which cell of a result folder a verb is about, and what there is of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactbench.core.errors import UsageError
+
+if TYPE_CHECKING:
+    from tactbench.core.matrix.explanation import Explanation
+    from tactbench.core.matrix.keys import Keys
+    from tactbench.core.matrix.material import Order
+    from tactbench.core.matrix.plan import Cell
+    from tactbench.core.matrix.recorded import Recorded
+    from tactbench.core.matrix.source import SourceDigests
+    from tactbench.core.matrix.store import Row, Store
+    from tactbench.core.plugins.registry import Registry
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One cell, as it is asked now and as it was answered."""
+
+    store: Store
+    keys: Keys
+    sources: SourceDigests
+    recorded: Recorded
+    cell: Cell
+    row: Row | None
+    """What the folder says of it."""
+    paths: tuple[Path, ...]
+    orders: tuple[Order, ...]
+    """How the recordings are made; none if they were made elsewhere, or cannot be made anew."""
+
+    def explain(self) -> Explanation:
+        """Return whether its result would be reused, and what differs."""
+        from tactbench.core.matrix.explanation import explain
+        from tactbench.core.matrix.key_book import KeyBook
+
+        known = str(self.row["key"]) if self.row is not None and self.row["status"] == "done" else ""
+        book = KeyBook(self.store.folder / "cache" / "keys")
+        return explain(self.cell, self.paths, self.orders, self.keys, self.recorded, book, self.store, known)
+
+
+def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> Subject:
+    """Return the cell that a person means.
+
+    Parameters
+    ----------
+    out
+        The result folder.
+    given
+        The cell's name, a part of it, or how its key begins.
+    options
+        The selecting options, given or not: if one was given, the cell is looked for in the matrix that they ask for;
+        otherwise among the folder's rows, and then in the default matrix. None: among the folder's rows only.
+
+    Raises
+    ------
+    UsageError
+        If there is no such folder or cell, or more than one cell is meant.
+    """
+    from tactbench.core.cli.selection import matrix_asked
+    from tactbench.core.matrix.keys import keys_of
+    from tactbench.core.matrix.material import need_of
+    from tactbench.core.matrix.naming import cell_of, meant
+    from tactbench.core.matrix.planned import planned
+    from tactbench.core.matrix.recorded import Recorded
+    from tactbench.core.matrix.source import SourceDigests
+    from tactbench.core.matrix.store import Store
+    from tactbench.core.plugins.registry import installed
+
+    if not out.is_dir():
+        raise UsageError(f"There is no folder {out}.", hint="Name one that `tactbench run --out DIR` wrote.")
+    registry, store = installed(), Store(out)
+    sources = SourceDigests(out / "cache" / "sources.json")
+    recorded = Recorded(out / "cache" / "recordings.json")
+    keys = keys_of(registry, sources)
+    rows = {row["cell"]: row for row in store.rows()}
+    known = {name: str(row.get("key", "")) for name, row in rows.items()}
+    if options is None or not any(options.values()):
+        try:
+            row = rows[meant(given, list(rows), known)]
+        except UsageError:
+            if options is None or any(given in name for name in rows):
+                raise
+        else:
+            cell = cell_of(row)
+            paths, orders = _material(cell, row, registry, sources, store)
+            return Subject(store, keys, sources, recorded, cell, row, paths, orders)
+    asked = dict(options or {})
+    if not asked["config"] and any(given in name for name in rows):
+        given = meant(given, list(rows), known)
+        # The options change how the cell was asked; what they do not mention stays.
+        was = {"sensors": (rows[given]["sensor"],), "tasks": (rows[given]["task"],), "rig": rows[given]["rig"]}
+        asked |= {name: value for name, value in was.items() if not asked[name]}
+    matrix, folder = matrix_asked(registry, **asked)
+    cells, needed = planned(matrix, registry, sources, store, folder, recorded)
+    cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
+    made = tuple(needed.orders.get(need_of(cell), ()))
+    return Subject(store, keys, sources, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)
+
+
+def _material(
+    cell: Cell, row: Row, registry: Registry, sources: SourceDigests, store: Store
+) -> tuple[tuple[Path, ...], tuple[Order, ...]]:
+    """Return the recordings a row was answered from, and how to make them where a simulation did."""
+    from tactbench.core.matrix.material import need_of, orders_for
+
+    if registry.rigs[cell.rig].simulated:
+        made = orders_for([cell], registry, sources, store, cell.simulation)[need_of(cell)]
+        return tuple(order.path for order in made), tuple(made)
+    return recordings_of(row, store), ()
+
+
+def recordings_of(row: Mapping[str, Any], store: Store) -> tuple[Path, ...]:
+    """Return the files that a row was answered from.
+
+    Raises
+    ------
+    UsageError
+        If one of them may not be opened: a folder may come from a stranger.
+    """
+    digests = row.get("digests") or [""] * len(row["recordings"])
+    found = []
+    for path, digest in zip(row["recordings"], digests, strict=False):
+        file = store.recording(path, digest)
+        if file is None:
+            raise UsageError(
+                f"The recording {path} is not there, or not as it was when the cell was answered.",
+                hint="Run the matrix again with --rig replay --recordings DIR.",
+            )
+        found.append(file)
+    return tuple(found)

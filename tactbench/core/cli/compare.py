@@ -1,0 +1,78 @@
+"""``tactbench compare A B``: two sensors, two estimators or two result folders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+DUEL_FORMATS = ("table", "json", "md", "latex", "csv")
+
+
+@click.command(name="compare")
+@click.argument("first", metavar="A")
+@click.argument("second", metavar="B")
+@click.option("--out", "folder", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
+              help="Result folder that sensors or estimators are compared in.")  # fmt: skip
+@click.option("--task", help="This task only.")
+@click.option("--config", metavar="FILE", help="Matrix whose declared comparisons p-values are corrected for.")
+@click.option("--format", "shape", type=click.Choice(DUEL_FORMATS), default="table", show_default=True)
+def command(first: str, second: str, folder: Path, task: str | None, config: str | None, shape: str) -> None:
+    """Compare A and B replicate by replicate: two sensors, two estimators, or two result folders.
+
+    Of two folders the same cells are compared: before and after a change, or two laboratories.
+    """
+    from tactbench.core.cli.config import default_matrix, matrix_called
+    from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.duel import duels, folder_duels, with_declared
+
+    if all((Path(one) / "leaderboard.json").is_file() for one in (first, second)):
+        found = folder_duels(kept_rows(Path(first)), kept_rows(Path(second)), first, second, task)
+    else:
+        matrix = matrix_called(config) if config else default_matrix()
+        rows = kept_rows(folder)
+        found = with_declared(duels(rows, first, second, task), rows, matrix.comparisons)
+    if not found:
+        raise UsageError(
+            f"{first} and {second} have no cell to compare" + (f" in task {task!r}." if task else "."),
+            hint="See what there is with `tactbench leaderboard`.",
+        )
+    _print(found, shape)
+
+
+def kept_rows(folder: Path) -> list[dict[str, Any]]:
+    """Return the rows of a result folder; raises UsageError."""
+    import json
+
+    from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.formats import JSON_KEYS
+
+    path = folder / "leaderboard.json"
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise UsageError(f"{path} cannot be read: {error}.", hint="Make one with `tactbench run --out DIR`.") from error
+    if not isinstance(rows, list) or not all(isinstance(row, dict) and set(JSON_KEYS) <= set(row) for row in rows):
+        raise UsageError(f"{path} is not a leaderboard of this version.", hint="Run `tactbench run` again.")
+    return rows
+
+
+def _print(found: Any, shape: str) -> None:
+    from tactbench.core.cli.grid import print_grid, print_records
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.leaderboard.duel_table import NUMERIC, notes_of, record_of, tables_of
+    from tactbench.core.leaderboard.duel_text import latex, markdown
+
+    if shape in ("json", "csv"):
+        print_records([record_of(duel) for duel in found], shape)
+        return
+    tables, notes = tables_of(found), notes_of(found)
+    if shape != "table":
+        click.echo((markdown if shape == "md" else latex)(tables, notes), nl=False)
+        return
+    for table in tables:
+        lines = [{k: v for k, v in zip(table.columns, line, strict=True) if v != "–"} for line in table.lines]
+        print_grid(table.title, table.columns, lines, numeric=sorted(NUMERIC))
+    for note in notes:
+        remark(note)

@@ -1,0 +1,95 @@
+"""``tactbench rerun``: one cell once more from scratch, held against what lies in the result folder."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tactbench.core.cli.threads import one_thread
+
+if TYPE_CHECKING:
+    from tactbench.core.cli.cells import Subject
+    from tactbench.core.matrix.again import Again
+
+
+@click.command(name="rerun")
+@click.argument("cell", metavar="CELL")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
+              metavar="DIR", help="The result folder; nothing in it is changed.")  # fmt: skip
+@click.option("--format", "shape", type=click.Choice(("text", "json")), default="text", show_default=True)
+@click.pass_context
+def command(ctx: click.Context, cell: str, out: Path, shape: str) -> None:
+    """Compute one cell again and say whether it comes out the same, bit for bit.
+
+    CELL is its name as tables show it, a part that only one cell has, or how its key begins. What a simulation recorded
+    is recorded again, into a place of its own; other cells are answered from the same recordings.
+
+    Exit code 0: identical; 1: something differs, or it fails; 2: usage.
+    """
+    one_thread()
+    from tactbench.core.cli.cells import subject
+    from tactbench.core.cli.screen import remark
+
+    found = subject(out, cell)
+    if found.row is not None and found.row.get("signal") is not None:
+        remark(f"It was ended by signal {found.row['signal']} before; it is computed in this process now.")
+    again = _compute(found)
+    circumstances = list(found.explain().reasons)
+    facts = {
+        "cell": found.cell.name,
+        "answer": "identical" if again.identical else "different",
+        "recordings_made": again.recordings,
+        "status": again.row["status"],
+        "reason": again.row["reason"],
+        "traceback": again.row["traceback"],
+        "score": again.row["score"],
+        "differences": list(again.differences),
+        "circumstances": circumstances,
+    }
+    click.echo(json.dumps(facts, indent=1, ensure_ascii=False) if shape == "json" else _text(facts))
+    ctx.exit(0 if again.identical else 1)
+
+
+def _compute(found: Subject) -> Again:
+    """Compute the cell; recordings of a simulation go where they are thrown away."""
+    from tactbench.core.cli.cells import recordings_of
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.errors import TactbenchError
+    from tactbench.core.matrix.again import compute_again
+    from tactbench.core.matrix.material import need_of, orders_for
+    from tactbench.core.matrix.store import Store
+    from tactbench.core.plugins.registry import installed
+
+    row = found.row or {}
+    try:
+        before = recordings_of(row, found.store)
+    except TactbenchError:
+        if not found.orders:
+            raise
+        before = ()
+    with tempfile.TemporaryDirectory(prefix="tactbench-rerun-") as place:
+        orders = []
+        if found.orders:
+            elsewhere = Store(Path(place))
+            made = orders_for([found.cell], installed(), found.sources, elsewhere, found.cell.simulation)
+            orders = made[need_of(found.cell)]
+        return compute_again(found.cell, row, found.store, before or found.paths, orders, remark)
+
+
+def _text(facts: dict[str, Any]) -> str:
+    lines = [facts["cell"]]
+    if facts["answer"] == "identical":
+        made = facts["recordings_made"]
+        lines.append(f"identical: {f'{made} recordings, ' if made else ''}answers, scores and intervals, bit for bit.")
+    else:
+        lines.append("different:" if facts["differences"] else f"{facts['status']} again, as before: {facts['reason']}")
+        lines += [f"  {difference}" for difference in facts["differences"]]
+        lines += [f"  {line}" for line in facts["traceback"].splitlines()]
+    if facts["circumstances"]:
+        lines.append("Since the cell was made, this has changed:")
+        lines += [f"  {reason}" for reason in facts["circumstances"]]
+    return "\n".join(lines)

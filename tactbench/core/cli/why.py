@@ -1,0 +1,115 @@
+"""``tactbench why``: whether a result would be reused, what changed, and how a cell ended that did not finish."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tactbench.core.cli.selection import selecting_options
+from tactbench.core.cli.threads import one_thread
+
+if TYPE_CHECKING:
+    from tactbench.core.cli.cells import Subject
+    from tactbench.core.matrix.explanation import Explanation
+
+_TAIL = 15
+"""Lines of a traceback or log that are shown; the whole of it stands in ``--format json``."""
+_REASONS = 20
+
+
+@click.command(name="why")
+@click.argument("cell", metavar="CELL")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
+              metavar="DIR", help="The result folder.")  # fmt: skip
+@selecting_options
+@click.option("--format", "shape", type=click.Choice(("text", "json")), default="text", show_default=True)
+def command(cell: str, out: Path, shape: str, **options: Any) -> None:
+    """Say why a cell would be reused or computed, and how it ended.
+
+    CELL is its name as tables show it, a part that only one cell has, or how its key begins. Without options the cell
+    is asked for as it was; with `run`'s options, as they ask for it.
+    """
+    one_thread()
+    from tactbench.core.cli.cells import subject
+
+    found = subject(out, cell, options)
+    facts = _facts(found, found.explain())
+    click.echo(json.dumps(facts, indent=1, ensure_ascii=False) if shape == "json" else _text(facts))
+
+
+def _facts(found: Subject, why: Explanation) -> dict[str, Any]:
+    row = found.row or {}
+    folder = found.store.folder
+    key = str(row.get("key") or "")
+    done = row.get("status") == "done"
+    return {
+        "cell": found.cell.name,
+        "answer": "hit" if why.hit else "miss",
+        "key": why.key,
+        "reasons": list(why.reasons),
+        "unknown": why.unknown,
+        "status": row.get("status", "never run"),
+        "reason": row.get("reason", ""),
+        "signal": row.get("signal"),
+        "traceback": row.get("traceback", ""),
+        "log": row.get("log", ""),
+        "stored_key": key,
+        "shard": str(folder / "cells" / f"{key}.h5") if done else None,
+        "recordings": list(row.get("recordings", [])) if done else [],
+        "simulation": row.get("simulation", {}),
+        "score": row.get("score"),
+        "made_by": row.get("made_by", ""),
+        "provenance": _provenance(found) if done else [],
+        "try": _try(found, why),
+    }
+
+
+def _provenance(found: Subject) -> list[str]:
+    from tactbench.core.matrix.provenance import foot
+
+    made_by = str((found.row or {}).get("made_by", ""))
+    facts = found.store.provenance(made_by) if made_by else {}
+    return list(foot([facts])) if facts else []
+
+
+def _try(found: Subject, why: Explanation) -> str:
+    if found.row is None or (not why.hit and found.row["status"] == "done"):
+        return "tactbench run: computes it"
+    return f"tactbench rerun '{found.cell.name}' --out {found.store.folder}"
+
+
+def _text(facts: dict[str, Any]) -> str:
+    lines = [facts["cell"]]
+    if facts["answer"] == "hit":
+        lines.append("hit: nothing that decides the result has changed; `tactbench run` uses it again.")
+    elif facts["status"] == "done":
+        lines.append("miss: `tactbench run` computes it again.")
+    else:
+        lines.append("miss: there is no result to use again; `tactbench run` computes it.")
+    lines += [f"  {reason}" for reason in facts["reasons"][:_REASONS]]
+    if len(facts["reasons"]) > _REASONS:
+        lines.append(f"  and {len(facts['reasons']) - _REASONS} more (--format json has all)")
+    if facts["unknown"]:
+        lines.append(f"  {facts['unknown']}")
+    lines += ["", *_ended(facts), "", f"Try: {facts['try']}"]
+    return "\n".join(lines)
+
+
+def _ended(facts: dict[str, Any]) -> list[str]:
+    if facts["status"] == "done":
+        where = ", ".join(facts["recordings"][:3])
+        more = len(facts["recordings"]) - 3
+        recordings = f"{where}{f' and {more} more' if more > 0 else ''}"
+        return [f"done: {facts['shard']}", f"recordings: {recordings}", *facts["provenance"]]
+    lines = [facts["status"] + (f": {facts['reason']}" if facts["reason"] else "")]
+    if facts["signal"] is not None:
+        lines.append(f"signal {facts['signal']}")
+    for part in ("traceback", "log"):
+        shown = facts[part].splitlines()
+        if shown:
+            lines.append(f"{part}{', its end' if len(shown) > _TAIL else ''}:")
+            lines += [f"  {line}" for line in shown[-_TAIL:]]
+    return lines

@@ -1,0 +1,83 @@
+"""Rows from a folder that anybody may have written: what cannot be a row of this version never gets into a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from tactbench.core.leaderboard.parquet import kind
+from tactbench.core.leaderboard.records import JSON_KEYS
+from tactbench.core.spec.status import STATUSES
+
+Row = dict[str, Any]
+
+_TABLES = frozenset({"params", "assumptions", "counts", "chosen", "scores", "fold_sizes", "replicates"})
+_LISTS = frozenset({"stamps", "remarks", "search", "classes", "recordings"})
+_LARGEST = 2**63
+"""Whole numbers from here on have no place in a table; a seed may be any."""
+_NEVER_ABSENT = frozenset({
+    "cell", "sensor", "task", "rig", "protocol", "estimator", "is_baseline", "repeat", "repeats", "status", "metric",
+    "unit", "simulated", "dagger",
+}) | _TABLES | _LISTS  # fmt: skip
+
+
+def checked(rows: Iterable[object]) -> tuple[list[Row], list[str]]:
+    """Return the rows that a table can be made of, and what is wrong with each of the others, in one sentence each."""
+    good: list[Row] = []
+    wrong: list[str] = []
+    for row in rows:
+        trouble = _trouble(row)
+        if trouble:
+            name = row.get("cell") if isinstance(row, dict) else None
+            wrong.append(f"{name if isinstance(name, str) else 'a row without a name'}: {trouble}")
+        elif isinstance(row, dict):
+            good.append(row)
+    return good, wrong
+
+
+def _trouble(row: object) -> str:
+    if not isinstance(row, dict):
+        return "it is no row"
+    lacking = [key for key in _STORED if key not in row]
+    if lacking:
+        return f"its row is of another version (it lacks {', '.join(lacking[:3])}); run it again"
+    for key in _STORED:
+        if not _fits(key, row[key]):
+            return f"its {key} is {type(row[key]).__name__}, not {_EXPECTED[key]}"
+    if row["status"] not in STATUSES:
+        return f"its status is none of {', '.join(STATUSES)}"
+    if row["status"] == "done" and row["score"] is None:
+        return "it is done and has no score"
+    if not all(type(count) is int for count in row["counts"].values()):
+        return "its counts are not all whole numbers"
+    return "" if _is_square(row["confusion"]) else "its confusion is no square of whole numbers"
+
+
+def _is_square(confusion: list[Any] | None) -> bool:
+    return confusion is None or all(
+        isinstance(line, list) and len(line) == len(confusion) and all(type(count) is int for count in line)
+        for line in confusion
+    )
+
+
+def _fits(key: str, value: Any) -> bool:
+    if value is None:
+        return key not in _NEVER_ABSENT
+    expected = _EXPECTED[key]
+    if type(value) is int and abs(value) >= _LARGEST and key != "seed":
+        return False
+    if expected == "a number":
+        return type(value) in (int, float)
+    if expected == "a whole number":
+        return type(value) is int
+    return isinstance(value, _TYPES[expected])
+
+
+_STORED = tuple(key for key in JSON_KEYS if key != "key")
+_TYPES = {"a table": dict, "a list": list, "true or false": bool, "text": str}
+_EXPECTED = {
+    key: "a table" if key in _TABLES
+    else "a list" if key in (*_LISTS, "confusion")
+    else {"whole": "a whole number", "float": "a number", "boolean": "true or false", "text": "text"}[kind(key)]
+    for key in JSON_KEYS
+}  # fmt: skip

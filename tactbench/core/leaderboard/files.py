@@ -1,0 +1,97 @@
+"""The files of a leaderboard in a result folder, written when what decides them has changed and not otherwise."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import tactbench
+from tactbench.core.errors import UsageError
+from tactbench.core.leaderboard import memo
+from tactbench.core.leaderboard.formats import TEXTS
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.matrix.files import replace_file
+
+Row = Mapping[str, Any]
+
+ENDINGS = ("md", "csv", "json", "html")
+"""The files are ``leaderboard.ENDING``; LaTeX and Parquet are made when asked for: `leaderboard --to FILE`."""
+STATE = Path("cache") / "tables.json"
+"""What decided the files that lie there, and their digests."""
+
+
+def write_tables(rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = ()) -> tuple[Path, ...]:
+    """Write the leaderboard of `rows` in every format that people open; return the files.
+
+    Parameters
+    ----------
+    rows
+        Rows in any order.
+    folder
+        A result folder. Files that are there and were made from the same rows by the same code are left alone.
+    provenance
+        What is known of the runs that the rows are from.
+
+    Raises
+    ------
+    UsageError
+        If the folder cannot be written; the files are then the old ones, each of them whole.
+    """
+    paths = tuple(folder / f"leaderboard.{ending}" for ending in ENDINGS)
+    inputs = _digest(rows, provenance)
+    if inputs is not None and _as_left(folder, inputs, paths):
+        return paths
+    memo.load(folder)
+    table = build_table(rows, provenance)
+    try:
+        made = {}
+        for ending, path in zip(ENDINGS, paths, strict=True):
+            content = TEXTS[ending](table).encode("utf-8", "replace")
+            replace_file(path, content)
+            made[path.name] = hashlib.sha256(content).hexdigest()
+        memo.save(folder)
+        if inputs is not None:
+            (folder / STATE).parent.mkdir(exist_ok=True)
+            replace_file(folder / STATE, json.dumps({"inputs": inputs, "files": made}).encode())
+    except OSError as error:
+        raise UsageError(
+            f"The tables cannot be written to {folder}: {error.strerror or error}.",
+            hint="Make room or give another folder; the results themselves are safe.",
+        ) from error
+    return paths
+
+
+def _digest(rows: Sequence[Row], provenance: Sequence[Row]) -> str | None:
+    """Return a digest of all that decides the files; None if the rows hold what is not plain as JSON is.
+
+    Rows share big values, such as what was assumed of a recording: each is read once.
+    """
+    shared: dict[int, str] = {}
+
+    def of(value: Any) -> Any:
+        if not isinstance(value, dict | list | tuple):
+            return value
+        if id(value) not in shared:
+            shared[id(value)] = memo.digest_of(value)
+        return shared[id(value)]
+
+    code = [memo.source_digest(f"tactbench.core.{package}") for package in ("leaderboard", "statistics")]
+    try:
+        told = [sorted((key, of(value)) for key, value in row.items()) for row in rows]
+        return memo.digest_of([tactbench.__version__, code, sorted(told, key=repr), [dict(one) for one in provenance]])
+    except (TypeError, ValueError):
+        return None
+
+
+def _as_left(folder: Path, inputs: str, paths: Sequence[Path]) -> bool:
+    """Tell whether the files are those that were made from `inputs`, byte for byte."""
+    try:
+        state = json.loads((folder / STATE).read_text(encoding="utf-8"))
+        if state["inputs"] != inputs:
+            return False
+        return all(hashlib.sha256(path.read_bytes()).hexdigest() == state["files"][path.name] for path in paths)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False

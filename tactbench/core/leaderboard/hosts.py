@@ -1,0 +1,80 @@
+"""Whose clock a time was taken by, and beside how many others: what keeps times apart that are not comparable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from string import ascii_uppercase
+from typing import Any
+
+from tactbench.core.leaderboard.text import visible
+
+Row = Mapping[str, Any]
+
+_TIMES = ("sim_s", "fit_s", "predict_s", "latency_ms_p50", "latency_ms_p95")
+
+
+def host_letters(rows: Iterable[Row]) -> dict[str, str]:
+    """Return a letter for each host that timed one of `rows`, in order of their ids; none if there is but one."""
+    hosts = sorted({_host(row) for row in rows if _timed(row)})
+    return {host: _letter(place) for place, host in enumerate(hosts)} if len(hosts) > 1 else {}
+
+
+def timing_mark(row: Row, letters: Mapping[str, str]) -> str:
+    """Return what stands behind every time of `row`: ``[A]`` for the host, ``‖4`` for four cells at once."""
+    letter = letters.get(_host(row))
+    at_once = _at_once(row)
+    return (f" [{letter}]" if letter else "") + (f" ‖{at_once}" if at_once > 1 else "")
+
+
+def timing_notes(rows: Sequence[Row], letters: Mapping[str, str], provenance: Iterable[Row]) -> list[str]:
+    """Return what the marks of times mean.
+
+    Parameters
+    ----------
+    provenance
+        What is known of the runs: `host`, `cpu`, `cores`.
+    """
+    machines = {str(one.get("host", "")): one for one in provenance}
+    notes = [f"[{letter}] timed on {_machine(host, machines.get(host))}." for host, letter in letters.items()]
+    if letters:
+        notes.append("Times marked with different letters are of different hosts: compare none of them. Scores do not "
+                     "depend on the host and are ranked together.")  # fmt: skip
+    for at_once in sorted({_at_once(row) for row in rows if _timed(row)} - {1}):
+        crowded = sorted(
+            {visible(_host(row)) for row in rows if _at_once(row) == at_once and _timed(row)
+             and at_once > _cores(machines.get(_host(row)), at_once)}
+        )  # fmt: skip
+        more = f", more than the cores of host {' and of host '.join(crowded)}" if crowded else ""
+        notes.append(f"‖{at_once}: timed while {at_once} cells ran at once{more}: not comparable with times measured "
+                     "alone.")  # fmt: skip
+    return notes
+
+
+def _timed(row: Row) -> bool:
+    return row["status"] == "done" and any(row[key] is not None for key in _TIMES)
+
+
+def _host(row: Row) -> str:
+    return str(row.get("host") or "")
+
+
+def _at_once(row: Row) -> int:
+    return int(row.get("concurrency") or 1)
+
+
+def _cores(machine: Row | None, otherwise: int) -> int:
+    cores = machine.get("cores") if machine else None
+    return cores if isinstance(cores, int) and not isinstance(cores, bool) else otherwise
+
+
+def _machine(host: str, machine: Row | None) -> str:
+    name = f"host {visible(host)}" if host else "a host that its rows do not name"
+    if not machine:
+        return f"{name}, of which nothing else is known"
+    return f"{name}: {visible(str(machine.get('cpu') or 'unknown CPU'))}, {visible(str(machine.get('cores')))} cores"
+
+
+def _letter(place: int) -> str:
+    """Return A … Z, then AA, AB and so on."""
+    before, last = divmod(place, 26)
+    return (_letter(before - 1) if before else "") + ascii_uppercase[last]

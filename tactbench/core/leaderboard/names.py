@@ -1,0 +1,48 @@
+"""What rows, metrics and answers are called in tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tactbench.core.evaluation.protocols import is_probe
+from tactbench.core.leaderboard.text import visible
+
+Row = Mapping[str, Any]
+
+LOWER_IS_BETTER = frozenset({"rmse", "mae"})
+METRIC_NAMES = {
+    "rmse": "RMSE",
+    "mae": "MAE",
+    "r2": "R²",
+    "macro_f1": "macro F1",
+    "accuracy": "accuracy",
+    "balanced_accuracy": "balanced accuracy",
+}
+
+
+def sensor_name(row: Row) -> str:
+    """Return a sensor's name, marked where it was simulated."""
+    return visible(f"{row['sensor']} SIM" if row["simulated"] else str(row["sensor"]))
+
+
+def answer_name(row: Row) -> str:
+    """Return the estimator's name, with the parameters that are not its defaults."""
+    options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
+    return visible(f"{row['estimator']} ({options})" if options else str(row["estimator"]))
+
+
+def metric_name(row: Row) -> str:
+    """Return the metric with its unit: ``RMSE [N]``."""
+    unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
+    return visible(f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}")
+
+
+def question_name(row: Row) -> str:
+    """Return sensor and task: what was asked of whom."""
+    return visible(f"{row['sensor']}/{row['task']}")
+
+
+def asked_of(row: Row) -> str:
+    """Return the estimator or, for a probe, its protocol: what makes no sense to probe makes none with any other."""
+    return visible(str(row["protocol"])) if is_probe(row["protocol"]) else answer_name(row)

@@ -1,0 +1,97 @@
+"""Several tasks in one number for each answer that was given to several: no ranking, and none of single scores."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tactbench.core.evaluation.protocols import is_probe
+from tactbench.core.leaderboard import memo
+from tactbench.core.leaderboard.names import answer_name, sensor_name
+from tactbench.core.leaderboard.numbers import interval, score
+from tactbench.core.leaderboard.sections import Section
+from tactbench.core.leaderboard.text import visible
+
+Row = Mapping[str, Any]
+
+TITLE = "Over tasks · interquartile mean between the trivial baseline, 0, and the reference of each task, 1"
+COLUMNS = ("sensor", "estimator", "protocol", "repeat", "mean", "95 % interval", "tasks")
+NUMERIC = frozenset({"repeat", "mean", "95 % interval"})
+NOTE = (
+    "Over tasks: compare means of the same tasks only. The interval is over replicates; the tasks are those given, not "
+    "a sample of all (docs/statistics.md)."
+)
+MOST_ROWS = 2000
+"""Rows beyond which resampling all of them takes too long for a table."""
+_DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
+"""Packages whose code averages."""
+_DECIDES = (
+    "task", "score", "baseline", "reference_score", "ci_low", "ci_high", "metric", "classes", "replicates",
+)  # fmt: skip
+
+
+def over_tasks(rows: Sequence[Row]) -> Section | None:
+    """Return the means of all answers that two tasks or more were given; None if there are none.
+
+    A task that was asked under several splits is left out: none of them stands for it.
+    """
+    groups: dict[tuple[Any, ...], dict[str, list[Row]]] = {}
+    for row in rows:
+        if _counts(row):
+            key = (sensor_name(row), answer_name(row), visible(row["protocol"]), row["rig"], row["repeat"])
+            groups.setdefault(key, {}).setdefault(row["task"], []).append(row)
+    alone = {
+        key: [members[0] for _, members in sorted(tasks.items()) if len(members) == 1] for key, tasks in groups.items()
+    }
+    several = {key: members for key, members in sorted(alone.items()) if len(members) > 1}
+    if not several or sum(map(len, several.values())) > MOST_ROWS:
+        return None
+    lines = []
+    notes: dict[str, None] = {NOTE: None}
+    for (sensor, answer, protocol, _, repeat), members in several.items():
+        found = _mean(members)
+        if found is None:
+            continue
+        value, low, high, left_out = found
+        absent = {told.partition(":")[0] for told in left_out}
+        names = ", ".join(visible(row["task"]) for row in members if row["task"] not in absent)
+        texts = (score(value, "1"), interval(low, high, "1"), names)
+        lines.append((sensor, answer, protocol, str(repeat) if members[0]["repeats"] > 1 else "", *texts))
+        notes |= dict.fromkeys(visible(f"Not in the mean of {sensor}/{answer}: {told}.") for told in left_out)
+    return Section(TITLE, COLUMNS, NUMERIC, tuple(lines), tuple(notes)) if lines else None
+
+
+def _counts(row: Row) -> bool:
+    return (
+        row["status"] == "done"
+        and not row["is_baseline"]
+        and not is_probe(row["protocol"])
+        and row["split"] not in ("shuffled", "in-session")
+        and bool(row.get("replicates"))
+        and math.isfinite(row["score"])
+    )
+
+
+def _mean(members: Sequence[Row]) -> tuple[float, float, float, tuple[str, ...]] | None:
+    """Return mean, interval and what is left out; None where fewer than two tasks are in it, or nothing can be told."""
+    facts = [[row.get(key) for key in _DECIDES] for row in members]
+    try:
+        digest = memo.digest_of("over tasks", *map(memo.source_digest, _DECIDING), facts)
+        told = memo.recall(digest)
+        if not _believable(told):
+            from tactbench.core.statistics.aggregate import aggregate
+
+            one = aggregate(members)
+            told = [0.0, 0.0, 0.0, 0, []] if one is None else [one.value, one.low, one.high, one.tasks, [*one.left_out]]
+            memo.remember(digest, told)
+    except (ArithmeticError, LookupError, TypeError, ValueError):
+        return None  # rows of a stranger's folder: their replicates may be anything
+    value, low, high, tasks, left_out = told
+    return (value, low, high, tuple(left_out)) if tasks > 1 else None
+
+
+def _believable(told: Any) -> bool:
+    if not (isinstance(told, list) and [type(one) for one in told] == [float, float, float, int, list]):
+        return False
+    return told[1] <= told[2] and all(isinstance(one, str) for one in told[4])

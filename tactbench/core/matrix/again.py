@@ -1,0 +1,128 @@
+"""A finished cell computed once more from scratch, and held against what lies in the result folder bit for bit."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from tactbench.core.matrix.execution import record, solve
+from tactbench.core.matrix.material import Order
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.recorded import Recorded
+from tactbench.core.matrix.run import SEED_DECIDES
+from tactbench.core.matrix.store import Row, Store
+from tactbench.core.samples import Answers
+from tactbench.core.spec.scene import Role
+
+
+@dataclass(frozen=True)
+class Again:
+    """What came out the second time."""
+
+    row: Row
+    differences: tuple[str, ...]
+    """What is not as it was, in words; none: identical."""
+    recordings: int
+    """Recordings made anew; 0: the cell was answered from the same files."""
+
+    @property
+    def identical(self) -> bool:
+        """Whether it was done before, is done now, and every bit that a seed decides is the same."""
+        return self.row["status"] == "done" and not self.differences
+
+
+def compute_again(
+    cell: Cell,
+    before: Row,
+    store: Store,
+    paths: Sequence[Path],
+    orders: Sequence[Order],
+    told: Callable[[str], None],
+) -> Again:
+    """Compute `cell` again; nothing in the result folder changes.
+
+    Parameters
+    ----------
+    before
+        Its row in `store`.
+    paths
+        The recordings it was answered from.
+    orders
+        How to make them anew, into another place; none where they cannot be made anew.
+    told
+        Told what is being done.
+    """
+    found: list[str] = []
+    trouble: BaseException | None = None
+    made: dict[Path, str] = {}
+    for order in orders:
+        if order.path in made:
+            continue
+        told(f"recording {order.sensor} {order.scene.name}")
+        try:
+            made[order.path] = record(order)
+        except Exception as error:
+            trouble = error
+            break
+    if orders and trouble is None:
+        found += _recordings(paths, [(order.scene.name, made[order.path]) for order in orders])
+    told(f"evaluating {cell.name}")
+    row, sets = solve((cell, tuple(order.path for order in orders) or tuple(paths), trouble))
+    found += _rows(before, row)
+    if row["status"] == "done" and before["status"] == "done":
+        found += _answers(store.answers(before["key"]), sets)
+    return Again(row, tuple(found), len(made))
+
+
+def _recordings(before: Sequence[Path], made: Sequence[tuple[str, str]]) -> list[str]:
+    if len(before) != len(made):
+        return [f"{len(made)} recordings are made now, {len(before)} were"]
+    recorded = Recorded(Path(os.devnull))
+    found = []
+    for path, (scene, digest) in zip(before, made, strict=True):
+        if not path.exists():
+            found.append(f"recording {scene}: the old one is gone, so that it cannot be held against the new one")
+        elif recorded.digest(path) != digest:
+            found.append(f"recording {scene}: other bytes")
+    return found
+
+
+def _rows(before: Row, now: Row) -> list[str]:
+    """Return what differs of a row that a seed decides, as it reads once it was written down."""
+    fresh = json.loads(json.dumps(now))
+    names = [name for name in (*SEED_DECIDES, "unit") if name != "cell"]
+    if before["status"] != "done" or now["status"] != "done":
+        names = ["status", "reason"]
+    return [
+        f"{name}: {_shown(before.get(name))} before, {_shown(fresh.get(name))} now"
+        for name in names
+        if before.get(name) != fresh.get(name)
+    ]
+
+
+def _answers(before: Mapping[str, Answers], now: Mapping[Role, Answers]) -> list[str]:
+    if not before:
+        return ["the answers in the folder cannot be read"]
+    found = []
+    fresh: dict[str, Answers] = dict(now.items())
+    for role in sorted({*before, *fresh}):
+        if role not in before or role not in fresh:
+            found.append(f"answers on {role}: {'none before' if role not in before else 'none now'}")
+            continue
+        for column in fields(Answers):
+            old, new = getattr(before[role], column.name), getattr(fresh[role], column.name)
+            if len(old) != len(new):
+                found.append(f"answers on {role}: {len(old)} rows before, {len(new)} now")
+                break
+            if old.astype(new.dtype).tobytes() != new.tobytes():
+                other = sum(a.tobytes() != b.tobytes() for a, b in zip(old.astype(new.dtype), new, strict=True))
+                found.append(f"answers on {role}: {other} of {len(new)} values of {column.name} differ")
+    return found
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:59] + "…"

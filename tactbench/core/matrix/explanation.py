@@ -1,0 +1,138 @@
+"""Why a cell would be reused, or computed: what its key is made of now, held against what it was made of before."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tactbench.core.errors import TactbenchError
+from tactbench.core.matrix.differences import differences
+from tactbench.core.matrix.key_book import Entry, KeyBook, recording_names
+from tactbench.core.matrix.keys import Fixed, Keys, Section, configuration_of
+from tactbench.core.matrix.material import Order
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.recorded import Recorded
+from tactbench.core.matrix.store import Store
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What would happen to a cell, and why."""
+
+    key: str
+    """Empty: not known before its recordings are there."""
+    hit: bool
+    reasons: tuple[str, ...]
+    """What differs from the result that is there, in words; what is missing."""
+    unknown: str = ""
+    """Why nothing can be said about what differs."""
+
+
+def cell_entry(cell: Cell, key: str, keys: Keys, paths: Sequence[Path], recorded: Recorded, folder: Path) -> Entry:
+    """Return what went into a cell's key, for the book."""
+    return Entry(cell.name, key, _configuration(cell), keys.answer(cell), _data(paths, recorded, folder))
+
+
+def recording_entry(order: Order, keys: Keys) -> Entry:
+    """Return what went into a recording's key, for the book."""
+    scene = {"role": order.role, "seed": order.seed, "scene": order.scene.model_dump()}
+    return Entry(_name(order), order.path.stem[-12:], scene, keys.maker(order.sensor, order.rig))
+
+
+def explain(
+    cell: Cell,
+    paths: Sequence[Path],
+    orders: Sequence[Order],
+    keys: Keys,
+    recorded: Recorded,
+    book: KeyBook,
+    store: Store,
+    known: str,
+) -> Explanation:
+    """Say whether the result of `cell` would be reused, and what differs.
+
+    Parameters
+    ----------
+    paths
+        Its recordings, whether they are there or not.
+    orders
+        How they are made; none if they were made elsewhere.
+    known
+        Key of the latest result of that name, or nothing.
+    """
+    now = _sections(keys.answer(cell), _configuration(cell))
+    missing = [path for path in paths if not path.exists()]
+    before = book.sections(cell.name, known) if known else book.sections(cell.name)
+    if missing or not paths:
+        reasons = differences({name: part for name, part in (before or {}).items() if name != "data"}, now)
+        reasons = reasons if before else []
+        return Explanation("", False, (*reasons, *_unmade(paths, orders, missing, keys, book)))
+    try:
+        key = keys.of_cell(cell, [recorded.digest(path) for path in paths])
+        now["data"] = _plain(_data(paths, recorded, store.folder))
+    except TactbenchError as error:
+        return Explanation("", False, (str(error),))
+    if key == known or store.finished(key) is not None:
+        return Explanation(key, True, ())
+    if before is None:
+        said = "" if not known else "What the result that is there was made of is not recorded in this folder."
+        return Explanation(key, False, ("It was never computed into this folder.",) if not known else (), said)
+    return Explanation(key, False, tuple(differences(before, now)))
+
+
+def _unmade(
+    paths: Sequence[Path], orders: Sequence[Order], missing: Sequence[Path], keys: Keys, book: KeyBook
+) -> list[str]:
+    """Say why recordings have to be made; a reason that several share is said once."""
+    if not paths:
+        return ["There are no recordings of it."]
+    if not orders:
+        return [f"recording {path} is not there" for path in missing]
+    reasons: dict[str, None] = {}
+    never: list[str] = []
+    for order in orders:
+        if order.path not in missing:
+            continue
+        entry = recording_entry(order, keys)
+        before = book.sections(entry.name)
+        if before is None:
+            never.append(order.scene.name)
+            continue
+        found = differences(before, _sections(entry.fixed, entry.configuration))
+        reasons.update(dict.fromkeys(found or [f"recording {order.scene.name} was removed"]))
+    said = [f"{len(never)} of {len(orders)} recordings were never made, {never[0]} first"] if never else []
+    return [*said, *reasons]
+
+
+def _name(order: Order) -> str:
+    return f"recording {order.sensor} {order.rig} {order.scene.name} {order.role} {order.seed}"
+
+
+def _configuration(cell: Cell) -> Section:
+    # What the simulation was asked for decides through the recordings' bytes; here it tells why those differ.
+    return {**configuration_of(cell), "simulation": cell.simulation.model_dump(exclude_defaults=True)}
+
+
+def _sections(fixed: Fixed, configuration: Section) -> dict[str, Section]:
+    return {name: _plain(part) for name, part in {**fixed.sections, "configuration": configuration}.items()}
+
+
+def _plain(section: Section) -> Section:
+    """Return a section as it reads when it comes back from the book."""
+    plain: Section = json.loads(json.dumps(section, default=repr))
+    return plain
+
+
+def _data(paths: Sequence[Path], recorded: Recorded, folder: Path) -> dict[str, dict[str, str]]:
+    return {
+        name: {"digest": recorded.digest(path), "path": beside(path, folder)}
+        for name, path in zip(recording_names(paths), paths, strict=True)
+    }
+
+
+def beside(path: Path, folder: Path) -> str:
+    """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
+    inside = path.is_relative_to(folder)
+    return str(path.relative_to(folder)) if inside else str(path.resolve())

@@ -1,0 +1,154 @@
+"""What went into the keys of a result folder, kept so that a miss can be explained.
+
+::
+
+    OUT/cache/keys/
+      keys.jsonl        one line a key: name, key, configuration, and which sections went into it
+      DIGEST.json       one section, or one list of sections, shared by every key it went into
+
+It only explains: losing it costs no result.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tactbench.core.matrix.keys import Fixed, Section
+
+Sections = Mapping[str, Section]
+
+_REFERENCE = re.compile(r"[0-9a-f]{32}")
+_LARGEST_SECTION = 16 * 2**20
+_LARGEST_BOOK = 512 * 2**20
+"""Bytes that are still read: folders come from strangers."""
+
+
+class Entry(NamedTuple):
+    """One key, and what went into it."""
+
+    name: str
+    key: str
+    configuration: Section
+    fixed: Fixed
+    data: Mapping[str, Mapping[str, str]] = {}
+    """``digest`` and ``path`` of each recording, by a name that does not depend on its key."""
+
+
+class KeyBook:
+    """The book of one result folder; `folder` is ``OUT/cache/keys``."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._lines: dict[str, dict[str, Any]] | None = None
+
+    def write(self, entries: Iterable[Entry]) -> None:
+        """Add the entries that the book lacks; a folder that refuses them costs no result."""
+        known = self._read()
+        fresh = [entry for entry in entries if (known.get(entry.name) or {}).get("key") != entry.key]
+        if not fresh:
+            return
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            kept: dict[int, str] = {}
+            lines = [self._line(entry, kept) for entry in fresh]
+            path = self._folder / "keys.jsonl"
+            torn = path.exists() and not path.read_bytes().endswith(b"\n")
+            with path.open("a", encoding="utf-8") as book:
+                text = "".join(json.dumps(line, sort_keys=True, default=repr) + "\n" for line in lines)
+                book.write("\n" * torn + text)
+        except OSError:
+            return
+        known.update((line["name"], line) for line in lines)
+
+    def sections(self, name: str, key: str = "") -> Sections | None:
+        """Return what went into `key`, or into the latest key of that name; None if the book does not know."""
+        lines = self._read()
+        line = lines.get(key) or lines.get(name)
+        if line is None:
+            return None
+        fixed = self._section(line.get("fixed"))
+        sections = {section: self._section(reference) for section, reference in fixed.items()}
+        sections["configuration"] = line["configuration"]
+        if line.get("data"):
+            sections["data"] = self._section(line["data"])
+        return sections
+
+    def _line(self, entry: Entry, kept: dict[int, str]) -> dict[str, Any]:
+        """Return an entry's line; `kept` are the sections written now, by identity: many entries share one object."""
+
+        def keep(section: Section) -> str:
+            if id(section) not in kept:
+                kept[id(section)] = self._keep(section)
+            return kept[id(section)]
+
+        sections = entry.fixed.sections
+        if id(sections) not in kept:
+            kept[id(sections)] = self._keep({name: keep(section) for name, section in sections.items()})
+        line = {
+            "name": entry.name,
+            "key": entry.key,
+            "configuration": dict(entry.configuration),
+            "fixed": kept[id(sections)],
+        }
+        return {**line, "data": keep(entry.data)} if entry.data else line
+
+    def _keep(self, section: Section) -> str:
+        content = json.dumps(section, sort_keys=True, separators=(",", ":"), default=repr).encode()
+        reference = hashlib.sha256(content).hexdigest()[:32]
+        path = self._folder / f"{reference}.json"
+        if not path.exists():
+            aside = path.with_suffix(".partial")
+            aside.write_bytes(content)  # not synced: what a power cut takes costs an explanation
+            aside.replace(path)
+        return reference
+
+    def _section(self, reference: object) -> dict[str, Any]:
+        if not isinstance(reference, str) or not _REFERENCE.fullmatch(reference):
+            return {}
+        found = _json(self._folder / f"{reference}.json", _LARGEST_SECTION)
+        return found if isinstance(found, dict) else {}
+
+    def _read(self) -> dict[str, dict[str, Any]]:
+        """Return the latest line of each name, and every line by its key."""
+        if self._lines is None:
+            self._lines = {}
+            path = self._folder / "keys.jsonl"
+            try:
+                lines = path.read_text(encoding="utf-8").splitlines() if path.stat().st_size < _LARGEST_BOOK else []
+            except (OSError, ValueError):
+                lines = []
+            for text in lines:
+                try:
+                    line = json.loads(text)
+                    if isinstance(line["configuration"], dict):
+                        self._lines[str(line["name"])] = self._lines[str(line["key"])] = line
+                except (ValueError, KeyError, TypeError, RecursionError):
+                    continue  # a line cut short
+        return self._lines
+
+
+def _json(path: Path, largest: int) -> Any:
+    try:
+        return json.loads(path.read_bytes()) if path.stat().st_size <= largest else None
+    except (OSError, ValueError, RecursionError):
+        return None
+
+
+def recording_names(paths: Sequence[Path]) -> list[str]:
+    """Return names of recordings that stay the same when they are made anew, each once."""
+    above = Path(os.path.commonpath([path.parent for path in paths])) if paths else Path()
+    names: dict[str, None] = {}
+    for path in paths:
+        stem = re.sub(r"-[0-9a-f]{12}$", "", path.relative_to(above).with_suffix("").as_posix())
+        number, name = 1, stem
+        while name in names:
+            number += 1
+            name = f"{stem} ({number})"
+        names[name] = None
+    return list(names)

@@ -1,0 +1,85 @@
+"""Which cell a person means, and what a row says about how it was asked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from tactbench.core.errors import UsageError, nearest
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.spec.scene import Simulation
+
+_SHOWN = 8
+"""Cells named in a message."""
+
+
+def meant(given: str, names: Sequence[str], keys: Mapping[str, str]) -> str:
+    """Return the name of the cell that `given` stands for: its name, a part of only one name, or how its key begins.
+
+    Parameters
+    ----------
+    names
+        Of the cells there are.
+    keys
+        Name -> key, for those that have one.
+
+    Raises
+    ------
+    UsageError
+        If several cells are meant (the message lists them), or none.
+    """
+    if given in names:
+        return given
+    found = [name for name in names if given in name]
+    if not found and re.fullmatch(r"[0-9a-f]{4,}", given):
+        found = [name for name in names if keys.get(name, "").startswith(given)]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        close = " or ".join(repr(name) for name in nearest(given, names))
+        raise UsageError(
+            f"There is no cell called {given!r} among {len(names)}.",
+            hint=f"Did you mean {close}?"
+            if close
+            else "See their names with `tactbench leaderboard DIR --format json`.",
+        )
+    more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+    raise UsageError(
+        f"{given!r} is part of the names of {len(found)} cells.",
+        hint=f"Give more of the name of one: {', '.join(found[:_SHOWN])}{more}.",
+    )
+
+
+def cell_of(row: Mapping[str, Any]) -> Cell:
+    """Return the cell that a row answers.
+
+    Raises
+    ------
+    UsageError
+        If the row does not say how the cell was asked.
+    """
+    try:
+        cell = Cell(
+            sensor=row["sensor"],
+            task=row["task"],
+            rig=row["rig"],
+            protocol=row["protocol"],
+            split=row["split"],
+            estimator=row["estimator"],
+            params=tuple(sorted(row["params"].items())),
+            baseline=row["is_baseline"],
+            repeat=row["repeat"],
+            repeats=row["repeats"],
+            seed=row["seed"],
+            simulation=Simulation.model_validate(row.get("simulation", {})),
+        )
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise UsageError(
+            f"The row of {row.get('cell')!r} does not say how the cell was asked: {error!r}.",
+            hint="It was written by another version: run the matrix again.",
+        ) from error
+    # A row says which split was taken; its name, whether that one was asked for or found.
+    found = replace(cell, split=None)
+    return found if found.name == row["cell"] else cell

@@ -1,0 +1,215 @@
+"""Two cells compared: the difference of their scores, how sure it is, and whether it matters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from tactbench.core.evaluation.metrics import METRICS, Metric
+from tactbench.core.evaluation.replicate_sums import tables_of
+from tactbench.core.samples import FloatArray
+from tactbench.core.statistics.influence import Together, together
+from tactbench.core.statistics.student import NORMAL, quantile, two_sided
+
+Row = Mapping[str, Any]
+Verdict = Literal["better", "worse", "equivalent", "undecided"]
+EXACT = 12
+"""Up to so many replicates, all ways of exchanging the two are tried."""
+EXCHANGES = 9_999
+"""Ways tried of more."""
+SEED = 0x7AC7
+"""Of these ways: the same rows have the same p-value, on any machine."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One cell's score less another's, in the metric's unit."""
+
+    value: float
+    low: float | None
+    high: float | None
+    """95 % interval; None: nothing can be resampled"""
+    p: float | None
+    """two-sided, of no difference"""
+    smallest_p: float | None
+    """the least that so few replicates can give"""
+    effect: float | None
+    """difference over the standard deviation of the replicates' differences"""
+    improved: float | None
+    """probability that the first is better on a replicate; 0.5 is no difference"""
+    verdict: Verdict
+    """of the first cell"""
+    beyond: bool
+    """the whole interval is beyond the region of practical equivalence"""
+    replicates: int
+    """how many both have, where they are paired; else the fewer of the two"""
+    unit: str
+    paired: bool
+    method: str
+
+
+def difference(first: Row, second: Row) -> Difference:
+    """Compare two finished rows of one metric.
+
+    Notes
+    -----
+    Where both were tested on replicates of the same names, differences are taken replicate by replicate. The interval
+    is Student's, with the jackknife's standard error of the difference of scores over replicates (Efron and Stein 1981;
+    Cameron, Gelbach and Miller 2008 on t with few clusters), which widens by itself where there are few. The p-value is
+    that of exchanging the two answers within replicates, each way as likely as another if there is no difference: all
+    2^n ways up to 12 replicates, else 9,999 drawn (Phipson and Smyth 2010 on counting the observed one). With n
+    replicates it cannot be below 2 / 2^n.
+
+    Where the replicates differ, errors are taken as independent, and of two degrees of freedom the smaller.
+
+    The verdict is *better* or *worse* if the interval neither contains 0 nor lies within the task's region of practical
+    equivalence, *equivalent* if it lies within, else *undecided*: ranks follow the same rule.
+    """
+    metric = METRICS[first["metric"]]
+    sign = 1.0 if metric.higher_is_better else -1.0
+    value = float(first["score"] - second["score"])
+    groups = together([first, second])
+    if len(groups) == 1 and len(groups[0].places) == 2:
+        return _paired(first, second, value, sign, groups[0], metric)
+    return _unpaired(first, second, value, sign, groups)
+
+
+def _paired(first: Row, second: Row, value: float, sign: float, group: Together, metric: Metric) -> Difference:
+    carried = group.influence[0] - group.influence[1]
+    deviation = float(np.sqrt(carried @ carried))
+    freedom = float(group.freedom.min())
+    run = max(int(row["replicates"].get("run", 1)) for row in (first, second))
+    n = len(group.names) / run
+    p, smallest = exchanged(first, second, run)
+    unit = str(first["replicates"]["unit"])
+    over = f"paired over {len(group.names)} {_several(unit, len(group.names))}"
+    own = value + carried * _to_own(group)
+    return _told(
+        value, deviation, freedom, sign, _region(first),
+        p=p,
+        smallest_p=smallest,
+        effect=value / (deviation * np.sqrt(n)) if deviation > 0 else None,
+        improved=float(np.mean((sign * own > 0) + 0.5 * (own == 0))),
+        replicates=len(group.names),
+        unit=unit,
+        paired=True,
+        method=f"{over}, Student's t ({freedom:.0f} degrees of freedom){_in_time(group)}",
+    )  # fmt: skip
+
+
+def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[Together]) -> Difference:
+    of = {int(place): (group, line) for group in groups for line, place in enumerate(group.places)}
+    errors, freedoms, own = [], [], []
+    for place, row in enumerate((first, second)):
+        if place in of:
+            group, line = of[place]
+            carried = group.influence[line]
+            errors.append(float(np.sqrt(carried @ carried)))
+            freedoms.append(float(group.freedom[line]))
+            own.append(row["score"] + carried * _to_own(group))
+        elif row["ci_low"] is not None and row["ci_high"] is not None:
+            errors.append((row["ci_high"] - row["ci_low"]) / (2 * NORMAL))
+            freedoms.append(np.inf)
+        else:
+            errors.append(np.inf)
+            freedoms.append(np.inf)
+    deviation, freedom = float(np.hypot(errors[0], errors[1])), min(freedoms)
+    counts = [len(of[place][0].names) if place in of else 0 for place in (0, 1)]
+    why = "they have other replicates" if len(of) == 2 else "replicates are missing, their own intervals stand in"
+    spread = float(np.sqrt((np.var(own[0], ddof=1) + np.var(own[1], ddof=1)) / 2)) if len(of) == 2 else 0.0
+    pairs = sign * np.subtract.outer(own[0], own[1]) if len(of) == 2 else np.empty(0)
+    return _told(
+        value, deviation, freedom, sign, _region(first),
+        p=two_sided(value / deviation, freedom) if 0 < deviation < np.inf else None,
+        smallest_p=0.0 if 0 < deviation < np.inf else None,
+        effect=value / spread if spread > 0 else None,
+        improved=float(np.mean((pairs > 0) + 0.5 * (pairs == 0))) if len(pairs) else None,
+        replicates=min(counts),
+        unit=" and ".join(dict.fromkeys(str(row["replicates"].get("unit", "none")) for row in (first, second))),
+        paired=False,
+        method=f"not paired ({why}), Student's t (of two degrees of freedom the smaller)"
+        + next((_in_time(group) for group in groups if group.in_time), ""),
+    )  # fmt: skip
+
+
+def _told(value: float, deviation: float, freedom: float, sign: float, region: float, **more: Any) -> Difference:
+    if not np.isfinite(deviation):
+        return Difference(value, None, None, verdict="undecided", beyond=False, **more)
+    reach = float(quantile(freedom)) * deviation
+    low, high = value - reach, value + reach
+    verdict: Verdict = "undecided"
+    if region > 0 and -region <= low and high <= region:
+        verdict = "equivalent"
+    elif low > 0 or high < 0:
+        verdict = "better" if value * sign > 0 else "worse"
+    return Difference(value, low, high, verdict=verdict, beyond=bool(low > region or high < -region), **more)
+
+
+def _region(row: Row) -> float:
+    return float(row.get("equivalence") or 0.0)
+
+
+def _to_own(group: Together) -> FloatArray:
+    """Return (replicates,) what turns a replicate's influence on the whole into its own difference from the whole.
+
+    The jackknife's pseudo-value: of a mean over n replicates, ``sqrt(n (n - 1))``, within each of several strata alike.
+    """
+    _, which, sizes = np.unique(group.strata, return_inverse=True, return_counts=True)
+    n = sizes[which].astype(np.float64)
+    return np.asarray(len(sizes) * np.sqrt(n * (n - 1)))
+
+
+def _in_time(group: Together) -> str:
+    return ": spread between sessions is not in it" if group.in_time else ""
+
+
+def _several(unit: str, n: int) -> str:
+    if unit.startswith("block"):
+        return unit.replace("block", "blocks", 1)
+    return unit if n == 1 else unit + ("es" if unit.endswith("s") else "s")
+
+
+def exchanged(first: Row, second: Row, run: int = 1) -> tuple[float, float]:
+    """Return the p-value of exchanging two rows' answers within replicates, and the least it can be.
+
+    Parameters
+    ----------
+    first, second
+        Rows whose replicates have the same names and strata.
+    run
+        Neighbouring blocks of time that are exchanged together.
+    """
+    n_classes = len(first["classes"])
+    metric = METRICS[first["metric"]]
+    sums = tables_of([first["replicates"], second["replicates"]], metric.name, n_classes)
+    strata = first["replicates"]["strata"] or [0] * sums.shape[1]
+    sums = np.add.reduceat(sums, _starts(strata, run), axis=1)
+    n = sums.shape[1]
+    if n <= EXACT:
+        ways = (np.arange(2**n)[:, None] >> np.arange(n)) & 1
+        smallest = 2.0 / 2**n
+    else:
+        drawn = np.random.default_rng(SEED).integers(0, 2, size=(EXCHANGES, n))
+        ways = np.concatenate([np.zeros((1, n), dtype=np.int64), drawn])  # as it was is one of the ways
+        smallest = 1.0 / len(ways)
+    moved = ways.astype(np.float64) @ (sums[1] - sums[0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = metric.score(sums[0].sum(axis=0) + moved, n_classes) - metric.score(
+            sums[1].sum(axis=0) - moved, n_classes
+        )
+    apart = np.abs(apart[np.isfinite(apart)])
+    return float(np.mean(apart >= apart[0] * (1 - 1e-9) - 1e-15)), smallest
+
+
+def _starts(strata: list[int], run: int) -> list[int]:
+    """Return where runs of blocks begin, `run` blocks of a stratum each; the blocks of a stratum are neighbours."""
+    starts, since = [], run
+    for place, stratum in enumerate(strata):
+        if since == run or stratum != strata[place - 1]:
+            starts.append(place)
+            since = 0
+        since += 1
+    return starts

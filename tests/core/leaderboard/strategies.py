@@ -1,0 +1,67 @@
+"""Rows that nobody would write: hostile names, odd numbers, every status."""
+
+from hypothesis import strategies as st
+
+from tactbench.core.spec.status import STATUSES
+
+from .rows import row
+
+HOSTILE = (
+    "\x1b[31mred\x1b[0m", "a|b\\|c", "[link](javascript:x)", "![i](http://x)", "<script>alert(1)</script>", "=1+1",
+    "'=1",
+    "@SUM(A1)", "-1 apple", "**bold** _a_ `code` ~~x~~", "\\\\ \\end{table} \\input{x}", "$x$ #1 %c ^2 & ~ {}",
+    "line\nbreak",
+    "\u202eright to left", "\ud800", "é ï ç ü Ö ø 中 😀", "-- --- `` '' ?` !` ,,", "* [x]", "# heading #", "&lt;&#38;",
+    "1. one", "", " ", "\x85\u2028\x9b", "[bold red]a[/]", ":smile:", "a_b_c", "'", '"quoted"', "a,b;c\td",
+)  # fmt: skip
+
+texts = st.one_of(
+    st.sampled_from(HOSTILE), st.text(st.characters(exclude_categories=()), max_size=12), st.sampled_from("ab")
+)
+numbers = st.floats(-1e6, 1e6)
+times = st.one_of(st.none(), st.floats(0, 1e5))
+counts = st.one_of(st.none(), st.integers(0, 10**7))
+
+
+@st.composite
+def some_rows(draw, most=6):
+    """Rows with names of their own."""
+    return [draw(one_row(place)) for place in range(draw(st.integers(1, most)))]
+
+
+@st.composite
+def one_row(draw, place):
+    status = draw(st.sampled_from(["done"] * 4 + [status for status in STATUSES if status != "done"]))
+    done = status == "done"
+    metric, unit = draw(st.sampled_from([("rmse", "N"), ("macro_f1", "1"), ("accuracy", "1")]))
+    more = {
+        "cell": f"{place} {draw(texts)}",
+        "task": metric,
+        "metric": metric,
+        "unit": unit,
+        "params": draw(st.dictionaries(texts, texts, max_size=2)),
+        "status": status,
+        "reason": "" if done else draw(texts),
+        "signal": 6 if status == "crashed" else None,
+        "split": draw(st.sampled_from(["session", "roles"])) if done else draw(st.sampled_from(["session", None])),
+        "protocol": draw(st.sampled_from(["deployable", "karl2016"])),
+        "rig": draw(st.sampled_from(["twin", "arm"])),
+        "is_baseline": draw(st.booleans()),
+        "simulated": done and draw(st.booleans()),
+        "dagger": draw(st.booleans()),
+        "stamps": draw(st.lists(texts, max_size=1)),
+        "remarks": draw(st.lists(texts, max_size=1)),
+        "score": draw(numbers) if done else None,
+        "ci_low": draw(numbers) if done else None,
+        "ci_high": draw(numbers) if done else None,
+        "baseline": draw(st.one_of(st.none(), numbers)),
+        "published": draw(st.one_of(st.none(), numbers)),
+        "published_reference": draw(texts),
+        "n_test": draw(counts),
+        "n_sessions": draw(counts),
+        "host": draw(st.sampled_from(["", "one", "two"])),
+        "concurrency": draw(st.sampled_from([None, 1, 4])),
+        **{key: draw(times) for key in ("sim_s", "fit_s", "predict_s", "latency_ms_p50", "latency_ms_p95")},
+        "batch_rows": draw(counts),
+    }
+    return row(draw(texts), draw(texts), **more)

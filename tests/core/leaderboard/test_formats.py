@@ -1,0 +1,215 @@
+"""Every format shows the same cells: each is read back by a reader of its own and compared with the table."""
+
+import csv
+import io
+import json
+import re
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+
+from tactbench.core.errors import UsageError
+from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
+from tactbench.core.leaderboard.csv_text import csv_text, guarded, unguarded
+from tactbench.core.leaderboard.formats import to_csv, to_json, to_latex, to_markdown, to_page, to_parquet
+from tactbench.core.leaderboard.latex import latex
+from tactbench.core.leaderboard.markdown import markdown
+from tactbench.core.leaderboard.records import JSON_KEYS, OF_THE_MACHINE, RANK_KEYS
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.terminal import plain_text
+
+from .board.reading import planes, read_page
+from .board.reading import texts as texts_of
+from .rows import row
+from .strategies import HOSTILE, some_rows, texts
+from .tex import as_set, untex
+
+many = settings(max_examples=60)
+either = st.booleans()
+
+
+def lines_of(table):
+    return [line.cells for block in table.blocks for line in block.lines]
+
+
+def one_spaced(cells):
+    return [" ".join(cell.split()) for cell in cells]
+
+
+@many
+@given(some_rows(), either)
+def test_json_shows_the_cells_of_the_table(rows, times):
+    table = build_table(rows, times=times)
+    read = json.loads(to_json(rows, times=times).encode())
+    assert [tuple(entry["shown"].values()) for entry in read] == lines_of(table)
+    assert [tuple(entry["shown"]) for entry in read] == [tuple(SHOWN[name] for name in table.columns)] * len(rows)
+    assert [entry["cell"] for entry in read] == [one["cell"] for one in table.rows]
+
+
+@many
+@given(some_rows(), either)
+def test_csv_shows_the_cells_of_the_table(rows, times):
+    table = build_table(rows, times=times)
+    read = list(csv.DictReader(io.StringIO(to_csv(rows, times=times).encode().decode(), newline="")))
+    shown = [f"shown_{SHOWN[name]}" for name in table.columns]
+    assert [tuple(unguarded(entry[name]) for name in shown) for entry in read] == lines_of(table)
+    for entry, one in zip(read, table.rows, strict=True):
+        assert entry["score"] == ("" if one["score"] is None else str(one["score"]))
+        assert json.loads(entry["params"]) == one["params"]
+
+
+@many
+@given(some_rows(), either)
+def test_parquet_shows_the_cells_of_the_table_and_keeps_types(rows, times):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = build_table(rows, times=times)
+    read = pq.read_table(io.BytesIO(to_parquet(rows, [{"host": "one"}], times=times)))
+    shown = [f"shown_{SHOWN[name]}" for name in table.columns]
+    assert list(zip(*(read[name].to_pylist() for name in shown), strict=True)) == lines_of(table)
+    assert read["score"].to_pylist() == [one["score"] for one in table.rows]
+    types = {field.name: field.type for field in read.schema}
+    assert (types["score"], types["seed"], types["dagger"], types["sensor"]) == (
+        pa.float64(), pa.int64(), pa.bool_(), pa.string(),
+    )  # fmt: skip
+    assert [json.loads(text) for text in read["params"].to_pylist()] == [one["params"] for one in table.rows]
+    assert read.schema.metadata[b"tactbench.format_version"] == b"1"
+    assert json.loads(read.schema.metadata[b"tactbench.provenance"]) == ([{"host": "one"}] if times else [])
+
+
+@many
+@given(some_rows(), either)
+def test_markdown_shows_the_cells_of_the_table_as_text(rows, times):
+    table = build_table(rows, times=times)
+    tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(markdown(table))
+    allowed = {"inline", "text", "code_inline"} | {
+        f"{kind}_{edge}"
+        for kind in ("heading", "table", "thead", "tbody", "tr", "th", "td", "bullet_list", "list_item", "paragraph")
+        for edge in ("open", "close")
+    }
+    assert {token.type for token in tokens} | {c.type for t in tokens for c in t.children or ()} <= allowed
+    cells, place = [], None
+    for token in tokens:
+        place = [] if token.type == "tr_open" else place
+        if token.type == "tr_close":
+            cells.append(place)
+            place = None
+        elif token.type == "inline" and place is not None:
+            assert {child.type for child in token.children} <= {"text"}
+            place.append("".join(child.content for child in token.children))
+    expected = [list(one) for block in table.blocks for one in (table.columns, *(line.cells for line in block.lines))]
+    expected += [list(one) for section in table.sections for one in (section.columns, *section.lines)]
+    assert [one_spaced(line) for line in cells] == [one_spaced(line) for line in expected]
+    notes = [token.content for token in tokens if token.type == "inline"]
+    assert len(notes) >= len(table.notes)
+
+
+@many
+@given(some_rows(), either)
+def test_latex_sets_the_cells_of_the_table_whatever_names_are_made_of(rows, times):
+    table = build_table(rows, times=times)
+    text = latex(table)
+    assert text.isascii()
+    cells = []
+    for body in re.findall(r"\\toprule\n(.*?)\\bottomrule", text, re.DOTALL):
+        for line in body.splitlines():
+            if line != r"\midrule":
+                assert line.endswith(r" \\")
+                cells.append([untex(cell) for cell in line.removesuffix(r" \\").split(" & ")])
+    expected = [one for block in table.blocks for one in (table.columns, *(line.cells for line in block.lines))]
+    expected += [one for section in table.sections for one in (section.columns, *section.lines)]
+    assert [one_spaced(line) for line in cells] == [one_spaced(map(as_set, line)) for line in expected]
+    for said in re.findall(r"\\caption\{(.*)\}$|\\par\\footnotesize (.*)$", text, re.MULTILINE):
+        untex("".join(said))
+    assert text.count(r"\begin{table}") == text.count(r"\end{table}") == len(table.blocks) + len(table.sections)
+
+
+@many
+@given(some_rows(), either)
+def test_a_terminal_shows_the_cells_of_the_table(rows, times):
+    table = build_table(rows, times=times)
+    lines = [" ".join(line.split()) for line in plain_text(table).splitlines()]
+    for block in table.blocks:
+        used = [
+            place for place in range(len(table.columns)) if any(line.cells[place].strip("–") for line in block.lines)
+        ]
+        for line in block.lines:
+            whole = " ".join(" ".join(line.cells[place] for place in used).split())
+            if len(whole) < 180:  # a longer one may meet the edge
+                assert whole in lines
+
+
+@settings(max_examples=30)
+@given(some_rows())
+def test_the_page_shows_the_cells_of_the_table(rows):
+    head, blobs = read_page(to_page(rows))
+    table = build_table(rows)
+    shown = [texts_of(blobs, column["column"]) or [""] * len(rows) for column in head["columns"]]
+    assert tuple(column["name"] for column in head["columns"]) == table.columns
+    cells = list(zip(*shown, strict=True))
+    assert [one_spaced(cells[place]) for place in planes(blobs, head["order"])] == [
+        one_spaced(line) for line in lines_of(table)
+    ]
+
+
+@given(texts)
+def test_a_formula_is_text_for_a_spreadsheet_and_comes_back(text):
+    assert unguarded(guarded(text)) == text
+    assert not re.match(r"[=+\-@]", guarded(text)) or re.fullmatch(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", text, re.IGNORECASE)
+
+
+def test_no_cell_of_csv_is_a_formula_but_negative_numbers_stay_numbers():
+    rows = [row(name, score=-0.25, metric="r2", unit="1", reason="=cmd()") for name in HOSTILE]
+    for entry in csv.DictReader(io.StringIO(csv_text(build_table(rows)), newline="")):
+        assert entry["score"] == "-0.25"
+        assert entry["shown_score"] == "-0.250"
+        assert entry["reason"] == "'=cmd()"
+        assert not [text for text in entry.values() if text[:1] in tuple("=+@") and text]
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_nothing_in_a_name_acts_on_a_terminal_in_any_format(name):
+    rows = [row(name, name, reason=name, status=status, score=score, stamps=[name], published=1.0,
+                published_reference=name, ci_method=name, remarks=[name])
+            for status, score in (("done", 0.5), ("failed", None))]  # fmt: skip
+    rows[0]["cell"], rows[1]["cell"] = name, f"{name} 2"
+    for text in (to_json(rows), to_csv(rows), to_markdown(rows), to_latex(rows), plain_text(build_table(rows))):
+        assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]", text)
+
+
+def test_numbers_that_are_none_are_null_in_json_and_told_in_the_table():
+    text = to_json([row(score=float("nan"), fit_s=float("inf"))])
+    (entry,) = json.loads(text, parse_constant=pytest.fail)
+    assert entry["score"] is None
+    assert entry["shown"]["score"] == "nan"
+
+
+def test_without_times_nothing_is_left_that_a_machine_decides():
+    here = row(host="here", concurrency=4, fit_s=1.0, made_by="x", wall_s=2.0, peak_rss_mb=1.0, threads=2, key="k")
+    there = here | dict.fromkeys(OF_THE_MACHINE) | {"host": "there", "concurrency": 1, "search": [1]}
+    machine = [{"host": "here", "cpu": "fast", "cores": 1}], [{"host": "there", "cpu": "slow", "cores": 2}]
+    for form in (to_json, to_csv, to_markdown, to_latex, to_parquet):
+        texts = [form([one], known, times=False) for one, known in zip((here, there), machine, strict=True)]
+        assert texts[0] == texts[1]
+        assert form([here]) != form([there])
+    assert set(json.loads(to_json([here], times=False))[0]) == {*JSON_KEYS, *RANK_KEYS, "shown"} - OF_THE_MACHINE
+
+
+def test_parquet_without_pyarrow_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(UsageError, match=r"pip install 'tactbench\[parquet\]'"):
+        to_parquet([row()])
+
+
+def test_a_number_that_64_bits_cannot_hold_is_no_traceback():
+    with pytest.raises(UsageError, match="do not fit Parquet"):
+        to_parquet([row(seed=2**70)])
+
+
+def test_every_column_has_a_name_for_programs():
+    assert tuple(SHOWN) == COLUMNS
+    assert len(set(SHOWN.values())) == len(COLUMNS)

@@ -1,0 +1,147 @@
+"""Ranks: what holds of them whatever the numbers."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.core.statistics.ranking import ranks
+
+from .made import mae_row, row
+
+
+def board(seed, cells=6, replicates=8, spread=0.3, **more):
+    rng = np.random.default_rng(seed)
+    session = rng.normal(0, 0.5, replicates)
+    return [
+        mae_row(f"c{place}", 5 + 0.2 * place + session + spread * rng.normal(size=replicates), **more)
+        for place in range(cells)
+    ]
+
+
+def test_cells_far_apart_have_strict_ranks():
+    found = ranks(board(1, spread=0.001))
+    assert [(one.place, one.low, one.high, one.tied) for one in found.values()] == [
+        (n, n, n, False) for n in range(1, 7)
+    ]
+
+
+def test_cells_that_chance_made_differ_share_the_first_rank():
+    found = ranks(board(2, cells=4, spread=5.0))
+    assert {one.place for one in found.values()} == {1}
+    assert all(one.tied and one.low == 1 for one in found.values())
+
+
+def test_pairing_tells_apart_what_two_intervals_would_not():
+    """The sessions differ by far more than the sensors do, and alike for both."""
+    session = np.linspace(1, 9, 8)
+    pair = [mae_row("a", session), mae_row("b", session + np.linspace(0.09, 0.11, 8))]
+    assert [one.place for one in ranks(pair).values()] == [1, 2]
+    pair[1]["replicates"]["names"] = [f"other {place}" for place in range(8)]
+    assert [one.place for one in ranks(pair).values()] == [1, 1]
+
+
+def test_what_is_practically_the_same_shares_a_rank():
+    means = np.linspace(1, 2, 8)
+    near = np.linspace(0.009, 0.011, 8)
+    for same, places in ((None, [1, 2]), (0.02, [1, 1]), (0.005, [1, 2])):
+        pair = [mae_row("a", means, equivalence=same), mae_row("b", means + near, equivalence=same)]
+        assert [one.place for one in ranks(pair).values()] == places
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), spread=st.sampled_from([0.01, 0.1, 1.0]), order=st.permutations(range(6)))
+def test_order_and_names_change_nothing(seed, spread, order):
+    rows = board(seed, spread=spread)
+    found = ranks(rows)
+    assert ranks([rows[place] for place in order]) == found
+    renamed = ranks([one | {"cell": f"x{order[place]}"} for place, one in enumerate(rows)])
+    assert [renamed[f"x{order[place]}"] for place in range(6)] == list({c: found[c] for c in sorted(found)}.values())
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), spread=st.sampled_from([0.01, 0.1, 1.0]))
+def test_places_follow_scores_and_intervals_hold_them(seed, spread):
+    rows = sorted(board(seed, spread=spread), key=lambda one: one["score"])
+    found = [ranks(rows)[one["cell"]] for one in rows]
+    assert found[0].place == 1
+    assert [one.place for one in found] == sorted(one.place for one in found)
+    assert all(1 <= one.low <= one.place <= one.high <= len(rows) for one in found)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), spread=st.sampled_from([0.01, 0.1, 1.0]), far=st.sampled_from([1e2, 1e12]))
+def test_what_comes_in_far_behind_changes_no_place(seed, spread, far):
+    rows = board(seed, spread=spread)
+    rng = np.random.default_rng(seed)
+    found = ranks([*rows, mae_row("far", far * (1 + 0.01 * rng.random(8)))])
+    assert found.pop("far").place == 7
+    assert found == ranks(rows)
+
+
+def test_equal_rows_have_equal_ranks():
+    rows = board(3, cells=2, spread=0.001)
+    found = ranks([rows[0], rows[0] | {"cell": "twin"}, rows[1]])
+    assert found["c0"] == found["twin"]
+    assert (found["c0"].place, found["c0"].low, found["c0"].high, found["c0"].tied) == (1, 1, 2, True)
+    assert found["c1"].place == 3
+
+
+def test_higher_is_better_where_it_is():
+    def accuracy(cell, share):
+        hits = np.round(100 * np.asarray(share))
+        sums = np.zeros((len(hits), 4))
+        sums[:, 0], sums[:, 1] = hits, 100 - hits
+        return row(cell, sums, metric="accuracy", classes=2)
+
+    found = ranks([accuracy("bad", np.linspace(0.4, 0.5, 8)), accuracy("good", np.linspace(0.8, 0.9, 8))])
+    assert (found["good"].place, found["bad"].place) == (1, 2)
+
+
+def test_a_row_without_replicates_enters_with_its_own_interval():
+    """Rows of older results, or two recordings of one row each."""
+    near = mae_row("a", np.full(8, 1.0), replicates={}, ci_low=0.9, ci_high=1.1)
+    far = mae_row("b", np.full(8, 9.0), replicates={}, ci_low=8.9, ci_high=9.1)
+    assert [one.place for one in ranks([near, far]).values()] == [1, 2]
+    assert [one.place for one in ranks([near, far | {"ci_low": 0.0, "ci_high": 18.0}]).values()] == [1, 1]
+    assert [one.high for one in ranks([near, far | {"ci_low": None, "ci_high": None}]).values()] == [2, 2]
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        {"sums": [[1.0, 2.0]]},
+        {"sums": "text"},
+        {"sums": [[1.0]] * 8},
+        {"sums": [[float("nan"), 1.0]] * 8},
+        {"names": None},
+        {"strata": [0]},
+        {"run": "x"},
+    ],
+)
+def test_replicates_that_make_no_sense_spoil_no_other_row(broken):
+    """Result folders come from strangers."""
+    rows = board(4, spread=0.001)
+    spoilt = rows[2] | {"replicates": rows[2]["replicates"] | broken}
+    found = ranks([*rows[:2], spoilt, *rows[3:]])
+    assert [found[f"c{place}"].place for place in (0, 1)] == [1, 2]
+
+
+def test_baselines_and_failures_have_no_rank():
+    rows = board(5, cells=3)
+    assert ranks([rows[0], rows[1] | {"is_baseline": True}, rows[2] | {"status": "failed", "score": None}]).keys() == {
+        "c0"
+    }
+    assert ranks([]) == {}
+
+
+def test_blocks_of_time_that_depend_on_each_other_say_less():
+    """The same sums, once as independent blocks and once as runs of eight that hang together."""
+    rng = np.random.default_rng(7)
+    slow = np.repeat(rng.normal(0, 1, 5), 8)
+    rows = [mae_row("a", 5 + slow), mae_row("b", 5.35 + np.roll(slow, 8))]
+    block = {"unit": "block of 100 rows in time", "strata": [0] * 40}
+    apart = [one | {"replicates": one["replicates"] | block | {"run": 1}} for one in rows]
+    runs = [one | {"replicates": one["replicates"] | block | {"run": 8}} for one in rows]
+    assert ranks(runs)["b"].low <= ranks(apart)["b"].low
+    assert ranks(runs)["b"].place == 1
