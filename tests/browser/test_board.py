@@ -8,8 +8,8 @@ import re
 import pytest
 
 from tactbench.core.leaderboard.board.page import to_html
-from tactbench.core.leaderboard.board.still import visible
 from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.values import VALUES
 from tests.browser.boards import HOST, HOSTILE, PROVENANCE, board_rows
 from tests.browser.test_page import loaded

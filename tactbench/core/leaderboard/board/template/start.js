@@ -116,12 +116,12 @@ const drawNotes = (most) => {
 };
 
 const drawSections = () => {
-  byId("sections").replaceChildren(...board.head.sections.flatMap(({ title, columns, lines, notes }) => [
+  byId("sections").replaceChildren(...board.head.sections.flatMap(({ title, columns, lines, notes, alarms }) => [
     make("h2", {}, title),
     make("div", { class: "box" }, make("table", { "aria-label": title },
       make("thead", {}, make("tr", {}, ...columns.map(([name, numeric]) =>
         make("th", { scope: "col", class: numeric ? "number" : "" }, name)))),
-      make("tbody", {}, ...lines.map((line) => make("tr", {}, ...line.map((text, place) =>
+      make("tbody", {}, ...lines.map((line, at) => make("tr", { class: alarms.includes(at) ? "failed" : "" }, ...line.map((text, place) =>
         make("td", { class: columns[place][1] ? "number" : "" }, text))))))),
     make("ul", { class: "notes" }, ...notes.map((note) => make("li", {}, ...prose(note)))),
   ]));
