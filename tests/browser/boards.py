@@ -1,5 +1,8 @@
 """Rows of a board that has everything: two directions, two hosts, stopped cells, hostile names, many lines."""
 
+import hashlib
+import json
+
 from tests.core.leaderboard.rows import row
 
 HOSTILE = (
@@ -15,7 +18,8 @@ def board_rows():
     for n in range(24):
         slow = n * 7 % 24  # the slower, the better, more or less
         about = {"fit_s": 10.0 ** (slow / 4 - 3), "latency_ms_p50": 10.0 ** ((slow + n % 3) / 8 - 2),
-                 "n_sessions": n % 5, "host": OTHER if n % 6 == 5 else HOST, "concurrency": 1 + n % 2}  # fmt: skip
+                 "n_sessions": n % 5, "host": OTHER if n % 6 == 5 else HOST, "concurrency": 1 + n % 2,
+                 "made_by": MADE_BY}  # fmt: skip
         good = slow - 5 * (n % 4) + n / 1e4
         rows.append(row(f"s{n:02d}", score=0.6 - good / 100, key=f"{n:064x}", **about))
         share = 0.5 + good / 60
@@ -33,4 +37,8 @@ def board_rows():
     return rows
 
 
-PROVENANCE = [{"host": HOST, "python": "3.11.7", "cpu": "<u>cpu</u>", "distributions": {"numpy": "2.0"}}]
+PROVENANCE = [
+    {"host": HOST, "python": "3.12.0", "cpu": "another run"},
+    {"host": HOST, "python": "3.11.7", "cpu": "<u>cpu</u>", "distributions": {"numpy": "2.0"}},
+]
+MADE_BY = hashlib.sha256(json.dumps(PROVENANCE[1], sort_keys=True).encode()).hexdigest()[:16]

@@ -8,8 +8,8 @@ import re
 import pytest
 
 from tactbench.core.leaderboard.board.page import to_html
-from tactbench.core.leaderboard.board.still import visible
 from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.values import VALUES
 from tests.browser.boards import HOST, HOSTILE, PROVENANCE, board_rows
 from tests.browser.test_page import loaded
@@ -121,13 +121,13 @@ def test_names_are_text_wherever_they_stand(board):
 def test_the_lines_are_those_of_the_table_digit_by_digit(board, rows):
     table = build_table(rows)
     shown = board.execute_script(LINES)
-    assert [body[0][1][0] for body in shown] == [visible(block.title) for block in table.blocks]
+    assert [body[0][1][0] for body in shown] == [block.title for block in table.blocks]
     empty = {place for place, name in enumerate(table.columns)
              if all(line.cells[place] in ("", "–") for block in table.blocks for line in block.lines)}  # fmt: skip
     for body, block in zip(shown, table.blocks, strict=True):
         for (kind, texts), line in zip(body[1:], block.lines, strict=True):
             assert kind == line.kind
-            expected = [visible(text) for place, text in enumerate(line.cells) if place not in empty]
+            expected = [text for place, text in enumerate(line.cells) if place not in empty]
             if kind in ("result", "baseline"):
                 assert texts == expected
             else:  # the reason in place of numbers

@@ -61,12 +61,14 @@ def print_rows(
         If a terminal is asked to show bytes, the page to have no times, or the file cannot be written.
     """
     from tactbench.core.leaderboard import memo
+    from tactbench.core.leaderboard.collector import collector_at_rest
     from tactbench.core.leaderboard.table import build_table
 
     check_destination(shape, to, times=times)
     if folder is not None:
         memo.load(folder)
-    table = build_table(rows, provenance, times=times)
+    with collector_at_rest():
+        table = build_table(rows, provenance, times=times)
     if folder is not None:
         memo.save(folder)
     if shape == "table" and to is None:
@@ -85,7 +87,9 @@ def print_rows(
     else:
         from tactbench.core.leaderboard.formats import TEXTS
 
-        _put(TEXTS[shape](table).encode("utf-8", "replace"), to)
+        with collector_at_rest():
+            text = TEXTS[shape](table)
+        _put(text.encode("utf-8", "replace"), to)
 
 
 def _put(content: bytes, to: Path | None) -> None:

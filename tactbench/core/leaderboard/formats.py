@@ -41,9 +41,9 @@ def json_array(table: Table) -> str:
 
 def page(table: Table) -> str:
     """Return the page of a table: one HTML file, every cell behind its numbers, times among them."""
-    from tactbench.core.leaderboard.board.page import to_html
+    from tactbench.core.leaderboard.board.page import page_of
 
-    return to_html(table.rows, table.provenance)
+    return page_of(table)
 
 
 TEXTS: dict[str, Callable[[Table], str]] = {

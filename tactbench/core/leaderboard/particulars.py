@@ -9,7 +9,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "Answer": (
         "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method", "baseline",
-        "published", "published_reference", "published_remark", "n_recordings", "n_sessions", "n_train", "n_test",
+        "published", "published_reference", "published_remark", "equivalence", "reference_score", "n_recordings",
+        "n_sessions", "n_train", "n_test",
     ),
     "Times and memory": (
         "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95", "latency_n",
@@ -23,6 +24,7 @@ TITLES = {
     "chosen": "Chosen on validation data",
     "search": "Every candidate that was compared",
     "scores": "Other scores: by class, by fold, by other metrics",
+    "fold_sizes": "Sizes of the folds",
     "counts": "What was counted",
     "assumptions": "Assumed by the simulation",
     "plan": "Effects of the first recording: included and left out, with reasons",

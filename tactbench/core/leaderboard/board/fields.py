@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from operator import itemgetter
+from collections.abc import Sequence
 from typing import Any
 
+from tactbench.core.leaderboard.board.columns import Columns
 from tactbench.core.leaderboard.board.digits import write_digits
 from tactbench.core.leaderboard.board.pack import Column, Pack
 from tactbench.core.leaderboard.board.words import LONGEST, write_words
 from tactbench.core.leaderboard.numbers import duration
-
-Row = Mapping[str, Any]
 
 MANY = 5_000
 """Cells beyond which what every cell has of its own is told shortly, or left to its shard."""
@@ -22,11 +20,11 @@ KEY_DIGITS = 8
 _ALWAYS = (
     "status", "reason", "sensor", "task", "estimator", "params", "is_baseline", "rig", "protocol", "split", "repeat",
     "repeats", "seed", "simulated", "dagger", "stamps", "metric", "unit", "ci_method", "host", "made_by", "concurrency",
-    "threads", "signal", "n_recordings", "n_train",
+    "threads", "signal", "n_recordings", "n_train", "equivalence", "reference_score",
 )  # fmt: skip
 _OFTEN = (
     "traceback", "remarks", "assumptions", "plan", "chosen", "counts", "published_reference", "published_remark",
-    "batch_rows", "latency_n", "search_s", "wall_s", "peak_rss_mb", "classes", "log", "recordings",
+    "batch_rows", "latency_n", "search_s", "wall_s", "peak_rss_mb", "classes", "log", "fold_sizes", "recordings",
 )  # fmt: skip
 _IN_THE_LINE = (
     "score", "ci_low", "ci_high", "baseline", "published", "n_sessions", "n_test", "sim_s", "fit_s", "predict_s",
@@ -42,11 +40,13 @@ NOTHING: Column = {"kind": "nothing"}
 _HEX = re.compile(f"[0-9a-f]{{{KEY_DIGITS}}}")
 
 
-def write_fields(pack: Pack, rows: Sequence[Row], room: int) -> tuple[dict[str, Column], tuple[str, ...]]:
+def write_fields(pack: Pack, rows: Columns, room: int) -> tuple[dict[str, Column], tuple[str, ...]]:
     """Write what is known of the cells into `pack`.
 
     Parameters
     ----------
+    rows
+        What is known of the cells, by key.
     room
         Characters that the pack may hold in the end.
 
@@ -55,16 +55,17 @@ def write_fields(pack: Pack, rows: Sequence[Row], room: int) -> tuple[dict[str, 
     dict, tuple
         The columns by key, and the keys that were left out for want of room.
     """
-    many = len(rows) > MANY
-    columns: dict[str, Column] = {"cell": _names(pack, [row["cell"] for row in rows]), "key": _keys(pack, rows, many)}
+    names = rows.get("cell", ())
+    many = len(names) > MANY
+    columns: dict[str, Column] = {"cell": _names(pack, names), "key": _keys(pack, rows.get("key", ()), many)}
     left_out: list[str] = []
     for key in (*_ALWAYS, *_OFTEN):
         _write(pack, rows, key, room, columns, left_out, many)
     others = [*_IN_THE_LINE, *_OWN]
     known = {*columns, *left_out, *others}
-    more = sorted(set().union(*rows) - known, key=str)
+    more = sorted(set(rows) - known, key=str)
     if many:
-        left_out += [key for key in (*_OWN, *more) if any(row.get(key) for row in rows)]
+        left_out += [key for key in (*_OWN, *more) if any(rows.get(key, ()))]
     else:
         for key in (*others[: len(_IN_THE_LINE)], *more, *_OWN):
             _write(pack, rows, key, room, columns, left_out, many)
@@ -72,10 +73,10 @@ def write_fields(pack: Pack, rows: Sequence[Row], room: int) -> tuple[dict[str, 
 
 
 def _write(
-    pack: Pack, rows: Sequence[Row], key: str, room: int, columns: dict[str, Column], left_out: list[str], many: bool
+    pack: Pack, rows: Columns, key: str, room: int, columns: dict[str, Column], left_out: list[str], many: bool
 ) -> None:
     """Write one column, cut as far as it must be, or not at all; a column that says nothing is not written."""
-    values = _values(rows, key)
+    values = rows.get(key, ())
     types = set(map(type, values))
     before = len(pack.blobs)
     if many and float in types and types <= {float, int, type(None)}:
@@ -96,13 +97,6 @@ def _write(
     left_out.append(key)
 
 
-def _values(rows: Sequence[Row], key: str) -> list[Any]:
-    try:
-        return list(map(itemgetter(key), rows))
-    except KeyError:
-        return [row.get(key) for row in rows]
-
-
 def _shortly(key: str, value: float | None) -> str:
     if value is None:
         return ""
@@ -121,8 +115,8 @@ def _names(pack: Pack, names: Sequence[str]) -> Column:
     }
 
 
-def _keys(pack: Pack, rows: Sequence[Row], many: bool) -> Column:
-    keys = [str(row.get("key") or "") for row in rows]
+def _keys(pack: Pack, values: Sequence[Any], many: bool) -> Column:
+    keys = [str(value or "") for value in values]
     if not many or not all(_HEX.match(key) or not key for key in keys):
         return write_words(pack, keys) or NOTHING
     whole = [int(key[:KEY_DIGITS], 16) if key else 0 for key in keys]

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-import gc
+import hashlib
 import json
 from collections import Counter, defaultdict, deque
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from html import escape
 from operator import itemgetter
 from string import Template
 from typing import Any
 
 import tactbench
+from tactbench.core.leaderboard.board.columns import columns_of
 from tactbench.core.leaderboard.board.digits import FEW_STEPS, STEPS, write_digits
 from tactbench.core.leaderboard.board.fields import MANY, NOTHING, write_fields
 from tactbench.core.leaderboard.board.pack import Column, Pack, deflated
 from tactbench.core.leaderboard.board.sound import sound, table_of
-from tactbench.core.leaderboard.board.still import still, visible
+from tactbench.core.leaderboard.board.still import still
 from tactbench.core.leaderboard.board.words import cut, tame, write_words
+from tactbench.core.leaderboard.collector import collector_at_rest
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.particulars import GROUPS, TITLES
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER, NUMERIC, Table
+from tactbench.core.leaderboard.table import ABSENT, LOWER_IS_BETTER, NUMERIC, Section, Table
+from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.values import VALUES
 
 Row = Mapping[str, Any]
@@ -38,7 +40,7 @@ MOST_LINES = 500
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
 DURATIONS = ("latency p50", "p95", "fit", "sim", "batch/row")
 """Columns that a score can be drawn against."""
-_NOTHING = frozenset({"", "–"})
+_NOTHING = frozenset({"", ABSENT})
 _HOME = "tactbench.core.leaderboard.board"
 
 
@@ -52,50 +54,29 @@ def to_html(rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]] = ()) -
     provenance
         What made them, one entry a run.
     """
-    with _collector_at_rest():
-        return _to_html(rows, provenance)
+    with collector_at_rest():
+        kept, remarks = sound(rows)
+        return page_of(table_of(kept, provenance), remarks)
 
 
-@contextmanager
-def _collector_at_rest() -> Iterator[None]:
-    """Keep Python from looking for garbage among a million objects of which none is: a fifth of the time."""
-    was = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was:
-            gc.enable()
-
-
-def _to_html(rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]]) -> str:
-    kept, remarks = sound(rows)
-    kept, table = table_of(sorted(kept, key=itemgetter("cell")))
-    return page_of(table, kept, provenance, remarks)
-
-
-def page_of(
-    table: Table, rows: Sequence[Row], provenance: Sequence[Mapping[str, Any]] = (), remarks: Sequence[str] = ()
-) -> str:
+def page_of(table: Table, remarks: Sequence[str] = ()) -> str:
     """Return the page of a table.
 
     Parameters
     ----------
     table
-        Of `rows`: each row has a line, which names its cell.
-    rows
-        In the order of their cells' names, in which what they share lies together.
-    provenance
-        What made them.
+        With times.
     remarks
         What a reader must know first.
     """
+    # By name: what neighbours share lies together.
+    rows = sorted(table.rows, key=itemgetter("cell"))
     order = _places(rows, table)
     pack = Pack()
-    head = _head(pack, rows, table, order, remarks, provenance)
+    head = _head(pack, rows, table, order, remarks)
     frame = _frame(rows, still(table, rows, order, remarks) if len(rows) <= MOST_STILL else "")
     taken = len(frame.encode()) + len(deflated(_json(head))) + _ROOM_FOR_FIELDS
-    head["fields"], head["leftOut"] = write_fields(pack, rows, LARGEST - taken)
+    head["fields"], head["leftOut"] = write_fields(pack, columns_of(rows), LARGEST - taken)
     written = pack.add(_json(head))
     data = json.dumps({"head": written, "blobs": pack.blobs}, separators=(",", ":"))
     # The last one: a name may say the same.
@@ -126,7 +107,6 @@ def _head(
     table: Table,
     order: Sequence[Sequence[int]],
     remarks: Sequence[str],
-    provenance: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """Return all that the page's script must know, the blobs that it is in aside."""
     lines = [line for block in table.blocks for line in block.lines]
@@ -156,17 +136,25 @@ def _head(
             {"name": name, "numeric": name in NUMERIC, "column": _column(pack, name, shown, rows)}
             for name, shown in zip(table.columns, texts, strict=True)
         ],
-        "sections": [_section(section) for section in getattr(table, "sections", ())],
-        "foot": [cut(text, LONGEST_NOTE) for text in getattr(table, "foot", ())],
+        "sections": [_section(section) for section in table.sections],
+        "foot": [cut(text, LONGEST_NOTE) for text in table.foot],
         "roles": _roles(table.columns),
         "groups": GROUPS,
         "titles": TITLES,
         "notes": notes,
-        "provenance": [tame(entry) for entry in provenance],
+        "provenance": [[_id(entry), tame(entry)] for entry in table.provenance],
     }
 
 
-def _section(section: Any) -> dict[str, Any]:
+def _id(entry: Mapping[str, Any]) -> str:
+    """Return what rows call their provenance by (`made_by`): the digest that a store names its file with."""
+    try:
+        return hashlib.sha256(json.dumps(dict(entry), sort_keys=True).encode()).hexdigest()[:16]
+    except (TypeError, ValueError, RecursionError):
+        return ""
+
+
+def _section(section: Section) -> dict[str, Any]:
     """Return a table below the blocks, which no cell is behind."""
     lines = [list(line) for line in section.lines[:MOST_LINES]]
     more = len(section.lines) - len(lines)
@@ -175,6 +163,7 @@ def _section(section: Any) -> dict[str, Any]:
         "title": section.title,
         "columns": [[name, name in section.numeric] for name in section.columns],
         "lines": lines,
+        "alarms": sorted(section.alarms),
         "notes": [cut(note, LONGEST_NOTE) for note in notes],
     }
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
-from operator import itemgetter
 from typing import Any
 
+from tactbench.core.leaderboard.board.columns import columns_of
 from tactbench.core.leaderboard.board.words import tame, tame_text
 from tactbench.core.leaderboard.table import Table, build_table
 
@@ -29,7 +29,7 @@ _NAMES = frozenset(
 )
 _NUMBER = (
     "score", "ci_low", "ci_high", "baseline", "published", "sim_s", "search_s", "fit_s", "predict_s", "latency_ms_p50",
-    "latency_ms_p95", "peak_rss_mb", "wall_s",
+    "latency_ms_p95", "peak_rss_mb", "wall_s", "equivalence", "reference_score",
 )  # fmt: skip
 _WHOLE = (
     "repeat", "repeats", "seed", "signal", "n_recordings", "n_sessions", "n_train", "n_test", "batch_rows", "latency_n",
@@ -37,7 +37,7 @@ _WHOLE = (
 )  # fmt: skip
 _FLAG = ("is_baseline", "simulated", "dagger")
 _LIST = ("stamps", "remarks", "plan", "search", "recordings", "classes")
-_TABLE = ("params", "assumptions", "counts", "chosen", "scores", "replicates")
+_TABLE = ("params", "assumptions", "counts", "chosen", "scores", "replicates", "fold_sizes")
 
 # What a key may hold, and what stands for it where it holds anything else.
 _KINDS: dict[str, tuple[frozenset[type], Callable[[Any], Any]]] = {
@@ -50,8 +50,6 @@ _KINDS: dict[str, tuple[frozenset[type], Callable[[Any], Any]]] = {
     **dict.fromkeys(_TABLE, (frozenset({dict}), lambda value: {})),
     "confusion": (frozenset({list, tuple, _NOTHING}), lambda value: None),
 }
-_LIMITED = frozenset({*_NAMES, *_NUMBER, "counts", "chosen", "stamps", "remarks"})
-"""Keys of which a value of the right type may still be odd."""
 _FALLBACK = {"repeat": 1, "repeats": 1}
 
 
@@ -60,11 +58,9 @@ def sound(rows: Sequence[Any]) -> tuple[list[Row], tuple[str, ...]]:
     kept: list[Row] = [row for row in rows if isinstance(row, Mapping)]
     told = [f"{len(rows) - len(kept)} entries are no rows and are left out."] if len(kept) < len(rows) else []
     odd: Counter[str] = Counter()
-    alike = _of_sound_types(kept)
+    columns = columns_of(kept)
     for key, (kinds, mend) in _KINDS.items():
-        if alike and key not in _LIMITED:
-            continue
-        places = _odd_places(kept, key, kinds)
+        places = _odd_places(kept, columns.get(key, ()), key, kinds)
         for place in places:
             kept[place] = {**kept[place], key: _mended(kept[place], key, kinds, mend)}
         if places:
@@ -79,26 +75,13 @@ def sound(rows: Sequence[Any]) -> tuple[list[Row], tuple[str, ...]]:
     return kept, tuple(told)
 
 
-def _of_sound_types(rows: Sequence[Row]) -> bool:
-    """Tell whether every row has every key, and nothing in it that is of a wrong type."""
-    shapes = {(tuple(row), tuple(map(type, row.values()))) for row in rows}
-    return all(
-        _KINDS.keys() <= set(keys)
-        and all(kind in _KINDS[key][0] for key, kind in zip(keys, types, strict=True) if key in _KINDS)
-        for keys, types in shapes
-    )
-
-
-def _odd_places(rows: Sequence[Row], key: str, kinds: frozenset[type]) -> list[int]:
+def _odd_places(rows: Sequence[Row], values: Sequence[Any], key: str, kinds: frozenset[type]) -> list[int]:
     """Return the places of rows that lack `key` or hold in it what does not belong there."""
-    try:
-        values = list(map(itemgetter(key), rows))
-    except KeyError:
-        return [place for place, row in enumerate(rows) if key not in row or not _fits(row[key], key, kinds)]
     types = set(map(type, values))
-    if types <= kinds and not _limited(values, key, types):
+    missing = not values or (_NOTHING in types and any(key not in row for row in rows))
+    if types <= kinds and not missing and not _limited(values, key, types):
         return []
-    return [place for place, value in enumerate(values) if not _fits(value, key, kinds)]
+    return [place for place, row in enumerate(rows) if key not in row or not _fits(row[key], key, kinds)]
 
 
 def _limited(values: Sequence[Any], key: str, types: Collection[type]) -> bool:
@@ -156,13 +139,13 @@ def _whole(value: Any) -> int | None:
     return int(found) if found is not None and found == int(found) else None
 
 
-def table_of(rows: Sequence[Row]) -> tuple[list[Row], Table]:
-    """Return the rows and their table; a row that no table can be made of says so in its place."""
+def table_of(rows: Sequence[Row], provenance: Sequence[Row]) -> Table:
+    """Return the table of rows; a row that no table can be made of says so in its place."""
+    known = [entry for entry in provenance if isinstance(entry, Mapping)]
     try:
-        return list(rows), build_table(rows)
+        return build_table(rows, known)
     except Exception:
-        alone = [_alone(row) for row in rows]
-        return alone, build_table(alone)
+        return build_table([_alone(row) for row in rows], known)
 
 
 def _alone(row: Row) -> Row:

@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
 from tactbench.core.leaderboard.one_file import prose
 from tactbench.core.leaderboard.table import NUMERIC, Table
-
-
-def visible(text: str) -> str:
-    r"""Return text with what cannot be seen, or turns the rest round, written out, as ``\u202e``."""
-    return text if text.isprintable() else "".join(map(_shown, text))
-
-
-def _shown(character: str) -> str:
-    if character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs":
-        return character
-    code = ord(character)
-    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+from tactbench.core.leaderboard.text import visible
 
 
 def still(
@@ -35,7 +23,7 @@ def still(
         lines = []
         for line, place in zip(block.lines, places, strict=True):
             row = rows[place]
-            why = "" if row["status"] == "done" else f"{row['status']}: {row['reason']}"
+            why = "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
             cells = "".join(
                 f"<td{_class(name)}>{_text(text)}</td>" for name, text in zip(table.columns, line.cells, strict=True)
             )
@@ -45,7 +33,7 @@ def still(
             f'<div class="box"><table><caption>{_text(block.title)}</caption>\n'
             f"<thead><tr>{heads}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
         )
-    notes = "\n".join(f"<li>{prose(visible(note))}</li>" for note in (*remarks, *table.notes))
+    notes = "\n".join(f"<li>{prose(note)}</li>" for note in (*remarks, *table.notes, *table.foot))
     return "\n".join(parts) + f'\n<ul class="notes">\n{notes}\n</ul>'
 
 
@@ -54,4 +42,4 @@ def _class(name: str) -> str:
 
 
 def _text(text: str) -> str:
-    return f"<bdi>{escape(visible(text))}</bdi>"
+    return f"<bdi>{escape(text)}</bdi>"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.board.pack import Column, Pack
@@ -33,8 +33,13 @@ def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Co
     types = set(map(type, values))
     if types <= _EMPTY.keys() and not any(values):
         return None
+    if types == {_NOTHING} or not values:
+        return None
     # By value where that is safe (1, 1.0 and True are equal), else by identity: the values outlive this call.
     alike = len(types - {_NOTHING}) <= 1 and types <= _PLAIN
+    if alike and len(set(values)) == 1:
+        text = written(values[0], longest)
+        return None if text in _SILENT else _column(pack, [text], pack.zeros(len(values)))
     keys: Sequence[Any] = values if alike else list(map(id, values))
     texts: dict[str, int] = {}
     places = {
@@ -43,9 +48,12 @@ def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Co
     }
     if texts.keys() <= _SILENT:
         return None
-    words = "[" + ",".join(texts) + "]"
     at = pack.zeros(len(values)) if len(texts) == 1 else pack.planes(list(map(places.__getitem__, keys)))
-    return {"kind": "words", "words": pack.add(words.encode()), "at": at}
+    return _column(pack, texts, at)
+
+
+def _column(pack: Pack, texts: Iterable[str], at: list[int]) -> Column:
+    return {"kind": "words", "words": pack.add(("[" + ",".join(texts) + "]").encode()), "at": at}
 
 
 def written(value: Any, longest: int = LONGEST) -> str:

@@ -71,7 +71,8 @@ def test_the_same_rows_in_any_order_give_the_same_page():
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_name_is_text(name):
-    plain = Tags(to_html([row("sensor"), row("b", name[:9], status="failed", score=None)])).seen
+    tame = [row("sensor", reason="r", cell="c"), row("b", status="failed", score=None, reason="r", traceback="t")]
+    plain = Tags(to_html(tame, [{"host": "h", "x": {"x": "x"}}])).seen
     stopped = row("b", status="failed", score=None, reason=name, traceback=name)
     rows = [row(name, reason=name, cell=name), stopped]
     page = to_html(rows, [{"host": name, name: {name: name}}])

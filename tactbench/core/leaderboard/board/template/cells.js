@@ -51,10 +51,11 @@ const commands = (name) => {
 const provenanceOf = (row) => {
   const all = board.head.provenance;
   const made = board.field("made_by", row), host = board.field("host", row);
-  const named = all.findIndex((one) => made && one.id === made);
+  const named = all.findIndex(([id]) => made && id === made);
   if (named >= 0) return named;
-  const there = all.map((one, place) => place).filter((place) => host && all[place].host === host);
-  return there.length === 1 ? there[0] : all.length === 1 && !host ? 0 : -1;
+  // Rows of another version may not say which run made them: the only one of their host did.
+  const there = all.map((_, place) => place).filter((place) => host && all[place][1].host === host);
+  return !made && there.length === 1 ? there[0] : -1;
 };
 
 const provenanceTables = (entry) => {
@@ -119,7 +120,7 @@ const openCell = (row) => {
     ...longText("What the cell printed", board.raw("log", row)),
     make("div", { class: "tables" }, ...cellBody(row)),
     make("h3", {}, "Made by"),
-    ...(made >= 0 ? provenanceTables(head.provenance[made])
+    ...(made >= 0 ? provenanceTables(head.provenance[made][1])
       : [make("p", { class: "note" }, "This page was given no provenance of the run that made this cell.")]),
     ...file, ...missing);
   if (!dialog.open) dialog.showModal();

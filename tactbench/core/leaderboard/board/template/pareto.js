@@ -101,7 +101,7 @@ const drawTime = () => {
   const elsewhere = all.length - points.length;
   const atOnce = [...new Set(points.map((one) => board.field("concurrency", one.row)).filter((text) => text))].sort(words.compare);
   const told = [
-    `${block.lower ? "Lower" : "Higher"} and further left is better. Filled: answers; joined: the front, which no other answer beats in both; its 95 % intervals are the upright lines. Hollow: trivial answers, which are not part of it.`,
+    `${block.lower ? "Lower" : "Higher"} and further left is better. Filled: answers; joined: the front, which no other answer beats in both; its intervals are the upright bands. Hollow: trivial answers, which are not part of it.`,
     `All times of this figure were taken on ${host === UNKNOWN ? UNKNOWN : `host ${host}`}${atOnce.length ? `, with ${
       atOnce.length > 1 ? `${atOnce[0]} to ${atOnce.at(-1)} cells` : atOnce[0] === "1" ? "one cell" : `${atOnce[0]} cells`} at once` : ""}.`,
   ];

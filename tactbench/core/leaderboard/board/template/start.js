@@ -116,12 +116,12 @@ const drawNotes = (most) => {
 };
 
 const drawSections = () => {
-  byId("sections").replaceChildren(...board.head.sections.flatMap(({ title, columns, lines, notes }) => [
+  byId("sections").replaceChildren(...board.head.sections.flatMap(({ title, columns, lines, notes, alarms }) => [
     make("h2", {}, title),
     make("div", { class: "box" }, make("table", { "aria-label": title },
       make("thead", {}, make("tr", {}, ...columns.map(([name, numeric]) =>
         make("th", { scope: "col", class: numeric ? "number" : "" }, name)))),
-      make("tbody", {}, ...lines.map((line) => make("tr", {}, ...line.map((text, place) =>
+      make("tbody", {}, ...lines.map((line, at) => make("tr", { class: alarms.includes(at) ? "failed" : "" }, ...line.map((text, place) =>
         make("td", { class: columns[place][1] ? "number" : "" }, text))))))),
     make("ul", { class: "notes" }, ...notes.map((note) => make("li", {}, ...prose(note)))),
   ]));
@@ -130,7 +130,7 @@ const drawSections = () => {
 const drawProvenance = () => {
   const all = board.head.provenance;
   byId("foot").replaceChildren(...board.head.foot.map((text) => make("p", { class: "note" }, ...prose(text))));
-  byId("provenance").replaceChildren(...(all.length ? all.map((entry) => make("details", {},
+  byId("provenance").replaceChildren(...(all.length ? all.map(([, entry]) => make("details", {},
     make("summary", {}, Object.entries(entry).filter(([, value]) => !isEmpty(value) && !isRecord(value)).slice(0, 6)
       .map(([name, value]) => `${name} ${asText(value)}`).join(" · ")), ...provenanceTables(entry)))
     : [make("p", { class: "note" }, "This page was given no provenance.")]));

@@ -1,6 +1,7 @@
 // Text is only ever put in as text; what cannot be seen, or turns the rest round, is written out.
 const UNSEEN = /(?![\n\t])[\p{C}\p{Zl}\p{Zp}]/gu;
 const visible = (text) => text.replace(UNSEEN, (one) => {
+  if ("\r\v\f\u2028\u2029".includes(one)) return " ";
   const code = one.codePointAt(0), hex = code.toString(16);
   return code < 0x100 ? `\\x${hex.padStart(2, "0")}` : code < 0x10000 ? `\\u${hex.padStart(4, "0")}` : `\\U${hex.padStart(8, "0")}`;
 });
