@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from tactbench.core.matrix.keys import RELEVANT, versions
-from tactbench.core.matrix.source import SourceDigests
+from tactbench.core.matrix.source import SourceDigests, digest_of
 from tactbench.core.plugins.registry import Registry
 
 
@@ -26,9 +26,11 @@ def surroundings(registry: Registry, sources: SourceDigests) -> dict[str, str]:
     sources
         Digests of packages.
     """
-    modules = [shelf.owned(one.name).module for shelf in registry.shelves().values() for one in shelf]
-    packages = {"tactbench", *(module.partition(":")[0].partition(".")[0] for module in modules)}
-    found = {f"the source of {package}": sources.package(package) for package in sorted(packages)}
+    modules = {shelf.owned(one.name).module for shelf in registry.shelves().values() for one in shelf}
+    modules |= {one.where for one in registry.estimators}
+    behind = sources.behind(modules, "answer")
+    found = {f"the source of {package}": digest_of(files) for package, files in sorted(behind.packages.items())}
+    found |= {f"the version of {name}": version for name, version in sorted(behind.versions.items())}
     more = {name for estimator in registry.estimators for name in estimator.distributions} - set(RELEVANT)
     for name, version in versions(tuple(sorted(more))).items():
         if version != "missing":

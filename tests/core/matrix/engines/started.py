@@ -32,6 +32,7 @@ class Started:
     def _start(self, program, *arguments, path=(), cwd=None):
         log = self._stack.enter_context((self.folder / f"{program}.log").open("ab"))
         env = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path)), "OMP_NUM_THREADS": "1"}
+        env["TMPDIR"] = str(self.folder)  # what they keep for themselves goes with the test
         host = ("--host", "127.0.0.1")
         process = subprocess.Popen(
             [sys.executable, "-m", f"distributed.cli.{program}", *arguments, *host],

@@ -1,5 +1,6 @@
 """A scheduler and workers that somebody has started: who may compute, and what happens when they go."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -70,7 +71,9 @@ with open_dask(sys.argv[1], 1, Limits()) as engine:
 
 def test_a_cell_ends_when_the_run_that_wanted_it_is_killed(cluster, worker, tmp_path):
     begun = tmp_path / "begun"
-    run = subprocess.Popen([sys.executable, "-c", RUN, cluster.address, str(begun)])
+    run = subprocess.Popen(
+        [sys.executable, "-c", RUN, cluster.address, str(begun)], env={**os.environ, "TMPDIR": str(tmp_path)}
+    )
     try:
         assert until(lambda: begun.exists() and begun.read_text())
     finally:
