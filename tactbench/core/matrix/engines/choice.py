@@ -8,10 +8,7 @@ from typing import Literal, get_args
 from tactbench.core.errors import UsageError
 from tactbench.core.matrix.engines.engine import Engine
 from tactbench.core.matrix.engines.family import can_fork
-from tactbench.core.matrix.engines.in_process import InProcess
-from tactbench.core.matrix.engines.isolated import Isolated
 from tactbench.core.matrix.engines.limits import UNLIMITED, Limits
-from tactbench.core.matrix.engines.processes import Processes
 
 EngineName = Literal["in-process", "isolated", "dask"]
 ENGINES: tuple[EngineName, ...] = get_args(EngineName)
@@ -68,6 +65,10 @@ class EngineChoice:
         In process, one cell is carried out here. Several are carried out in one forked process, one after the other,
         that this one looks after: a cell that ends it costs its own row and nobody else's.
         """
+        from tactbench.core.matrix.engines.in_process import InProcess
+        from tactbench.core.matrix.engines.isolated import Isolated
+        from tactbench.core.matrix.engines.processes import Processes
+
         name = self.named(cells)
         if name == "dask":
             return _dask(self)
@@ -79,6 +80,9 @@ class EngineChoice:
 
     def pool(self, hands: int, *, grace_s: float = 0.0) -> Engine:
         """Return reused processes for `hands` items at once, for what is no cell."""
+        from tactbench.core.matrix.engines.in_process import InProcess
+        from tactbench.core.matrix.engines.processes import Processes
+
         limits = replace(self.limits, grace_s=grace_s)
         if can_fork():
             return Processes(hands, limits)
@@ -101,6 +105,8 @@ def _served(choice: EngineChoice) -> Engine:
     try:
         from tactbench.core.matrix.engines.served import Served  # type: ignore[import-untyped,unused-ignore]
     except ImportError:
+        from tactbench.core.matrix.engines.in_process import InProcess
+
         return InProcess(choice.limits)
     engine: Engine = Served(choice.jobs, choice.limits)
     return engine
