@@ -28,8 +28,11 @@ import trivial
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.recording.reader import open_recording
 
-TWIN = ("--sensor", "icub", "--task", "curvature", "--estimator", "lda", "--repeats", "2")
-TRIVIAL = ("--task", "nothing-asked", "--estimator", "nothing", "--repeats", "200", "--no-latency")
+TWIN = (
+    "--sensor", "icub", "--task", "curvature", "--repeats", "2", "--estimator", "lda", "--estimator", "logistic",
+    "--estimator", "knn",
+)  # fmt: skip
+TRIVIAL = ("--task", "nothing-asked", "--estimator", "nothing", "--repeats", "100", "--no-latency")
 
 
 def started(arguments: list[str], folder: Path) -> subprocess.Popen[bytes]:

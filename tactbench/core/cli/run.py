@@ -76,9 +76,11 @@ def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:
     from tactbench.core.cli.stopped import tell_stopped
     from tactbench.core.leaderboard.formats import FORMATS as TEXTS
     from tactbench.core.matrix.files import replace_file
+    from tactbench.core.matrix.store.disk import writing
 
-    for ending in ("md", "csv", "json"):
-        replace_file(folder / f"leaderboard.{ending}", TEXTS[ending](outcome.rows).encode())
+    with writing(folder):
+        for ending in ("md", "csv", "json"):
+            replace_file(folder / f"leaderboard.{ending}", TEXTS[ending](outcome.rows).encode())
     cells = len(outcome.rows)
     remark(f"\n{cells - outcome.computed} of {cells} cells were found finished, {outcome.computed} computed now; "
            f"{outcome.recorded} recordings made now.")  # fmt: skip

@@ -30,5 +30,6 @@ def _group(row: Row) -> tuple[Any, ...]:
 
 
 def scores_text(rows: Sequence[Row]) -> str:
-    """Return what a seed decides, as text that may be compared byte by byte."""
-    return json.dumps([{key: row[key] for key in SEED_DECIDES} for row in rows], indent=1, sort_keys=True) + "\n"
+    """Return what a seed decides, as text that may be compared byte by byte: JSON, one row a line."""
+    lines = (json.dumps({key: row[key] for key in SEED_DECIDES}, sort_keys=True) for row in rows)
+    return "[\n" + ",\n".join(lines) + "\n]\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -42,7 +43,7 @@ class Cell:
     simulation: Simulation = _AS_PLANNED
     """How a simulated rig is asked to carry out its scenes."""
 
-    @property
+    @cached_property
     def name(self) -> str:
         """A readable name, unique in a matrix."""
         options = "".join(f",{key}={value}" for key, value in self.params)

@@ -11,10 +11,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.errors import FormatError, RecordingError
+from tactbench.core.errors import FormatError
 from tactbench.core.matrix.files import replace_file
 from tactbench.core.matrix.store import leftovers, limits
 from tactbench.core.matrix.store.disk import refusal, removed, sync_all, sync_folder, writing
+from tactbench.core.matrix.store.following import Following
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
 from tactbench.core.matrix.store.rows import NAMING, Row
@@ -45,7 +46,7 @@ class Store:
 
     def __init__(self, folder: Path, *, recordings: tuple[Path, ...] = ()) -> None:
         self.folder = folder
-        self._allowed = tuple(path.resolve() for path in recordings)
+        self._follow = Following(folder, recordings)
         self._lock: Lock | None = None
         self._ledger: Ledger | None = None
         self._done: dict[str, Entry] = {}
@@ -53,7 +54,6 @@ class Store:
         self._orphans: list[Entry] = []
         self._provenance = ("", "{}")
         self._synced, self._unsynced = -_SYNC_EVERY_S, 0
-        self._followed: dict[tuple[str, str], bool] = {}
 
     # One run at a time
 
@@ -143,7 +143,7 @@ class Store:
             try:
                 with aside.open("wb") as file:
                     file.write(image)
-                    if due:
+                    if due and not self._unsynced:  # else all are synced together below
                         file.flush()
                         os.fsync(file.fileno())
                 ledger.append(entry)
@@ -275,11 +275,6 @@ class Store:
     def recording(self, path: str, digest: str = "") -> Path | None:
         """Return the file of a recording that a row names, or None if it may not be followed.
 
-        A row may be a stranger's, and a path in it may lead anywhere. Followed are files inside the folder; files in
-        the folders that the person has named; and elsewhere regular files that hold the very content the row tells of,
-        so that one's own runs on recordings elsewhere need no naming, while a stranger shows nothing to anybody that he
-        does not know himself.
-
         Parameters
         ----------
         path
@@ -287,15 +282,7 @@ class Store:
         digest
             The content digest that stands beside it in ``row["digests"]``.
         """
-        if "\0" in path:
-            return None
-        found = (self.folder / path).resolve()
-        if any(found.is_relative_to(root) for root in (self.folder.resolve(), *self._allowed)):
-            return found
-        asked = (str(found), digest)
-        if asked not in self._followed:
-            self._followed[asked] = bool(digest) and found.is_file() and _content(found) == digest
-        return found if self._followed[asked] else None
+        return self._follow(path, digest)
 
     # The rest
 
@@ -377,12 +364,3 @@ def _clipped(text: Any) -> Any:
     if isinstance(text, str) and len(text) > limits.TEXT_CHARACTERS:
         return f"… {text[-limits.TEXT_CHARACTERS :]}"
     return text
-
-
-def _content(path: Path) -> str:
-    from tactbench.core.recording.reader import content_digest
-
-    try:
-        return content_digest(path)
-    except RecordingError:
-        return ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -98,6 +99,13 @@ def read_ledger(folder: Path) -> Ledger:
             f"{path} is larger than {limits.LEDGER_BYTES // 2**20} MiB, more than any ledger that tactbench reads.",
             hint="Split the matrix over several folders, or delete this one if it is not yours.",
         )
+    with _without_collecting():
+        _take_in(ledger, content)
+    return ledger
+
+
+def _take_in(ledger: Ledger, content: bytes) -> None:
+    """Turn the bytes of a ledger into entries."""
     broken = 0
     waiting: list[tuple[dict[str, Any], int]] = []
     shared: dict[str, Any] = {}
@@ -117,8 +125,7 @@ def read_ledger(folder: Path) -> Ledger:
     ledger.known = set(shared)
     _fill(ledger, waiting, shared, sizes)
     if broken:
-        ledger.troubles.insert(0, f"{_lines_of(broken)} of {path} could not be read")
-    return ledger
+        ledger.troubles.insert(0, f"{_lines_of(broken)} of {ledger.path} could not be read")
 
 
 def whole_text(entries: Sequence[Entry]) -> str:
@@ -141,6 +148,18 @@ def _lines(entry: Entry, known: set[str]) -> tuple[list[str], set[str]]:
     if entry.shard is not None:
         said["shard"] = list(entry.shard)
     return [*shared_lines(fresh), canonical(said)], set(fresh)
+
+
+@contextmanager
+def _without_collecting() -> Iterator[None]:
+    """Let no garbage be looked for while millions of objects are made to stay: it would take as long again."""
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if before:
+            gc.enable()
 
 
 def _parsed(content: bytes) -> Iterator[tuple[str, Any]]:

@@ -45,6 +45,7 @@ class Lock:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._process = os.getpid()
         self.works = True
         """False where the file system knows no locks."""
         self._note = folder / "cache" / "held.json"
@@ -81,8 +82,9 @@ class Lock:
 
     def release(self) -> None:
         """Let go; who held it is forgotten."""
-        with suppress(OSError):
-            self._note.unlink(missing_ok=True)
+        if self._process == os.getpid():  # not in a child, whose copy of this is none
+            with suppress(OSError):
+                self._note.unlink(missing_ok=True)
         self._close()
 
     def _close(self) -> None:

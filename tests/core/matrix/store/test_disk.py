@@ -9,6 +9,7 @@ import pytest
 
 from tactbench.core.errors import FolderError
 from tactbench.core.matrix.store import Store
+from tests.conftest import ROOT, Shell
 
 from .made import answers, done, ended, kept, key
 
@@ -88,27 +89,30 @@ def test_a_file_in_the_folders_place_is_refused(tmp_path):
         pass
 
 
-def test_the_command_line_stops_with_a_clear_message_and_goes_on_later(tmp_path):
+def test_the_command_line_stops_with_a_clear_message_and_goes_on_later(tmp_path, monkeypatch):
     """The real run on a real disk that fills up: exit code 2, no traceback, and the same scores in the end."""
-    from tests.conftest import Shell
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    import trivial
 
-    asked = ("run", "--sensor", "icub", "--task", "curvature", "--estimator", "lda")
-    plain = Shell(tmp_path)
-    plain(*asked, "--out", "plain")
-    size = sum(path.stat().st_size for path in (tmp_path / "plain" / "recordings").rglob("*.h5"))
+    shelf = trivial.install(tmp_path / "plugin")
+    asked = ("run", "--task", "nothing-asked", "--estimator", "nothing", "--recordings", str(shelf), "--repeats", "60",
+             "--no-latency")  # fmt: skip
+    plain, plugin = Shell(tmp_path), (str(tmp_path / "plugin"),)
+    plain(*asked, "--out", "plain", plugins=plugin)
     with small_disk(tmp_path / "disk") as disk:
-        room = (size + 64 * 1024) // 1024 + 16
-        subprocess.run(["mount", "-o", f"remount,size={room + 400}k", str(disk)], check=True)
-        (disk / "filler").write_bytes(b"x" * 390 * 1024)
-        stopped = plain(*asked, "--out", str(disk / "out"), code=None)
-        assert stopped.returncode == 2, stopped.stderr
-        assert "the disk is full" in stopped.stderr or "No space left on device" in stopped.stderr
+        (disk / "filler").write_bytes(b"x" * 240 * 1024)
+        stopped = plain(*asked, "--out", str(disk / "out"), plugins=plugin, code=2)
+        assert "the disk is full" in stopped.stderr
         assert str(disk / "out") in stopped.stderr
+        assert "the same command goes on" in stopped.stderr
         assert "Traceback" not in stopped.stderr
+        before = {row["cell"]: row for row in Store(disk / "out").rows()}
+        assert 5 < len(before) < 60
         (disk / "filler").unlink()
-        subprocess.run(["mount", "-o", f"remount,size={4 * room + 4000}k", str(disk)], check=True)
-        plain(*asked, "--out", str(disk / "out"))
+        subprocess.run(["mount", "-o", "remount,size=4000k", str(disk)], check=True)
+        plain(*asked, "--out", str(disk / "out"), plugins=plugin)
         assert (disk / "out" / "scores.json").read_bytes() == (tmp_path / "plain" / "scores.json").read_bytes()
+        assert {row["cell"]: row for row in Store(disk / "out").rows()}.items() >= before.items()
 
 
 def test_a_limit_on_the_size_of_files_is_told(tmp_path):
@@ -119,11 +123,19 @@ def test_a_limit_on_the_size_of_files_is_told(tmp_path):
         "resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500))\n"
         "try:\n    kept(store, 'b')\nexcept FolderError as error:\n    print(error)\n"
     )
-    from tests.conftest import ROOT
-
     done_ = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path)], check=True, capture_output=True, text=True, cwd=ROOT
     )
     assert "larger than this process may write" in done_.stdout
     assert [row["cell"] for row in Store(tmp_path).rows()] == ["a"]
     assert not list(tmp_path.rglob("*.partial"))
+
+
+def test_a_disk_too_full_for_a_recording_stops_the_run_and_fails_no_cell(tmp_path):
+    with small_disk(tmp_path / "disk") as disk:
+        (disk / "filler").write_bytes(b"x" * 540 * 1024)
+        stopped = Shell(tmp_path)("run", "--sensor", "icub", "--task", "curvature", "--out", str(disk / "out"), code=2)
+        assert "No space left on device" in stopped.stderr
+        assert str(disk / "out" / "recordings") in stopped.stderr
+        assert "Traceback" not in stopped.stderr
+        assert Store(disk / "out").rows() == []

@@ -29,25 +29,39 @@ def forged(folder, change):
     return Store(folder)
 
 
+FIELDS = [("y_true", "<f8"), ("y_pred", "<f8"), ("recording", "<i8"), ("row", "<i8"), ("fold", "<i8"),
+          ("time_s", "<f8"), ("force_n", "<f8")]  # fmt: skip
+
+
 def remade(file, **options):
-    del file["test/y_true"]
-    file["test"].create_dataset("y_true", **options)
+    """Put another dataset in the place of the answers."""
+    del file["test"]
+    file.create_dataset("test", **options)
+
+
+def another(file, name, value):
+    """Put another text in the place of one of the shard's own."""
+    del file.attrs[name]
+    file.attrs[name] = value
 
 
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda file: remade(file, shape=(2**40,), dtype="f8", chunks=(1024,)), "claims"),
-        (lambda file: remade(file, shape=(2**60,), dtype="f8", chunks=(1024,), compression="gzip"), "claims"),
-        (lambda file: remade(file, data=np.zeros((5, 5))), "2 dimensions"),
-        (lambda file: remade(file, data=np.zeros(7)), "differ in length"),
-        (lambda file: remade(file, data=["a"] * 5, dtype=h5py.string_dtype()), "holds object"),
-        (lambda file: remade(file, data=np.zeros(5), compression="lzf"), "asks for a filter"),
-        (lambda file: remade(file, data=np.ones(5)), "does not hold what was written"),
-        (lambda file: remade(file, shape=(5,), dtype="f8", external=[("/etc/passwd", 0, 40)]), "another file"),
-        (lambda file: file["test"].__delitem__("fold"), "has no fold"),
-        (lambda file: file.attrs.modify("format", "else"), "no shard of this version"),
-        (lambda file: file.attrs.__delitem__("row"), "damaged"),
+        (lambda file: remade(file, shape=(2**35,), dtype=FIELDS, chunks=(1024,)), "claims"),
+        (lambda file: remade(file, shape=(2**55,), dtype=FIELDS, chunks=(1024,), compression="gzip"), "claims"),
+        (lambda file: remade(file, data=np.zeros((5, 5), dtype=FIELDS)), "2 dimensions"),
+        (lambda file: remade(file, data=np.zeros(5)), "holds float64"),
+        (lambda file: remade(file, data=np.zeros(5, dtype=FIELDS[1:])), "test holds"),
+        (lambda file: remade(file, data=np.zeros(5, dtype=[("y_true", "S8"), *FIELDS[1:]])), "test holds"),
+        (lambda file: remade(file, shape=(5,), dtype=[("y_true", h5py.string_dtype()), *FIELDS[1:]]), "test holds"),
+        (lambda file: remade(file, data=np.zeros(5, dtype=FIELDS), compression="lzf"), "asks for a filter"),
+        (lambda file: remade(file, data=np.ones(5, dtype=FIELDS)), "does not hold what was written"),
+        (lambda file: remade(file, shape=(5,), dtype=FIELDS, external=[("/etc/passwd", 0, 280)]), "another file"),
+        (lambda file: another(file, "format", "else"), "no shard of this version"),
+        (lambda file: another(file, "row", "{}"), "does not hold what was written"),
+        (lambda file: another(file, "provenance", np.arange(3)), "does not hold what was written"),
+        (lambda file: file.attrs.__delitem__("sha256"), "does not hold what was written"),
     ],
 )
 def test_a_shard_that_claims_what_cannot_be_answers_nothing(tmp_path, change, says):
@@ -74,10 +88,10 @@ def test_an_untouched_shard_made_so_is_read(tmp_path):
 
 def test_a_column_larger_than_the_limit_is_refused(tmp_path, monkeypatch):
     kept(Store(tmp_path), "a")
-    monkeypatch.setattr(limits, "ARRAY_BYTES", 16)
+    monkeypatch.setattr(limits, "ARRAY_BYTES", 100)
     store = Store(tmp_path)
     assert store.answers(key("a")) == {}
-    assert "claims 3 values" in store.troubles[0]
+    assert "claims 3 rows" in store.troubles[0]
     monkeypatch.setattr(limits, "SHARD_BYTES", 100)
     assert Store(tmp_path).rows() == []
 
