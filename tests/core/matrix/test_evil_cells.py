@@ -59,6 +59,11 @@ def whole_rows(folder):
     return {row["estimator"]: row for row in Store(folder).rows()}
 
 
+def lines_of(folder):
+    """Return what a seed decides of each cell, as it is written."""
+    return [line.rstrip(",") for line in (folder / "scores.json").read_text().splitlines()[1:-1]]
+
+
 def processes_in(folder):
     """Return the processes that were started in `folder` and are still there."""
     found = []
@@ -77,7 +82,7 @@ def alone(tmp_path_factory):
     shell = Shell(tmp_path_factory.mktemp("honest"))
     presses(shell.folder / "shelf")
     run(shell, "--estimator", "ols", code=0)
-    return (shell.folder / "out" / "scores.json").read_text(), shell.folder / "shelf"
+    return lines_of(shell.folder / "out"), shell.folder / "shelf"
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -102,9 +107,8 @@ def test_every_evil_cell_has_one_row_and_the_others_are_right(engine, alone, tmp
     assert "in _raise" in stopped["evil-raise"]["traceback"]
     assert "in _hang" in stopped["evil-hang"]["traceback"]
     assert "tactbench why " in done.stderr
-    scores = json.loads((tmp_path / "out" / "scores.json").read_text())
-    beside = [score for score in scores if score["cell"].split("/")[4] in HONEST]
-    assert json.dumps(beside, indent=1, sort_keys=True) + "\n" == honest, "not a byte of an honest score has changed"
+    beside = [line for line in lines_of(tmp_path / "out") if not any(f"/{name}/" in line for name in ENDS)]
+    assert beside == honest, "not a byte of an honest score has changed"
     assert "said" not in done.stdout + done.stderr
     assert "Traceback" not in done.stderr
     assert processes_in(tmp_path) == []

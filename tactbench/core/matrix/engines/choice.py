@@ -8,10 +8,7 @@ from typing import Literal, get_args
 from tactbench.core.errors import UsageError
 from tactbench.core.matrix.engines.engine import Engine
 from tactbench.core.matrix.engines.family import can_fork
-from tactbench.core.matrix.engines.in_process import InProcess
-from tactbench.core.matrix.engines.isolated import Isolated
 from tactbench.core.matrix.engines.limits import UNLIMITED, Limits
-from tactbench.core.matrix.engines.processes import Processes
 
 EngineName = Literal["in-process", "isolated", "dask"]
 ENGINES: tuple[EngineName, ...] = get_args(EngineName)
@@ -81,6 +78,10 @@ class EngineChoice:
         In process, one cell is carried out here. Several are carried out in one forked process, one after the other,
         that this one looks after: a cell that ends it costs its own row and nobody else's.
         """
+        from tactbench.core.matrix.engines.in_process import InProcess
+        from tactbench.core.matrix.engines.isolated import Isolated
+        from tactbench.core.matrix.engines.processes import Processes
+
         name = self.named(cells)
         if name == "dask":
             return _dask(self)
@@ -92,6 +93,9 @@ class EngineChoice:
 
     def pool(self, hands: int, *, grace_s: float = 0.0) -> Engine:
         """Return reused processes for `hands` items at once, for what is no cell."""
+        from tactbench.core.matrix.engines.in_process import InProcess
+        from tactbench.core.matrix.engines.processes import Processes
+
         limits = replace(self.limits, grace_s=grace_s)
         if can_fork():
             return Processes(hands, limits)

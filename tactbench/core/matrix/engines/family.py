@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import threading
@@ -125,15 +124,21 @@ def interrupts_held_back() -> Iterator[None]:
 
 @lru_cache(maxsize=1)
 def _library() -> Any:
+    import ctypes
+
     return ctypes.CDLL(None)
 
 
 def _prctl(option: int, value: int) -> None:
+    import ctypes
+
     with suppress(AttributeError, OSError):
         _library().prctl(option, ctypes.c_ulong(value), 0, 0, 0)
 
 
 def _get_subreaper() -> int:
+    import ctypes
+
     value = ctypes.c_int(0)
     with suppress(AttributeError, OSError):
         _library().prctl(_GET_CHILD_SUBREAPER, ctypes.byref(value), 0, 0, 0)
