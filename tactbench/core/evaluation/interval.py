@@ -1,4 +1,4 @@
-"""The interval of a score: resampled by session, or by blocks of time where there are too few sessions."""
+"""The interval of a score: over sessions, or over blocks of time where there are too few sessions."""
 
 from __future__ import annotations
 
@@ -9,18 +9,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tactbench.core.evaluation.jackknife import influences
 from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.scales import Scale, scale_of
 from tactbench.core.samples import FloatArray, IntArray
 
 LEVEL = 0.95
 RESAMPLES = 2000
 ENOUGH_CLUSTERS = 5
 """Fewer than this cannot be resampled: the interval would be their range."""
+NOT_ONE = float(np.sqrt(2.0))
+"""Standard error of the log-odds of half an error in n rows: where not one was wrong, more may not be known."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A percentile interval, and how it was found."""
+    """Where a score may lie, and how that was found."""
 
     low: float
     high: float
@@ -48,18 +52,19 @@ def score_interval(
 
     Notes
     -----
-    With at least five clusters, clusters are drawn with replacement, those of one class only within that class, and the
-    percentiles are widened as Student's t would widen a normal interval [4]_: plain percentiles of few clusters cover
-    less than they say. With fewer, or when a class is in fewer than five, time is resampled instead: circular blocks
-    within each recording [1]_, whose length follows from the autocorrelation of the loss [2]_ [3]_. Such an interval
-    knows nothing of the spread between sessions and says so.
+    With at least five clusters, each is left out in turn, those of one class standing in for each other only, and the
+    interval is Student's over clusters [4]_, on a scale that suits the metric (:func:`scale_of`). Percentiles of
+    resampled clusters cover less than they say where there are few: ``benchmarks/coverage.py``. With fewer clusters, or
+    when a class is in fewer than five, time is resampled instead: circular blocks within each recording [1]_, whose
+    length follows from the autocorrelation of the loss [2]_ [3]_. Such an interval knows nothing of the spread between
+    sessions and says so.
 
     References
     ----------
     .. [1] Politis and Romano 1992, A circular block-resampling procedure for stationary data.
     .. [2] Politis and White 2004, Automatic block-length selection for the dependent bootstrap.
     .. [3] Patton, Politis and White 2009, correction to [2]_.
-    .. [4] Hesterberg 2015, What teachers should know about the bootstrap, section 5.3.
+    .. [4] Cameron, Gelbach and Miller 2008, Bootstrap-based improvements for inference with clustered errors.
     """
     rng = np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))
     rows = metric.rows(y, predicted, n_classes)
@@ -68,27 +73,56 @@ def score_interval(
         sums = np.zeros((len(names), rows.shape[1]))
         np.add.at(sums, number, rows)
         strata = strata_of(y, number, n_classes)
-        times = np.zeros((RESAMPLES, len(names)))
-        for one in strata:
-            times[:, one] = rng.multinomial(len(one), np.full(len(one), 1 / len(one)), size=RESAMPLES)
-        scores = metric.score(times @ sums, n_classes)
-        tail = widened_tail(len(names) - len(strata), min(len(one) for one in strata))
-        plural = cluster_name + ("es" if cluster_name.endswith("s") else "s")
-        return _percentiles(scores, f"bootstrap over {len(names)} {plural}", tail)
+        return _of_clusters(metric, sums, strata, cluster_name, n_classes, len(y))
     if len(np.unique(recording)) == len(recording):
         return _of_too_few(metric, rows, n_classes)
     total = np.zeros((RESAMPLES, rows.shape[1]))
-    lengths = []
+    lengths, sizes = [], []
     for one in np.unique(recording):
         mine = rows[recording == one]
         loss = loss_of(metric, y[recording == one], predicted[recording == one])
         length = block_length(loss)
         lengths.append(length)
+        sizes.append(len(mine) / length)
         total += _circular_blocks(mine, length, rng)
     spread = f"{min(lengths)}" if min(lengths) == max(lengths) else f"{min(lengths)}–{max(lengths)}"
     many = f"{len(lengths)} recording" + ("s" if len(lengths) > 1 else "")
     method = f"block bootstrap in time within {many} (blocks of {spread} rows): spread between sessions is not in it"
-    return _percentiles(metric.score(total, n_classes), method)
+    score = float(metric.score(rows.sum(axis=0), n_classes))
+    scale = scale_of(metric.name, score, len(y))
+    resampled = scale.there(metric.score(total, n_classes))
+    resampled = resampled[np.isfinite(resampled)]  # R² of a resample whose labels are all alike
+    freedom = max(sum(sizes) - len(lengths), 1.0)
+    widened = np.sqrt(sum(sizes) / freedom)  # a variance of so many blocks is that much too small
+    return _student(metric, score, float(resampled.std()) * widened, freedom, scale, method)
+
+
+def _of_clusters(
+    metric: Metric, sums: FloatArray, strata: list[IntArray], cluster_name: str, n_classes: int, n: int
+) -> Interval:
+    """Return Student's interval over clusters, from what leaving each out changes."""
+    score = float(metric.score(sums.sum(axis=0), n_classes))
+    scale = scale_of(metric.name, score, n)
+    code = np.zeros(len(sums), dtype=np.int64)
+    for place, one in enumerate(strata):
+        code[one] = place
+    without = scale.there(metric.score(sums.sum(axis=0) - sums, n_classes))
+    without = np.where(np.isfinite(without), without, scale.there(score))  # R² of labels that are all alike
+    freedom = len(sums) - len(strata)
+    plural = cluster_name + ("es" if cluster_name.endswith("s") else "s")
+    method = f"jackknife over {len(sums)} {plural} (Student's t, {freedom} degrees of freedom, {scale.name})"
+    deviation = float(np.sqrt((influences(without, code) ** 2).sum()))
+    return _student(metric, score, deviation, freedom, scale, method)
+
+
+def _student(metric: Metric, score: float, deviation: float, freedom: float, scale: Scale, method: str) -> Interval:
+    """Return Student's interval of a score whose standard error on `scale` is `deviation`."""
+    if metric.kind == "classification" and score in (0.0, 1.0):
+        deviation = NOT_ONE
+    quantile = float(importlib.import_module("scipy.special").stdtrit(freedom, 0.5 + LEVEL / 2))
+    reach = quantile * deviation
+    ends = [float(scale.back(scale.there(score) + one * reach)) for one in (-1.0, 1.0)]
+    return Interval(min(*ends, score), max(*ends, score), method)
 
 
 def _of_too_few(metric: Metric, rows: FloatArray, n_classes: int) -> Interval:
@@ -123,13 +157,6 @@ def strata_of(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> list[In
         return [every]
     own = there.argmax(axis=1)
     return [every[own == one] for one in np.unique(own)]
-
-
-def widened_tail(freedom: int, n: int) -> float:
-    """Return the normal tail beyond ``sqrt(n / (n - 1)) t(freedom)``, where n clusters are drawn from the fewest."""
-    special = importlib.import_module("scipy.special")
-    quantile = special.stdtrit(freedom, 0.5 + LEVEL / 2)
-    return float(special.ndtr(-quantile * np.sqrt(n / (n - 1))))
 
 
 def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
@@ -204,9 +231,3 @@ def _autocovariance(centred: FloatArray, lags: int) -> FloatArray:
     size = 1 << int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.rfft(centred, size)
     return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size)[: min(lags, n - 1) + 1] / n)
-
-
-def _percentiles(scores: FloatArray, method: str, tail: float = (1 - LEVEL) / 2) -> Interval:
-    scores = scores[np.isfinite(scores)]  # R² of a resample whose labels are all alike
-    low, high = np.quantile(scores, [tail, 1 - tail])
-    return Interval(float(low), float(high), method)

@@ -15,6 +15,7 @@ column, count …``. Scores follow exactly: :attr:`Metric.score` of the sum of a
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -58,12 +59,18 @@ def summed(metric: Metric, tested: Answers, unit: Units, data: Dataset) -> dict[
             "run": 1,
             "sums": _lines(summands, unit.codes, len(unit.labels), n_classes),
         }
-    return _of_blocks(metric, tested, summands, data)
+    return summed_in_time(metric, tested, _recording_names(data), n_classes)
 
 
-def _of_blocks(metric: Metric, tested: Answers, summands: FloatArray, data: Dataset) -> dict[str, Any]:
-    n_classes = len(data.classes)
-    names = _recording_names(data)
+def summed_in_time(metric: Metric, tested: Answers, names: Sequence[str], n_classes: int) -> dict[str, Any]:
+    """Return what a row keeps where time is all there is to resample: sums over blocks of each recording.
+
+    Parameters
+    ----------
+    names
+        What each recording is called, by its number.
+    """
+    summands = metric.rows(tested.y_true, tested.y_pred, n_classes)
     order = sorted(np.unique(tested.recording).tolist(), key=lambda place: names[place])
     most = int(np.clip(BLOCKS_IN_ALL // len(order), FEWEST, BLOCKS))
     code = np.zeros(len(tested), dtype=np.int64)
@@ -136,8 +143,12 @@ def tables_of(several: list[dict[str, Any]], metric: str, n_classes: int) -> Flo
         if dense.ndim != 3:
             raise ValueError(f"sums of shape {dense.shape} are not (rows, replicates, summands)")
         return dense
-    out = np.zeros((len(several), len(several[0]["names"]), n_classes * n_classes))
-    for place, one in enumerate(several):
-        for replicate, line in enumerate(one["sums"]):
-            out[place, replicate, line[::2]] = line[1::2]
-    return out
+    replicates, columns = len(several[0]["names"]), n_classes * n_classes
+    lines = [line for one in several for line in one["sums"]]
+    pairs = np.array([value for line in lines for value in line], dtype=np.float64).reshape(-1, 2)
+    column = pairs[:, 0].astype(np.int64)
+    if len(lines) != len(several) * replicates or ((column < 0) | (column >= columns)).any():
+        raise ValueError(f"sums are not of {replicates} replicates and {n_classes} classes")
+    out = np.zeros((len(lines), columns))
+    out[np.repeat(np.arange(len(lines)), [len(line) // 2 for line in lines]), column] = pairs[:, 1]
+    return out.reshape(len(several), replicates, columns)

@@ -13,12 +13,13 @@ from typing import Any
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.leaderboard.numbers import interval, score
+from tactbench.core.statistics.paired import difference
 
 Row = Mapping[str, Any]
 
 _NOTE = (
     "Differences are against the first column; intervals are those of each score alone, and two that overlap may still "
-    "differ."
+    "differ. Δ is the interval of the difference, where both were tested on the same replicates."
 )
 
 
@@ -138,17 +139,22 @@ def _numbers_first(name: str) -> tuple[bool, float]:
 
 def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> Comparison:
     lines: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
+    asked: dict[tuple[str, str, str], Row] = {}
     for row in members:
+        asked[sensor_name(row), answer_name(row), str(row.get(by))] = row
         cells = lines.setdefault((sensor_name(row), answer_name(row)), {})
         if by == "fold":
             cells |= {way: _record(row, by, way, value) for way, value in _scores_of_folds(row)}
         else:
             cells[str(row[by])] = _record(row, by, str(row[by]), row["score"])
-    for cells in lines.values():
+    for names, cells in lines.items():
         start = cells.get(ways[0], {}).get("score")
         for way, record in cells.items():
             if way != ways[0] and by != "fold" and start is not None and record["score"] is not None:
                 record["difference"] = record["score"] - start
+                found = difference(asked[(*names, way)], asked[(*names, ways[0])])
+                if found.paired:
+                    record["difference_low"], record["difference_high"] = found.low, found.high
     first = members[0]
     return Comparison(
         title=_title(first, by),
@@ -185,6 +191,8 @@ def _record(row: Row, by: str, way: str, value: float | None) -> dict[str, Any]:
         "ci_low": row["ci_low"] if whole else None,
         "ci_high": row["ci_high"] if whole else None,
         "difference": None,
+        "difference_low": None,
+        "difference_high": None,
     }
 
 
@@ -208,4 +216,8 @@ def _text(record: Mapping[str, Any] | None, unit: str) -> str:
     if record["difference"] is not None:
         sign = "+" if record["difference"] >= 0 else "−"
         value += f" ({sign}{score(abs(record['difference']), unit)})"
-    return value if record["ci_low"] is None else f"{value}\n{interval(record['ci_low'], record['ci_high'], unit)}"
+    if record["ci_low"] is not None:
+        value += f"\n{interval(record['ci_low'], record['ci_high'], unit)}"
+    if record["difference_low"] is not None:
+        value += f"\nΔ {interval(record['difference_low'], record['difference_high'], unit)}"
+    return value

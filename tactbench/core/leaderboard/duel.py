@@ -54,9 +54,9 @@ def duels(rows: Sequence[Row], first: str, second: str, task: str | None = None)
     Raises
     ------
     UnknownNameError
-        If these rows have no sensor and no estimator of such a name, or not both names are of one kind.
+        If these rows have no such task, no sensor and no estimator of such a name, or not both names are of one kind.
     """
-    rows = [row for row in rows if task is None or row["task"] == task]
+    rows = _in_task(rows, task)
     sensors = list(dict.fromkeys(str(row["sensor"]) for row in rows))
     estimators = list(dict.fromkeys(answer_name(row) for row in rows))
     if first in sensors and second in sensors:
@@ -65,7 +65,7 @@ def duels(rows: Sequence[Row], first: str, second: str, task: str | None = None)
     if first in estimators and second in estimators:
         return _compared("estimators", first, second, *_of(rows, answer_name, first, second))
     known = estimators if first in estimators else sensors if first in sensors else [*sensors, *estimators]
-    wrong = second if known is not None and first in (*sensors, *estimators) else first
+    wrong = second if first in (*sensors, *estimators) else first
     kind = "estimator" if known is estimators else "sensor" if known is sensors else "sensor or estimator"
     raise UnknownNameError(f"{kind} in these results", wrong, known)
 
@@ -73,12 +73,17 @@ def duels(rows: Sequence[Row], first: str, second: str, task: str | None = None)
 def folder_duels(
     first_rows: Iterable[Row], second_rows: Iterable[Row], first: str, second: str, task: str | None = None
 ) -> list[Duel]:
-    """Compare the same cells of two result folders."""
-    one, other = (
-        [row for row in rows if not row["is_baseline"] and (task is None or row["task"] == task)]
-        for rows in (first_rows, second_rows)
-    )
+    """Compare the same cells of two result folders; raises UnknownNameError for a task that one has not."""
+    one, other = ([row for row in _in_task(rows, task) if not row["is_baseline"]] for rows in (first_rows, second_rows))
     return _compared("folders", first, second, one, other)
+
+
+def _in_task(rows: Iterable[Row], task: str | None) -> list[Row]:
+    rows = list(rows)
+    tasks = list(dict.fromkeys(str(row["task"]) for row in rows))
+    if task is not None and task not in tasks:
+        raise UnknownNameError("task in these results", task, tasks)
+    return [row for row in rows if task is None or row["task"] == task]
 
 
 def with_declared(found: Sequence[Duel], rows: Sequence[Row], declared: Iterable[ComparisonChoice]) -> list[Duel]:

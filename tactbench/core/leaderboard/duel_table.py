@@ -147,8 +147,8 @@ def _averages(found: Sequence[Duel]) -> list[str]:
             continue
         told = f"{members[0].first} {_average(sides[0])}, {members[0].second} {_average(sides[1])}"
         notes.append(
-            f"Interquartile mean over {sides[0].tasks} tasks under {protocol} ({sides[0].entries} scores; 0 the trivial "
-            f"baseline, 1 the reference): {told}."
+            f"Interquartile mean over {sides[0].tasks} tasks under {protocol} ({sides[0].entries} scores; 0 is the "
+            f"trivial baseline, 1 the reference): {told}."
             + "".join(f" Left out: {one}." for one in dict.fromkeys(sides[0].left_out + sides[1].left_out))
         )
     return notes

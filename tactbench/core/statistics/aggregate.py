@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.evaluation.interval import LEVEL, widened_tail
+from tactbench.core.evaluation.interval import LEVEL
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray
@@ -91,7 +92,7 @@ def aggregate(rows: Sequence[Row]) -> Aggregate | None:
     value = float(interquartile_mean(np.concatenate(values)[None, :], weights)[0])
     resampled = interquartile_mean(np.concatenate(drawn, axis=1), weights)
     resampled = resampled[np.isfinite(resampled)]
-    tail = widened_tail(fewest - 1, fewest) if 2 <= fewest < 10**9 else (1 - LEVEL) / 2
+    tail = _widened_tail(fewest - 1, fewest) if 2 <= fewest < 10**9 else (1 - LEVEL) / 2
     low, high = np.quantile(resampled, [tail, 1 - tail])
     return Aggregate(value, float(low), float(high), len(cells), len(weights), tuple(left_out))
 
@@ -111,7 +112,7 @@ def _entries(row: Row) -> tuple[FloatArray, FloatArray, int]:
     metric, n_classes, kept = METRICS[row["metric"]], len(row["classes"]), row["replicates"]
     group = together([row])[0]
     sums = tables_of([kept], row["metric"], n_classes)[0]
-    run = int(kept.get("run", 1))
+    run = int(group.runs[0])
     sizes = np.unique(group.strata, return_counts=True)[1]
     with np.errstate(divide="ignore", invalid="ignore"):
         own = metric.score(sums, n_classes)
@@ -147,3 +148,14 @@ def interquartile_mean(values: FloatArray, weights: FloatArray) -> FloatArray:
     end = np.cumsum(share, axis=1)
     inside = np.clip(np.minimum(end, 1 - TRIM) - np.maximum(end - share, TRIM), 0.0, None)
     return np.asarray((sorted_values * inside).sum(axis=1) / inside.sum(axis=1))
+
+
+def _widened_tail(freedom: int, n: int) -> float:
+    """Return the normal tail beyond ``sqrt(n / (n - 1)) t(freedom)``, where n replicates are drawn from the fewest.
+
+    Percentiles of few resampled replicates cover less than they say: they are widened as Student's t would widen a
+    normal interval (Hesterberg 2015, What teachers should know about the bootstrap, section 5.3).
+    """
+    special = importlib.import_module("scipy.special")
+    quantile = special.stdtrit(freedom, 0.5 + LEVEL / 2)
+    return float(special.ndtr(-quantile * np.sqrt(n / (n - 1))))

@@ -7,12 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from tactbench.core.evaluation.jackknife import influences
 from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
 
 Row = Mapping[str, Any]
+_Carried = tuple[npt.NDArray[np.bool_], FloatArray, FloatArray, FloatArray]
+"""Which rows are sound, and their influences, degrees of freedom and runs."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,8 @@ class Together:
     of their products"""
     freedom: FloatArray
     """(n,) degrees of freedom of the standard error"""
+    runs: FloatArray
+    """(n,) how many neighbouring replicates depend on each other"""
 
 
 def together(rows: Sequence[Row]) -> list[Together]:
@@ -43,11 +49,9 @@ def together(rows: Sequence[Row]) -> list[Together]:
 
     Notes
     -----
-    The influence of a replicate is what leaving it out changes (the jackknife of Quenouille and Tukey, within strata as
-    in Shao and Tu 1995, section 6.2): for a mean over replicates this gives the usual standard error exactly, and no
-    derivative of a metric is needed. Where the replicates are blocks of time that depend on their neighbours,
-    influences are smoothed so that the sums of squares become those of Bartlett's window (Künsch 1989), to which a
-    circular block bootstrap converges.
+    The influence of a replicate is what leaving it out changes (:func:`influences`). Where the replicates are blocks of
+    time that depend on their neighbours, influences are smoothed so that the sums of squares become those of Bartlett's
+    window (Künsch 1989), to which a circular block bootstrap converges.
     """
     groups: dict[tuple[Any, ...], list[int]] = {}
     for place, row in enumerate(rows):
@@ -58,10 +62,10 @@ def together(rows: Sequence[Row]) -> list[Together]:
     for (names, strata, in_time, n_classes, metric), places in groups.items():
         one = _group([rows[place]["replicates"] for place in places], METRICS[metric], n_classes, strata, len(names))
         if one is not None:
-            good, influence, freedom = one
+            good, influence, freedom, runs = one
             codes = np.array(strata or [0] * len(names), dtype=np.int64)
             where = np.array(places, dtype=np.int64)[good]
-            found.append(Together(where, names, codes, in_time, influence[good], freedom[good]))
+            found.append(Together(where, names, codes, in_time, influence[good], freedom[good], runs[good]))
     return found
 
 
@@ -71,23 +75,23 @@ def _mark(row: Row) -> tuple[Any, ...] | None:
     if not kept or row["metric"] not in METRICS:
         return None
     try:
-        strata = None if kept["strata"] is None else tuple(kept["strata"])
-        names = tuple(kept["names"])
+        strata = None if kept["strata"] is None else tuple(int(one) for one in kept["strata"])
+        names = tuple(str(one) for one in kept["names"])
         return names, strata, str(kept["unit"]).startswith("block"), len(row["classes"]), row["metric"]
-    except (KeyError, TypeError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         return None
 
 
 def _group(
     kept: list[dict[str, Any]], metric: Metric, n_classes: int, strata: tuple[int, ...] | None, replicates: int
-) -> tuple[Any, FloatArray, FloatArray] | None:
+) -> _Carried | None:
     codes = np.zeros(replicates, dtype=np.int64) if strata is None else np.array(strata, dtype=np.int64)
     sizes = np.unique(codes, return_counts=True)[1] if len(codes) == replicates else np.zeros(1)
     if not replicates or sizes.min() < 2:
         return None
     try:
         sums = tables_of(kept, metric.name, n_classes)
-        runs = np.array([float(one.get("run", 1)) for one in kept])
+        runs = np.clip([float(one.get("run", 1)) for one in kept], 1.0, float(replicates))
         with np.errstate(divide="ignore", invalid="ignore"):
             without = metric.score(sums.sum(axis=1, keepdims=True) - sums, n_classes)
     except (ValueError, IndexError, TypeError, KeyError):
@@ -96,24 +100,23 @@ def _group(
         return _one_by_one(kept, metric, n_classes, strata, replicates)
     if sums.shape[1] != replicates:
         return None
-    influence = np.zeros_like(without)
+    influence = influences(without, codes)
     for one in np.unique(codes):
-        mine = without[:, codes == one]
-        n = mine.shape[1]
-        influence[:, codes == one] = _smoothed(np.sqrt((n - 1) / n) * (mine.mean(axis=1, keepdims=True) - mine), runs)
+        influence[:, codes == one] = _smoothed(influence[:, codes == one], runs)
     freedom = np.maximum(replicates / runs - len(sizes), 1.0)
-    return np.isfinite(influence).all(axis=1), influence, freedom
+    return np.isfinite(influence).all(axis=1) & np.isfinite(runs), influence, freedom, runs
 
 
 def _one_by_one(
     kept: list[dict[str, Any]], metric: Metric, n_classes: int, strata: tuple[int, ...] | None, replicates: int
-) -> tuple[Any, FloatArray, FloatArray]:
+) -> _Carried:
     """Keep one row of another shape from spoiling the rest."""
     each = [_group([one], metric, n_classes, strata, replicates) for one in kept]
     good = np.array([one is not None and bool(one[0][0]) for one in each])
     influence = np.vstack([np.zeros(replicates) if one is None else one[1][0] for one in each])
     freedom = np.array([1.0 if one is None else one[2][0] for one in each])
-    return good, influence, freedom
+    runs = np.array([1.0 if one is None else one[3][0] for one in each])
+    return good, influence, freedom, runs
 
 
 def _smoothed(influence: FloatArray, runs: FloatArray) -> FloatArray:
@@ -126,7 +129,7 @@ def _smoothed(influence: FloatArray, runs: FloatArray) -> FloatArray:
     n = influence.shape[1]
     out = influence.copy()
     frequency = np.arange(n // 2 + 1) / n
-    for run in np.unique(runs[runs > 1]):
+    for run in np.unique(runs[runs > 1]).tolist():
         response = np.abs(np.exp(-2j * np.pi * np.outer(frequency, np.arange(int(run)))).sum(axis=1)) / np.sqrt(run)
         mine = runs == run
         out[mine] = np.fft.irfft(np.fft.rfft(influence[mine], axis=1) * response, n, axis=1)

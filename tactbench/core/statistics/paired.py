@@ -81,7 +81,7 @@ def _paired(first: Row, second: Row, value: float, sign: float, group: Together,
     carried = group.influence[0] - group.influence[1]
     deviation = float(np.sqrt(carried @ carried))
     freedom = float(group.freedom.min())
-    run = max(int(row["replicates"].get("run", 1)) for row in (first, second))
+    run = int(group.runs.max())
     n = len(group.names) / run
     p, smallest = exchanged(first, second, run)
     unit = str(first["replicates"]["unit"])

@@ -1,5 +1,6 @@
 """The same question asked in several ways, side by side."""
 
+import numpy as np
 import pytest
 
 from tactbench.core.leaderboard.comparison import compare, few_shot_curves
@@ -17,6 +18,21 @@ def test_protocols_stand_side_by_side_with_their_difference():
         ("b SIM", "lasso", "0.7000\n0.6000 … 0.8000", "–"),
     )
     assert [record["difference"] for record in table.records] == [None, 0.125, None]
+
+
+def test_the_difference_of_two_ways_has_an_interval_where_both_met_the_same_sessions():
+    """Sessions differ by far more than protocols do: the scores' own intervals overlap, the difference is clear."""
+    kept = {"unit": "session", "names": list("abcde"), "strata": None, "run": 1}
+    rows = [
+        row(protocol=protocol, score=float(np.sqrt(np.mean(np.square(errors)))),
+            replicates=kept | {"sums": [[100 * error**2, 100] for error in errors]})
+        for protocol, errors in (("karl2016", (1.0, 2.0, 3.0, 4.0, 5.0)), ("deployable", (1.1, 2.1, 3.1, 4.1, 5.1)))
+    ]  # fmt: skip
+    (table,) = compare(rows, "protocol")
+    first, second = table.records
+    assert (first["difference_low"], first["difference_high"]) == (None, None)
+    assert 0.07 < second["difference_low"] < second["difference"] < second["difference_high"] < 0.13
+    assert "\nΔ 0.0" in table.lines[0][3]
 
 
 def test_what_must_not_be_mixed_never_shares_a_table():

@@ -45,9 +45,9 @@ def test_a_miss_says_by_how_much_and_which_way_is_better(metric, unit, published
 
 def test_a_miss_says_what_is_not_in_its_interval_by_the_interval_s_own_words():
     assert "spread between sessions is not in it" in verdict(force_row(ci_method=METHOD), 0.9, None)[1]
-    over_sessions = verdict(force_row(ci_method="bootstrap over 12 sessions"), 0.9, None)[1]
+    over_sessions = verdict(force_row(ci_method="jackknife over 12 sessions"), 0.9, None)[1]
     assert "spread" not in over_sessions
-    assert "bootstrap over 12 sessions" in over_sessions
+    assert "jackknife over 12 sessions" in over_sessions
 
 
 def test_a_calibration_says_whether_it_reaches_the_number_and_what_the_number_goes_with():

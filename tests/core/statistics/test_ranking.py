@@ -117,6 +117,11 @@ def test_a_row_without_replicates_enters_with_its_own_interval():
         {"names": None},
         {"strata": [0]},
         {"run": "x"},
+        {"run": 1e300},
+        {"run": float("nan")},
+        {"run": 0},
+        {"strata": ["x"] * 8},
+        {"names": [[]] * 8},
     ],
 )
 def test_replicates_that_make_no_sense_spoil_no_other_row(broken):

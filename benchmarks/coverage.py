@@ -1,0 +1,272 @@
+"""Do intervals cover what they say, and do tests find what is not there? Synthetic sensors whose truth is known.
+
+::
+
+    python benchmarks/coverage.py [--trials 1000] [--seed 1] [--only scores|time|differences|ranks|errors]
+
+A synthetic sensor's error has a part that stays for a session (another in the next one; "session sd" is its deviation,
+that of the rest is 1) and a part that moves slowly within it, first order with memory 0.9. The truth is the score over
+infinitely many sessions: exact for numbers, from a million rows for classes. Every interval is nominally 95 %, every
+test nominally 5 %; a binomial deviation of 1,000 trials is 0.7 %.
+
+The intervals and tests are tactbench's own, called as a run and `tactbench compare` call them; what they are held
+against (percentiles of resampled sessions, ranks resampled, rows taken as independent, folds taken as independent) is a
+few lines here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+import numpy as np
+from scipy import stats
+from scipy.signal import lfilter
+
+from tactbench.core.evaluation.interval import score_interval
+from tactbench.core.evaluation.metrics import METRICS
+from tactbench.core.evaluation.replicate_sums import summed_in_time
+from tactbench.core.samples import Answers
+from tactbench.core.statistics.overlap import corrected_t
+from tactbench.core.statistics.paired import difference
+from tactbench.core.statistics.ranking import ranks
+
+ROWS = 60
+MEMORY = 0.9
+CLASSES = 3
+SESSIONS = (5, 8, 15, 30)
+
+
+def slow(rng: np.random.Generator, *shape: int, memory: float = MEMORY) -> np.ndarray:
+    """Return (…, n) of variance 1 whose neighbours are alike."""
+    noise = rng.normal(size=shape) * np.sqrt(1 - memory**2)
+    noise[..., 0] /= np.sqrt(1 - memory**2)
+    return lfilter([1.0], [1.0, -memory], noise, axis=-1)
+
+
+def numbers(rng: np.random.Generator, sessions: int, spread: float, scale: float = 1.0, shared=None, n: int = ROWS):
+    """Return truth and answers, (sessions, n): an offset a session, and a slow error."""
+    own = rng.normal(size=(sessions, 1))
+    offset = own if shared is None else np.sqrt(0.5) * (own + shared)
+    return np.zeros((sessions, n)), scale * (spread * offset + slow(rng, sessions, n))
+
+
+def classes(rng: np.random.Generator, sessions: int, spread: float, ease: float = 1.0, shared=None, n: int = ROWS):
+    """Return truth and answers, (sessions, n): right while a slow latent quantity is above 0."""
+    own = rng.normal(size=(sessions, 1))
+    offset = own if shared is None else np.sqrt(0.5) * (own + shared)
+    y = np.tile(np.repeat(np.arange(CLASSES), n // CLASSES), (sessions, 1))
+    right = ease + spread * offset + slow(rng, sessions, n) > 0
+    return y, np.where(right, y, (y + rng.integers(1, CLASSES, size=y.shape)) % CLASSES)
+
+
+def sums_of(metric: str, y: np.ndarray, answered: np.ndarray) -> np.ndarray:
+    """Return (sessions, m) the metric's summands over each session."""
+    k = CLASSES if METRICS[metric].kind == "classification" else 0
+    rows = METRICS[metric].rows(y.ravel(), answered.ravel(), k)
+    return rows.reshape(*y.shape, -1).sum(axis=1)
+
+
+def truth_of(metric: str, draw: Callable, spread: float, level: float) -> float:
+    """Return the score over infinitely many sessions."""
+    if metric == "rmse":
+        return level * np.sqrt(1 + spread**2)
+    if metric == "mae":
+        return level * np.sqrt((1 + spread**2) * 2 / np.pi)
+    y, answered = draw(np.random.default_rng(99), 20_000, spread, level)
+    return METRICS[metric].of(y.ravel(), answered.ravel(), CLASSES)
+
+
+def percentile(metric: str, sums: np.ndarray, rng: np.random.Generator) -> tuple[float, float]:
+    """Return the interval of resampled sessions, widened as Student's t."""
+    n = len(sums)
+    tail = stats.norm.cdf(-stats.t.ppf(0.975, n - 1) * np.sqrt(n / (n - 1)))
+    k = CLASSES if METRICS[metric].kind == "classification" else 0
+    drawn = METRICS[metric].score(rng.multinomial(n, np.full(n, 1 / n), size=1000) @ sums, k)
+    return tuple(np.quantile(drawn, [tail, 1 - tail]))
+
+
+def row_of(cell: str, metric: str, sums: np.ndarray, **more) -> dict:
+    """Return a row as an evaluation leaves it, as far as statistics look at it."""
+    k = CLASSES if METRICS[metric].kind == "classification" else 0
+    lines = sums.tolist()
+    if k:
+        lines = [[int(v) for c in np.flatnonzero(line) for v in (c, line[c])] for line in sums]
+    kept = {"unit": "session", "names": [str(place) for place in range(len(sums))], "strata": None, "run": 1}
+    return {
+        "cell": cell, "status": "done", "is_baseline": False, "metric": metric, "classes": list(range(k)),
+        "score": float(METRICS[metric].score(sums.sum(axis=0), k)), "ci_low": None, "ci_high": None,
+        "replicates": kept | {"sums": lines},
+    } | more  # fmt: skip
+
+
+def table(title: str, columns: list[str], lines: list[list[str]]) -> None:
+    """Print lines under their columns."""
+    widths = [max(len(line[place]) for line in [columns, *lines]) for place in range(len(columns))]
+    print(f"\n{title}")
+    for line in [columns, *lines]:
+        print("  " + "  ".join(text.rjust(width) for text, width in zip(line, widths, strict=True)))
+
+
+def scores(trials: int, seed: int) -> None:
+    """Cover the truth by the interval of one score over sessions."""
+    lines = []
+    for metric, draw, level in (
+        ("rmse", numbers, 1.0), ("mae", numbers, 1.0), ("accuracy", classes, 1.0), ("macro_f1", classes, 1.0),
+        ("macro_f1", classes, 2.0),
+    ):  # fmt: skip
+        for spread in (0.3, 0.5, 1.0):
+            truth = truth_of(metric, draw, spread, level)
+            cells = [metric, f"{truth:.3f}", f"{spread:g}"]
+            for sessions in SESSIONS:
+                rng = np.random.default_rng([seed, sessions, int(10 * spread), int(level)])
+                hits, wider = np.zeros(2), []
+                for _ in range(trials):
+                    y, answered = draw(rng, sessions, spread, level)
+                    code = np.repeat(np.arange(sessions), ROWS)
+                    k = CLASSES if draw is classes else 0
+                    found = score_interval(METRICS[metric], y.ravel(), answered.ravel(), code, code, "session", k, 0)
+                    low, high = percentile(metric, sums_of(metric, y, answered), rng)
+                    hits += found.low <= truth <= found.high, low <= truth <= high
+                    wider.append((found.high - found.low) / max(high - low, 1e-9))
+                shares = " / ".join(f"{100 * hit / trials:.1f}" for hit in hits)
+                cells.append(f"{shares} x{np.median(wider):.1f}")
+            lines.append(cells)
+    columns = ["metric", "truth", "session sd", *(f"{n} sessions" for n in SESSIONS)]
+    title = (
+        "Coverage [%] of a score's interval: ours / widened percentiles of resampled sessions, x how much wider ours is"
+    )
+    table(title, columns, lines)
+
+
+def in_time(trials: int, seed: int) -> None:
+    """Cover the truth of the one session that there is, by blocks of time; and the difference of two sensors in it."""
+    lines = []
+    for metric, draw in (("rmse", numbers), ("macro_f1", classes)):
+        k = CLASSES if draw is classes else 0
+        for n in (1500, 6000):
+            truth = truth_of(metric, draw, 0.0, 1.0)
+            rng = np.random.default_rng([seed, n])
+            hits = np.zeros(4)
+            zeros = np.zeros(n, dtype=np.int64)
+            for trial in range(trials):
+                rows = []
+                for name in "ab":
+                    y, answered = (one.ravel() for one in draw(rng, 1, 0.0, 1.0, n=n))
+                    asked = Answers(y, answered, zeros, np.arange(n), zeros, np.arange(n) * 1.0, zeros * np.nan)
+                    score = METRICS[metric].of(y, answered, k)
+                    kept = summed_in_time(METRICS[metric], asked, ["press"], k)
+                    rows.append(row_of(name, metric, np.ones((2, max(2, k * k))), score=score, replicates=kept))
+                found = score_interval(METRICS[metric], y, answered, zeros, zeros, "session", k, trial)
+                loss = (y != answered) * 1.0 if k else (answered - y) ** 2
+                half = 1.96 * loss.std() / np.sqrt(n) / (1 if k else 2 * np.sqrt(loss.mean()))
+                apart = difference(*rows)
+                hits += (
+                    found.low <= truth <= found.high, abs(score - truth) <= half, apart.low <= 0 <= apart.high,
+                    apart.p <= 0.05,
+                )  # fmt: skip
+            lines.append([metric, str(n), *(f"{100 * hit / trials:.1f}" for hit in hits)])
+    columns = ["metric", "rows", "ours", "rows independent", "difference", "wrong: p"]
+    table("One recording: coverage [%] of that session's truth, and of a difference of two", columns, lines)
+
+
+def differences(trials: int, seed: int) -> None:
+    """Cover the true difference of two sensors on the same sessions, and find none where there is none."""
+    lines = []
+    for metric, draw, levels in (
+        ("rmse", numbers, (1.0, 1.2)), ("rmse", numbers, (1.0, 1.0)),
+        ("macro_f1", classes, (1.0, 1.5)), ("macro_f1", classes, (2.0, 2.0)),
+    ):  # fmt: skip
+        for spread in (0.5, 1.0):
+            truth = truth_of(metric, draw, spread, levels[0]) - truth_of(metric, draw, spread, levels[1])
+            for sessions in SESSIONS:
+                rng = np.random.default_rng([seed, sessions, int(10 * spread)])
+                cover, by_t, by_p, naive = 0, 0, 0, 0
+                for _ in range(trials):
+                    shared = rng.normal(size=(sessions, 1))
+                    pair = [draw(rng, sessions, spread, level, shared) for level in levels]
+                    rows = [row_of(name, metric, sums_of(metric, *one)) for name, one in zip("ab", pair, strict=True)]
+                    found = difference(*rows)
+                    cover += found.low <= truth <= found.high
+                    by_t += not found.low <= 0 <= found.high
+                    by_p += found.p <= 0.05
+                    losses = [(one[0] != one[1]) * 1.0 if draw is classes else (one[1] - one[0]) ** 2 for one in pair]
+                    naive += stats.ttest_rel(losses[0].ravel(), losses[1].ravel()).pvalue <= 0.05
+                same = levels[0] == levels[1]
+                shares = [f"{100 * n / trials:.1f}" for n in (cover, by_t, by_p, naive)]
+                lines.append([metric, f"{truth:+.3f}", f"{spread:g}", str(sessions), shares[0],
+                              *(shares[1:] if same else ("", "", ""))])  # fmt: skip
+    columns = ["metric", "truth", "session sd", "sessions", "coverage", "wrong: interval", "wrong: p", "wrong: rows"]
+    table("Paired differences: coverage [%]; where there is none, how often one is found [%]", columns, lines)
+
+
+def ranking(trials: int, seed: int) -> None:
+    """Cover the true rank of ten sensors on the same sessions."""
+    lines = []
+    k = 10
+    for step in (0.01, 0.05, 0.2):
+        for sessions in SESSIONS:
+            rng = np.random.default_rng([seed, sessions, int(100 * step)])
+            ours = resampled = first = 0.0
+            for _ in range(max(trials // 5, 1)):  # ten ranks each
+                shared = rng.normal(size=(sessions, 1))
+                sums = [sums_of("rmse", *numbers(rng, sessions, 0.5, 1 + step * place, shared)) for place in range(k)]
+                found = ranks([row_of(str(place), "rmse", one) for place, one in enumerate(sums)])
+                each = [found[str(place)] for place in range(k)]
+                ours += np.mean([one.low <= 1 + place <= one.high for place, one in enumerate(each)])
+                first += each[0].place == 1
+                times = rng.multinomial(sessions, np.full(sessions, 1 / sessions), size=1000)
+                drawn = np.argsort(np.argsort([METRICS["rmse"].score(times @ one, 0) for one in sums], axis=0), axis=0)
+                low, high = np.quantile(1 + drawn, [0.025, 0.975], axis=1, method="inverted_cdf")
+                resampled += np.mean((low <= 1 + np.arange(k)) & (1 + np.arange(k) <= high))
+            share = [f"{100 * n / max(trials // 5, 1):.1f}" for n in (ours, resampled, first)]
+            lines.append([f"{100 * step:g} %", str(sessions), *share])
+    columns = ["step", "sessions", "ours", "ranks resampled", "best has place 1"]
+    table(f"Coverage [%] of the ranks of {k} sensors, each worse by a step; a fifth of the trials", columns, lines)
+
+
+def errors(trials: int, seed: int) -> None:
+    """Find no difference between two estimators of equal worth, over folds whose training data overlap."""
+    lines = []
+    n = 100
+    for repeats, folds in ((1, 5), (1, 10), (10, 10)):
+        rng = np.random.default_rng([seed, folds, repeats])
+        corrected = naive = 0
+        for _ in range(trials):
+            # Two weak learners that see one of two equally good features each: these data make one of them look better.
+            X = rng.normal(size=(n, 2))
+            y = X.sum(axis=1) + rng.normal(size=n)
+            d = []
+            for _ in range(repeats):
+                place = rng.permutation(n) % folds
+                for fold in range(folds):
+                    train, test = place != fold, place == fold
+                    slope = [(X[train, j] @ y[train]) / (X[train, j] @ X[train, j]) for j in (0, 1)]
+                    d.append(np.subtract(*(np.mean((y[test] - slope[j] * X[test, j]) ** 2) for j in (0, 1))))
+            corrected += corrected_t(d, 1 / (folds - 1), repeats).p <= 0.05
+            naive += stats.ttest_1samp(d, 0).pvalue <= 0.05
+        share = [f"{100 * found / trials:.1f}" for found in (corrected, naive)]
+        lines.append([f"{repeats} x {folds}", *share])
+    table("Differences found [%] where there is none, over folds", ["folds", "corrected", "naive t"], lines)
+
+
+PARTS = {"scores": scores, "time": in_time, "differences": differences, "ranks": ranking, "errors": errors}
+
+
+def main() -> None:
+    """Print a table a part."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--trials", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", choices=PARTS)
+    given = parser.parse_args()
+    for name, part in PARTS.items():
+        if given.only in (None, name):
+            began = time.perf_counter()
+            part(given.trials, given.seed)
+            print(f"  ({given.trials} trials, {time.perf_counter() - began:.0f} s)")
+
+
+if __name__ == "__main__":
+    main()

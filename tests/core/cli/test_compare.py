@@ -1,0 +1,59 @@
+"""``tactbench compare`` as a person uses it, on a real run."""
+
+import csv
+import io
+import json
+
+import pytest
+
+ASKED = ("run", "--sensor", "biotac", "--sensor", "icub", "--task", "force", "--protocol", "deployable",
+         "--estimator", "ols", "--estimator", "lasso")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def shell(tmp_path_factory):
+    from tests.conftest import Shell
+
+    shell = Shell(tmp_path_factory.mktemp("compared"))
+    shell(*ASKED, "--out", "here")
+    return shell
+
+
+def test_two_sensors_in_every_format(shell):
+    asked = ("compare", "biotac", "icub", "--out", "here")
+    shown = shell(*asked)
+    assert "A = biotac, B = icub · force · RMSE [N] · deployable" in shown.stdout
+    assert "paired over 40 blocks" in shown.stderr
+    records = json.loads(shell(*asked, "--format", "json").stdout)
+    assert {record["of"] for record in records} == {"ols", "lasso"}
+    assert all(record["low"] < record["difference"] < record["high"] for record in records)
+    lines = list(csv.DictReader(io.StringIO(shell(*asked, "--format", "csv").stdout)))
+    assert [float(line["difference"]) for line in lines] == [record["difference"] for record in records]
+    first = f"{abs(records[0]['difference']):.4f}"
+    for shape in ("table", "md", "latex"):
+        assert first in shell(*asked, "--format", shape).stdout
+    assert r"\toprule" in shell(*asked, "--format", "latex").stdout
+
+
+def test_a_declared_comparison_is_corrected_and_another_is_exploratory(shell):
+    """The default matrix declares biotac against icub in force, not ols against lasso."""
+    declared, other = (
+        json.loads(shell("compare", *pair, "--out", "here", "--format", "json").stdout)
+        for pair in (("biotac", "icub"), ("ols", "lasso"))
+    )
+    assert all(record["declared"] and record["p_holm"] >= record["p"] for record in declared)
+    assert not any(record["declared"] or record["p_holm"] for record in other)
+
+
+def test_a_folder_against_itself_differs_nowhere(shell):
+    records = json.loads(shell("compare", "here", "here", "--format", "json").stdout)
+    assert len(records) == 4
+    assert {(record["difference"], record["p"], record["paired"]) for record in records} == {(0.0, 1.0, True)}
+
+
+def test_what_is_not_there_is_named(shell):
+    assert "biotac" in shell("compare", "biotack", "icub", "--out", "here", code=2).stderr
+    assert "cannot be read" in shell("compare", "biotac", "icub", "--out", "nowhere", code=2).stderr
+    told = shell("compare", "biotac", "icub", "--out", "here", "--task", "forse", code=2).stderr
+    assert "forse" in told
+    assert "force" in told
