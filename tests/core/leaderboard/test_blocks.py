@@ -23,6 +23,12 @@ def test_a_table_does_not_depend_on_the_order_of_its_rows(rows, rng):
         assert form(rows) == form(other)
 
 
+def test_equal_scores_stand_in_the_order_of_their_cells_however_they_come():
+    rows = [row(name, cell=f"cell of {name}") for name in "cab"]
+    for some in (rows, rows[::-1]):
+        assert [line.cells[1] for line in build_table(some).blocks[0].lines] == ["a SIM", "b SIM", "c SIM"]
+
+
 @settings(max_examples=50)
 @given(some_rows(most=8))
 def test_every_row_is_one_line_and_no_block_mixes_what_is_not_comparable(rows):

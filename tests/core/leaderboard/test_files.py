@@ -35,6 +35,7 @@ def test_so_does_other_provenance_and_a_file_that_was_changed_or_is_gone(rows, t
     paths = write_tables(rows, tmp_path)
     first = stamps(paths)
     write_tables(rows, tmp_path, [{"host": "h", "cpu": "c"}])
+    assert "Host h: c" in (tmp_path / "leaderboard.md").read_text()
     write_tables(rows, tmp_path)
     paths[0].write_text("mine")
     paths[1].unlink()

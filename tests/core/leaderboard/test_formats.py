@@ -190,7 +190,12 @@ def test_numbers_that_are_none_are_null_in_json_and_told_in_the_table():
 
 def test_without_times_nothing_is_left_that_a_machine_decides():
     here = row(host="here", concurrency=4, fit_s=1.0, made_by="x", wall_s=2.0, peak_rss_mb=1.0, threads=2, key="k")
-    there = here | dict.fromkeys(OF_THE_MACHINE) | {"host": "there", "concurrency": 1, "search": [1]}
+    there = here | {
+        "host": "there", "concurrency": 1, "fit_s": 2.0, "made_by": "y", "wall_s": 3.0, "peak_rss_mb": 2.0, "threads": 1,
+        "key": "l", "search": [{"fit_s": 1.0}], "recordings": ["elsewhere"], "sim_s": 1.0, "search_s": 1.0,
+        "predict_s": 2.0, "batch_rows": 2, "latency_ms_p50": 1.0, "latency_ms_p95": 2.0, "latency_n": 3,
+    }  # fmt: skip
+    assert {key for key in JSON_KEYS if here.get(key) != there.get(key)} == OF_THE_MACHINE
     machine = [{"host": "here", "cpu": "fast", "cores": 1}], [{"host": "there", "cpu": "slow", "cores": 2}]
     for form in (to_json, to_csv, to_markdown, to_latex, to_parquet):
         texts = [form([one], known, times=False) for one, known in zip((here, there), machine, strict=True)]
