@@ -24,7 +24,6 @@ TITLES = {
     "chosen": "Chosen on validation data",
     "search": "Every candidate that was compared",
     "scores": "Other scores: by class, by fold, by other metrics",
-    "fold_sizes": "Sizes of the folds",
     "counts": "What was counted",
     "assumptions": "Assumed by the simulation",
     "plan": "Effects of the first recording: included and left out, with reasons",

@@ -22,7 +22,7 @@ from tactbench.core.leaderboard.board.words import cut, tame, write_words
 from tactbench.core.leaderboard.collector import collector_at_rest
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.particulars import GROUPS, TITLES
-from tactbench.core.leaderboard.table import ABSENT, LOWER_IS_BETTER, NUMERIC, Section, Table
+from tactbench.core.leaderboard.table import ABSENT, LOWER_IS_BETTER, NUMERIC, Block, Section, Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.values import VALUES
 
@@ -40,6 +40,8 @@ MOST_LINES = 500
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
 DURATIONS = ("latency p50", "p95", "fit", "sim", "batch/row")
 """Columns that a score can be drawn against."""
+SIMULATED = "SIM (twin)"
+"""What a block's title says of simulated cells."""
 _NOTHING = frozenset({"", ABSENT})
 _HOME = "tactbench.core.leaderboard.board"
 
@@ -129,7 +131,7 @@ def _head(
         "kinds": write_words(pack, kinds) or NOTHING,
         "blocks": [
             {"title": block.title, "size": len(block.lines), "lower": first["metric"] in LOWER_IS_BETTER}
-            | {key: first[key] for key in ("task", "metric", "unit", "simulated", "rig")}
+            | {"metric": first["metric"], "unit": first["unit"], "simulated": _is_simulated(block)}
             for block, first in zip(table.blocks, firsts, strict=True)
         ],
         "columns": [
@@ -144,6 +146,11 @@ def _head(
         "notes": notes,
         "provenance": [[_id(entry), tame(entry)] for entry in table.provenance],
     }
+
+
+def _is_simulated(block: Block) -> bool:
+    """Tell whether a block stands among simulated ones; a cell that was not begun does not know it of itself."""
+    return SIMULATED in block.title.split(" · ")[2:] or any(line.row["simulated"] for line in block.lines)
 
 
 def _id(entry: Mapping[str, Any]) -> str:

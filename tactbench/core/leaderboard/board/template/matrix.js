@@ -52,8 +52,8 @@ const drawMatrix = () => {
   };
   const titles = columns.map((place) => head.blocks[place].title.split(" · "));
   const alike = titles.length > 1 ? titles[0].slice(1).filter((part) => titles.every((one) => one.includes(part))) : [];
-  byId("matrix-note").textContent = visible("One line a sensor and estimator, one column a block of the tables; the best " +
-    "of a column in bold. Scores are compared down a column only." + (alike.length ? ` All columns: ${alike.join(" · ")}.` : ""));
+  byId("matrix-note").textContent = visible("One line a sensor and estimator, one column a block of the tables; the first " +
+    "of a column, ties too, in bold. Scores are compared down a column only." + (alike.length ? ` All columns: ${alike.join(" · ")}.` : ""));
   table.tHead.replaceChildren(make("tr", {},
     heading("sensor", false, "sensor", sort, again), heading("estimator", false, "estimator", sort, again),
     ...columns.map((place, at) => {
