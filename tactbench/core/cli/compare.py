@@ -43,19 +43,9 @@ def command(first: str, second: str, folder: Path, task: str | None, config: str
 
 def kept_rows(folder: Path) -> list[dict[str, Any]]:
     """Return the rows of a result folder; raises UsageError."""
-    import json
+    from tactbench.core.cli.results import opened, shown_rows
 
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.formats import JSON_KEYS
-
-    path = folder / "leaderboard.json"
-    try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UsageError(f"{path} cannot be read: {error}.", hint="Make one with `tactbench run --out DIR`.") from error
-    if not isinstance(rows, list) or not all(isinstance(row, dict) and set(JSON_KEYS) <= set(row) for row in rows):
-        raise UsageError(f"{path} is not a leaderboard of this version.", hint="Run `tactbench run` again.")
-    return rows
+    return shown_rows(opened(folder))
 
 
 def _print(found: Any, shape: str) -> None:

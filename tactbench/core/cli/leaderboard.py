@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
 from tactbench.core.cli.comparisons import print_comparisons
+from tactbench.core.cli.results import opened, provenance_of, shown_rows
 from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
 from tactbench.core.leaderboard.axes import AXES
-
-if TYPE_CHECKING:
-    from tactbench.core.matrix.store import Store
-
-_MOST_TOLD = 5
-"""Rows that cannot be shown and are told one by one."""
 
 
 @click.command(name="leaderboard")
@@ -34,12 +28,10 @@ def command(folder: Path, shape: str | None, to: Path | None, by: str | None, ti
 
     shape = shape or _meant(to)
     check_destination(shape, to, times=times)
-    store = _opened(folder)
-    rows = _rows(store)
+    store = opened(folder)
+    rows = shown_rows(store)
     if by is None:
-        made_by = sorted({row["made_by"] for row in rows if row["made_by"]})
-        provenance = [known for known in map(store.provenance, made_by) if known]
-        print_rows(rows, shape, provenance, times=times, to=to, folder=folder)
+        print_rows(rows, shape, provenance_of(store, rows), times=times, to=to, folder=folder)
     elif to is not None or not times:
         raise UsageError("A comparison is printed, and has no times.", hint="Leave out --to and --no-times.")
     else:
@@ -52,35 +44,3 @@ def _meant(to: Path | None) -> str:
     from tactbench.core.leaderboard.formats import SUFFIXES
 
     return SUFFIXES.get(to.suffix.lower(), "table")
-
-
-def _opened(folder: Path) -> Store:
-    from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.store import Store
-
-    if not (folder / "cells").is_dir():
-        raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
-    return Store(folder)
-
-
-def _rows(store: Store) -> list[dict[str, Any]]:
-    """Return the rows of a folder that a table can be made of; tell of the others."""
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.checked import checked
-    from tactbench.core.leaderboard.text import cut, visible
-    from tactbench.core.matrix.leaving import fill_baselines
-
-    rows, wrong = checked(store.rows())
-    told = [cut(visible(one), 300) for one in (*getattr(store, "troubles", ()), *wrong)]
-    if not rows:
-        raise UsageError(
-            f"{store.folder} has no row that can be shown" + (f": {told[0]}." if told else "."),
-            hint="Run `tactbench run` again.",
-        )
-    for one in told[:_MOST_TOLD]:
-        remark(f"Left out: {one}")
-    if len(told) > _MOST_TOLD:
-        remark(f"Left out: {len(told) - _MOST_TOLD} more rows.")
-    fill_baselines(rows)
-    return rows

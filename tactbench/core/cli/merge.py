@@ -41,9 +41,10 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
 
 def _tables(folder: Path, rows: Sequence[Row]) -> None:
     """Write what `tactbench leaderboard` shows."""
-    from tactbench.core.leaderboard.formats import FORMATS
+    from tactbench.core.cli.results import provenance_of
+    from tactbench.core.leaderboard.files import write_tables
     from tactbench.core.matrix.leaving import fill_baselines
+    from tactbench.core.matrix.store import Store
 
     fill_baselines(list(rows))
-    for ending in ("md", "csv", "json"):
-        (folder / f"leaderboard.{ending}").write_text(FORMATS[ending](rows), encoding="utf-8")
+    write_tables(rows, folder, provenance_of(Store(folder), rows))

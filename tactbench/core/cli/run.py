@@ -10,7 +10,7 @@ import click
 
 from tactbench.core.cli.engines import choice_of, engine_options
 from tactbench.core.cli.selection import matrix_asked, selecting_options
-from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
+from tactbench.core.cli.tables import TABLE_FORMATS, check_destination, print_rows
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
@@ -42,8 +42,11 @@ def command(
 
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.
     """
+    check_destination(shape)
     one_thread()
     from tactbench.core.cli.progress import progress
+    from tactbench.core.cli.results import provenance_of
+    from tactbench.core.leaderboard.files import write_tables
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
@@ -53,9 +56,11 @@ def command(
     store = Store(out)
     with progress() as told:
         outcome = run_matrix(matrix, store, choice=choice, recordings=folder, progress=told)
-    print_rows(outcome.rows, shape)
+    provenance = provenance_of(store, outcome.rows)
+    print_rows(outcome.rows, shape, provenance, folder=store.folder)
     if shape == "table":
         _side_by_side(outcome)
+    write_tables(outcome.rows, store.folder, provenance)
     _farewell(outcome, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
 
@@ -71,20 +76,14 @@ def _side_by_side(outcome: Outcome) -> None:
 
 
 def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:
-    """Write the table's files; say where they are and what to try next."""
+    """Say what there is now, where it lies and what to try next."""
     from tactbench.core.cli.screen import remark
     from tactbench.core.cli.stopped import tell_stopped
-    from tactbench.core.leaderboard.formats import FORMATS as TEXTS
-    from tactbench.core.matrix.files import replace_file
-    from tactbench.core.matrix.store.disk import writing
 
-    with writing(folder):
-        for ending in ("md", "csv", "json"):
-            replace_file(folder / f"leaderboard.{ending}", TEXTS[ending](outcome.rows).encode())
     cells = len(outcome.rows)
     remark(f"\n{cells - outcome.computed} of {cells} cells were found finished, {outcome.computed} computed now; "
            f"{outcome.recorded} recordings made now.")  # fmt: skip
-    remark(f"Files: {folder}/leaderboard.md, .csv, .json; scores.json; recordings/; cells/; run.json")
+    remark(f"Files: {folder}/leaderboard.html, .md, .csv, .json; scores.json; recordings/; cells/; run.json")
     tell_stopped(outcome.failures, folder)
     if shape == "table":
         _suggest(outcome.rows[0])

@@ -13,7 +13,6 @@ from typing import Any
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.statistics.paired import difference
 
 Row = Mapping[str, Any]
 
@@ -138,6 +137,8 @@ def _numbers_first(name: str) -> tuple[bool, float]:
 
 
 def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> Comparison:
+    from tactbench.core.statistics.paired import difference  # numerics, for who compares
+
     lines: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
     asked: dict[tuple[str, str, str], Row] = {}
     for row in members:

@@ -42,7 +42,7 @@ def answer(
     from tactbench.core.evaluation.cell import evaluate
 
     task = registry.tasks[cell.task].spec
-    row = opening(cell, task)
+    row = opening(cell, task, simulated=registry.rigs[cell.rig].simulated)
     try:
         material = dataset(task.name, tuple(recordings))
         result = evaluate(
@@ -74,7 +74,7 @@ def answer(
     return row, dict(result.sets)
 
 
-def opening(cell: Cell, task: TaskSpec) -> Row:
+def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with what is known before anything is computed; every key of the format is there."""
     return {
         "cell": cell.name,
@@ -123,7 +123,7 @@ def opening(cell: Cell, task: TaskSpec) -> Row:
         "concurrency": None,
         "host": "",
         "made_by": "",
-        "simulated": False,
+        "simulated": simulated,
         "dagger": False,
         "stamps": [],
         "remarks": [],

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tactbench.core.evaluation.libraries import import_libraries
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.engines.in_process import InProcess
 from tactbench.core.matrix.plan import Cell
@@ -43,7 +43,7 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
 
     What others bring is built in a process of its own first: only what that process survives is done here as well.
     """
-    importlib.import_module("threadpoolctl")  # every cell holds its threads with it
+    import_libraries()
     several = {(cell.task, cell.estimator): cell for cell in cells if (cell.task, cell.estimator) not in _prepared}
     _prepared.update(several)
     foreign = [cell for cell in several.values() if not our_own(cell.estimator)]

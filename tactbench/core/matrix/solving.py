@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import random
 import time
 from collections import OrderedDict
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tactbench.core.errors import NotApplicable
+from tactbench.core.evaluation.libraries import import_libraries
 from tactbench.core.matrix.answer import Answer, answer, opening, stopped
 from tactbench.core.matrix.engines.company import company
 from tactbench.core.matrix.engines.log import printed
@@ -108,8 +108,7 @@ def _shares(job: Job) -> list[Share]:
     """Return what other cells need as well, so that a process may load it for its children."""
     cell, recordings, _ = job
     return [
-        # Every cell holds its threads with it.
-        Share("threadpoolctl", lambda: importlib.import_module("threadpoolctl"), trusted=True),
+        Share("libraries", import_libraries, trusted=True),
         Share(("estimator", cell.task, cell.estimator), lambda: prepare(cell), trusted=our_own(cell.estimator)),
         Share(("recordings", cell.task, recordings), lambda: DATASETS(cell.task, recordings)),
     ]
@@ -120,7 +119,8 @@ setattr(solve, "shares", _shares)  # noqa: B010  (type checkers know no attribut
 
 def unanswered(cell: Cell, trouble: BaseException) -> dict[str, object]:
     """Return the row of a cell that could not be carried out, or not to its end."""
-    row = opening(cell, installed().tasks[cell.task].spec)
+    registry = installed()
+    row = opening(cell, registry.tasks[cell.task].spec, simulated=registry.rigs[cell.rig].simulated)
     if isinstance(trouble, NotApplicable):
         return {**row, "status": "skipped", "reason": str(trouble)}
     return stopped(row, trouble)

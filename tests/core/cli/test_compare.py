@@ -53,7 +53,7 @@ def test_a_folder_against_itself_differs_nowhere(shell):
 
 def test_what_is_not_there_is_named(shell):
     assert "biotac" in shell("compare", "biotack", "icub", "--out", "here", code=2).stderr
-    assert "cannot be read" in shell("compare", "biotac", "icub", "--out", "nowhere", code=2).stderr
+    assert "no results in nowhere" in shell("compare", "biotac", "icub", "--out", "nowhere", code=2).stderr
     told = shell("compare", "biotac", "icub", "--out", "here", "--task", "forse", code=2).stderr
     assert "forse" in told
     assert "force" in told

@@ -95,7 +95,7 @@ def test_every_evil_cell_has_one_row_and_the_others_are_right(engine, alone, tmp
     rows, done = run(shell, *asked, *LIMITS, *ENGINES[engine])
     assert set(rows) == {*HONEST, *ENDS}
     for name, (status, _, says) in ENDS.items():
-        assert rows[name]["status"] == status, rows[name]
+        assert rows[name]["status"] == status, (rows[name]["reason"], done.stderr[-3000:])
         assert says in rows[name]["reason"]
     kept = whole_rows(tmp_path / "out")
     assert set(kept) == set(rows), "what was written over is computed again"

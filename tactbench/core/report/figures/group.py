@@ -58,6 +58,8 @@ def groups(material: Material, remark: Remark) -> list[Group]:
     repeats the first. Whatever is not shown is told to `remark`.
     """
     alike: dict[tuple[Any, ...], list[Row]] = {}
+    for told in material.store.troubles:
+        remark(told)
     for row in material.rows:
         if row["status"] == "done":
             alike.setdefault((row["task"], row["protocol"], row["split"], row["rig"]), []).append(row)

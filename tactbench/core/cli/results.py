@@ -1,0 +1,58 @@
+"""How verbs open a result folder: what can be shown of it, and what is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tactbench.core.matrix.store import Store
+
+_MOST_TOLD = 5
+"""Rows that cannot be shown and are told one by one."""
+
+
+def opened(folder: Path) -> Store:
+    """Return a result folder; raises UsageError if there is none."""
+    from tactbench.core.errors import UsageError
+    from tactbench.core.matrix.store import Store
+
+    if not (folder / "cells").is_dir():
+        raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
+    return Store(folder)
+
+
+def shown_rows(store: Store) -> list[dict[str, Any]]:
+    """Return the rows of a folder that a table can be made of, baselines beside each; tell of the others.
+
+    Raises
+    ------
+    UsageError
+        If there is none.
+    """
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.checked import checked
+    from tactbench.core.leaderboard.text import cut, visible
+    from tactbench.core.matrix.leaving import fill_baselines
+
+    rows, wrong = checked(store.rows())
+    told = [cut(visible(one), 300) for one in (*store.troubles, *wrong)]
+    if not rows:
+        raise UsageError(
+            f"{store.folder} has no row that can be shown" + (f": {told[0]}." if told else "."),
+            hint="Run `tactbench run` again.",
+        )
+    for one in told[:_MOST_TOLD]:
+        remark(f"Left out: {one}")
+    if len(told) > _MOST_TOLD:
+        remark(f"Left out: {len(told) - _MOST_TOLD} more rows.")
+    fill_baselines(rows)
+    return rows
+
+
+def provenance_of(store: Store, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return what is known of the runs that `rows` are from."""
+    made_by = sorted({str(row["made_by"]) for row in rows if row.get("made_by")})
+    return [known for known in map(store.provenance, made_by) if known]
