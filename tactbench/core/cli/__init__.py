@@ -27,7 +27,7 @@ VERBS = {
     "why": ("why", "Say why a cell would be reused or computed again, and how it ended."),
     "rerun": ("rerun", "Compute one cell again and say whether it comes out the same, bit for bit."),
     "merge": ("merge", "Make one result folder of several, and refuse those that contradict each other."),
-    "leaderboard": ("leaderboard", "Show the last run's table again, in any format."),
+    "leaderboard": ("leaderboard", "Show the table of all results in a folder, in any format."),
     "compare": ("compare", "Compare two sensors, two estimators or two result folders, replicate by replicate."),
 }
 

@@ -31,7 +31,7 @@ TITLES = {
     "recordings": "Recordings",
     "remarks": "Remarks of the recordings",
     "stamps": "Stamps",
-    "replicates": "What the interval was resampled over",
+    "replicates": "What the interval is over",
 }
 """Lists and tables."""
 

@@ -1,6 +1,6 @@
 """Where each answer of a block stands: its place, whether it shares it, and between which places it may lie.
 
-Rank intervals take a bootstrap and numpy; what they came to is remembered by a digest of everything that decides them
+Ranks take every pair of cells and numpy; what they came to is remembered by a digest of everything that decides them
 (the scores and replicates of the block, and the code that ranks), so that a table that is shown again costs neither.
 """
 
