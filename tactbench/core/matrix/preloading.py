@@ -43,12 +43,18 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
 
     What others bring is built in a process of its own first: only what that process survives is done here as well.
     """
-    importlib.import_module("threadpoolctl")  # every cell holds its threads with it
+    from tactbench.core.evaluation.thread_limit import thread_limit
+
     several = {(cell.task, cell.estimator): cell for cell in cells if (cell.task, cell.estimator) not in _prepared}
     _prepared.update(several)
     foreign = [cell for cell in several.values() if not our_own(cell.estimator)]
     survived = [cell for cell, outcome in choice.pool(1).each(prepare, foreign) if outcome is None] if foreign else []
     for _ in InProcess(choice.limits).each(prepare, [*(set(several.values()) - set(foreign)), *survived]):
+        pass
+    # What every cell needs takes a forked one 0.2 s to import if this process has not.
+    importlib.import_module("tactbench.core.evaluation.cell")
+    importlib.import_module("scipy.special")  # Student's intervals
+    with thread_limit(1):  # looks for the libraries here, so that no forked cell has to
         pass
 
 
