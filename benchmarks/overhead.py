@@ -90,7 +90,7 @@ def main() -> None:
     for _ in range(asked.rounds):
         for size in sizes:
             command = [sys.executable, __file__, "--one", str(size), *(["--on", asked.on] if asked.on else [])]
-            done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+            done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=trivial.with_byte_code())
             rounds[size].append(json.loads(done.stdout))
     # Added, by the difference to the plain loop of the same round, and by the clock around evaluate() in the run.
     added = {size: statistics.median(one["cold"] - one["plain"] for one in rounds[size]) for size in sizes}

@@ -24,6 +24,8 @@ def shared(groups: Groups, choice: EngineChoice) -> Iterator[Job]:
 
     Recordings that cannot be read are the trouble of their cells.
     """
+    from tactbench.core.evaluation.thread_limit import find_libraries
+
     for (task, recordings), jobs in groups.items():
         import_estimators([job[0] for job in jobs], choice)
         trouble = None
@@ -35,6 +37,7 @@ def shared(groups: Groups, choice: EngineChoice) -> Iterator[Job]:
             else:
                 DATASETS.keep((task, recordings), outcome)
         for cell, paths, _ in jobs:
+            find_libraries()
             yield cell, paths, trouble
 
 
@@ -43,7 +46,7 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
 
     What others bring is built in a process of its own first: only what that process survives is done here as well.
     """
-    from tactbench.core.evaluation.thread_limit import thread_limit
+    from tactbench.core.evaluation.thread_limit import find_libraries
 
     several = {(cell.task, cell.estimator): cell for cell in cells if (cell.task, cell.estimator) not in _prepared}
     _prepared.update(several)
@@ -54,8 +57,7 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
     # What every cell needs takes a forked one 0.2 s to import if this process has not.
     importlib.import_module("tactbench.core.evaluation.cell")
     importlib.import_module("scipy.special")  # Student's intervals
-    with thread_limit(1):  # looks for the libraries here, so that no forked cell has to
-        pass
+    find_libraries()
 
 
 _prepared: set[tuple[str, str]] = set()
