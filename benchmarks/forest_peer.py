@@ -185,7 +185,9 @@ def record(shelf: Path, name: str, role: str, X: np.ndarray, y: np.ndarray) -> N
 def seconds(command: list[str], folder: Path) -> float:
     """Return how long a process took; SystemExit with what it said if it failed."""
     began = time.perf_counter()
-    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    done = subprocess.run(
+        command, cwd=folder, env=trivial.with_byte_code(), stdin=subprocess.DEVNULL, capture_output=True, text=True
+    )
     spent = time.perf_counter() - began
     if done.returncode:
         raise SystemExit(f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}")

@@ -38,10 +38,12 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         from tactbench.core.evaluation.cell import evaluate
         from tactbench.core.evaluation.dataset import load_dataset
         from tactbench.core.matrix import answer
+        from tactbench.core.matrix.engines.choice import EngineChoice
         from tactbench.core.matrix.installed import installed
         from tactbench.core.matrix.run import run_matrix
         from tactbench.core.matrix.store import Store
 
+        choice = EngineChoice("in-process")
         within = [0.0]
 
         def timed(*arguments: Any, **named: Any) -> Any:
@@ -52,12 +54,12 @@ def one(cells: int, on: str | None) -> dict[str, float]:
                 within[0] += time.perf_counter() - began
 
         answer.evaluate = timed
-        run_matrix(trivial.matrix(3), Store(folder / "warm"), recordings=shelf)  # imports
+        run_matrix(trivial.matrix(3), Store(folder / "warm"), choice=choice, recordings=shelf)  # imports
         found = {}
         within[0] = 0.0
         for name in ("cold", "cached"):
             began = time.perf_counter()
-            outcome = run_matrix(trivial.matrix(cells), Store(folder / "out"), recordings=shelf)
+            outcome = run_matrix(trivial.matrix(cells), Store(folder / "out"), choice=choice, recordings=shelf)
             found[name] = time.perf_counter() - began
             assert [row["status"] for row in outcome.rows] == ["done"] * cells
             assert outcome.computed == (cells if name == "cold" else 0)
@@ -88,7 +90,7 @@ def main() -> None:
     for _ in range(asked.rounds):
         for size in sizes:
             command = [sys.executable, __file__, "--one", str(size), *(["--on", asked.on] if asked.on else [])]
-            done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+            done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=trivial.with_byte_code())
             rounds[size].append(json.loads(done.stdout))
     # Added, by the difference to the plain loop of the same round, and by the clock around evaluate() in the run.
     added = {size: statistics.median(one["cold"] - one["plain"] for one in rounds[size]) for size in sizes}

@@ -69,6 +69,11 @@ def use(folder: Path) -> None:
     os.environ["PYTHONPATH"] = os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])
 
 
+def with_byte_code() -> dict[str, str]:
+    """Return the environment for processes to be timed: they keep byte code, though tests may have switched it off."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+
+
 def matrix(cells: int) -> MatrixSpec:
     """Return a matrix of so many cells."""
     choice = TaskChoice(name="nothing-asked", protocol="deployable", split="session", estimators=("nothing",))

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -30,6 +28,7 @@ from tactbench.core.evaluation.splits import (
     assert_disjoint,
     choose_split,
 )
+from tactbench.core.evaluation.thread_limit import thread_limit
 from tactbench.core.evaluation.timing import peak_rss_mb, single_row_latency_s
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import Answers, FloatArray, Fold, Part
@@ -156,7 +155,7 @@ def evaluate(
     build = builder(estimator, params, task, seed, threads)
     counts: Counter[str] = Counter(data.counts)
     total = _Sum()
-    with _thread_limit(threads):
+    with thread_limit(threads):
         for number, assignment in enumerate(assignments):
             say(f"{estimator.name}: {assignment.name}")
             alone = len(assignments) == 1
@@ -171,11 +170,6 @@ def _latency_ms(model: Estimator, X: FloatArray, clock: Callable[[], float]) -> 
     waits = 1e3 * single_row_latency_s(model, X, clock)
     p50, p95 = (float(np.quantile(waits, share)) for share in (0.5, 0.95))
     return {"latency_ms_p50": p50, "latency_ms_p95": p95, "latency_n": len(waits)}
-
-
-def _thread_limit(threads: int) -> AbstractContextManager[Any]:
-    limit: AbstractContextManager[Any] = importlib.import_module("threadpoolctl").threadpool_limits(limits=threads)
-    return limit
 
 
 def _fold(

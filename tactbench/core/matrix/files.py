@@ -6,10 +6,19 @@ import os
 from pathlib import Path
 
 
-def replace_file(path: Path, content: bytes) -> None:
+def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:
     """Write `content` aside, sync it and rename it to `path`: a reader sees the old file or the new one.
 
     A file that holds it already is left alone: syncing takes milliseconds, and a run in which nothing is new has none.
+
+    Parameters
+    ----------
+    path
+        The file.
+    content
+        What it is to hold.
+    sync
+        Whether it must survive a power cut, and not only the end of this process.
 
     Raises
     ------
@@ -22,8 +31,9 @@ def replace_file(path: Path, content: bytes) -> None:
     try:
         with aside.open("wb") as file:
             file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
+            if sync:
+                file.flush()
+                os.fsync(file.fileno())
         aside.replace(path)
     except BaseException:
         aside.unlink(missing_ok=True)

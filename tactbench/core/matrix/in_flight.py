@@ -29,8 +29,8 @@ class InFlight:
             return False
 
     def set(self, key: str) -> None:
-        """Say that the cell with this key begins."""
-        replace_file(self._path, key.encode())
+        """Say that the cell with this key begins: to whoever comes after this process, not after a power cut."""
+        replace_file(self._path, key.encode(), sync=False)
         self._set = True
 
     def clear(self) -> None:

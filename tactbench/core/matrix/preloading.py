@@ -24,6 +24,8 @@ def shared(groups: Groups, choice: EngineChoice) -> Iterator[Job]:
 
     Recordings that cannot be read are the trouble of their cells.
     """
+    from tactbench.core.evaluation.thread_limit import find_libraries
+
     for (task, recordings), jobs in groups.items():
         import_estimators([job[0] for job in jobs], choice)
         trouble = None
@@ -35,6 +37,7 @@ def shared(groups: Groups, choice: EngineChoice) -> Iterator[Job]:
             else:
                 DATASETS.keep((task, recordings), outcome)
         for cell, paths, _ in jobs:
+            find_libraries()
             yield cell, paths, trouble
 
 
@@ -43,6 +46,8 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
 
     What others bring is built in a process of its own first: only what that process survives is done here as well.
     """
+    from tactbench.core.evaluation.thread_limit import find_libraries
+
     import_libraries()
     several = {(cell.task, cell.estimator): cell for cell in cells if (cell.task, cell.estimator) not in _prepared}
     _prepared.update(several)
@@ -50,6 +55,7 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
     survived = [cell for cell, outcome in choice.pool(1).each(prepare, foreign) if outcome is None] if foreign else []
     for _ in InProcess(choice.limits).each(prepare, [*(set(several.values()) - set(foreign)), *survived]):
         pass
+    find_libraries()
 
 
 _prepared: set[tuple[str, str]] = set()

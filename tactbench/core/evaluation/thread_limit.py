@@ -1,0 +1,33 @@
+"""Holding numerical libraries to so many threads, without looking for them again before every cell."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from contextlib import AbstractContextManager
+from functools import lru_cache
+from typing import Any
+
+
+def thread_limit(threads: int) -> AbstractContextManager[Any]:
+    """Return a context in which OpenMP and BLAS use at most `threads` threads.
+
+    Notes
+    -----
+    Finding the libraries that a process has loaded takes threadpoolctl about 2 ms, setting their threads some
+    microseconds. They are looked for again where modules were imported since: that is how libraries come in. A
+    forked process has the libraries that its parent had found.
+    """
+    limit: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=threads)
+    return limit
+
+
+def find_libraries() -> None:
+    """Look for libraries now, if modules were imported since: processes forked from here need not."""
+    _libraries(len(sys.modules))
+
+
+@lru_cache(maxsize=1)
+def _libraries(modules: int) -> Any:
+    """Return the libraries of this process as they were when it had imported so many modules."""
+    return importlib.import_module("threadpoolctl").ThreadpoolController()
