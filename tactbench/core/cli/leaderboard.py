@@ -30,16 +30,22 @@ _MOST_TOLD = 5
 def command(folder: Path, shape: str | None, to: Path | None, by: str | None, times: bool) -> None:
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
     from tactbench.core.cli.tables import check_destination
-    from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.collector import collector_at_rest
 
     shape = shape or _meant(to)
     check_destination(shape, to, times=times)
-    store = _opened(folder)
+    with collector_at_rest():
+        _show(_opened(folder), shape, to, by, times)
+
+
+def _show(store: Store, shape: str, to: Path | None, by: str | None, times: bool) -> None:
+    from tactbench.core.errors import UsageError
+
     rows = _rows(store)
     if by is None:
         made_by = sorted({row["made_by"] for row in rows if row["made_by"]})
         provenance = [known for known in map(store.provenance, made_by) if known]
-        print_rows(rows, shape, provenance, times=times, to=to, folder=folder)
+        print_rows(rows, shape, provenance, times=times, to=to, folder=store.folder)
     elif to is not None or not times:
         raise UsageError("A comparison is printed, and has no times.", hint="Leave out --to and --no-times.")
     else:

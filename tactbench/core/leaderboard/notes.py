@@ -105,13 +105,14 @@ def _left_out_notes(rows: Iterable[Row]) -> list[str]:
     """Return what was left out of the data, and what their recordings remark; rows share these, each is told once."""
     counted: dict[str, None] = {}
     remarked: dict[str, None] = {}
-    told: set[tuple[str, str, int]] = set()
+    told: set[tuple[Any, ...]] = set()
     for row in rows:
-        mark = (row["sensor"], row["task"], id(row["counts"]))
+        counts = row["counts"]
+        mark = (row["sensor"], row["task"], *counts, *counts.values(), *map(type, counts.values()))
         if mark not in told:
             told.add(mark)
             where = question_name(row)
-            counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in told_counts(row["counts"]))
+            counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in told_counts(counts))
         if row["remarks"]:
             remarked |= dict.fromkeys(visible(f"{row['sensor']}: {remark}") for remark in row["remarks"])
     return [*counted, *remarked]
