@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,6 +11,9 @@ from tactbench.core.cli.comparisons import print_comparisons
 from tactbench.core.cli.results import opened, provenance_of, shown_rows
 from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
 from tactbench.core.leaderboard.axes import AXES
+
+if TYPE_CHECKING:
+    from tactbench.core.matrix.store import Store
 
 
 @click.command(name="leaderboard")
@@ -24,14 +28,20 @@ from tactbench.core.leaderboard.axes import AXES
 def command(folder: Path, shape: str | None, to: Path | None, by: str | None, times: bool) -> None:
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
     from tactbench.core.cli.tables import check_destination
-    from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.collector import collector_at_rest
 
     shape = shape or _meant(to)
     check_destination(shape, to, times=times)
-    store = opened(folder)
+    with collector_at_rest():
+        _show(opened(folder), shape, to, by, times)
+
+
+def _show(store: Store, shape: str, to: Path | None, by: str | None, times: bool) -> None:
+    from tactbench.core.errors import UsageError
+
     rows = shown_rows(store)
     if by is None:
-        print_rows(rows, shape, provenance_of(store, rows), times=times, to=to, folder=folder)
+        print_rows(rows, shape, provenance_of(store, rows), times=times, to=to, folder=store.folder)
     elif to is not None or not times:
         raise UsageError("A comparison is printed, and has no times.", hint="Leave out --to and --no-times.")
     else:

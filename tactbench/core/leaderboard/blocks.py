@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
@@ -20,6 +21,8 @@ from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
 _Key = tuple[str, str, str, str, int]
+_ORIGIN = itemgetter("task", "protocol", "rig", "simulated", "status", "repeat", "split")
+"""All that says in which block a row stands."""
 
 
 @dataclass(frozen=True)
@@ -58,21 +61,28 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
     A cell that was not begun knows neither its split, if nobody asked for one, nor whether it would have been
     simulated: it stands with the finished cells of its rig, if these agree.
     """
+    origins = list(map(_ORIGIN, rows))
+    alike = dict(zip(origins, rows, strict=True))  # one row of each origin: the others are asked nothing
     kinds: dict[str, set[str]] = {}
     splits: dict[tuple[Any, ...], set[str]] = {}
-    for row in rows:
+    for row in alike.values():
         if row["status"] == "done":
             kinds.setdefault(row["rig"], set()).add(_kind(row))
-    for row in rows:
+    for row in alike.values():
         if row["split"] is not None:
             splits.setdefault(_without_split(row, kinds), set()).add(row["split"])
+    keys = {origin: _key(row, kinds, splits) for origin, row in alike.items()}
     groups: dict[_Key, list[Row]] = {}
-    for row in rows:
-        task, protocol, kind, repeat = _without_split(row, kinds)
-        known = splits.get((task, protocol, kind, repeat), set())
-        split = row["split"] if row["split"] is not None else next(iter(known)) if len(known) == 1 else ""
-        groups.setdefault((task, protocol, split, kind, repeat), []).append(row)
+    for row, origin in zip(rows, origins, strict=True):
+        groups.setdefault(keys[origin], []).append(row)
     return groups
+
+
+def _key(row: Row, kinds: Mapping[str, set[str]], splits: Mapping[tuple[Any, ...], set[str]]) -> _Key:
+    task, protocol, kind, repeat = _without_split(row, kinds)
+    known = splits.get((task, protocol, kind, repeat), set())
+    split = row["split"] if row["split"] is not None else next(iter(known)) if len(known) == 1 else ""
+    return task, protocol, split, kind, repeat
 
 
 def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, str, int]:
@@ -95,7 +105,7 @@ def _block(key: _Key, members: Sequence[Row], letters: Mapping[str, str], times:
     done = [row for row in members if row["status"] == "done"]
     results = sorted((row for row in done if not row["is_baseline"]), key=better)
     placings, unranked = places(results)
-    results.sort(key=lambda row: (placings[row["cell"]].place, *better(row)))
+    results.sort(key=lambda row: placings[row["cell"]].place)  # of equal place stays the better one first
     baselines = sorted((row for row in done if row["is_baseline"]), key=lambda row: (row["sensor"], *better(row)))
     stopped = sorted((row for row in members if row["status"] != "done"), key=lambda row: (row["status"], row["cell"]))
     lines = (

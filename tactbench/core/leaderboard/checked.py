@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from operator import itemgetter
 from typing import Any
 
 from tactbench.core.leaderboard.parquet import kind
@@ -25,8 +26,9 @@ def checked(rows: Iterable[object]) -> tuple[list[Row], list[str]]:
     """Return the rows that a table can be made of, and what is wrong with each of the others, in one sentence each."""
     good: list[Row] = []
     wrong: list[str] = []
+    trouble_of = _Troubles()
     for row in rows:
-        trouble = _trouble(row)
+        trouble = trouble_of(row)
         if trouble:
             name = row.get("cell") if isinstance(row, dict) else None
             wrong.append(f"{name if isinstance(name, str) else 'a row without a name'}: {trouble}")
@@ -35,20 +37,49 @@ def checked(rows: Iterable[object]) -> tuple[list[Row], list[str]]:
     return good, wrong
 
 
-def _trouble(row: object) -> str:
-    if not isinstance(row, dict):
-        return "it is no row"
+class _Troubles:
+    """Says what is wrong with a row, or nothing; remembers which combinations of types it has seen."""
+
+    def __init__(self) -> None:
+        self._alike: dict[tuple[type, ...], tuple[int, ...]] = {}
+        """Where whole numbers stand in the values of `_STORED`, by their types."""
+
+    def __call__(self, row: object) -> str:
+        """Return what is wrong with `row`, or nothing."""
+        if not isinstance(row, dict):
+            return "it is no row"
+        try:
+            values = _VALUES(row)
+        except KeyError:
+            return _mistyped(row)
+        types = tuple(map(type, values))
+        wholes = self._alike.get(types)
+        if wholes is None or any(not -_LARGEST < values[place] < _LARGEST for place in wholes):
+            trouble = _mistyped(row)
+            if trouble:
+                return trouble
+            self._alike[types] = tuple(
+                place for place, one in enumerate(types) if one is int and _STORED[place] != "seed"
+            )
+        return _senseless(row)
+
+
+def _mistyped(row: Row) -> str:
     lacking = [key for key in _STORED if key not in row]
     if lacking:
         return f"its row is of another version (it lacks {', '.join(lacking[:3])}); run it again"
     for key in _STORED:
         if not _fits(key, row[key]):
             return f"its {key} is {type(row[key]).__name__}, not {_EXPECTED[key]}"
+    return ""
+
+
+def _senseless(row: Row) -> str:
     if row["status"] not in STATUSES:
         return f"its status is none of {', '.join(STATUSES)}"
     if row["status"] == "done" and row["score"] is None:
         return "it is done and has no score"
-    if not all(type(count) is int for count in row["counts"].values()):
+    if not _WHOLE.issuperset(map(type, row["counts"].values())):
         return "its counts are not all whole numbers"
     return "" if _is_square(row["confusion"]) else "its confusion is no square of whole numbers"
 
@@ -74,6 +105,8 @@ def _fits(key: str, value: Any) -> bool:
 
 
 _STORED = tuple(key for key in JSON_KEYS if key != "key")
+_VALUES = itemgetter(*_STORED)
+_WHOLE = frozenset({int})
 _TYPES = {"a table": dict, "a list": list, "true or false": bool, "text": str}
 _EXPECTED = {
     key: "a table" if key in _TABLES

@@ -10,8 +10,6 @@ from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
 
-_TIMES = ("sim_s", "fit_s", "predict_s", "latency_ms_p50", "latency_ms_p95")
-
 
 def host_letters(rows: Iterable[Row]) -> dict[str, str]:
     """Return a letter for each host that timed one of `rows`, in order of their ids; none if there is but one."""
@@ -21,7 +19,7 @@ def host_letters(rows: Iterable[Row]) -> dict[str, str]:
 
 def timing_mark(row: Row, letters: Mapping[str, str]) -> str:
     """Return what stands behind every time of `row`: ``[A]`` for the host, ``‖4`` for four cells at once."""
-    letter = letters.get(_host(row))
+    letter = letters.get(_host(row)) if letters else None
     at_once = _at_once(row)
     return (f" [{letter}]" if letter else "") + (f" ‖{at_once}" if at_once > 1 else "")
 
@@ -51,7 +49,14 @@ def timing_notes(rows: Sequence[Row], letters: Mapping[str, str], provenance: It
 
 
 def _timed(row: Row) -> bool:
-    return row["status"] == "done" and any(row[key] is not None for key in _TIMES)
+    # One by one: of nearly every row the first is known.
+    return row["status"] == "done" and (
+        row["fit_s"] is not None
+        or row["sim_s"] is not None
+        or row["predict_s"] is not None
+        or row["latency_ms_p50"] is not None
+        or row["latency_ms_p95"] is not None
+    )
 
 
 def _host(row: Row) -> str:

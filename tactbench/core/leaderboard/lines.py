@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from tactbench.core.leaderboard.columns import COLUMNS, TIMED, columns
+from tactbench.core.leaderboard.columns import columns
 from tactbench.core.leaderboard.marks import score_marks
 from tactbench.core.leaderboard.names import answer_name, sensor_name
 from tactbench.core.leaderboard.numbers import duration, interval, score, whole
@@ -46,8 +46,7 @@ def done_line(row: Row, placing: Placing | None, mark: str, times: bool) -> Line
         Whether the table has times.
     """
     unit = row["unit"]
-    per_row = row["predict_s"] / row["batch_rows"] if row["predict_s"] is not None and row["batch_rows"] else None
-    texts = (
+    texts: tuple[str, ...] = (
         _place(placing),
         sensor_name(row),
         answer_name(row),
@@ -58,19 +57,18 @@ def done_line(row: Row, placing: Placing | None, mark: str, times: bool) -> Line
         score(row["baseline"], unit),
         whole(row["n_test"]),
         whole(row["n_sessions"]),
-        *(
-            _time(seconds, mark)
-            for seconds in (
-                row["sim_s"],
-                row["fit_s"],
-                _seconds(row["latency_ms_p50"]),
-                _seconds(row["latency_ms_p95"]),
-                per_row,
-            )
-        ),
     )
-    shown = texts if times else tuple(text for name, text in zip(COLUMNS, texts, strict=True) if name not in TIMED)
-    return Line(shown, "baseline" if placing is None else "result", row["cell"], placing, row)
+    if times:
+        spent, count = row["predict_s"], row["batch_rows"]
+        p50, p95 = row["latency_ms_p50"], row["latency_ms_p95"]
+        texts += (
+            _time(row["sim_s"], mark),
+            _time(row["fit_s"], mark),
+            _time(None if p50 is None else p50 / 1e3, mark),
+            _time(None if p95 is None else p95 / 1e3, mark),
+            _time(spent / count if spent is not None and count else None, mark),
+        )
+    return Line(texts, "baseline" if placing is None else "result", row["cell"], placing, row)
 
 
 def stopped_line(row: Row, times: bool) -> Line:
@@ -94,7 +92,3 @@ def _places(placing: Placing | None) -> str:
 
 def _time(seconds: float | None, mark: str) -> str:
     return ABSENT if seconds is None else duration(seconds) + mark
-
-
-def _seconds(milliseconds: float | None) -> float | None:
-    return None if milliseconds is None else milliseconds / 1e3

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
+
+_name = lru_cache(maxsize=4096)(visible)
+"""A name, made fit to be shown: rows share few of them."""
 
 LOWER_IS_BETTER = frozenset({"rmse", "mae"})
 METRIC_NAMES = {
@@ -23,13 +27,15 @@ METRIC_NAMES = {
 
 def sensor_name(row: Row) -> str:
     """Return a sensor's name, marked where it was simulated."""
-    return visible(f"{row['sensor']} SIM" if row["simulated"] else str(row["sensor"]))
+    return _name(f"{row['sensor']} SIM" if row["simulated"] else str(row["sensor"]))
 
 
 def answer_name(row: Row) -> str:
     """Return the estimator's name, with the parameters that are not its defaults."""
+    if not row["params"]:
+        return _name(str(row["estimator"]))
     options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
-    return visible(f"{row['estimator']} ({options})" if options else str(row["estimator"]))
+    return _name(f"{row['estimator']} ({options})" if options else str(row["estimator"]))
 
 
 def metric_name(row: Row) -> str:
@@ -40,7 +46,7 @@ def metric_name(row: Row) -> str:
 
 def question_name(row: Row) -> str:
     """Return sensor and task: what was asked of whom."""
-    return visible(f"{row['sensor']}/{row['task']}")
+    return _name(f"{row['sensor']}/{row['task']}")
 
 
 def asked_of(row: Row) -> str:

@@ -92,24 +92,27 @@ def _no_better_notes(rows: Iterable[Row]) -> list[str]:
 def _no_better(row: Row) -> bool:
     if row["status"] != "done" or row["is_baseline"] or row["baseline"] is None:
         return False
-    if is_probe(row["protocol"]):
-        return False  # no better than trivial is what a probe should be
     lower = row["metric"] in LOWER_IS_BETTER
     bound = row["ci_high"] if lower else row["ci_low"]
     if bound is None:
         return False
-    return bool(bound >= row["baseline"] if lower else bound <= row["baseline"])
+    if not (bound >= row["baseline"] if lower else bound <= row["baseline"]):
+        return False
+    return not is_probe(row["protocol"])  # no better than trivial is what a probe should be
 
 
 def _left_out_notes(rows: Iterable[Row]) -> list[str]:
     """Return what was left out of the data, and what their recordings remark; rows share these, each is told once."""
     counted: dict[str, None] = {}
     remarked: dict[str, None] = {}
-    told: set[tuple[str, int]] = set()
+    told: set[tuple[Any, ...]] = set()
     for row in rows:
-        where = question_name(row)
-        if (where, id(row["counts"])) not in told:
-            told.add((where, id(row["counts"])))
-            counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in told_counts(row["counts"]))
-        remarked |= dict.fromkeys(visible(f"{row['sensor']}: {remark}") for remark in row["remarks"])
+        counts = row["counts"]
+        mark = (row["sensor"], row["task"], *counts, *counts.values(), *map(type, counts.values()))
+        if mark not in told:
+            told.add(mark)
+            where = question_name(row)
+            counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in told_counts(counts))
+        if row["remarks"]:
+            remarked |= dict.fromkeys(visible(f"{row['sensor']}: {remark}") for remark in row["remarks"])
     return [*counted, *remarked]

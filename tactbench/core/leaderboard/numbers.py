@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 
 def score(value: float | None, unit: str) -> str:
     """Return a score: three decimals for shares; four for numbers with a unit, two from ten on."""
@@ -26,17 +28,20 @@ def duration(seconds: float | None) -> str:
     """Return a duration with three significant digits and a unit that fits."""
     if seconds is None:
         return "–"
-    for factor, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
-        if seconds * factor >= 0.9995:
-            return f"{_three(seconds * factor)} {unit}"
-    return f"{_three(seconds * 1e6)} µs" if seconds > 0 else "0 s"
+    if seconds >= 0.9995:
+        value, unit = seconds, "s"
+    elif (value := seconds * 1e3) >= 0.9995:
+        unit = "ms"
+    elif seconds > 0:
+        value, unit = seconds * 1e6, "µs"
+    else:
+        return "0 s"
+    if value >= 99.95:
+        return f"{value:.0f} {unit}"
+    return f"{value:.1f} {unit}" if value >= 9.995 else f"{value:.2f} {unit}"
 
 
+@lru_cache(maxsize=4096, typed=True)  # rows of one data set have the same counts
 def whole(value: int | None) -> str:
     """Return a count with thin groups of three."""
     return "–" if value is None else f"{value:,}".replace(",", "\u202f")
-
-
-def _three(value: float) -> str:
-    digits = 0 if value >= 99.95 else 1 if value >= 9.995 else 2
-    return f"{value:.{digits}f}"

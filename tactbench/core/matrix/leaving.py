@@ -26,7 +26,8 @@ def fill_baselines(rows: Sequence[Row]) -> None:
 
 
 def _group(row: Row) -> tuple[Any, ...]:
-    return tuple(row.get(key) for key in ("sensor", "task", "rig", "protocol", "split", "repeat"))
+    get = row.get
+    return get("sensor"), get("task"), get("rig"), get("protocol"), get("split"), get("repeat")
 
 
 def scores_text(rows: Sequence[Row]) -> str:

@@ -80,7 +80,7 @@ def _write(
     types = set(map(type, values))
     before = len(pack.blobs)
     if many and float in types and types <= {float, int, type(None)}:
-        column = write_digits(pack, [_shortly(key, value) for value in values])
+        column = write_digits(pack, _shortly(key, values))
         if column is not None and pack.size <= room:
             columns[key] = column
             return
@@ -97,10 +97,10 @@ def _write(
     left_out.append(key)
 
 
-def _shortly(key: str, value: float | None) -> str:
-    if value is None:
-        return ""
-    return duration(value) if key.endswith("_s") else f"{value:.4g}"
+def _shortly(key: str, values: Sequence[float | None]) -> list[str]:
+    if key.endswith("_s"):
+        return ["" if value is None else duration(value) for value in values]
+    return ["" if value is None else f"{value:.4g}" for value in values]
 
 
 def _names(pack: Pack, names: Sequence[str]) -> Column:

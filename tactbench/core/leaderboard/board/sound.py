@@ -59,12 +59,18 @@ def sound(rows: Sequence[Any]) -> tuple[list[Row], tuple[str, ...]]:
     told = [f"{len(rows) - len(kept)} entries are no rows and are left out."] if len(kept) < len(rows) else []
     odd: Counter[str] = Counter()
     columns = columns_of(kept)
+    present = set(columns).intersection(*{tuple(row) for row in kept})
+    copies: dict[int, dict[str, Any]] = {}
     for key, (kinds, mend) in _KINDS.items():
-        places = _odd_places(kept, columns.get(key, ()), key, kinds)
+        places = _odd_places(kept, columns.get(key, ()), key, kinds, key not in present)
         for place in places:
-            kept[place] = {**kept[place], key: _mended(kept[place], key, kinds, mend)}
+            if place not in copies:
+                copies[place] = dict(kept[place])
+            copies[place][key] = _mended(kept[place], key, kinds, mend)
         if places:
             odd[key] = len(places)
+    for place, copy in copies.items():
+        kept[place] = copy
     for place, row in enumerate(kept):
         if row["status"] == "done" and row["score"] is None:
             kept[place] = {**row, "status": "failed", "reason": "This row says done and holds no finite score."}
@@ -75,10 +81,11 @@ def sound(rows: Sequence[Any]) -> tuple[list[Row], tuple[str, ...]]:
     return kept, tuple(told)
 
 
-def _odd_places(rows: Sequence[Row], values: Sequence[Any], key: str, kinds: frozenset[type]) -> list[int]:
-    """Return the places of rows that lack `key` or hold in it what does not belong there."""
+def _odd_places(
+    rows: Sequence[Row], values: Sequence[Any], key: str, kinds: frozenset[type], missing: bool
+) -> list[int]:
+    """Return the places of rows that lack `key` (some do if it is `missing`), or hold what does not belong there."""
     types = set(map(type, values))
-    missing = not values or (_NOTHING in types and any(key not in row for row in rows))
     if types <= kinds and not missing and not _limited(values, key, types):
         return []
     return [place for place, row in enumerate(rows) if key not in row or not _fits(row[key], key, kinds)]

@@ -7,6 +7,7 @@ what is longer than anybody reads; each says so in its place.
 from __future__ import annotations
 
 import json
+import marshal
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -41,9 +42,10 @@ def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Co
         text = written(values[0], longest)
         return None if text in _SILENT else _column(pack, [text], pack.zeros(len(values)))
     keys: Sequence[Any] = values if alike else list(map(id, values))
+    write = written if alike else _Writer()
     texts: dict[str, int] = {}
     places = {
-        key: texts.setdefault(written(value, longest), len(texts))
+        key: texts.setdefault(write(value, longest), len(texts))
         for key, value in dict(zip(keys, values, strict=True)).items()
     }
     if texts.keys() <= _SILENT:
@@ -54,6 +56,27 @@ def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Co
 
 def _column(pack: Pack, texts: Iterable[str], at: list[int]) -> Column:
     return {"kind": "words", "words": pack.add(("[" + ",".join(texts) + "]").encode()), "at": at}
+
+
+class _Writer:
+    """Writes values of which many are equal without being the same."""
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, str] = {}
+
+    def __call__(self, value: Any, longest: int) -> str:
+        """Return `written` of the value."""
+        if not value or type(value) not in _EMPTY:
+            return written(value, longest)
+        try:
+            # Version 2 of the format writes equal values of equal types as equal bytes; it is never read.
+            mark = marshal.dumps(value, 2)
+        except ValueError:  # holds what is not plain, or is endless
+            return written(value, longest)
+        text = self._known.get(mark)
+        if text is None:
+            text = self._known[mark] = written(value, longest)
+        return text
 
 
 def written(value: Any, longest: int = LONGEST) -> str:

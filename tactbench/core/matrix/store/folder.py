@@ -292,7 +292,7 @@ class Store:
             for entry in self._ledger.entries:
                 self._place(entry)
             known = {f"{key}.h5" for key in self._done}
-            for name in sorted(set(self._sizes()) - known):
+            for name in sorted(self._names() - known):
                 self._adopt(name)
         return self._ledger
 
@@ -325,6 +325,13 @@ class Store:
             return os.lstat(self._shard(key)).st_size
         except OSError:
             return -1
+
+    def _names(self) -> set[str]:
+        try:
+            with os.scandir(self.folder / "cells") as found:
+                return {one.name for one in found if one.name.endswith(".h5")}
+        except OSError:
+            return set()
 
     def _sizes(self) -> dict[str, int]:
         try:
