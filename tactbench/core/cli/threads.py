@@ -17,3 +17,6 @@ def keep_threads(number: int) -> None:
     """Keep numerical libraries at `number` threads; before any of them is imported."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, str(number))
+    # scikit-learn imports pandas where it is, pandas imports Arrow, and Arrow's allocator would start a thread of its
+    # own: no numbers are computed in it, but a process with threads cannot fork its cells.
+    os.environ.setdefault("JE_ARROW_MALLOC_CONF", "background_thread:false")

@@ -75,7 +75,7 @@ def _digest(rows: Sequence[Row], provenance: Sequence[Row]) -> str | None:
         if not isinstance(value, dict | list | tuple):
             return value
         if id(value) not in shared:
-            shared[id(value)] = memo.digest_of(value)
+            shared[id(value)] = memo.digest_of(memo.ordered(value))
         return shared[id(value)]
 
     code = [memo.source_digest(f"tactbench.core.{package}") for package in ("leaderboard", "statistics")]

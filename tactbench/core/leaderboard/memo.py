@@ -33,6 +33,13 @@ def digest_of(*facts: Any) -> str:
     return hashlib.sha256(marshal.dumps(facts, 2)).hexdigest()
 
 
+def ordered(value: Any) -> Any:
+    """Return a mapping as its pairs in order: what was just computed and what was read again have one digest."""
+    if isinstance(value, dict):
+        return [(key, ordered(inner)) for key, inner in sorted(value.items())]
+    return value
+
+
 @cache
 def source_digest(package: str) -> bytes:
     """Return a digest of the files of a package, read as bytes; of nothing if there is no such package."""

@@ -75,8 +75,8 @@ def _counts(row: Row) -> bool:
 
 def _mean(members: Sequence[Row]) -> tuple[float, float, float, tuple[str, ...]] | None:
     """Return mean, interval and what is left out; None where fewer than two tasks are in it, or nothing can be told."""
-    facts = [[row.get(key) for key in _DECIDES] for row in members]
     try:
+        facts = [[memo.ordered(row.get(key)) for key in _DECIDES] for row in members]
         digest = memo.digest_of("over tasks", *map(memo.source_digest, _DECIDING), facts)
         told = memo.recall(digest)
         if not _believable(told):

@@ -47,8 +47,8 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Placing], str]:
     reason = _unrankable(results)
     if not results or reason:
         return _by_score(results), reason
-    facts = [[row.get(key) for key in _DECIDES] for row in results]
     try:
+        facts = [[memo.ordered(row.get(key)) for key in _DECIDES] for row in results]
         digest = memo.digest_of(*map(memo.source_digest, _DECIDING), facts)
         found = _believed(memo.recall(digest), results)
         if found is None:

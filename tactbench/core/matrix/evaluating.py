@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -94,11 +95,11 @@ class _Known:
     made_by: str
 
     def told(self, row: Row, folder: Path) -> Row:
-        """Return `row` with all of it."""
+        """Return `row` with all of it, as the ledger will give it back: lists for tuples, keys in order."""
         from tactbench.core.matrix.solving import this_host
 
         paths = [Path(path) for path in row["recordings"]]
-        return {
+        whole = {
             **row,
             "key": self.keys.get(row["cell"], ""),
             "digests": [self.material.recorded.digest(path) for path in paths],
@@ -106,6 +107,8 @@ class _Known:
             "made_by": self.made_by,
             "host": row["host"] or this_host(),
         }
+        plain: Row = json.loads(json.dumps(whole, sort_keys=True))
+        return plain
 
 
 _beside = lru_cache(maxsize=4096)(beside)

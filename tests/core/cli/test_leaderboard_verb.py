@@ -28,6 +28,14 @@ def test_a_folder_shows_the_same_table_as_its_run(ran):
     assert json.loads(again) == json.loads((ran.folder / "out" / "leaderboard.json").read_text())
 
 
+def test_what_was_just_computed_and_what_is_read_again_have_one_digest(shell):
+    shell(*RUN)
+    kept = [shell.folder / "out" / "cache" / name for name in ("ranks.json", "tables.json")]
+    before = [path.read_bytes() for path in kept]
+    shell(*RUN)
+    assert [path.read_bytes() for path in kept] == before
+
+
 def test_every_format_goes_to_a_file_named_for_it(ran):
     for suffix, shape in (
         (".md", "md"),

@@ -62,13 +62,13 @@ class Guarded:
         self.ended = os.pidfd_open(self.pid) if hasattr(os, "pidfd_open") else -1
         """Becomes readable when the process is over; -1 where the system has no such thing."""
         self._began_mb = memory.resident_mb(parent)
+        self._kills = memory.oom_kills()
 
     def ask(self, number: int) -> None:
         """Have it carry out item `number`."""
         self.number = number
         self._began_s = time.monotonic()
         self._ends_s = None if self._limits.timeout_s is None else self._began_s + self._limits.timeout_s
-        self._kills = memory.oom_kills()
         self._began_mb = max(self._began_mb, memory.resident_mb(self.pid))
         with suppress(BrokenPipeError):  # it is over already: what it says or does not say will tell
             ask(self._orders, number)
