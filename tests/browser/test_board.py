@@ -356,6 +356,9 @@ def test_the_figure_is_walked_with_arrow_keys_and_opens_cells(board):
     board.find_element("css selector", "svg [tabindex='0']").send_keys(RIGHT)
     told = board.switch_to.active_element.get_attribute("aria-label")
     assert board.find_element("css selector", ".tip").text.split("\n") == told.split(", ")
+    rests = "document.querySelector('#view-time svg').dispatchEvent(new PointerEvent('pointerover', {bubbles: true}))"
+    board.execute_script(rests)  # a pointer beside the points, as after a click on the tab
+    assert board.find_element("css selector", ".tip").text.split("\n") == told.split(", ")
     board.switch_to.active_element.send_keys(END)
     board.switch_to.active_element.send_keys(ENTER)
     board.execute_async_script("setTimeout(arguments[0])")

@@ -197,8 +197,10 @@ const drawFigure = (width, points, front, block, axis) => {
   const first = drawn.find((one) => onFront.has(one.point)) ?? drawn[0];
   first.setAttribute("tabindex", 0);
   const markOf = (event) => (event.target.point ? event.target : null);
-  picture.addEventListener("pointerover", (event) => { const mark = markOf(event); if (mark) tell(mark); else tip.hidden = true; });
-  picture.addEventListener("pointerleave", () => { tip.hidden = true; });
+  // A pointer that rests beside the points does not silence the one that the keyboard is at.
+  const pointed = (mark) => { const told = mark ?? markOf({ target: document.activeElement }); if (told) tell(told); else tip.hidden = true; };
+  picture.addEventListener("pointerover", (event) => pointed(markOf(event)));
+  picture.addEventListener("pointerleave", () => pointed());
   picture.addEventListener("focusin", (event) => { const mark = markOf(event); if (mark) tell(mark); });
   picture.addEventListener("focusout", () => { tip.hidden = true; });
   picture.addEventListener("click", (event) => { const mark = markOf(event); if (mark) open(mark); });
