@@ -18,7 +18,7 @@ Row = Mapping[str, Any]
 
 _DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
 """Packages whose code ranks."""
-_DECIDES = ("cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes", "replicates")
+_DECIDES = ("cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes")
 MOST_RANKED = 20_000
 """Answers of one block beyond which comparing all pairs takes too long."""
 
@@ -48,7 +48,7 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Placing], str]:
     if not results or reason:
         return _by_score(results), reason
     try:
-        facts = [[memo.ordered(row.get(key)) for key in _DECIDES] for row in results]
+        facts = [([row.get(key) for key in _DECIDES], memo.ordered(row.get("replicates"))) for row in results]
         digest = memo.digest_of(*map(memo.source_digest, _DECIDING), facts)
         found = _believed(memo.recall(digest), results)
         if found is None:
