@@ -41,9 +41,9 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         from tactbench.core.evaluation.cell import evaluate
         from tactbench.core.evaluation.dataset import load_dataset
         from tactbench.core.matrix.engines.choice import EngineChoice
-        from tactbench.core.matrix.installed import installed
         from tactbench.core.matrix.run import run_matrix
         from tactbench.core.matrix.store import Store
+        from tactbench.core.plugins.registry import installed
 
         choice = EngineChoice("in-process")
         run_matrix(trivial.matrix(3), Store(folder / "warm"), choice=choice, recordings=shelf)  # imports

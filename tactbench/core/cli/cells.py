@@ -128,10 +128,8 @@ def recordings_of(row: Mapping[str, Any], store: Store) -> tuple[Path, ...]:
     UsageError
         If one of them may not be opened: a folder may come from a stranger.
     """
-    digests = row.get("digests") or [""] * len(row["recordings"])
     found = []
-    for path, digest in zip(row["recordings"], digests, strict=False):
-        file = store.recording(path, digest)
+    for path, file in store.recordings(row):
         if file is None:
             raise UsageError(
                 f"The recording {path} is not there, or not as it was when the cell was answered.",

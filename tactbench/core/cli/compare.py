@@ -24,10 +24,11 @@ def command(first: str, second: str, folder: Path, task: str | None, config: str
     Of two folders the same cells are compared: before and after a change, or two laboratories.
     """
     from tactbench.core.cli.config import default_matrix, matrix_called
+    from tactbench.core.cli.results import is_results
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.duel import duels, folder_duels, with_declared
 
-    if all((Path(one) / "leaderboard.json").is_file() for one in (first, second)):
+    if all(is_results(Path(one)) for one in (first, second)):
         found = folder_duels(kept_rows(Path(first)), kept_rows(Path(second)), first, second, task)
     else:
         matrix = matrix_called(config) if config else default_matrix()

@@ -13,12 +13,17 @@ _MOST_TOLD = 5
 """Rows that cannot be shown and are told one by one."""
 
 
+def is_results(folder: Path) -> bool:
+    """Return whether a folder is one that ``run --out`` has made."""
+    return (folder / "cells").is_dir()
+
+
 def opened(folder: Path) -> Store:
     """Return a result folder; raises UsageError if there is none."""
     from tactbench.core.errors import UsageError
     from tactbench.core.matrix.store import Store
 
-    if not (folder / "cells").is_dir():
+    if not is_results(folder):
         raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
     return Store(folder)
 

@@ -30,6 +30,6 @@ def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
 
 def one_line(reason: str) -> str:
     """Return `reason` in one line of readable length; what could move a terminal's cursor is shown, not done."""
-    line = " ".join(str(reason).split())
-    line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line)
-    return line if len(line) <= WIDTH else line[: WIDTH - 1] + "…"
+    from tactbench.core.leaderboard.text import cut, visible
+
+    return cut(visible(" ".join(str(reason).split())), WIDTH)

@@ -68,11 +68,10 @@ def _facts(found: Subject, why: Explanation) -> dict[str, Any]:
 
 
 def _provenance(found: Subject) -> list[str]:
+    from tactbench.core.cli.results import provenance_of
     from tactbench.core.matrix.provenance import foot
 
-    made_by = str((found.row or {}).get("made_by", ""))
-    facts = found.store.provenance(made_by) if made_by else {}
-    return list(foot([facts])) if facts else []
+    return list(foot(provenance_of(found.store, [found.row or {}])))
 
 
 def _try(found: Subject, why: Explanation) -> str:

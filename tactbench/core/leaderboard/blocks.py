@@ -15,7 +15,7 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.hosts import timing_mark
 from tactbench.core.leaderboard.lines import Line, done_line, stopped_line
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, metric_name
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
 from tactbench.core.leaderboard.placing import places
 from tactbench.core.leaderboard.text import visible
 
@@ -67,7 +67,7 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
     splits: dict[tuple[Any, ...], set[str]] = {}
     for row in alike.values():
         if row["status"] == "done":
-            kinds.setdefault(row["rig"], set()).add(_kind(row))
+            kinds.setdefault(row["rig"], set()).add(hardware_name(row))
     for row in alike.values():
         if row["split"] is not None:
             splits.setdefault(_without_split(row, kinds), set()).add(row["split"])
@@ -87,12 +87,8 @@ def _key(row: Row, kinds: Mapping[str, set[str]], splits: Mapping[tuple[Any, ...
 
 def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, str, int]:
     known = kinds.get(row["rig"], set())
-    kind = next(iter(known)) if row["status"] != "done" and len(known) == 1 else _kind(row)
+    kind = next(iter(known)) if row["status"] != "done" and len(known) == 1 else hardware_name(row)
     return row["task"], row["protocol"], kind, row["repeat"] or 0
-
-
-def _kind(row: Row) -> str:
-    return "SIM (twin)" if row["simulated"] else f"rig {row['rig']}"
 
 
 def _block(key: _Key, members: Sequence[Row], letters: Mapping[str, str], times: bool) -> Block:

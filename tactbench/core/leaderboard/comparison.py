@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.evaluation.few_shot import shots
-from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sensor_name
+from tactbench.core.leaderboard.names import answer_name, hardware_name, metric_name, sensor_name
 from tactbench.core.leaderboard.numbers import interval, score
 
 Row = Mapping[str, Any]
@@ -198,13 +198,12 @@ def _record(row: Row, by: str, way: str, value: float | None) -> dict[str, Any]:
 
 
 def _title(row: Row, by: str) -> str:
-    unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
-    parts = [str(row["task"]), f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}"]
+    parts = [str(row["task"]), metric_name(row)]
     if by != "protocol":
         parts.append(row["protocol"])
     if by != "split" and row["split"]:
         parts.append(f"split {row['split']}")
-    parts.append("SIM (twin)" if row["simulated"] else f"rig {row['rig']}")
+    parts.append(hardware_name(row))
     return " · ".join([*parts, f"by {by}"])
 
 

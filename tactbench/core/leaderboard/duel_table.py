@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.leaderboard.duel import Duel
+from tactbench.core.leaderboard.names import hardware_name, metric_name
 from tactbench.core.leaderboard.numbers import interval, score, suffix
-from tactbench.core.leaderboard.table import METRIC_NAMES
 from tactbench.core.statistics.aggregate import Aggregate, aggregate
 
 NUMERIC = frozenset({"A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "effect", "P(A better)", "n"})
@@ -36,16 +36,15 @@ def tables_of(duels: Sequence[Duel]) -> list[DuelTable]:
 
 def _title(duel: Duel) -> str:
     row = duel.row
-    unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
     parts = [
         f"A = {duel.first}, B = {duel.second}",
         row["task"],
-        f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}",
+        metric_name(row),
     ]
     parts.append(row["protocol"] + (" †" if row["dagger"] else ""))
     if row["split"]:
         parts.append(f"split {row['split']}")
-    parts.append("SIM (twin)" if row["simulated"] else f"rig {row['rig']}")
+    parts.append(hardware_name(row))
     if row["repeats"] > 1:
         parts.append(f"repeat {row['repeat']} of {row['repeats']}")
     return " · ".join(parts)

@@ -14,6 +14,8 @@ Row = Mapping[str, Any]
 _name = lru_cache(maxsize=4096)(visible)
 """A name, made fit to be shown: rows share few of them."""
 
+SIMULATED = "SIM (twin)"
+"""What is said of simulated rows in place of a rig."""
 LOWER_IS_BETTER = frozenset({"rmse", "mae"})
 METRIC_NAMES = {
     "rmse": "RMSE",
@@ -42,6 +44,11 @@ def metric_name(row: Row) -> str:
     """Return the metric with its unit: ``RMSE [N]``."""
     unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
     return visible(f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}")
+
+
+def hardware_name(row: Row) -> str:
+    """Return what carried out a row's scenes: the twin, or a rig by its name."""
+    return SIMULATED if row["simulated"] else f"rig {row['rig']}"
 
 
 def question_name(row: Row) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 from tactbench.core.errors import RigError, TactbenchError
 from tactbench.core.plugins.interfaces import Rig, RigContext, Shelf
 from tactbench.core.plugins.registry import Registry, load_object
-from tactbench.core.plugins.registry import installed as installed
 
 
 def rig_of(name: str, registry: Registry, recordings: Path | None = None) -> Rig | Shelf:

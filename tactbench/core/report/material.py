@@ -46,10 +46,8 @@ class Material:
         DataError
             If one lies outside the folder, was not allowed and does not hold what the row tells of.
         """
-        digests = row.get("digests") or [""] * len(row["recordings"])
         found = []
-        for path, digest in zip(row["recordings"], digests, strict=False):
-            recording = self.store.recording(path, digest)
+        for path, recording in self.store.recordings(row):
             if recording is None:
                 raise DataError(
                     f"The recording {path} lies outside {self.store.folder}, and is not there any more, or not the one "

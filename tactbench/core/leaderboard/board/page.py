@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import Counter, defaultdict, deque
 from collections.abc import Mapping, Sequence
@@ -20,11 +19,13 @@ from tactbench.core.leaderboard.board.sound import sound, table_of
 from tactbench.core.leaderboard.board.still import still
 from tactbench.core.leaderboard.board.words import cut, tame, write_words
 from tactbench.core.leaderboard.collector import collector_at_rest
+from tactbench.core.leaderboard.names import SIMULATED
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.particulars import GROUPS, TITLES
 from tactbench.core.leaderboard.table import ABSENT, LOWER_IS_BETTER, NUMERIC, Block, Section, Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.values import VALUES
+from tactbench.core.matrix.store.sharing import canonical, provenance_id
 
 Row = Mapping[str, Any]
 
@@ -40,8 +41,6 @@ MOST_LINES = 500
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
 DURATIONS = ("latency p50", "p95", "fit", "sim", "batch/row")
 """Columns that a score can be drawn against."""
-SIMULATED = "SIM (twin)"
-"""What a block's title says of simulated cells."""
 _NOTHING = frozenset({"", ABSENT})
 _HOME = "tactbench.core.leaderboard.board"
 
@@ -154,9 +153,9 @@ def _is_simulated(block: Block) -> bool:
 
 
 def _id(entry: Mapping[str, Any]) -> str:
-    """Return what rows call their provenance by (`made_by`): the digest that a store names its file with."""
+    """Return what rows call their provenance by (`made_by`); "" if it is no plain data."""
     try:
-        return hashlib.sha256(json.dumps(dict(entry), sort_keys=True).encode()).hexdigest()[:16]
+        return provenance_id(canonical(dict(entry)).encode())
     except (TypeError, ValueError, RecursionError):
         return ""
 

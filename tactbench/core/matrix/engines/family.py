@@ -65,7 +65,7 @@ def descendants(pid: int) -> list[int]:
 def adopting() -> Iterator[None]:
     """Become the parent of whatever the processes started meanwhile leave behind, and end it."""
     before = _get_subreaper()
-    strangers = set(_children(os.getpid()))
+    strangers = own_children()
     _prctl(_SET_CHILD_SUBREAPER, 1)
     try:
         yield
@@ -80,7 +80,7 @@ def bury_orphans(spared: set[int]) -> None:
     A parent that is killed hands its children on: ended generation by generation, at most as many as nobody nests.
     """
     for _ in range(64):
-        orphans = set(_children(os.getpid())) - _ours - spared
+        orphans = own_children() - _ours - spared
         if not orphans:
             return
         for pid in orphans:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import time
@@ -19,7 +18,7 @@ from tactbench.core.matrix.store.following import Following
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
 from tactbench.core.matrix.store.rows import NAMING, Row
-from tactbench.core.matrix.store.sharing import canonical
+from tactbench.core.matrix.store.sharing import canonical, provenance_id
 
 if TYPE_CHECKING:
     from tactbench.core.samples import Answers
@@ -100,7 +99,7 @@ class Store:
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Keep who computes from now on, with what, and return its id: equal provenances have equal ones."""
         text = canonical(dict(provenance))
-        name = hashlib.sha256(text.encode()).hexdigest()[:16]
+        name = provenance_id(text.encode())
         path = self.folder / "provenance" / f"{name}.json"
         with self._written():
             if not path.exists():
@@ -269,7 +268,7 @@ class Store:
             said = json.loads(content)
         except (OSError, ValueError, RecursionError):
             return {}
-        whole = hashlib.sha256(content).hexdigest()[:16] == name and isinstance(said, dict)
+        whole = provenance_id(content) == name and isinstance(said, dict)
         return said if whole else {}
 
     def recording(self, path: str, digest: str = "") -> Path | None:
@@ -283,6 +282,11 @@ class Store:
             The content digest that stands beside it in ``row["digests"]``.
         """
         return self._follow(path, digest)
+
+    def recordings(self, row: Mapping[str, Any]) -> list[tuple[str, Path | None]]:
+        """Return each recording that a row names, in its order, and its file, or None if it may not be followed."""
+        digests = row.get("digests") or [""] * len(row["recordings"])
+        return [(path, self.recording(path, digest)) for path, digest in zip(row["recordings"], digests, strict=False)]
 
     # The rest
 

@@ -25,6 +25,11 @@ def canonical(value: Any) -> str:
     return json.dumps(value, sort_keys=True)
 
 
+def provenance_id(content: bytes) -> str:
+    """Return what rows and files call a provenance by, from the bytes of its canonical text."""
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
 def digest_of(text: str) -> str:
     """Return the name under which a value is shared, from its canonical text."""
     return hashlib.sha256(text.encode()).hexdigest()[:32]
