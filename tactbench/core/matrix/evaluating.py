@@ -142,7 +142,8 @@ def _compute(
     hopeless: Iterator[tuple[Job, Any]] = (
         (job, (unanswered(job[0], job[2]), {})) for job in waiting if job[2] is not None
     )
-    computed = engine.each(work, _marked(_ordered(jobs, choice), marks, known.keys, here))
+    ordered = _ordered(jobs, choice)
+    computed = engine.each(work, _marked(ordered, marks, known.keys) if here else ordered)
     with closing(_each(hopeless, computed)) as outcomes:
         for job, outcome in outcomes:
             _entered(job[0], outcome, known, store, told, done)
@@ -168,23 +169,22 @@ def _each(*several: Iterable[tuple[Job, Any]]) -> Generator[tuple[Job, Any], Non
 
 def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
     """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
-    from tactbench.core.matrix.preloading import import_estimators, shared
+    from tactbench.core.matrix.preloading import Shared, import_estimators
 
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
         groups.setdefault((job[0].task, job[1]), []).append(job)
     if choice.shares(len(jobs)):
-        return shared(groups, choice)
+        return Shared(groups, choice)
     if choice.forks(len(jobs)):
         import_estimators([job[0] for job in jobs], choice)
     return [job for group in groups.values() for job in group]
 
 
-def _marked(jobs: Iterable[Job], marks: InFlight, keys: Mapping[str, str], here: bool) -> Iterator[Job]:
-    """Yield `jobs`; where a cell may end this process, note each before it begins."""
+def _marked(jobs: Iterable[Job], marks: InFlight, keys: Mapping[str, str]) -> Iterator[Job]:
+    """Yield `jobs`, and note each before it begins: one that ends this process is known to the next."""
     for job in jobs:
-        if here:
-            marks.set(keys[job[0].name])
+        marks.set(keys[job[0].name])
         yield job
 
 

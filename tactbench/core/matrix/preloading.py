@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from tactbench.core.evaluation.libraries import import_libraries
 from tactbench.core.matrix.engines.choice import EngineChoice
@@ -19,26 +20,45 @@ Groups = Mapping[tuple[str, tuple[Path, ...]], Sequence[Job]]
 """Cells by task and recordings."""
 
 
-def shared(groups: Groups, choice: EngineChoice) -> Iterator[Job]:
-    """Yield the cells group by group; before each group, have here what several of its cells need.
+class Shared:
+    """Yields the cells group by group; before each group, has here what several of its cells need.
 
-    Recordings that cannot be read are the trouble of their cells.
+    What it has at hand, and says so (see `tactbench.core.matrix.engines.engine.Engine`), are the cells that are left of
+    a group: the first one of the next has recordings read.
     """
-    from tactbench.core.evaluation.thread_limit import find_libraries
 
-    for (task, recordings), jobs in groups.items():
-        import_estimators([job[0] for job in jobs], choice)
-        trouble = None
-        if len(jobs) > 1 and (task, recordings) not in DATASETS:
-            # Read in a process of its own: what it does to the reader, it does not do to the run.
-            ((_, outcome),) = choice.pool(1).each(_read, [(task, recordings)])
-            if isinstance(outcome, BaseException):
-                trouble = outcome
-            else:
-                DATASETS.keep((task, recordings), outcome)
-        for cell, paths, _ in jobs:
-            find_libraries()
-            yield cell, paths, trouble
+    def __init__(self, groups: Groups, choice: EngineChoice) -> None:
+        self._groups = iter(groups.items())
+        self._choice = choice
+        self._at_hand: deque[Job] = deque()
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __length_hint__(self) -> int:
+        return len(self._at_hand)
+
+    def __next__(self) -> Job:
+        from tactbench.core.evaluation.thread_limit import find_libraries
+
+        while not self._at_hand:
+            (task, recordings), jobs = next(self._groups)
+            trouble = self._prepared(task, recordings, jobs)
+            self._at_hand += [(cell, paths, trouble) for cell, paths, _ in jobs]
+        find_libraries()
+        return self._at_hand.popleft()
+
+    def _prepared(self, task: str, recordings: tuple[Path, ...], jobs: Sequence[Job]) -> BaseException | None:
+        """Have here what several of `jobs` need; return what is wrong with that."""
+        import_estimators([job[0] for job in jobs], self._choice)
+        if len(jobs) == 1 or (task, recordings) in DATASETS:
+            return None
+        # Read in a process of its own: what it does to the reader, it does not do to the run.
+        ((_, outcome),) = self._choice.pool(1).each(_read, [(task, recordings)])
+        if isinstance(outcome, BaseException):
+            return outcome
+        DATASETS.keep((task, recordings), outcome)
+        return None
 
 
 def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Any, NoReturn
 
-from tactbench.core.matrix.engines.family import die_with_parent
+from tactbench.core.matrix.engines.family import adopt, bury_ended, die_with_parent
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.log import flush, print_to
 from tactbench.core.matrix.engines.memory import data_limit, first_to_go
@@ -35,6 +35,7 @@ def live(
         _settle(log, limits, parent)
         me = os.getpid()
         for item in items:
+            bury_ended()  # what the item before has left here
             os.ftruncate(log, 0)
             message = _carried_out(work, item, limits)
             if os.getpid() != me:
@@ -51,6 +52,7 @@ def live(
 def _settle(log: int, limits: Limits, parent: int) -> None:
     os.setsid()  # what it starts is found, and ended, by its group
     die_with_parent(parent)
+    adopt()  # what it leaves behind stays below it while it lives: nobody takes it for what another item has left
     signal.set_wakeup_fd(-1)
     for number in (signal.SIGALRM, signal.SIGCHLD, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)

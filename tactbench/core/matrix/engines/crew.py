@@ -1,104 +1,154 @@
-"""Several guarded processes at once: what `Isolated` and `Processes` share."""
+"""The processes that an engine has forked: at work, waiting to be asked, and killed but not gone yet."""
 
 from __future__ import annotations
 
+import importlib
+import os
 import time
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Any, Self
 
 from tactbench.core.matrix.engines import family
-from tactbench.core.matrix.engines.engine import R, T
 from tactbench.core.matrix.engines.guarded import PENDING, Guarded, wait_for
 from tactbench.core.matrix.engines.limits import Limits
 
+LOOK_S = 0.1
+"""How often somebody looks, at least."""
 
-def guarded(
-    work: Callable[[T], R], items: Iterable[T], jobs: int, limits: Limits, meanwhile: Callable[[], None] | None
-) -> Iterator[tuple[T, R | BaseException]]:
-    """Yield every item with what came of it, each in a process of its own, up to `jobs` at once.
 
-    The next item is taken, and its process forked, when there is room for it: what the taking has prepared in this
-    process, that process inherits.
+class Crew:
+    """Forked processes, whom nothing outlives that they have started.
+
+    Parameters
+    ----------
+    work
+        What they do with an item.
+    limits
+        What one item may take.
+    again
+        Whether a process is asked again once it is through with an item; else it is ended.
+
+    Notes
+    -----
+    A process needs a core while it is at work, and while it ends: what it holds is taken apart page by page. So does
+    this process while it forks another. Whoever keeps to `free` disturbs no item that is being timed.
     """
-    busy: dict[Guarded, T] = {}
-    coming = iter(items)
-    more = True
-    with family.adopting():
-        strangers = family.own_children()
+
+    def __init__(self, work: Callable[[Any], Any], limits: Limits, *, again: bool) -> None:
+        self._work = work
+        self._limits = limits
+        self._again = again
+        self._cores = _cores()
+        self._dying: list[Guarded] = []
+        self._instead: set[Guarded] = set()
+        self.busy: list[Guarded] = []
+        """At work."""
+        self.waiting: list[Guarded] = []
+        """Forked, and nothing asked of them."""
+
+    def __enter__(self) -> Self:
+        importlib.import_module("resource")  # once here, not once in every process
+        self._strangers = family.own_children()
+        self._before = family.adopt()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         try:
-            while more or busy:
-                while more and len(busy) < jobs:
-                    try:
-                        item = next(coming)
-                    except StopIteration:
-                        more = False
-                        break
-                    one = Guarded(work, [item], limits)
-                    busy[one] = item
-                    one.ask(0)
-                if meanwhile is not None:
-                    meanwhile()
-                    meanwhile = None
-                for one, outcome in _heard(list(busy)):
-                    item = busy.pop(one)
-                    one.number = None
-                    one.end()
-                    if not busy:
-                        family.bury_orphans(strangers)
-                    yield item, outcome
+            for one in self.busy:
+                one.give_grace()
         finally:
-            _end(list(busy))
+            with family.interrupts_held_back():
+                everyone = {*self.busy, *self.waiting, *self._dying}
+                for one in everyone:
+                    one.kill()
+                for one in everyone:
+                    one.bury()
+                family.bury_orphans(self._strangers)
+                family.adopt(self._before)
+
+    @property
+    def free(self) -> int:
+        """How many of the cores that this process may use nobody needs but itself."""
+        return self._cores - len(self.busy) - len(self._dying)
+
+    @property
+    def settled(self) -> bool:
+        """Whether whoever was killed is gone."""
+        return not self._dying
+
+    def fork(self, items: Sequence[Any]) -> None:
+        """Have one more process wait, that may be asked for any of `items`."""
+        with family.interrupts_held_back():
+            self.waiting.append(Guarded(self._work, items, self._limits))
+
+    def ask(self, number: int) -> None:
+        """Have the process that was forked last carry out its item `number`."""
+        one = self.waiting[-1]
+        self.busy.append(one)
+        self.waiting.pop()
+        one.ask(number)
+
+    def heard(self) -> list[tuple[Any, Any]]:
+        """Wait until something may have happened; return each item that is through, and what came of it.
+
+        A process that ended before it had begun costs no item: another one is asked, once.
+        """
+        self._listen()
+        for one in [one for one in self._dying if one.gone()]:
+            self._let_go(one)
+        found = []
+        for one in list(self.busy):
+            outcome = one.look()
+            if outcome is PENDING:
+                continue
+            assert one.number is not None
+            item = one.items[one.number]
+            if one.pid == 0 and not one.begun and one not in self._instead:
+                self._replace(one, one.number)
+            else:
+                self._dismiss(one)
+                found.append((item, outcome))
+        return found
+
+    def _listen(self) -> None:
+        now_s = time.monotonic()
+        ears = [one.link for one in self.busy] + [one.ended for one in (*self.busy, *self._dying)]
+        wait_for([ear for ear in ears if ear >= 0], min([LOOK_S, *(one.waits_s(now_s) for one in self.busy)]))
+
+    def _dismiss(self, one: Guarded) -> None:
+        """End what is left of an item that is over; have its process wait, or end it."""
+        self._instead.discard(one)
+        if one.pid == 0:
+            self._dying.append(one)
+            self.busy.remove(one)
+            self._let_go(one)
+        elif self._again:
+            one.tidy()
+            self.waiting.append(one)
+            self.busy.remove(one)
+        else:
+            one.kill()
+            self._dying.append(one)
+            self.busy.remove(one)
+            if one.gone():
+                self._let_go(one)
+
+    def _let_go(self, one: Guarded) -> None:
+        """Bury a process that is over, with those that it has left behind: nobody else's are below this process."""
+        one.bury()
+        self._dying.remove(one)
+        family.bury_orphans(self._strangers)
+
+    def _replace(self, one: Guarded, number: int) -> None:
+        self.busy.remove(one)
+        self.fork(one.items)
+        self._instead.add(self.waiting[-1])
+        self.ask(number)
 
 
-def reused(
-    work: Callable[[T], R], items: Iterable[T], jobs: int, limits: Limits, meanwhile: Callable[[], None] | None
-) -> Iterator[tuple[T, R | BaseException]]:
-    """Yield every item with what came of it, from up to `jobs` processes that are used again and again.
-
-    One that ends with an item has the others done by another.
-    """
-    every = list(items)
-    waiting = list(range(len(every)))[::-1]
-    crew: list[Guarded] = []
-    with family.adopting():
-        try:
-            while waiting or any(one.number is not None for one in crew):
-                idle = [one for one in crew if one.number is None]
-                while waiting and (idle or len(crew) < jobs):
-                    if idle:
-                        one = idle.pop()
-                    else:
-                        one = Guarded(work, every, limits)
-                        crew.append(one)
-                    one.ask(waiting.pop())
-                if meanwhile is not None:
-                    meanwhile()
-                    meanwhile = None
-                for one, outcome in _heard([one for one in crew if one.number is not None]):
-                    number, one.number = one.number, None
-                    if one.pid:
-                        one.tidy()
-                    else:
-                        crew.remove(one)
-                    assert number is not None
-                    yield every[number], outcome
-        finally:
-            _end(crew)
-
-
-def _heard(busy: list[Guarded]) -> Iterator[tuple[Guarded, Any]]:
-    """Wait until something may have happened; yield each process that is through with its item, and what came of it."""
-    if not busy:
-        return
-    now_s = time.monotonic()
-    ears = [one.link for one in busy] + [one.ended for one in busy if one.ended >= 0]
-    wait_for(ears, min(one.waits_s(now_s) for one in busy))
-    for one in busy:
-        outcome = one.look()
-        if outcome is not PENDING:
-            yield one, outcome
-
-
-def _end(crew: list[Guarded]) -> None:
-    for one in crew:
-        one.end()
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

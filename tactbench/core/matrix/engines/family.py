@@ -14,6 +14,9 @@ from typing import Any
 # prctl(2)
 _SET_PDEATHSIG, _SET_CHILD_SUBREAPER, _GET_CHILD_SUBREAPER = 1, 36, 37
 
+_GENERATIONS = 64
+"""Of processes that leave each other behind: as many as nobody nests."""
+
 _ours: set[int] = set()
 """Processes that engines of this process have started and not yet buried."""
 
@@ -42,15 +45,44 @@ def born(pid: int) -> None:
     _ours.add(pid)
 
 
-def end_group(pid: int) -> int:
-    """Kill what is left of a process and of its group; return its wait status."""
+def kill(pid: int) -> None:
+    """Kill what is left of a process, of its group, and of whatever is below it."""
+    kill_below(pid)  # first: what is below a process that has ended is below another one then
     with suppress(ProcessLookupError, PermissionError):
         os.killpg(pid, signal.SIGKILL)
     with suppress(ProcessLookupError, PermissionError):
         os.kill(pid, signal.SIGKILL)  # it may not have founded its group yet
+
+
+def kill_below(pid: int) -> None:
+    """Kill the processes below `pid`.
+
+    Who is killed starts nobody any more, but may have done so while we looked: there may be another generation, at
+    most as many as nobody nests.
+    """
+    known: set[int] = set()
+    for _ in range(_GENERATIONS):
+        found = set(descendants(pid)) - known
+        if not found:
+            return
+        for one in found:
+            with suppress(ProcessLookupError, PermissionError):
+                os.kill(one, signal.SIGKILL)
+        known |= found
+
+
+def buried(pid: int) -> int:
+    """Wait for the end of a process that an engine has started; return its wait status."""
     _, status = os.waitpid(pid, 0)
     _ours.discard(pid)
     return status
+
+
+def bury_ended() -> None:
+    """Bury the children of this process that have ended."""
+    with suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
 
 
 def descendants(pid: int) -> list[int]:
@@ -61,25 +93,19 @@ def descendants(pid: int) -> list[int]:
     return found
 
 
-@contextmanager
-def adopting() -> Iterator[None]:
-    """Become the parent of whatever the processes started meanwhile leave behind, and end it."""
+def adopt(whether: int = 1) -> int:
+    """Have this process become the parent of what is left behind below it, or not; return what it was before."""
     before = _get_subreaper()
-    strangers = own_children()
-    _prctl(_SET_CHILD_SUBREAPER, 1)
-    try:
-        yield
-    finally:
-        bury_orphans(strangers)
-        _prctl(_SET_CHILD_SUBREAPER, before)
+    _prctl(_SET_CHILD_SUBREAPER, whether)
+    return before
 
 
 def bury_orphans(spared: set[int]) -> None:
-    """End children that nobody here has started, except those `spared`: a cell that is over has left them behind.
+    """End children that no engine here has started, except those `spared`: an item that is over has left them behind.
 
-    A parent that is killed hands its children on: ended generation by generation, at most as many as nobody nests.
+    A parent that is killed hands its children on: ended generation by generation.
     """
-    for _ in range(64):
+    for _ in range(_GENERATIONS):
         orphans = own_children() - _ours - spared
         if not orphans:
             return

@@ -6,7 +6,7 @@ import os
 import select
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -19,6 +19,10 @@ from tactbench.core.matrix.engines.message import Inbox, Message, Told, ask, ask
 
 WORD_S = 0.1
 """Seconds that a process which is about to be ended has to say where it is."""
+
+
+_open: set[int] = set()
+"""Descriptors by which this process looks after others: none of theirs, and one that is forked closes them."""
 
 
 class Guarded:
@@ -34,9 +38,12 @@ class Guarded:
         What one item may take.
     """
 
-    def __init__(self, work: Callable[[Any], Any], items: list[Any], limits: Limits) -> None:
+    def __init__(self, work: Callable[[Any], Any], items: Sequence[Any], limits: Limits) -> None:
+        self.items = items
         self.number: int | None = None
         """The item it is busy with."""
+        self.begun = False
+        """Whether it had begun with that, known once it is buried."""
         self._limits = limits
         self._log = open_log()
         self._last = ""
@@ -44,34 +51,36 @@ class Guarded:
         self._inbox = Inbox()
         self._stopped: CellStopped | None = None
         """Why this process was told to end."""
-        link, theirs = os.pipe()
-        their_orders, orders = os.pipe()
+        self.link, theirs = os.pipe()
+        self._unread, self._orders = os.pipe()
         flush()
         parent = os.getpid()
-        with family.interrupts_held_back():
-            self.pid = os.fork()
-            if self.pid == 0:
-                os.close(link)
-                os.close(orders)
-                live(work, _ordered(items, their_orders), theirs, self._log, limits, parent)
-            family.born(self.pid)
+        self.pid = os.fork()
+        if self.pid == 0:
+            for descriptor in (*_open, self.link, self._orders):
+                os.close(descriptor)
+            _open.clear()
+            live(work, _ordered(items, self._unread), theirs, self._log, limits, parent)
+        family.born(self.pid)
         os.close(theirs)
-        os.close(their_orders)
-        os.set_blocking(link, False)
-        self.link, self._orders = link, orders
+        os.set_blocking(self.link, False)
         self.ended = os.pidfd_open(self.pid) if hasattr(os, "pidfd_open") else -1
         """Becomes readable when the process is over; -1 where the system has no such thing."""
+        self._descriptors = {self.link, self._unread, self._orders, self._log, self.ended} - {-1}
+        _open.update(self._descriptors)
         self._began_mb = memory.resident_mb(parent)
-        self._kills = memory.oom_kills()
+        self._kills = -1
+        """Processes that the system had ended for want of memory when this one was first asked."""
 
     def ask(self, number: int) -> None:
-        """Have it carry out item `number`."""
+        """Have it carry out item `number`, which may take what it may from now on."""
         self.number = number
+        self._began_mb = max(self._began_mb, memory.resident_mb(self.pid))
         self._began_s = time.monotonic()
         self._ends_s = None if self._limits.timeout_s is None else self._began_s + self._limits.timeout_s
-        self._began_mb = max(self._began_mb, memory.resident_mb(self.pid))
-        with suppress(BrokenPipeError):  # it is over already: what it says or does not say will tell
-            ask(self._orders, number)
+        ask(self._orders, number)
+        if self._kills < 0:
+            self._kills = memory.oom_kills()
 
     def waits_s(self, now_s: float) -> float:
         """Return the seconds until this process must be looked at again, at most."""
@@ -112,7 +121,8 @@ class Guarded:
 
     def _over(self) -> CellStopped:
         """Say why the process ended without a result, and bury it."""
-        status = self._bury()
+        self.kill()
+        status = self.bury()
         if self._stopped is not None:
             return self._with_log(self._stopped)
         return verdict.crashed(status, self._printed(), memory_was_short=memory.oom_kills() > self._kills)
@@ -164,26 +174,36 @@ class Guarded:
 
     def tidy(self) -> None:
         """End what an item that is over has left running below this process."""
-        for pid in family.descendants(self.pid):
-            with suppress(ProcessLookupError, PermissionError):
-                os.kill(pid, signal.SIGKILL)
+        self.number = None
+        family.kill_below(self.pid)
 
-    def end(self) -> None:
-        """End the process: at once, or after the time it has to close what is open."""
+    def give_grace(self) -> None:
+        """Leave it the time that it has to close what is open."""
         if self.pid and self.number is not None and self._limits.grace_s and self.ended >= 0:
             self._please_end(time.monotonic())
             wait_for([self.ended], self._limits.grace_s)
-        self._bury()
 
-    def _bury(self) -> int:
+    def kill(self) -> None:
+        """Have it end, and whatever it has started; how long that takes nobody knows."""
+        if self.pid:
+            family.kill(self.pid)
+
+    def gone(self) -> bool:
+        """Return whether it is over, as far as the system tells; then burying it takes no time."""
+        return self.ended < 0 or wait_for([self.ended], 0)
+
+    def bury(self) -> int:
+        """Wait for the end of the process and let go of it; return its wait status."""
         if not self.pid:
             return 0
-        status = family.end_group(self.pid)
+        with family.interrupts_held_back():
+            status = family.buried(self.pid)
+            self.pid = 0
         self._last = tail(self._log)
-        self.pid = 0
-        for descriptor in (self.link, self._orders, self.ended, self._log):
-            if descriptor >= 0:
-                os.close(descriptor)
+        self.begun = not wait_for([self._unread], 0)
+        for descriptor in self._descriptors:
+            os.close(descriptor)
+        _open.difference_update(self._descriptors)
         return status
 
     def _printed(self) -> str:
@@ -205,7 +225,7 @@ class Pending:
 PENDING = Pending()
 
 
-def _ordered(items: list[Any], orders: int) -> Iterator[Any]:
+def _ordered(items: Sequence[Any], orders: int) -> Iterator[Any]:
     """Yield the items that the parent asks for, until it asks for no more."""
     while (number := asked(orders)) is not None:
         yield items[number]

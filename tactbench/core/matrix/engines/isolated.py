@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from operator import length_hint
 
-from tactbench.core.matrix.engines.crew import guarded
+from tactbench.core.matrix.engines.crew import Crew
 from tactbench.core.matrix.engines.engine import R, T
 from tactbench.core.matrix.engines.limits import UNLIMITED, Limits
 
@@ -23,6 +24,9 @@ class Isolated:
     -----
     The calling process must be its only thread. What it holds when an item is taken, libraries and recordings, its
     child shares until one of the two writes to it.
+
+    Where there are more cores than jobs, an item that is at hand is taken, and its process forked, while others are at
+    work; and nobody waits until a process that was killed is gone.
     """
 
     def __init__(self, jobs: int = 1, limits: Limits = UNLIMITED) -> None:
@@ -33,4 +37,33 @@ class Isolated:
         self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
     ) -> Iterator[tuple[T, R | BaseException]]:
         """Yield every item with its result or what stopped it, in the order in which they end."""
-        return guarded(work, items, self._jobs, self._limits, meanwhile)
+        coming = iter(items)
+        more = True
+        with Crew(work, self._limits, again=False) as crew:
+            while True:
+                while (more or crew.waiting) and len(crew.busy) < self._jobs and (crew.free > 0 or crew.settled):
+                    if not crew.waiting:
+                        more = _forked(crew, coming)
+                    if crew.waiting:
+                        crew.ask(0)
+                if more and not crew.waiting and crew.free > 0 and length_hint(coming) > 0:
+                    more = _forked(crew, coming)
+                if not (more or crew.waiting or crew.busy):
+                    return
+                if meanwhile is not None:
+                    meanwhile()
+                    meanwhile = None
+                for heard in crew.heard():
+                    if crew.waiting and crew.free > 1:  # one for it, and one for whoever hears of this outcome
+                        crew.ask(0)
+                    yield heard
+
+
+def _forked(crew: Crew, coming: Iterator[T]) -> bool:
+    """Fork a process for the next item; return whether there was one."""
+    try:
+        item = next(coming)
+    except StopIteration:
+        return False
+    crew.fork([item])
+    return True
