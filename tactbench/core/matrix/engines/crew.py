@@ -39,7 +39,7 @@ class Crew:
         self._work = work
         self._limits = limits
         self._again = again
-        self._cores = _cores()
+        self._cores = cores()
         self._dying: list[Guarded] = []
         self._instead: set[Guarded] = set()
         self.busy: list[Guarded] = []
@@ -149,6 +149,6 @@ class Crew:
         self.ask(number)
 
 
-def _cores() -> int:
+def cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -199,11 +199,11 @@ class Guarded:
         with family.interrupts_held_back():
             status = family.buried(self.pid)
             self.pid = 0
-        self._last = tail(self._log)
-        self.begun = not wait_for([self._unread], 0)
-        for descriptor in self._descriptors:
-            os.close(descriptor)
-        _open.difference_update(self._descriptors)
+            self._last = tail(self._log)
+            self.begun = not wait_for([self._unread], 0)
+            for descriptor in self._descriptors:
+                os.close(descriptor)
+            _open.difference_update(self._descriptors)
         return status
 
     def _printed(self) -> str:

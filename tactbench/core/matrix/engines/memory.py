@@ -68,7 +68,9 @@ def oom_kills() -> int:
 def first_to_go() -> None:
     """Have the system end this process before any that has not said so, if memory is short."""
     with suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text("1000")
+        adjustment = os.open("/proc/self/oom_score_adj", os.O_WRONLY)  # a file of Python's would cost five times that
+        os.write(adjustment, b"1000")
+        os.close(adjustment)
 
 
 @lru_cache(maxsize=1)

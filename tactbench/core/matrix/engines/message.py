@@ -100,10 +100,14 @@ class Inbox:
 
 def ask(link: int, number: int) -> None:
     """Ask the process at the other end for item `number`."""
-    os.write(link, _NUMBER.pack(number))
+    os.write(link, _NUMBER.pack(number) + b"!")
 
 
 def asked(link: int) -> int | None:
-    """Return the number of the item asked for; None when there are no more."""
+    """Return the number of the item asked for; None when there are no more.
+
+    The last byte is read apart: who is killed while it waits may still be handed what it waits for, but reads no more.
+    As long as there is something to read at `link`, the item has not begun.
+    """
     content = os.read(link, _NUMBER.size)
-    return _NUMBER.unpack(content)[0] if len(content) == _NUMBER.size else None
+    return _NUMBER.unpack(content)[0] if len(content) == _NUMBER.size and os.read(link, 1) else None

@@ -1,0 +1,234 @@
+"""Who is there beside an item at work: the next one's process, what the last one left behind, and nobody at the end."""
+
+import os
+import signal
+import time
+
+import pytest
+
+from tactbench.core.errors import Crashed, OutOfMemory
+from tactbench.core.matrix.engines import family
+from tactbench.core.matrix.engines.isolated import Isolated
+from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.engines.processes import Processes
+from tests.core.matrix.engines.patience import gone, pause, until
+from tests.core.matrix.engines.works import flees, leaves, work
+
+CORES = sorted(os.sched_getaffinity(0))
+needs_two_cores = pytest.mark.skipif(len(CORES) < 2, reason="nothing is done beside an item where no core is free")
+LIMITS = Limits(timeout_s=20.0, memory_mb=64)
+ENGINES = {
+    "isolated": lambda: Isolated(1, LIMITS),
+    "isolated-2": lambda: Isolated(2, LIMITS),
+    "reused": lambda: Processes(1, LIMITS),
+    "reused-2": lambda: Processes(2, LIMITS),
+}
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request):
+    return ENGINES[request.param]()
+
+
+@pytest.fixture
+def one_core():
+    """As on a machine with one core: nothing is done ahead."""
+    os.sched_setaffinity(0, CORES[:1])
+    yield
+    os.sched_setaffinity(0, CORES)
+
+
+@pytest.fixture(autouse=True)
+def nobody_and_nothing_left():
+    """Whatever a test does: no process and no descriptor stays."""
+    children, descriptors = family.own_children(), os.listdir("/proc/self/fd")
+    yield
+    assert family.own_children() == children
+    assert len(os.listdir("/proc/self/fd")) <= len(descriptors)
+
+
+class Handed:
+    """Hands out items, says that so many are at hand, and remembers how many outcomes were heard before each."""
+
+    def __init__(self, items, at_hand):
+        self.items, self.at_hand, self.heard, self.when = list(items), at_hand, 0, []
+
+    def __iter__(self):
+        return self
+
+    def __length_hint__(self):
+        return min(self.at_hand, len(self.items))
+
+    def __next__(self):
+        if not self.items:
+            raise StopIteration
+        self.when.append(self.heard)
+        return self.items.pop(0)
+
+
+def taken(at_hand):
+    """Return how many outcomes were heard before each of four items was taken."""
+    handed = Handed(range(4), at_hand)
+    for _ in Isolated(1).each(lambda item: pause.wait(0.1), handed):
+        handed.heard += 1
+    return handed.when
+
+
+def test_an_item_whose_taking_is_work_is_not_taken_beside_another():
+    assert taken(0) == [0, 1, 2, 3]
+
+
+@needs_two_cores
+def test_an_item_that_is_at_hand_is_taken_while_the_one_before_is_at_work():
+    assert taken(4) == [0, 0, 1, 2]
+
+
+def test_without_a_core_for_it_nothing_is_done_ahead(one_core):
+    assert taken(4) == [0, 1, 2, 3]
+
+
+def test_what_an_item_has_left_is_ended_while_others_are_at_work_and_theirs_is_not(engine, tmp_path):
+    left = tmp_path / "left"
+
+    def works(item):
+        if item == "leaves":
+            (tmp_path / "unnamed").write_text(f"{leaves()} {flees()}")
+            (tmp_path / "unnamed").rename(left)
+            return True
+        own = leaves(), flees()
+        assert until(left.exists)
+        assert until(lambda: all(gone(pid) for pid in left.read_text().split()))
+        pause.wait(0.1)  # for whoever might take ours for those
+        return not any(gone(pid) for pid in own)
+
+    assert dict(engine.each(works, ["leaves", "watches", "looks"])) == {"leaves": True, "watches": True, "looks": True}
+
+
+def test_what_an_item_left_that_crashed_is_ended_while_others_are_at_work(engine, tmp_path):
+    left = tmp_path / "left"
+
+    def works(item):
+        if item == "crashes":
+            (tmp_path / "unnamed").write_text(f"{leaves()} {flees()}")
+            (tmp_path / "unnamed").rename(left)
+            os.abort()
+        assert until(left.exists)
+        return until(lambda: all(gone(pid) for pid in left.read_text().split()))
+
+    found = dict(engine.each(works, ["crashes", "watches", "looks"]))
+    assert type(found.pop("crashes")) is Crashed
+    assert found == {"watches": True, "looks": True}
+
+
+@pytest.mark.parametrize("heard", [0, 1, 2])
+def test_an_iteration_given_up_leaves_nobody(engine, heard):
+    running = engine.each(work, ["fine", "flees", "leaves", "hangs", "fine"])
+    for _ in range(heard):
+        next(running)
+    running.close()
+
+
+@pytest.mark.filterwarnings("ignore:Exception ignored in. <_io.FileIO")  # one just opened closes itself
+@pytest.mark.parametrize("after_s", [n / 500 for n in range(1, 25)])
+def test_ctrl_c_leaves_nobody_whenever_it_comes(engine, after_s):
+    before = signal.signal(signal.SIGALRM, lambda number, frame: signal.raise_signal(signal.SIGINT))
+    signal.setitimer(signal.ITIMER_REAL, after_s)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            for _ in engine.each(work, ["fine"] * 10_000):
+                pass
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+
+@needs_two_cores
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_a_process_that_ends_before_it_is_asked_costs_no_item(number):
+    def works(item):
+        if item == "alone":
+            return True
+        beside = []
+
+        def found():
+            with open(f"/proc/{os.getppid()}/task/{os.getppid()}/children") as file:
+                beside[:] = {int(word) for word in file.read().split()} - {os.getpid()}
+            return bool(beside)
+
+        assert until(found)
+        for pid in beside:
+            os.kill(pid, number)
+        return until(lambda: all(gone(pid) for pid in beside))
+
+    assert dict(Isolated(1).each(works, ["first", "second", "alone"])) == {"first": True, "second": True, "alone": True}
+
+
+def test_a_process_that_ends_between_two_items_costs_none(one_core):
+    pids = []
+    for _, pid in Processes(1).each(work, ["whoami"] * 4):
+        pids.append(pid)
+        os.kill(pid, signal.SIGKILL)
+    assert len(set(pids)) == 4
+    assert all(isinstance(pid, int) for pid in pids)
+
+
+def test_an_item_that_ends_every_process_ends_two_at_most():
+    """One that cannot even begin is not tried for ever."""
+
+    def works(item):
+        return item
+
+    ends = os.getpid()
+    os.register_at_fork(after_in_child=lambda: os._exit(7) if ends and os.getppid() == ends else None)
+    try:
+        ((_, outcome),) = Isolated(1).each(works, ["item"])
+    finally:
+        ends = 0
+    assert type(outcome) is Crashed
+    assert "exit code 7" in str(outcome)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_memory_is_limited_as_it_is_without_anybody_ahead(name):
+    asked = ["fine", "eats", "fine", "eats", "prints"]
+    found = list(ENGINES[name]().each(work, asked))
+    assert sorted(item for item, _ in found) == sorted(asked)
+    ended = [type(outcome) is OutOfMemory for item, outcome in found if item == "eats"]
+    assert ended == [True, True]
+    assert {outcome for item, outcome in found if item != "eats"} == {"fine", "printed"}
+
+
+def test_limits_begin_with_the_item_and_not_with_its_process():
+    engine = Isolated(1, Limits(timeout_s=0.6, memory_mb=64))
+    grown = []
+    for _, outcome in engine.each(lambda item: pause.wait(0.35), range(4)):
+        assert outcome is False
+        grown.append(bytearray(b"\1" * (100 * 2**20)))  # what this process holds, none of its children took
+
+
+def test_the_next_item_of_a_reused_process_begins_before_the_last_outcome_is_dealt_with(tmp_path):
+    if len(CORES) < 2:
+        pytest.skip("no core is free for it")
+    running = Processes(1).each(lambda path: path.write_text("begun"), [tmp_path / "one", tmp_path / "two"])
+    next(running)
+    assert until((tmp_path / "two").exists)
+    assert [path.name for path, _ in running] == ["two"]
+
+
+def test_with_a_device_to_close_no_item_begins_before_the_last_outcome_is_dealt_with(tmp_path):
+    engine = Processes(1, Limits(grace_s=5.0))
+    running = engine.each(lambda path: path.write_text("begun"), [tmp_path / "one", tmp_path / "two"])
+    next(running)
+    pause.wait(0.2)
+    assert not (tmp_path / "two").exists()
+    running.close()
+    assert not (tmp_path / "two").exists()
+
+
+def test_an_item_that_ends_its_process_costs_itself_only_also_where_the_next_was_asked_for_already():
+    for ends in ("aborts", "vanishes", "kills"):
+        began = time.monotonic()
+        found = list(Processes(1).each(work, ["fine", ends, "fine", ends, "prints"]))
+        assert [(item, type(outcome) is Crashed) for item, outcome in found] == [
+            ("fine", False), (ends, True), ("fine", False), (ends, True), ("prints", False),
+        ]  # fmt: skip
+        assert time.monotonic() - began < 20
