@@ -23,7 +23,7 @@ from pathlib import Path
 import forest_peer
 import trivial
 
-from tactbench.core.matrix.engines import crew
+from tactbench.core.matrix.engines import cores
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.engines.family import can_fork
 from tactbench.core.matrix.run import carry_out
@@ -47,7 +47,7 @@ def main() -> None:
     repeats = int(sys.argv[2]) if len(sys.argv) > 2 else 2
     if not can_fork():
         sys.exit("This process has threads: set OMP_NUM_THREADS=1.")
-    ways: dict[str, Callable[[], int]] = {"beside": crew.cores, "alone": lambda: 1}
+    ways: dict[str, Callable[[], int]] = {"beside": cores.cores, "alone": lambda: 1}
     found: dict[str, dict[tuple[str, str], list[float]]] = {name: defaultdict(list) for name in ways}
     whole: dict[str, list[float]] = {name: [] for name in ways}
     with tempfile.TemporaryDirectory() as made:
@@ -56,7 +56,7 @@ def main() -> None:
         trivial.use(folder)
         for turn in range(rounds + 1):
             for name in sorted(ways, reverse=bool(turn % 2)):
-                crew.cores = ways[name]  # type: ignore[assignment]
+                cores.cores = ways[name]
                 began = time.perf_counter()
                 with Store(folder / f"{name}-{turn}").hold() as store:
                     rows = carry_out(matrix(repeats), store, choice=EngineChoice("isolated"),

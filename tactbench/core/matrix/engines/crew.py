@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import importlib
-import os
 import time
 from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from tactbench.core.matrix.engines import family
+from tactbench.core.matrix.engines import cores, family
 from tactbench.core.matrix.engines.guarded import PENDING, Guarded, wait_for
 from tactbench.core.matrix.engines.limits import Limits
 
@@ -39,7 +38,7 @@ class Crew:
         self._work = work
         self._limits = limits
         self._again = again
-        self._cores = cores()
+        self._cores = cores.cores()
         self._dying: list[Guarded] = []
         self._instead: set[Guarded] = set()
         self.busy: list[Guarded] = []
@@ -71,8 +70,9 @@ class Crew:
 
     @property
     def free(self) -> int:
-        """How many of the cores that this process may use nobody needs but itself."""
-        return self._cores - len(self.busy) - len(self._dying)
+        """How many of the cores that this process may use nobody needs but itself, other programs included."""
+        ours = len(self.busy) + len(self._dying)
+        return self._cores - (ours if ours >= self._cores else max(ours, cores.wanted() - 1))
 
     @property
     def settled(self) -> bool:
@@ -147,8 +147,3 @@ class Crew:
         self.fork(one.items)
         self._instead.add(self.waiting[-1])
         self.ask(number)
-
-
-def cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -3,11 +3,12 @@
 import os
 import signal
 import time
+from pathlib import Path
 
 import pytest
 
 from tactbench.core.errors import Crashed, OutOfMemory
-from tactbench.core.matrix.engines import family
+from tactbench.core.matrix.engines import cores, family
 from tactbench.core.matrix.engines.isolated import Isolated
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.processes import Processes
@@ -15,7 +16,6 @@ from tests.core.matrix.engines.patience import gone, pause, until
 from tests.core.matrix.engines.works import flees, leaves, work
 
 CORES = sorted(os.sched_getaffinity(0))
-needs_two_cores = pytest.mark.skipif(len(CORES) < 2, reason="nothing is done beside an item where no core is free")
 LIMITS = Limits(timeout_s=20.0, memory_mb=64)
 ENGINES = {
     "isolated": lambda: Isolated(1, LIMITS),
@@ -25,9 +25,13 @@ ENGINES = {
 }
 
 
-@pytest.fixture(params=ENGINES)
-def engine(request):
-    return ENGINES[request.param]()
+@pytest.fixture(params=[(name, free) for name in ENGINES for free in (False, True)], ids=str)
+def engine(request, monkeypatch):
+    """Every engine, as this machine is now and as where cores are always free."""
+    name, free = request.param
+    if free:
+        monkeypatch.setattr(cores, "cores", lambda: 1000)
+    return ENGINES[name]()
 
 
 @pytest.fixture
@@ -38,13 +42,20 @@ def one_core():
     os.sched_setaffinity(0, CORES)
 
 
+@pytest.fixture
+def free_cores(monkeypatch):
+    """As on a machine where cores are always free: what is done ahead is done."""
+    monkeypatch.setattr(cores, "cores", lambda: 1000)
+
+
 @pytest.fixture(autouse=True)
 def nobody_and_nothing_left():
     """Whatever a test does: no process and no descriptor stays."""
-    children, descriptors = family.own_children(), os.listdir("/proc/self/fd")
+    open_ones = Path("/proc/self/fd")
+    children, descriptors = family.own_children(), len(list(open_ones.iterdir()))
     yield
     assert family.own_children() == children
-    assert len(os.listdir("/proc/self/fd")) <= len(descriptors)
+    assert len(list(open_ones.iterdir())) <= descriptors
 
 
 class Handed:
@@ -78,8 +89,7 @@ def test_an_item_whose_taking_is_work_is_not_taken_beside_another():
     assert taken(0) == [0, 1, 2, 3]
 
 
-@needs_two_cores
-def test_an_item_that_is_at_hand_is_taken_while_the_one_before_is_at_work():
+def test_an_item_that_is_at_hand_is_taken_while_the_one_before_is_at_work(free_cores):
     assert taken(4) == [0, 0, 1, 2]
 
 
@@ -129,7 +139,7 @@ def test_an_iteration_given_up_leaves_nobody(engine, heard):
 
 
 @pytest.mark.filterwarnings("ignore:Exception ignored in. <_io.FileIO")  # one just opened closes itself
-@pytest.mark.parametrize("after_s", [n / 500 for n in range(1, 25)])
+@pytest.mark.parametrize("after_s", [n / 200 for n in range(1, 13)])
 def test_ctrl_c_leaves_nobody_whenever_it_comes(engine, after_s):
     before = signal.signal(signal.SIGALRM, lambda number, frame: signal.raise_signal(signal.SIGINT))
     signal.setitimer(signal.ITIMER_REAL, after_s)
@@ -141,17 +151,16 @@ def test_ctrl_c_leaves_nobody_whenever_it_comes(engine, after_s):
         signal.signal(signal.SIGALRM, before)
 
 
-@needs_two_cores
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_a_process_that_ends_before_it_is_asked_costs_no_item(number):
+def test_a_process_that_ends_before_it_is_asked_costs_no_item(number, free_cores):
     def works(item):
         if item == "alone":
             return True
         beside = []
 
         def found():
-            with open(f"/proc/{os.getppid()}/task/{os.getppid()}/children") as file:
-                beside[:] = {int(word) for word in file.read().split()} - {os.getpid()}
+            children = Path(f"/proc/{os.getppid()}/task/{os.getppid()}/children").read_text().split()
+            beside[:] = {int(pid) for pid in children} - {os.getpid()}
             return bool(beside)
 
         assert until(found)
@@ -188,7 +197,7 @@ def test_an_item_that_ends_every_process_ends_two_at_most():
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_memory_is_limited_as_it_is_without_anybody_ahead(name):
+def test_memory_is_limited_as_it_is_without_anybody_ahead(name, free_cores):
     asked = ["fine", "eats", "fine", "eats", "prints"]
     found = list(ENGINES[name]().each(work, asked))
     assert sorted(item for item, _ in found) == sorted(asked)
@@ -197,7 +206,7 @@ def test_memory_is_limited_as_it_is_without_anybody_ahead(name):
     assert {outcome for item, outcome in found if item != "eats"} == {"fine", "printed"}
 
 
-def test_limits_begin_with_the_item_and_not_with_its_process():
+def test_limits_begin_with_the_item_and_not_with_its_process(free_cores):
     engine = Isolated(1, Limits(timeout_s=0.6, memory_mb=64))
     grown = []
     for _, outcome in engine.each(lambda item: pause.wait(0.35), range(4)):
@@ -205,16 +214,14 @@ def test_limits_begin_with_the_item_and_not_with_its_process():
         grown.append(bytearray(b"\1" * (100 * 2**20)))  # what this process holds, none of its children took
 
 
-def test_the_next_item_of_a_reused_process_begins_before_the_last_outcome_is_dealt_with(tmp_path):
-    if len(CORES) < 2:
-        pytest.skip("no core is free for it")
+def test_the_next_item_of_a_reused_process_begins_before_the_last_outcome_is_dealt_with(tmp_path, free_cores):
     running = Processes(1).each(lambda path: path.write_text("begun"), [tmp_path / "one", tmp_path / "two"])
     next(running)
     assert until((tmp_path / "two").exists)
     assert [path.name for path, _ in running] == ["two"]
 
 
-def test_with_a_device_to_close_no_item_begins_before_the_last_outcome_is_dealt_with(tmp_path):
+def test_with_a_device_to_close_no_item_begins_before_the_last_outcome_is_dealt_with(tmp_path, free_cores):
     engine = Processes(1, Limits(grace_s=5.0))
     running = engine.each(lambda path: path.write_text("begun"), [tmp_path / "one", tmp_path / "two"])
     next(running)
@@ -224,7 +231,7 @@ def test_with_a_device_to_close_no_item_begins_before_the_last_outcome_is_dealt_
     assert not (tmp_path / "two").exists()
 
 
-def test_an_item_that_ends_its_process_costs_itself_only_also_where_the_next_was_asked_for_already():
+def test_an_item_that_ends_its_process_costs_itself_only_also_where_the_next_was_asked_for_already(free_cores):
     for ends in ("aborts", "vanishes", "kills"):
         began = time.monotonic()
         found = list(Processes(1).each(work, ["fine", ends, "fine", ends, "prints"]))
