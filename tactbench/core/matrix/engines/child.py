@@ -9,7 +9,8 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -25,13 +26,22 @@ WHERE_ARE_YOU = getattr(signal, "SIGUSR2", None)
 
 
 def live(
-    work: Callable[[Any], Any], items: Iterator[Any], link: int, log: int, limits: Limits, parent: int
+    work: Callable[[Any], Any],
+    items: Iterator[Any],
+    link: int,
+    log: int,
+    limits: Limits,
+    parent: int,
+    foreign: Iterable[int],
 ) -> NoReturn:
     """Carry out `work` for each of `items` and send what comes of each over `link`; never return.
 
-    `parent` is the process that forked this one.
+    `parent` is the process that forked this one, `foreign` are descriptors that are its own business.
     """
     try:
+        for descriptor in foreign:
+            with suppress(OSError):
+                os.close(descriptor)
         _settle(log, limits, parent)
         me = os.getpid()
         for item in items:

@@ -20,9 +20,8 @@ from tactbench.core.matrix.engines.message import Inbox, Message, Told, ask, ask
 WORD_S = 0.1
 """Seconds that a process which is about to be ended has to say where it is."""
 
-
 _open: set[int] = set()
-"""Descriptors by which this process looks after others: none of theirs, and one that is forked closes them."""
+"""Descriptors by which this process looks after others: one that is forked closes them."""
 
 
 class Guarded:
@@ -57,10 +56,9 @@ class Guarded:
         parent = os.getpid()
         self.pid = os.fork()
         if self.pid == 0:
-            for descriptor in (*_open, self.link, self._orders):
-                os.close(descriptor)
+            ours = (*_open, self.link, self._orders)
             _open.clear()
-            live(work, _ordered(items, self._unread), theirs, self._log, limits, parent)
+            live(work, _ordered(items, self._unread), theirs, self._log, limits, parent, ours)
         family.born(self.pid)
         os.close(theirs)
         os.set_blocking(self.link, False)
