@@ -15,12 +15,12 @@ from tactbench.core.matrix.explanation import Book
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import keys_of
 from tactbench.core.matrix.leaving import fill_baselines, scores_text
+from tactbench.core.matrix.personal import sources_of_this_user
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import plan
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.provenance import gather
 from tactbench.core.matrix.recorded import Recorded
-from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.matrix import MatrixSpec
@@ -105,7 +105,7 @@ def _carry_out(
     matrix: MatrixSpec, store: Store, choice: EngineChoice, recordings: Path | None, told: Progress
 ) -> Outcome:
     registry = installed()
-    sources = SourceDigests(store.folder / "cache" / "sources.json")
+    sources = sources_of_this_user()
     recorded = Recorded(store.folder / "cache" / "recordings.json")
     book = Book(KeyBook(store.folder / "cache" / "keys"), keys_of(registry, sources))
     cells, material = plan(matrix, registry, sources, store, recordings, recorded, choice)
