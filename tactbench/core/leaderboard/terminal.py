@@ -11,6 +11,7 @@ from tactbench.core.leaderboard.table import ABSENT, Block, Table
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.segment import Segment
 
 _STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim"}
 _FIRST_TO_GO = (
@@ -24,9 +25,13 @@ _WITHOUT_EDGE = 240
 
 def show(table: Table, console: Console) -> None:
     """Print a leaderboard on `console`; text from plugins is never read as markup."""
+    from rich.segment import Segments
+
     left_out: set[str] = set()
+    said: list[Segment] = []
     for block in table.blocks:
-        left_out |= _show_block(table.columns, block, console)
+        left_out |= _say_block(table.columns, block, console, said)
+    console.print(Segments(said), soft_wrap=True, end="")
     notes = list(table.notes)
     if left_out:
         names = ", ".join(name for name in table.columns if name in left_out)
@@ -39,31 +44,48 @@ def show(table: Table, console: Console) -> None:
         _show_notes(table.foot, console)
 
 
-def _show_block(columns: Sequence[str], block: Block, console: Console) -> set[str]:
-    """Print a block; return the columns that there was no room for.
+def _say_block(columns: Sequence[str], block: Block, console: Console, said: list[Segment]) -> set[str]:
+    """Add a block to what is `said`; return the columns that there was no room for.
 
-    The lines are padded here and printed as one text: a grid of rich takes a second for a thousand of them.
+    Lines are padded and cut here: a grid of rich takes a second for a thousand of them, and a text of its own for each
+    of a thousand blocks a third of one.
     """
+    from rich.segment import Segment
     from rich.text import Text
 
     widths, gone = _fitting(columns, block, console.width)
-    console.print(Text(f"{block.title}\n", style="bold"))
-    told = Text(no_wrap=True, overflow="ellipsis")
-    told.append(_padded(columns, columns, widths), style="bold")
-    told.append(f"\n {'─' * (sum(widths.values()) + _AROUND_A_CELL * len(widths) - 1)}\n")
-    for line in block.lines:
-        told.append(f"{_padded(line.cells, columns, widths)}\n", style=_STYLE[line.kind])
-    console.print(told)
+    style = {name: console.get_style(name) for name in ("bold", *_STYLE.values())}
+    title = [block.title]
+    if _width(block.title) > console.width:
+        title = [line.plain for line in Text(block.title).wrap(console, console.width)]
+    rule = f" {'─' * (sum(widths.values()) + _AROUND_A_CELL * len(widths) - 1)}"[: console.width]
+    body = [(_padded(columns, columns, widths), "bold"), (rule, "")]
+    body += [(_padded(line.cells, columns, widths), _STYLE[line.kind]) for line in block.lines]
+    lines = [*((line, "bold") for line in title), ("", ""), *((_cut(line, console.width), how) for line, how in body)]
+    for text, how in (*lines, ("", "")):
+        said += (Segment(text, style.get(how)), Segment("\n"))
     return gone
+
+
+def _width(text: str) -> int:
+    """Return how many places of a terminal `text` takes."""
+    from rich.cells import cell_len
+
+    return len(text) if text.isascii() else cell_len(text)
+
+
+def _cut(line: str, width: int) -> str:
+    """Return `line`, or as much of it as fits."""
+    from rich.cells import set_cell_size
+
+    return line if _width(line) <= width else f"{set_cell_size(line, width - 1)}…"
 
 
 def _padded(cells: Sequence[str], columns: Sequence[str], widths: Mapping[int, int]) -> str:
     """Return one line of a block, columns of numbers to the right."""
-    from rich.cells import cell_len
-
     parts = []
     for place, width in widths.items():
-        blank = " " * (width - cell_len(cells[place]))
+        blank = " " * (width - _width(cells[place]))
         parts.append(blank + cells[place] if columns[place] in NUMERIC else cells[place] + blank)
     return f"  {(' ' * _AROUND_A_CELL).join(parts)}".rstrip()
 
@@ -96,10 +118,8 @@ def _fitting(columns: Sequence[str], block: Block, width: int) -> tuple[dict[int
 
     Empty columns are never shown.
     """
-    from rich.cells import cell_len
-
     widths = {
-        place: max(cell_len(columns[place]), *(cell_len(line.cells[place]) for line in block.lines))
+        place: max(_width(columns[place]), *(_width(line.cells[place]) for line in block.lines))
         for place in range(len(columns))
         if any(line.cells[place].strip(ABSENT) for line in block.lines)
     }
