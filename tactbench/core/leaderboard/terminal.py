@@ -11,7 +11,6 @@ from tactbench.core.leaderboard.table import ABSENT, Block, Table
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.segment import Segment
 
 _STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim"}
 _FIRST_TO_GO = (
@@ -25,12 +24,17 @@ _WITHOUT_EDGE = 240
 
 def show(table: Table, console: Console) -> None:
     """Print a leaderboard on `console`; text from plugins is never read as markup."""
-    from rich.segment import Segments
+    from rich.segment import Segment, Segments
 
     left_out: set[str] = set()
     said: list[Segment] = []
+    width = console.width
+    style = {name: console.get_style(name) for name in ("bold", *_STYLE.values())}
     for block in table.blocks:
-        left_out |= _say_block(table.columns, block, console, said)
+        lines, gone = _block_lines(table.columns, block, width)
+        left_out |= gone
+        for text, how in lines:
+            said += (Segment(text, style.get(how)), Segment("\n"))
     console.print(Segments(said), soft_wrap=True, end="")
     notes = list(table.notes)
     if left_out:
@@ -44,41 +48,46 @@ def show(table: Table, console: Console) -> None:
         _show_notes(table.foot, console)
 
 
-def _say_block(columns: Sequence[str], block: Block, console: Console, said: list[Segment]) -> set[str]:
-    """Add a block to what is `said`; return the columns that there was no room for.
+def _block_lines(columns: Sequence[str], block: Block, width: int) -> tuple[list[tuple[str, str]], set[str]]:
+    """Return the lines of a block with their styles, and the columns that there was no room for.
 
     Lines are padded and cut here: a grid of rich takes a second for a thousand of them, and a text of its own for each
     of a thousand blocks a third of one.
     """
-    from rich.segment import Segment
+    widths, gone = _fitting(columns, block, width)
+    rule = f" {'─' * (sum(widths.values()) + _AROUND_A_CELL * len(widths) - 1)}"
+    body = [(_padded(columns, columns, widths), "bold"), (rule[:width], "")]
+    body += [(_padded(line.cells, columns, widths), _STYLE[line.kind]) for line in block.lines]
+    title = [(line, "bold") for line in _folded(block.title, width)]
+    return [*title, ("", ""), *((_cut(text, width), how) for text, how in body), ("", "")], gone
+
+
+def _folded(title: str, width: int) -> list[str]:
+    """Return `title` in lines that fit."""
+    if _width(title) <= width:
+        return [title]
+    from rich.console import Console
     from rich.text import Text
 
-    widths, gone = _fitting(columns, block, console.width)
-    style = {name: console.get_style(name) for name in ("bold", *_STYLE.values())}
-    title = [block.title]
-    if _width(block.title) > console.width:
-        title = [line.plain for line in Text(block.title).wrap(console, console.width)]
-    rule = f" {'─' * (sum(widths.values()) + _AROUND_A_CELL * len(widths) - 1)}"[: console.width]
-    body = [(_padded(columns, columns, widths), "bold"), (rule, "")]
-    body += [(_padded(line.cells, columns, widths), _STYLE[line.kind]) for line in block.lines]
-    lines = [*((line, "bold") for line in title), ("", ""), *((_cut(line, console.width), how) for line, how in body)]
-    for text, how in (*lines, ("", "")):
-        said += (Segment(text, style.get(how)), Segment("\n"))
-    return gone
+    return [line.plain for line in Text(title).wrap(Console(width=width), width)]
 
 
 def _width(text: str) -> int:
     """Return how many places of a terminal `text` takes."""
+    if text.isascii():
+        return len(text)
     from rich.cells import cell_len
 
-    return len(text) if text.isascii() else cell_len(text)
+    return cell_len(text)
 
 
 def _cut(line: str, width: int) -> str:
     """Return `line`, or as much of it as fits."""
+    if _width(line) <= width:
+        return line
     from rich.cells import set_cell_size
 
-    return line if _width(line) <= width else f"{set_cell_size(line, width - 1)}…"
+    return f"{set_cell_size(line, width - 1)}…"
 
 
 def _padded(cells: Sequence[str], columns: Sequence[str], widths: Mapping[int, int]) -> str:
