@@ -42,9 +42,10 @@ def shared(groups: Groups, choice: EngineChoice) -> Iterator[Job]:
 
 
 def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
-    """Build the estimator of each cell once, so that what it imports is there; what is wrong with it is its cells' own.
+    """Prepare the estimator of each cell once, so that what it imports is there; what is wrong with it is its cells'.
 
-    What others bring is built in a process of its own first: only what that process survives is done here as well.
+    What others bring is prepared in a process of its own first: only what that process survives, without a thread left
+    behind, is done here as well.
     """
     from tactbench.core.evaluation.thread_limit import find_libraries
 
@@ -52,7 +53,7 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
     several = {(cell.task, cell.estimator): cell for cell in cells if (cell.task, cell.estimator) not in _prepared}
     _prepared.update(several)
     foreign = [cell for cell in several.values() if not our_own(cell.estimator)]
-    survived = [cell for cell, outcome in choice.pool(1).each(prepare, foreign) if outcome is None] if foreign else []
+    survived = [cell for cell, outcome in choice.pool(1).each(prepare, foreign) if outcome is True] if foreign else []
     for _ in InProcess(choice.limits).each(prepare, [*(set(several.values()) - set(foreign)), *survived]):
         pass
     find_libraries()

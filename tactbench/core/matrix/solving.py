@@ -6,6 +6,7 @@ import random
 import time
 from collections import OrderedDict
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.libraries import import_libraries
 from tactbench.core.matrix.answer import Answer, answer, opening, stopped
 from tactbench.core.matrix.engines.company import company
+from tactbench.core.matrix.engines.family import can_fork
 from tactbench.core.matrix.engines.log import printed
 from tactbench.core.matrix.engines.share import Share
 from tactbench.core.matrix.plan import Cell
@@ -32,12 +34,25 @@ Wanted = tuple[str, tuple[Path, ...]]
 this_host = lru_cache(maxsize=1)(host_id)
 
 
-def prepare(cell: Cell) -> None:
-    """Import what a cell's estimator needs, so that no clock and no waiting person sees it later."""
+def prepare(cell: Cell) -> bool:
+    """Import what a cell's estimator needs, and use it once, so that no clock and no waiting person sees it later.
+
+    Returns
+    -------
+    bool
+        Whether this process is its only thread afterwards, and may still fork.
+    """
     registry = installed()
     descriptor = registry.estimators[cell.estimator]
     kind = registry.tasks[cell.task].spec.kind
-    load_object(descriptor.where)(kind=kind, seed=0, threads=1, **descriptor.params)
+    make = load_object(descriptor.where)
+    make(kind=kind, seed=0, threads=1, **descriptor.params)
+    if descriptor.rehearsal is not None:
+        from tactbench.core.evaluation.rehearsal import rehearse
+
+        with suppress(Exception):  # the cells will tell
+            rehearse(make(kind=kind, seed=0, threads=1, **{**descriptor.params, **descriptor.rehearsal}), kind)
+    return can_fork()
 
 
 class Datasets:
