@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,7 +55,9 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
     _prepared.update(several)
     foreign = [cell for cell in several.values() if not our_own(cell.estimator)]
     survived = [cell for cell, outcome in choice.pool(1).each(prepare, foreign) if outcome is True] if foreign else []
-    for _ in InProcess(choice.limits).each(prepare, [*(set(several.values()) - set(foreign)), *survived]):
+    # No limit of memory here: a BLAS that is refused some asks again for ever.
+    here = InProcess(replace(choice.limits, memory_mb=None))
+    for _ in here.each(prepare, [*(set(several.values()) - set(foreign)), *survived]):
         pass
     find_libraries()
 
