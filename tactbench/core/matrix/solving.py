@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -67,15 +67,18 @@ class Datasets:
     def __init__(self, most: int) -> None:
         self._most = most
         self._kept: OrderedDict[Wanted, Dataset] = OrderedDict()
+        self._ahead: dict[Wanted, Dataset] = {}
 
     def __contains__(self, wanted: Wanted) -> bool:
-        return wanted in self._kept
+        return wanted in self._kept or wanted in self._ahead
 
     def __call__(self, task: str, recordings: tuple[Path, ...]) -> Dataset:
         """Return `recordings` as `task` needs them; raises as `load_dataset` does."""
         from tactbench.core.evaluation.dataset import load_dataset
 
         wanted = (task, recordings)
+        if wanted in self._ahead:
+            return self._ahead[wanted]
         if wanted not in self._kept:
             self.keep(wanted, load_dataset(installed().tasks[task].spec, recordings))
         self._kept.move_to_end(wanted)
@@ -86,6 +89,10 @@ class Datasets:
         self._kept[wanted] = dataset
         while len(self._kept) > self._most:
             self._kept.popitem(last=False)
+
+    def keep_ahead(self, several: Mapping[Wanted, Dataset]) -> None:
+        """Keep small ones that were read before their turn; those kept so before are let go."""
+        self._ahead = dict(several)
 
 
 DATASETS = Datasets(2)
