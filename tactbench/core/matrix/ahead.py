@@ -47,6 +47,8 @@ def _data(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> di
     times = Counter((cell.task, tuple(material.paths(cell))) for cell in served)
     several = [wanted for wanted, number in times.items() if number > 1 and small.keys() >= set(wanted[1])]
     asked: _Asked = (material.recorded.unread(small, "digest"), several)
+    if not any(asked):
+        return {}
     importlib.import_module("h5py")  # once here, not once in every process that reads
     ((_, outcome),) = choice.pool(1).each(_read, [asked], lambda: import_estimators(served, choice))
     if isinstance(outcome, BaseException):
