@@ -28,19 +28,20 @@ def _trivial() -> list[EstimatorDescriptor]:
     return [
         EstimatorDescriptor(
             name="mean", title="Mean of the training labels", kinds=REGRESSION, looks_at="nothing", baseline=True,
-            where="tactbench.estimators.trivial:mean",
+            where="tactbench.estimators.trivial:mean", rehearsal={},
         ),
         EstimatorDescriptor(
             name="time-index", title="Linear regression on the time index (the paper's lower bound)", kinds=REGRESSION,
             looks_at="time", baseline=True, linear=True, where="tactbench.estimators.linear:least_squares",
+            rehearsal={},
         ),
         EstimatorDescriptor(
             name="majority", title="Most frequent class of the training labels", kinds=CLASSIFICATION,
-            looks_at="nothing", baseline=True, where="tactbench.estimators.trivial:majority",
+            looks_at="nothing", baseline=True, where="tactbench.estimators.trivial:majority", rehearsal={},
         ),
         EstimatorDescriptor(
             name="chance", title="A class drawn uniformly", kinds=CLASSIFICATION, looks_at="nothing", baseline=True,
-            where="tactbench.estimators.trivial:chance",
+            where="tactbench.estimators.trivial:chance", rehearsal={},
         ),
     ]  # fmt: skip
 
@@ -49,25 +50,25 @@ def _linear() -> list[EstimatorDescriptor]:
     return [
         EstimatorDescriptor(
             name="ols", title="Ordinary least squares on one sample", kinds=REGRESSION, linear=True,
-            where="tactbench.estimators.linear:least_squares",
+            where="tactbench.estimators.linear:least_squares", rehearsal={},
         ),
         EstimatorDescriptor(
             name="lasso", title="Lasso on a mean-filtered window", kinds=REGRESSION, linear=True,
             params={"lambda_": 0.2}, grid={"lambda_": LAMBDAS}, window_grid=WINDOWS,
-            where="tactbench.estimators.linear:lasso",
+            where="tactbench.estimators.linear:lasso", rehearsal={},
         ),
         EstimatorDescriptor(
             name="ridge", title="Ridge regression on a mean-filtered window", kinds=REGRESSION, linear=True,
             params={"alpha": 1.0}, grid={"alpha": (0.01, 1.0, 100.0)}, window_grid=WINDOWS,
-            where="tactbench.estimators.linear:ridge",
+            where="tactbench.estimators.linear:ridge", rehearsal={},
         ),
         EstimatorDescriptor(
             name="logistic", title="Logistic regression", kinds=CLASSIFICATION, linear=True, params={"C": 1.0},
-            where="tactbench.estimators.linear:logistic",
+            where="tactbench.estimators.linear:logistic", rehearsal={},
         ),
         EstimatorDescriptor(
             name="lda", title="Linear discriminant analysis", kinds=CLASSIFICATION, linear=True,
-            where="tactbench.estimators.linear:discriminant",
+            where="tactbench.estimators.linear:discriminant", rehearsal={},
         ),
     ]  # fmt: skip
 
@@ -76,21 +77,22 @@ def _curved() -> list[EstimatorDescriptor]:
     return [
         EstimatorDescriptor(
             name="knn", title="k nearest neighbours", kinds=BOTH, linear=False, params={"n_neighbors": 15},
-            where="tactbench.estimators.neighbours:neighbours",
+            where="tactbench.estimators.neighbours:neighbours", rehearsal={},
         ),
         EstimatorDescriptor(
             name="svm", title="Support vectors, Gaussian kernel, on every n-th row from 30 000 rows up", kinds=BOTH,
             linear=False, params={"C": 1.0, "gamma": "scale", "rows": 30_000},
-            where="tactbench.estimators.kernel:support_vectors",
+            where="tactbench.estimators.kernel:support_vectors", rehearsal={},
         ),
         EstimatorDescriptor(
             name="boosting", title="Gradient boosting on histograms", kinds=BOTH, linear=False,
             params={"max_iter": 100, "learning_rate": 0.1, "max_leaf_nodes": 31},
-            where="tactbench.estimators.boosting:boosting",
+            where="tactbench.estimators.boosting:boosting", rehearsal={"max_iter": 2},
         ),
         EstimatorDescriptor(
             name="mlp", title="Neural network with one hidden layer", kinds=BOTH, linear=False,
             params={"hidden": 64, "alpha": 1e-4, "max_iter": 200}, where="tactbench.estimators.neural:perceptron",
+            rehearsal={"max_iter": 2},
         ),
     ]  # fmt: skip
 
@@ -103,7 +105,7 @@ def _forests() -> list[EstimatorDescriptor]:
         found += [
             EstimatorDescriptor(
                 name=f"forest{number}", title=f"Random forest of {trees} trees", kinds=BOTH, linear=False,
-                params=params, where="tactbench.estimators.forest:forest",
+                params=params, where="tactbench.estimators.forest:forest", rehearsal={"n_estimators": 2},
             ),
             EstimatorDescriptor(
                 name=f"forest-fast{number}", title=f"Random forest of {trees} trees by oneDAL (extra: fast)",

@@ -67,16 +67,16 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
     from tactbench.core.matrix.keys import keys_of
     from tactbench.core.matrix.material import need_of
     from tactbench.core.matrix.naming import cell_of, meant
+    from tactbench.core.matrix.personal import sources_of_this_user
     from tactbench.core.matrix.planning import plan
     from tactbench.core.matrix.recorded import Recorded
-    from tactbench.core.matrix.source import SourceDigests
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
 
     if not out.is_dir():
         raise UsageError(f"There is no folder {out}.", hint="Name one that `tactbench run --out DIR` wrote.")
     registry, store = installed(), Store(out)
-    sources = SourceDigests(out / "cache" / "sources.json")
+    sources = sources_of_this_user()
     recorded = Recorded(out / "cache" / "recordings.json")
     keys = keys_of(registry, sources)
     rows = {row["cell"]: row for row in store.rows()}

@@ -9,7 +9,7 @@ import click
 
 from tactbench.core.cli.comparisons import print_comparisons
 from tactbench.core.cli.results import opened, provenance_of, shown_rows
-from tactbench.core.cli.tables import TABLE_FORMATS, print_rows
+from tactbench.core.cli.tables import TABLE_FORMATS, print_table
 from tactbench.core.leaderboard.axes import AXES
 
 if TYPE_CHECKING:
@@ -38,10 +38,11 @@ def command(folder: Path, shape: str | None, to: Path | None, by: str | None, ti
 
 def _show(store: Store, shape: str, to: Path | None, by: str | None, times: bool) -> None:
     from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.files import table_of
 
     rows = shown_rows(store)
     if by is None:
-        print_rows(rows, shape, provenance_of(store, rows), times=times, to=to, folder=store.folder)
+        print_table(table_of(rows, store.folder, provenance_of(store, rows), times=times), shape, to=to)
     elif to is not None or not times:
         raise UsageError("A comparison is printed, and has no times.", hint="Leave out --to and --no-times.")
     else:

@@ -10,7 +10,7 @@ import click
 
 from tactbench.core.cli.engines import choice_of, engine_options
 from tactbench.core.cli.selection import matrix_asked, selecting_options
-from tactbench.core.cli.tables import TABLE_FORMATS, check_destination, print_rows
+from tactbench.core.cli.tables import TABLE_FORMATS, check_destination, print_table
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def command(
     one_thread()
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
-    from tactbench.core.leaderboard.files import write_tables
+    from tactbench.core.leaderboard.files import table_of, write_tables
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
@@ -57,10 +57,11 @@ def command(
     with progress() as told:
         outcome = run_matrix(matrix, store, choice=choice, recordings=folder, progress=told)
     provenance = provenance_of(store, outcome.rows)
-    print_rows(outcome.rows, shape, provenance, folder=store.folder)
+    table = table_of(outcome.rows, store.folder, provenance)
+    print_table(table, shape)
     if shape == "table":
         _side_by_side(outcome)
-    write_tables(outcome.rows, store.folder, provenance)
+    write_tables(outcome.rows, store.folder, provenance, table)
     _farewell(outcome, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet", "html")
+if TYPE_CHECKING:
+    from tactbench.core.leaderboard.table import Table
 
-Row = Mapping[str, Any]
+TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet", "html")
 
 
 def check_destination(shape: str, to: Path | None = None, *, times: bool = True) -> None:
@@ -33,44 +33,21 @@ def check_destination(shape: str, to: Path | None = None, *, times: bool = True)
         )
 
 
-def print_rows(
-    rows: Sequence[Row],
-    shape: str,
-    provenance: Sequence[Row] = (),
-    *,
-    times: bool = True,
-    to: Path | None = None,
-    folder: Path | None = None,
-) -> None:
-    """Print `rows` on stdout, or write them to a file, in one of `TABLE_FORMATS`.
+def print_table(table: Table, shape: str, *, to: Path | None = None) -> None:
+    """Print a leaderboard on stdout, or write it to a file, in one of `TABLE_FORMATS`.
 
     Parameters
     ----------
-    provenance
-        What is known of the runs they are from.
-    times
-        False: only what a seed decides.
     to
         The file to write in place of stdout.
-    folder
-        The result folder that remembers how rows were ranked.
 
     Raises
     ------
     UsageError
-        If a terminal is asked to show bytes, the page to have no times, or the file cannot be written.
+        If the file cannot be written.
     """
-    from tactbench.core.leaderboard import memo
     from tactbench.core.leaderboard.collector import collector_at_rest
-    from tactbench.core.leaderboard.table import build_table
 
-    check_destination(shape, to, times=times)
-    if folder is not None:
-        memo.load(folder)
-    with collector_at_rest():
-        table = build_table(rows, provenance, times=times)
-    if folder is not None:
-        memo.save(folder)
     if shape == "table" and to is None:
         from tactbench.core.cli.screen import console
         from tactbench.core.leaderboard.terminal import show

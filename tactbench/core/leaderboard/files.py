@@ -11,8 +11,9 @@ from typing import Any
 import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard import memo
+from tactbench.core.leaderboard.collector import collector_at_rest
 from tactbench.core.leaderboard.formats import TEXTS
-from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.matrix.files import replace_file
 
 Row = Mapping[str, Any]
@@ -22,8 +23,12 @@ ENDINGS = ("md", "csv", "json", "html")
 STATE = Path("cache") / "tables.json"
 """What decided the files that lie there, and their digests."""
 
+_NESTED = (dict, list, tuple)
 
-def write_tables(rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = ()) -> tuple[Path, ...]:
+
+def write_tables(
+    rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = (), table: Table | None = None
+) -> tuple[Path, ...]:
     """Write the leaderboard of `rows` in every format that people open; return the files.
 
     Parameters
@@ -34,6 +39,8 @@ def write_tables(rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = 
         A result folder. Files that are there and were made from the same rows by the same code are left alone.
     provenance
         What is known of the runs that the rows are from.
+    table
+        The leaderboard of those rows, if it has been made.
 
     Raises
     ------
@@ -44,15 +51,13 @@ def write_tables(rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = 
     inputs = _digest(rows, provenance)
     if inputs is not None and _as_left(folder, inputs, paths):
         return paths
-    memo.load(folder)
-    table = build_table(rows, provenance)
+    table = table or table_of(rows, folder, provenance)
     try:
         made = {}
         for ending, path in zip(ENDINGS, paths, strict=True):
             content = TEXTS[ending](table).encode("utf-8", "replace")
             replace_file(path, content)
             made[path.name] = hashlib.sha256(content).hexdigest()
-        memo.save(folder)
         if inputs is not None:
             (folder / STATE).parent.mkdir(exist_ok=True)
             replace_file(folder / STATE, json.dumps({"inputs": inputs, "files": made}).encode())
@@ -64,24 +69,41 @@ def write_tables(rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = 
     return paths
 
 
+def table_of(rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
+    """Return the leaderboard of `rows`; what the statistics came to is recalled from `folder`, and kept there."""
+    memo.load(folder)
+    with collector_at_rest():
+        table = build_table(rows, provenance, times=times)
+    memo.save(folder)
+    return table
+
+
 def _digest(rows: Sequence[Row], provenance: Sequence[Row]) -> str | None:
     """Return a digest of all that decides the files; None if the rows hold what is not plain as JSON is.
 
-    Rows share big values, such as what was assumed of a recording: each is read once.
+    Rows share their keys, and big values such as what was assumed of a recording: each is looked at once.
     """
     shared: dict[int, str] = {}
+    in_order: dict[tuple[str, ...], Sequence[str]] = {}
 
-    def of(value: Any) -> Any:
-        if not isinstance(value, dict | list | tuple):
-            return value
+    def of(value: Any) -> str:
         if id(value) not in shared:
             shared[id(value)] = memo.digest_of(memo.ordered(value))
         return shared[id(value)]
 
+    def told(row: Row) -> str:
+        keys = tuple(row)
+        if keys not in in_order:
+            in_order[keys] = sorted(keys)
+        values = [row[key] for key in in_order[keys]]
+        return memo.digest_of(
+            of(in_order[keys]), [of(value) if isinstance(value, _NESTED) else value for value in values]
+        )
+
     code = [memo.source_digest(f"tactbench.core.{package}") for package in ("leaderboard", "statistics")]
     try:
-        told = [sorted((key, of(value)) for key, value in row.items()) for row in rows]
-        return memo.digest_of([tactbench.__version__, code, sorted(told, key=repr), [dict(one) for one in provenance]])
+        every = sorted(map(told, rows))
+        return memo.digest_of([tactbench.__version__, code, every, [dict(one) for one in provenance]])
     except (TypeError, ValueError):
         return None
 

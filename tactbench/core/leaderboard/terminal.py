@@ -24,9 +24,18 @@ _WITHOUT_EDGE = 240
 
 def show(table: Table, console: Console) -> None:
     """Print a leaderboard on `console`; text from plugins is never read as markup."""
+    from rich.segment import Segment, Segments
+
     left_out: set[str] = set()
+    said: list[Segment] = []
+    width = console.width
+    style = {name: console.get_style(name) for name in ("bold", *_STYLE.values())}
     for block in table.blocks:
-        left_out |= _show_block(table.columns, block, console)
+        lines, gone = _block_lines(table.columns, block, width)
+        left_out |= gone
+        for text, how in lines:
+            said += (Segment(text, style.get(how)), Segment("\n"))
+    console.print(Segments(said), soft_wrap=True, end="")
     notes = list(table.notes)
     if left_out:
         names = ", ".join(name for name in table.columns if name in left_out)
@@ -39,31 +48,53 @@ def show(table: Table, console: Console) -> None:
         _show_notes(table.foot, console)
 
 
-def _show_block(columns: Sequence[str], block: Block, console: Console) -> set[str]:
-    """Print a block; return the columns that there was no room for.
+def _block_lines(columns: Sequence[str], block: Block, width: int) -> tuple[list[tuple[str, str]], set[str]]:
+    """Return the lines of a block with their styles, and the columns that there was no room for.
 
-    The lines are padded here and printed as one text: a grid of rich takes a second for a thousand of them.
+    Lines are padded and cut here: a grid of rich takes a second for a thousand of them, and a text of its own for each
+    of a thousand blocks a third of one.
     """
+    widths, gone = _fitting(columns, block, width)
+    rule = f" {'─' * (sum(widths.values()) + _AROUND_A_CELL * len(widths) - 1)}"
+    body = [(_padded(columns, columns, widths), "bold"), (rule[:width], "")]
+    body += [(_padded(line.cells, columns, widths), _STYLE[line.kind]) for line in block.lines]
+    title = [(line, "bold") for line in _folded(block.title, width)]
+    return [*title, ("", ""), *((_cut(text, width), how) for text, how in body), ("", "")], gone
+
+
+def _folded(title: str, width: int) -> list[str]:
+    """Return `title` in lines that fit."""
+    if _width(title) <= width:
+        return [title]
+    from rich.console import Console
     from rich.text import Text
 
-    widths, gone = _fitting(columns, block, console.width)
-    console.print(Text(f"{block.title}\n", style="bold"))
-    told = Text(no_wrap=True, overflow="ellipsis")
-    told.append(_padded(columns, columns, widths), style="bold")
-    told.append(f"\n {'─' * (sum(widths.values()) + _AROUND_A_CELL * len(widths) - 1)}\n")
-    for line in block.lines:
-        told.append(f"{_padded(line.cells, columns, widths)}\n", style=_STYLE[line.kind])
-    console.print(told)
-    return gone
+    return [line.plain for line in Text(title).wrap(Console(width=width), width)]
+
+
+def _width(text: str) -> int:
+    """Return how many places of a terminal `text` takes."""
+    if text.isascii():
+        return len(text)
+    from rich.cells import cell_len
+
+    return cell_len(text)
+
+
+def _cut(line: str, width: int) -> str:
+    """Return `line`, or as much of it as fits."""
+    if _width(line) <= width:
+        return line
+    from rich.cells import set_cell_size
+
+    return f"{set_cell_size(line, width - 1)}…"
 
 
 def _padded(cells: Sequence[str], columns: Sequence[str], widths: Mapping[int, int]) -> str:
     """Return one line of a block, columns of numbers to the right."""
-    from rich.cells import cell_len
-
     parts = []
     for place, width in widths.items():
-        blank = " " * (width - cell_len(cells[place]))
+        blank = " " * (width - _width(cells[place]))
         parts.append(blank + cells[place] if columns[place] in NUMERIC else cells[place] + blank)
     return f"  {(' ' * _AROUND_A_CELL).join(parts)}".rstrip()
 
@@ -96,10 +127,8 @@ def _fitting(columns: Sequence[str], block: Block, width: int) -> tuple[dict[int
 
     Empty columns are never shown.
     """
-    from rich.cells import cell_len
-
     widths = {
-        place: max(cell_len(columns[place]), *(cell_len(line.cells[place]) for line in block.lines))
+        place: max(_width(columns[place]), *(_width(line.cells[place]) for line in block.lines))
         for place in range(len(columns))
         if any(line.cells[place].strip(ABSENT) for line in block.lines)
     }

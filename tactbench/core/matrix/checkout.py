@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -31,14 +32,21 @@ def checkout_of(folder: Path) -> Checkout | None:
 
     Notes
     -----
-    Three calls of git at once, about 10 ms. Only `folder` counts: the state of tests and documents changes no number.
+    One call of git, about 5 ms; two more at once where something is not committed. Only `folder` counts: the state of
+    tests and documents changes no number.
     """
     if not any((place / ".git").exists() for place in (folder, *folder.parents)):
         return None
     try:
-        head, diff, unknown = _asked(
+        (told,) = _asked(folder, ("status", "--porcelain=v2", "--branch", "--untracked-files=all", "--", "."))
+        head = re.search(rb"^# branch\.oid ([0-9a-f]{12})", told, re.MULTILINE)
+        if head is None:
+            return None  # nothing was ever committed
+        commit = head[1].decode()
+        if all(line.startswith(b"#") for line in told.splitlines()):
+            return Checkout(commit, "")
+        diff, unknown = _asked(
             folder,
-            ("rev-parse", "HEAD"),
             ("diff", "HEAD", "--no-ext-diff", "--no-textconv", "--no-color", "--binary", "--relative", "--", "."),
             ("ls-files", "--others", "--exclude-standard", "-z", "--", "*.py"),
         )
@@ -48,7 +56,7 @@ def checkout_of(folder: Path) -> Checkout | None:
             digest.update(name + b"\0" + (folder / name.decode()).read_bytes())
     except (OSError, subprocess.SubprocessError, ValueError):
         return None
-    return Checkout(head.decode().strip()[:12], digest.hexdigest()[:12] if diff or names else "")
+    return Checkout(commit, digest.hexdigest()[:12] if diff or names else "")
 
 
 def _asked(folder: Path, *several: Sequence[str]) -> list[bytes]:

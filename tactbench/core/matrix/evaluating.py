@@ -170,14 +170,17 @@ def _each(*several: Iterable[tuple[Job, Any]]) -> Generator[tuple[Job, Any], Non
 def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
     """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
     from tactbench.core.matrix.preloading import Shared, import_estimators
+    from tactbench.core.matrix.solving import our_own
 
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
         groups.setdefault((job[0].task, job[1]), []).append(job)
     if choice.shares(len(jobs)):
         return Shared(groups, choice)
-    if choice.forks(len(jobs)):
-        import_estimators([job[0] for job in jobs], choice)
+    here = choice.here(len(jobs))
+    if here or choice.forks(len(jobs)):
+        # A stranger's that ends this process does so in its cell, which is noted then.
+        import_estimators([job[0] for job in jobs if not here or our_own(job[0].estimator)], choice)
     return [job for group in groups.values() for job in group]
 
 

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 
-def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:
+def replace_file(path: Path, content: bytes, *, sync: bool = True, mode: int = 0o666) -> None:
     """Write `content` aside, sync it and rename it to `path`: a reader sees the old file or the new one.
 
     A file that holds it already is left alone: syncing takes milliseconds, and a run in which nothing is new has none.
@@ -19,6 +19,8 @@ def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:
         What it is to hold.
     sync
         Whether it must survive a power cut, and not only the end of this process.
+    mode
+        Who may do what with a new file, before the process's mask.
 
     Raises
     ------
@@ -29,7 +31,7 @@ def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:
         return
     aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        with aside.open("wb") as file:
+        with open(aside, "wb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
             file.write(content)
             if sync:
                 file.flush()

@@ -74,7 +74,7 @@ class Keys:
                 source,
                 estimator.descriptor.distributions,
                 task=task.descriptor.spec.model_dump(exclude=_TOLD_OTHERWISE),
-                estimator=estimator.descriptor.model_dump(exclude={"title", "linear"}),
+                estimator=estimator.descriptor.model_dump(exclude={"title", "linear", "rehearsal"}),
             )
         return self._answers[pair]
 

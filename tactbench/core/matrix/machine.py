@@ -34,6 +34,16 @@ def cpu_model() -> str:
     return platform.processor() or "unknown"
 
 
+def system() -> str:
+    """Return the operating system, its release, the machine and the C library.
+
+    What `platform.platform` says of a Linux, without the kind of processor, for which Python starts a program.
+    """
+    said = "-".join(filter(None, (platform.system(), platform.release(), platform.machine())))
+    library = "".join(platform.libc_ver())
+    return f"{said}-with-{library}" if library else said
+
+
 def memory_mb() -> int | None:
     """Return the main memory in MiB; None where the system does not say."""
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -62,9 +63,10 @@ class Shared:
 
 
 def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
-    """Build the estimator of each cell once, so that what it imports is there; what is wrong with it is its cells' own.
+    """Prepare the estimator of each cell once, so that what it imports is there; what is wrong with it is its cells'.
 
-    What others bring is built in a process of its own first: only what that process survives is done here as well.
+    What others bring is prepared in a process of its own first: only what that process survives, without a thread left
+    behind, is done here as well.
     """
     from tactbench.core.evaluation.thread_limit import find_libraries
 
@@ -72,8 +74,10 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
     several = {(cell.task, cell.estimator): cell for cell in cells if (cell.task, cell.estimator) not in _prepared}
     _prepared.update(several)
     foreign = [cell for cell in several.values() if not our_own(cell.estimator)]
-    survived = [cell for cell, outcome in choice.pool(1).each(prepare, foreign) if outcome is None] if foreign else []
-    for _ in InProcess(choice.limits).each(prepare, [*(set(several.values()) - set(foreign)), *survived]):
+    survived = [cell for cell, outcome in choice.pool(1).each(prepare, foreign) if outcome is True] if foreign else []
+    # No limit of memory here: a BLAS that is refused some asks again for ever.
+    here = InProcess(replace(choice.limits, memory_mb=None))
+    for _ in here.each(prepare, [*(set(several.values()) - set(foreign)), *survived]):
         pass
     find_libraries()
 

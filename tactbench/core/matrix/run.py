@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,12 @@ from tactbench.core.matrix.explanation import Book
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import keys_of
 from tactbench.core.matrix.leaving import fill_baselines, scores_text
+from tactbench.core.matrix.personal import sources_of_this_user
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.planning import plan
+from tactbench.core.matrix.planning import Material, plan
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.provenance import gather
 from tactbench.core.matrix.recorded import Recorded
-from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.matrix import MatrixSpec
@@ -105,7 +106,7 @@ def _carry_out(
     matrix: MatrixSpec, store: Store, choice: EngineChoice, recordings: Path | None, told: Progress
 ) -> Outcome:
     registry = installed()
-    sources = SourceDigests(store.folder / "cache" / "sources.json")
+    sources = sources_of_this_user()
     recorded = Recorded(store.folder / "cache" / "recordings.json")
     book = Book(KeyBook(store.folder / "cache" / "keys"), keys_of(registry, sources))
     cells, material = plan(matrix, registry, sources, store, recordings, recorded, choice)
@@ -113,13 +114,22 @@ def _carry_out(
     made_by = store.begin(provenance)
     inherited = choice.named(len(cells)) != "dask"
     acquire_missing(material, book, choice, told, (lambda: _import_estimators(cells, choice)) if inherited else None)
-    found = evaluate_all(cells, material, book, choice, store, made_by, told)
+    # A reader that nobody hears while libraries are imported would seem to take too long.
+    fresh = store.blank and choice.forks(len(cells)) and choice.limits.timeout_s is None
+    with _read_ahead(cells, material, choice) if fresh else nullcontext():
+        found = evaluate_all(cells, material, book, choice, store, made_by, told)
     sources.save()
     recorded.save()
     rows = [found.rows[cell.name] for cell in cells]
     fill_baselines(rows)
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, found.computed, recorded.number_made, used)
+
+
+def _read_ahead(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> AbstractContextManager[None]:
+    from tactbench.core.matrix.ahead import read_ahead
+
+    return read_ahead(cells, material, choice)
 
 
 def _import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:

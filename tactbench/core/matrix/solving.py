@@ -5,7 +5,8 @@ from __future__ import annotations
 import random
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.libraries import import_libraries
 from tactbench.core.matrix.answer import Answer, answer, opening, stopped
 from tactbench.core.matrix.engines.company import company
+from tactbench.core.matrix.engines.family import can_fork
 from tactbench.core.matrix.engines.log import printed
 from tactbench.core.matrix.engines.share import Share
 from tactbench.core.matrix.plan import Cell
@@ -32,12 +34,25 @@ Wanted = tuple[str, tuple[Path, ...]]
 this_host = lru_cache(maxsize=1)(host_id)
 
 
-def prepare(cell: Cell) -> None:
-    """Import what a cell's estimator needs, so that no clock and no waiting person sees it later."""
+def prepare(cell: Cell) -> bool:
+    """Import what a cell's estimator needs, and use it once, so that no clock and no waiting person sees it later.
+
+    Returns
+    -------
+    bool
+        Whether this process is its only thread afterwards, and may still fork.
+    """
     registry = installed()
     descriptor = registry.estimators[cell.estimator]
     kind = registry.tasks[cell.task].spec.kind
-    load_object(descriptor.where)(kind=kind, seed=0, threads=1, **descriptor.params)
+    make = load_object(descriptor.where)
+    make(kind=kind, seed=0, threads=1, **descriptor.params)
+    if descriptor.rehearsal is not None:
+        from tactbench.core.evaluation.rehearsal import rehearse
+
+        with suppress(Exception):  # the cells will tell
+            rehearse(make(kind=kind, seed=0, threads=1, **{**descriptor.params, **descriptor.rehearsal}), kind)
+    return can_fork()
 
 
 class Datasets:
@@ -52,15 +67,18 @@ class Datasets:
     def __init__(self, most: int) -> None:
         self._most = most
         self._kept: OrderedDict[Wanted, Dataset] = OrderedDict()
+        self._ahead: dict[Wanted, Dataset] = {}
 
     def __contains__(self, wanted: Wanted) -> bool:
-        return wanted in self._kept
+        return wanted in self._kept or wanted in self._ahead
 
     def __call__(self, task: str, recordings: tuple[Path, ...]) -> Dataset:
         """Return `recordings` as `task` needs them; raises as `load_dataset` does."""
         from tactbench.core.evaluation.dataset import load_dataset
 
         wanted = (task, recordings)
+        if wanted in self._ahead:
+            return self._ahead[wanted]
         if wanted not in self._kept:
             self.keep(wanted, load_dataset(installed().tasks[task].spec, recordings))
         self._kept.move_to_end(wanted)
@@ -71,6 +89,10 @@ class Datasets:
         self._kept[wanted] = dataset
         while len(self._kept) > self._most:
             self._kept.popitem(last=False)
+
+    def keep_ahead(self, several: Mapping[Wanted, Dataset]) -> None:
+        """Keep small ones that were read before their turn; those kept so before are let go."""
+        self._ahead = dict(several)
 
 
 DATASETS = Datasets(2)

@@ -58,13 +58,13 @@ class SourceDigests:
     Parameters
     ----------
     memory
-        A JSON file that remembers the digest of each file, since parsing takes time; it may be lost.
+        Remembers the digest of each file, since parsing takes time; or the JSON file of such a memory. It may be lost.
     clock
         As for `FileMemory`.
     """
 
-    def __init__(self, memory: Path, clock: Callable[[], int] = time.time_ns) -> None:
-        self._memory = FileMemory(memory, clock)
+    def __init__(self, memory: Path | FileMemory, clock: Callable[[], int] = time.time_ns) -> None:
+        self._memory = memory if isinstance(memory, FileMemory) else FileMemory(memory, clock)
         self._distributions = Distributions(self._memory)
         self._packages: dict[tuple[str, tuple[str, ...]], tuple[dict[str, str], frozenset[str]]] = {}
         self._behind: dict[tuple[Purpose, frozenset[str]], Source] = {}

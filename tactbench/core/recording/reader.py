@@ -85,6 +85,7 @@ class Recording:
         self._text = text
         self._file = file
         self._specs = layout.specs_by_name(self.meta)
+        self._looked_at: dict[str, LazyStream] = {}
         self._streams = trust.subgroup(path, file, "streams")
         if self._streams is None:
             raise FormatError(f"{path} has no streams.", hint=trust.SEE)
@@ -119,13 +120,17 @@ class Recording:
                 f"{self.path} has no stream {name!r}; it has {', '.join(self.stream_names) or 'none'}.",
                 hint="See what is in it with `tactbench inspect`.",
             )
+        if name in self._looked_at:
+            return self._looked_at[name]
         try:
             group = trust.subgroup(self.path, self._streams, name)
-            return LazyStream(self.path, self._specs[name], group, clock=self.meta.clock, strict=self.complete)
+            stream = LazyStream(self.path, self._specs[name], group, clock=self.meta.clock, strict=self.complete)
         except FormatError:
             raise
         except trust.READ_FAILURES as error:
             raise _damaged(self.path, error) from error
+        self._looked_at[name] = stream
+        return stream
 
     def read(self, name: str) -> StreamData:
         """Read a whole stream; FormatError if there is none, or if it is damaged."""

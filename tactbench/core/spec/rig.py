@@ -83,6 +83,9 @@ class EstimatorDescriptor(Frozen):
     """Whether answers are linear in the features (for classes: their boundaries are); None: its author does not say."""
     distributions: tuple[str, ...] = ()
     """Distributions beyond tactbench's own that compute its answers: a cell's key covers their versions."""
+    rehearsal: dict[str, Any] | None = None
+    """Parameters with which it learns a few rows in no time and leaves no thread behind: it then does so once before
+    cells are timed, and what its library does at its first use is in nobody's time. None: it is only built then."""
 
 
 class EffectDescriptor(Frozen):

@@ -46,6 +46,12 @@ def test_what_the_recordings_say_themselves_does_not_count(sources, change):
     assert key(sources, replace(CELL, **change)) == key(sources)
 
 
+def test_what_an_estimator_does_before_it_is_timed_does_not_count(sources):
+    ridge = keys_of(installed(), sources).answer(replace(CELL, estimator="ridge")).sections["estimator"]
+    assert "grid" in ridge
+    assert "rehearsal" not in ridge
+
+
 @given(st.lists(st.sampled_from([0, 1, 0.0, 1.0, -0.0, True, False, None, "1", "", 1e-300, float("inf")]), min_size=2,
                 max_size=2))  # fmt: skip
 def test_parameters_that_are_written_differently_have_different_keys(sources, pair):

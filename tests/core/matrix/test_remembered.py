@@ -153,3 +153,70 @@ def test_what_was_not_asked_for_is_kept(tmp_path, file):
 def test_nothing_about_paths_is_written_down(tmp_path, file):
     learnt(tmp_path / "memory", file)
     assert str(tmp_path) not in (tmp_path / "memory").read_text()
+
+
+@pytest.fixture
+def personal(tmp_path):
+    """Where a personal memory lies, and a way to open it."""
+    path = tmp_path / "cache" / "tactbench" / "memory"
+    return path, lambda clock=later: FileMemory(path, clock, personal=True)
+
+
+def seen_by(memory, file):
+    memory.learn(file.stat(), file.stat(), {"digest": file.read_text()})
+    memory.save()
+
+
+def test_a_personal_memory_is_its_users_alone(personal, file):
+    path, opened = personal
+    seen_by(opened(), file)
+    assert (path.parent.stat().st_mode & 0o777, path.stat().st_mode & 0o777) == (0o700, 0o600)
+    assert opened().facts(file.stat()) == {"digest": "a"}
+
+
+@pytest.mark.parametrize("which", ["the file", "the folder"])
+def test_a_personal_memory_that_others_can_write_is_not_believed(personal, file, which):
+    path, opened = personal
+    seen_by(opened(), file)
+    (path if which == "the file" else path.parent).chmod(0o770)
+    assert opened().facts(file.stat()) == {}
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may give files away")
+def test_a_personal_memory_of_somebody_else_is_neither_believed_nor_written(personal, file):
+    path, opened = personal
+    seen_by(opened(), file)
+    other = file.with_name("other")
+    other.write_text("b")
+    os.chown(path.parent, 12345, 12345)
+    before = path.read_bytes()
+    memory = opened()
+    assert memory.facts(file.stat()) == {}
+    seen_by(memory, other)
+    assert path.read_bytes() == before
+
+
+def test_a_personal_memory_that_cannot_be_written_costs_only_time(tmp_path, file):
+    (tmp_path / "cache").write_text("a file where a folder should be")
+    memory = FileMemory(tmp_path / "cache" / "memory", later, personal=True)
+    seen_by(memory, file)
+    assert memory.facts(file.stat()) == {"digest": "a"}
+
+
+def test_two_processes_that_began_with_one_memory_both_add_to_it(personal, file):
+    _, opened = personal
+    other = file.with_name("other")
+    other.write_text("b")
+    first, second = opened(), opened()
+    seen_by(first, file)
+    seen_by(second, other)
+    assert (opened().facts(file.stat()), opened().facts(other.stat())) == ({"digest": "a"}, {"digest": "b"})
+
+
+def test_a_personal_memory_does_not_trust_disks_that_count_whole_seconds(personal):
+    _, opened = personal
+    memory = opened()
+    for tick_ns in (10**9, 10**6):
+        stat = seen(1, 1_700_000_000_123_456_789, tick_ns)
+        memory.learn(stat, stat, {"digest": "a"})
+        assert memory.facts(stat) == ({} if tick_ns == 10**9 else {"digest": "a"})

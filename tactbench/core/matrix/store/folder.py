@@ -205,6 +205,11 @@ class Store:
     # What is read
 
     @property
+    def blank(self) -> bool:
+        """Whether no cell has ever ended here."""
+        return not self._read().entries and not self._orphans
+
+    @property
     def troubles(self) -> tuple[str, ...]:
         """What of this folder could not be used, in sentences."""
         return tuple(self._read().troubles)

@@ -1,0 +1,26 @@
+"""What estimators do before they are timed: learnt in a moment, and the process may still fork."""
+
+import os
+import subprocess
+import sys
+
+SCRIPT = """
+from tactbench.core.evaluation.rehearsal import rehearse
+from tactbench.core.matrix.engines.family import can_fork
+from tactbench.core.plugins.registry import installed, load_object
+
+rehearsed = [(one, kind) for one in installed().estimators if one.rehearsal is not None for kind in one.kinds]
+for one, kind in rehearsed:
+    assert set(one.rehearsal) <= set(one.params), one.name
+    rehearse(load_object(one.where)(kind=kind, seed=0, threads=1, **{**one.params, **one.rehearsal}), kind)
+    assert can_fork(), one.name
+print(len(rehearsed))
+"""
+
+
+def test_every_estimator_of_ours_can_be_rehearsed_and_leaves_no_thread():
+    # One thread for BLAS, as the command line has it; what OpenMP would start is held back by the rehearsal.
+    env = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "4"}
+    done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=env, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 10
