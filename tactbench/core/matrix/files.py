@@ -29,15 +29,27 @@ def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:
         return
     aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        with aside.open("wb") as file:
-            file.write(content)
-            if sync:
-                file.flush()
-                os.fsync(file.fileno())
+        write_file(aside, content, sync=sync)
         aside.replace(path)
     except BaseException:
         aside.unlink(missing_ok=True)
         raise
+
+
+def write_file(path: Path, content: bytes, *, sync: bool) -> None:
+    """Write a file anew, without what Python's own files do besides; raises OSError if not all of it could be written.
+
+    `sync` says whether it must survive a power cut.
+    """
+    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
+    try:
+        written = os.write(file, content)
+        while written < len(content):  # the last bytes of a disk: the next write says why; or two gigabytes
+            written += os.write(file, content[written:])
+        if sync:
+            os.fsync(file)
+    finally:
+        os.close(file)
 
 
 def _holds(path: Path, content: bytes) -> bool:
