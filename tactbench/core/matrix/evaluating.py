@@ -56,7 +56,9 @@ def evaluate_all(
     unreadable = _unreadable(cells, material, choice)
     for cell in cells:
         paths = material.paths(cell)
-        trouble = material.trouble(cell) or next((unreadable[path] for path in paths if path in unreadable), None)
+        trouble = material.trouble(cell)
+        if unreadable and trouble is None:
+            trouble = next((unreadable[path] for path in paths if path in unreadable), None)
         if trouble is None:
             try:
                 known.keys[cell.name] = book.keys.of_cell(cell, [material.recorded.digest(path) for path in paths])

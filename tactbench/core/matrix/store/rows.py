@@ -116,15 +116,18 @@ def _words(types: Iterable[type]) -> str:
     return " or ".join(names[one] for one in types)
 
 
+_NESTED = {dict, list}
+
+
 def too_deep(value: Any) -> bool:
-    """Return whether lists and mappings lie in each other more than `DEPTH` deep."""
+    """Return whether lists and mappings, as JSON has them, lie in each other more than `DEPTH` deep."""
     level = [value]
     for _ in range(DEPTH):
         level = [
             inner
             for outer in level
             for inner in (outer.values() if isinstance(outer, dict) else outer)
-            if isinstance(inner, dict | list)
+            if type(inner) in _NESTED
         ]
         if not level:
             return False
