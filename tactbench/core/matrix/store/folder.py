@@ -174,8 +174,6 @@ class Store:
         ------
         FolderError
             If the disk refuses, or the folder is gone.
-        NotPlainError
-            If the row holds what is no plain data.
         """
         if row.get("status") == "done":
             raise ValueError("a finished cell has answers: keep() it")
@@ -183,7 +181,7 @@ class Store:
             name: _clipped(value) if name in ("log", "traceback", "reason") else value for name, value in row.items()
         }
         ledger = self._read()
-        told, _ = plain(row)
+        told: Row = json.loads(canonical(row))
         before = self._latest.get(str(told.get("cell")))
         if before is None or before.row != told:
             with self._written():

@@ -46,11 +46,11 @@ _INSIDE: dict[str, tuple[type, ...]] = {
 }  # fmt: skip
 
 
-_written = json.JSONEncoder(sort_keys=True, allow_nan=False).encode
+_finite = json.JSONEncoder(sort_keys=True, allow_nan=False).encode
 
 
 class NotPlainError(ValueError):
-    """A row holds what is no plain data: nothing of it was written."""
+    """The row of a finished cell holds what is no plain data: nothing of it was written."""
 
 
 def plain(row: Mapping[str, Any]) -> tuple[Row, str]:
@@ -62,7 +62,7 @@ def plain(row: Mapping[str, Any]) -> tuple[Row, str]:
         If it holds what JSON has no word for.
     """
     try:
-        text = _written(row)
+        text = _finite(row)
         back: Row = json.loads(text)
     except (TypeError, ValueError, RecursionError) as error:
         raise NotPlainError(str(error)) from error
