@@ -1,10 +1,11 @@
 """What the matrix adds to a cell: cold and found finished, for 100, 1,000 and 10,000 cells that do nothing.
 
-Every round and size is a process of its own. It carries out the matrix cold, lists it again finished, and then calls
-`evaluate` for the same cells in a plain loop: what the matrix took beyond that is what it adds. Latency of single rows
-is not measured (``latency: false``). The slope is what one more cell costs, between two sizes; what is left at no cells
-is the fixed cost of a run (provenance, digests of source). Bounds, stated before measuring: 1.5 ms a cold cell, 0.2 ms
-one found finished, and slopes that differ by less than 1.3.
+Every round and size is a process of its own, and its cells are carried out as ``--engine in-process`` does: one after
+the other in one forked process, where the system can fork. It carries out the matrix cold, lists it again finished, and
+then calls `evaluate` for the same cells in a plain loop: what the matrix took beyond that is what it adds. Latency of
+single rows is not measured (``latency: false``). The slope is what one more cell costs, between two sizes; what is left
+at no cells is the fixed cost of a run (provenance, digests of source). Bounds, stated before measuring: 1.5 ms a cold
+cell, 0.2 ms one found finished, and slopes that differ by less than 1.3.
 
 Usage: python benchmarks/overhead.py [--rounds 5] [--sizes 100,1000,10000] [--on DIR]
 """
@@ -23,16 +24,17 @@ import tempfile
 import time
 from pathlib import Path
 
-import trivial
+from tactbench.core.cli.threads import one_thread
+
+one_thread()  # as the command line does, before numpy is imported: a process with threads cannot fork its cells
+
+import trivial  # noqa: E402
 
 COLD_MS, CACHED_MS, RATIO = 1.5, 0.2, 1.3
 
 
 def one(cells: int, on: str | None) -> dict[str, float]:
     """Measure one size once, seconds."""
-    from tactbench.core.cli.threads import one_thread
-
-    one_thread()
     gc.set_threshold(100_000, 50, 100)  # as the command line does
     with tempfile.TemporaryDirectory(dir=on) as made:
         folder = Path(made)
@@ -46,8 +48,9 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         from tactbench.core.plugins.registry import installed
 
         choice = EngineChoice("in-process")
+        forked = not choice.here(cells)
         run_matrix(trivial.matrix(3), Store(folder / "warm"), choice=choice, recordings=shelf)  # imports
-        found = {}
+        found = {"forked": float(forked)}
         for name in ("cold", "cached"):
             began = time.perf_counter()
             outcome = run_matrix(trivial.matrix(cells), Store(folder / "out"), choice=choice, recordings=shelf)
@@ -86,7 +89,8 @@ def main() -> None:
     added = {size: statistics.median(one["cold"] - one["plain"] for one in rounds[size]) for size in sizes}
     cached = {size: statistics.median(one["cached"] for one in rounds[size]) for size in sizes}
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
-    print(f"medians of {asked.rounds} rounds, load {load:.1f} on {os.cpu_count()} cores; ms a cell")
+    where = "a forked process" if rounds[sizes[0]][0]["forked"] else "the run's process"
+    print(f"medians of {asked.rounds} rounds, cells in {where}, load {load:.1f} on {os.cpu_count()} cores; ms a cell")
     print(f"{'cells':>7}{'whole, cold':>13}{'plain loop':>12}{'added':>8}{'cached':>8}")
     for size in sizes:
         whole, plain = (1e3 * statistics.median(one[name] for one in rounds[size]) / size for name in ("cold", "plain"))

@@ -1,10 +1,12 @@
-"""Whether what came back from a cell is what a cell gives; a plugin may have lied to whoever computed it."""
+"""Whether what came back from a cell is what a cell gives; a plugin may have lied to whoever computed it.
+
+Whether its row is plain data, the store finds out when it writes it (`NotPlainError`).
+"""
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import fields
 from typing import Any
 
@@ -17,29 +19,30 @@ from tactbench.core.spec.status import STATUSES
 _COLUMNS = tuple(column.name for column in fields(Answers))
 
 
-def fault_in(given: Any, opened: Row) -> str:
+def fault_in(given: Any, cell: str, keys: Set[str]) -> str:
     """Return what is wrong with what a cell gave, as a clause; "" if nothing is.
 
     Parameters
     ----------
     given
         What came; a row and its answers by role are wanted.
-    opened
-        The row that the cell began with: keys and name must still be the same.
+    cell
+        Name of the cell.
+    keys
+        What every row has.
     """
     if not (isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], dict)):
         return f"it gave a {type(given).__name__} and not a row with its answers"
     row, sets = given
-    if set(row) != set(opened):
-        return f"its row has other keys: {', '.join(sorted(map(str, set(row) ^ set(opened))))}"
-    if row["cell"] != opened["cell"]:
+    if row.keys() != keys:
+        return f"its row has other keys: {', '.join(sorted(map(str, row.keys() ^ keys)))}"
+    if row["cell"] != cell:
         return f"its row is that of another cell, {row['cell']!r}"
     if row["status"] not in STATUSES:
         return f"its status is {row['status']!r}"
-    try:
-        json.dumps(row, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        return f"its row is not plain data: {error}"
+    recordings = row["recordings"]
+    if not (isinstance(recordings, list) and all(isinstance(path, str) for path in recordings)):
+        return f"its recordings are {recordings!r}"
     if row["status"] != "done":
         return ""
     for name in ("score", "ci_low", "ci_high"):

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.errors import CellStopped, PluginContractError
-from tactbench.core.matrix.answer import reused
+from tactbench.core.errors import PluginContractError
+from tactbench.core.matrix.answer import Answer, opening, reused
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.explanation import Book, beside
 from tactbench.core.matrix.in_flight import InFlight
@@ -20,7 +19,7 @@ from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.reading import read_apart
 from tactbench.core.matrix.recorded import read_digest
-from tactbench.core.matrix.store import Row, Store
+from tactbench.core.matrix.store import NotPlainError, Row, Store
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.status import STOPPED
 
@@ -52,12 +51,14 @@ def evaluate_all(
     `made_by` is the id of this run's provenance.
     """
     done = Evaluated()
-    known = _Known({}, material, made_by)
+    known = _Known({}, material, store.folder, made_by)
     waiting: list[Job] = []
     unreadable = _unreadable(cells, material, choice)
     for cell in cells:
         paths = material.paths(cell)
-        trouble = material.trouble(cell) or next((unreadable[path] for path in paths if path in unreadable), None)
+        trouble = material.trouble(cell)
+        if unreadable and trouble is None:
+            trouble = next((unreadable[path] for path in paths if path in unreadable), None)
         if trouble is None:
             try:
                 known.keys[cell.name] = book.keys.of_cell(cell, [material.recorded.digest(path) for path in paths])
@@ -92,26 +93,30 @@ class _Known:
     keys: dict[str, str]
     """By name of the cell."""
     material: Material
+    folder: Path
     made_by: str
+    read: dict[tuple[str, ...], Row] = field(default_factory=dict)
+    """What rows say of the same recordings."""
+    opened: set[str] = field(default_factory=set)
+    """The keys that every row has, once the first was looked at."""
 
-    def told(self, row: Row, folder: Path) -> Row:
-        """Return `row` with all of it, as the ledger will give it back: lists for tuples, keys in order."""
+    def keys_of_rows(self, cell: Cell) -> set[str]:
+        """Return the keys that the row of `cell` must have, and that of any other."""
+        if not self.opened:
+            self.opened.update(opening(cell, installed().tasks[cell.task].spec))
+        return self.opened
+
+    def told(self, row: Row) -> Row:
+        """Return `row` with all of it."""
         from tactbench.core.matrix.solving import this_host
 
-        paths = [Path(path) for path in row["recordings"]]
-        whole = {
-            **row,
-            "key": self.keys.get(row["cell"], ""),
-            "digests": [self.material.recorded.digest(path) for path in paths],
-            "recordings": [_beside(path, folder) for path in paths],
-            "made_by": self.made_by,
-            "host": row["host"] or this_host(),
-        }
-        plain: Row = json.loads(json.dumps(whole, sort_keys=True))
-        return plain
-
-
-_beside = lru_cache(maxsize=4096)(beside)
+        named = tuple(row["recordings"])
+        if named not in self.read:
+            paths = [Path(path) for path in named]
+            digests = [self.material.recorded.digest(path) for path in paths]
+            self.read[named] = {"digests": digests, "recordings": [beside(path, self.folder) for path in paths]}
+        known = {"key": self.keys.get(row["cell"], ""), "made_by": self.made_by, "host": row["host"] or this_host()}
+        return {**row, **self.read[named], **known}
 
 
 def _unreadable(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> dict[Path, BaseException]:
@@ -144,22 +149,29 @@ def _compute(
     )
     ordered = _ordered(jobs, choice)
     computed = engine.each(work, _marked(ordered, marks, known.keys) if here else ordered)
-    with closing(_each(hopeless, computed)) as outcomes:
-        for job, outcome in outcomes:
-            _entered(job[0], outcome, known, store, told, done)
-            marks.clear()
+    try:
+        with closing(_each(hopeless, computed)) as outcomes:
+            for job, outcome in outcomes:
+                _entered(job[0], outcome, known, store, told, done)
+    finally:
+        marks.clear()
 
 
 def _entered(cell: Cell, outcome: Any, known: _Known, store: Store, told: Progress, done: Evaluated) -> None:
     """Keep what came of a cell."""
-    row, sets = _judged(cell, outcome)
-    row = known.told(row, store.folder)
-    if row["status"] == "done":
-        store.keep(row["key"], row, sets)
-    else:
-        store.note(row)
+    try:
+        row = _written(_judged(cell, outcome, known), known, store)
+    except NotPlainError as error:
+        row = _written(_refused(cell, f"its row is not plain data: {error}"), known, store)
     done.rows[cell.name] = row
     told.advance(cell.name, stopped=row["status"] in STOPPED)
+
+
+def _written(outcome: Answer, known: _Known, store: Store) -> Row:
+    """Write a row, and return it as the store will give it back."""
+    row, sets = outcome
+    told = known.told(row)
+    return store.keep(told["key"], told, sets) if told["status"] == "done" else store.note(told)
 
 
 def _each(*several: Iterable[tuple[Job, Any]]) -> Generator[tuple[Job, Any], None, None]:
@@ -191,18 +203,22 @@ def _marked(jobs: Iterable[Job], marks: InFlight, keys: Mapping[str, str]) -> It
         yield job
 
 
-def _judged(cell: Cell, outcome: Any) -> tuple[Row, Any]:
+def _judged(cell: Cell, outcome: Any, known: _Known) -> Answer:
     """Return the row and answers of a cell; what stopped it, or what is wrong with them, makes the row."""
     from tactbench.core.matrix.checking import fault_in
     from tactbench.core.matrix.solving import unanswered
 
     if isinstance(outcome, BaseException):
         return unanswered(cell, outcome), {}
-    fault = fault_in(outcome, unanswered(cell, CellStopped("")))
+    fault = fault_in(outcome, cell.name, known.keys_of_rows(cell))
     if fault:
-        error = PluginContractError(
-            f"The cell's result is not one: {fault}.", hint="Its estimator or task is at fault."
-        )
-        return unanswered(cell, error), {}
+        return _refused(cell, fault)
     row, sets = outcome
     return row, sets
+
+
+def _refused(cell: Cell, fault: str) -> Answer:
+    from tactbench.core.matrix.solving import unanswered
+
+    error = PluginContractError(f"The cell's result is not one: {fault}.", hint="Its estimator or task is at fault.")
+    return unanswered(cell, error), {}

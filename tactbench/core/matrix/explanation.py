@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,11 +30,6 @@ class Explanation:
     """Why nothing can be said about what differs."""
 
 
-def cell_entry(cell: Cell, key: str, keys: Keys, paths: Sequence[Path], recorded: Recorded, folder: Path) -> Entry:
-    """Return what went into a cell's key, for the book."""
-    return Entry(cell.name, key, _configuration(cell), keys.answer(cell), _data(paths, recorded, folder))
-
-
 def recording_entry(order: Order, keys: Keys) -> Entry:
     """Return what went into a recording's key, for the book."""
     scene = {"role": order.role, "seed": order.seed, "scene": order.scene.model_dump()}
@@ -54,7 +49,17 @@ class Book:
 
     def note_cells(self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path) -> None:
         """Note what goes into the keys of cells that are to be computed: each with its key and its recordings."""
-        self.pages.write(cell_entry(cell, key, self.keys, paths, recorded, folder) for cell, key, paths in cells)
+        self.pages.write(self._entries(cells, recorded, folder))
+
+    def _entries(
+        self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path
+    ) -> Iterator[Entry]:
+        data: dict[tuple[Path, ...], dict[str, dict[str, str]]] = {}
+        for cell, key, paths in cells:
+            several = tuple(paths)
+            if several not in data:  # one object for all cells of the same recordings: the book writes it once
+                data[several] = _data(paths, recorded, folder)
+            yield Entry(cell.name, key, _configuration(cell), self.keys.answer(cell), data[several])
 
 
 def explain(

@@ -31,15 +31,27 @@ def replace_file(path: Path, content: bytes, *, sync: bool = True, mode: int = 0
         return
     aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        with open(aside, "wb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
-            file.write(content)
-            if sync:
-                file.flush()
-                os.fsync(file.fileno())
+        write_file(aside, content, sync=sync, mode=mode)
         aside.replace(path)
     except BaseException:
         aside.unlink(missing_ok=True)
         raise
+
+
+def write_file(path: Path, content: bytes, *, sync: bool, mode: int = 0o666) -> None:
+    """Write a file anew, without what Python's own files do besides; raises OSError if not all of it could be written.
+
+    `sync` says whether it must survive a power cut; `mode`, who may do what with it, before the process's mask.
+    """
+    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), mode)
+    try:
+        written = os.write(file, content)
+        while written < len(content):  # the last bytes of a disk: the next write says why; or two gigabytes
+            written += os.write(file, content[written:])
+        if sync:
+            os.fsync(file)
+    finally:
+        os.close(file)
 
 
 def _holds(path: Path, content: bytes) -> bool:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from pathlib import Path
 
-from tactbench.core.matrix.files import replace_file
-
 
 class InFlight:
-    """One small file in a result folder, there while a cell is carried out in this process.
+    """One small file in a result folder, there while cells are carried out in this process.
 
     Parameters
     ----------
@@ -19,7 +18,7 @@ class InFlight:
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / "cache" / "running"
-        self._set = False
+        self._file = -1
 
     def ended_a_run(self, key: str) -> bool:
         """Return whether a run ended while it carried out the cell with this key."""
@@ -29,13 +28,19 @@ class InFlight:
             return False
 
     def set(self, key: str) -> None:
-        """Say that the cell with this key begins: to whoever comes after this process, not after a power cut."""
-        replace_file(self._path, key.encode(), sync=False)
-        self._set = True
+        """Say that the cell with this key begins: to whoever comes after this process, not after a power cut.
+
+        It stands there until the next one begins: a cell that has got its row is not asked for again.
+        """
+        if self._file < 0:
+            self._file = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+        os.lseek(self._file, 0, os.SEEK_SET)
+        os.write(self._file, key.encode())  # keys are equally long
 
     def clear(self) -> None:
-        """Say that it has got its row."""
-        if self._set or self._path.exists():
-            with suppress(OSError):
-                self._path.unlink(missing_ok=True)
-        self._set = False
+        """Say that no cell is under way, and none has ended the process."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+        with suppress(OSError):
+            self._path.unlink(missing_ok=True)

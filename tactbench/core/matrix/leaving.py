@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
 from tactbench.core.matrix.store import Row
+from tactbench.core.matrix.store.sharing import canonical
 
 SEED_DECIDES = (
     "cell", "status", "metric", "score", "ci_low", "ci_high", "ci_method", "n_recordings", "n_train", "n_test",
@@ -32,5 +32,5 @@ def _group(row: Row) -> tuple[Any, ...]:
 
 def scores_text(rows: Sequence[Row]) -> str:
     """Return what a seed decides, as text that may be compared byte by byte: JSON, one row a line."""
-    lines = (json.dumps({key: row[key] for key in SEED_DECIDES}, sort_keys=True) for row in rows)
+    lines = (canonical({key: row[key] for key in SEED_DECIDES}) for row in rows)
     return "[\n" + ",\n".join(lines) + "\n]\n"

@@ -93,8 +93,11 @@ def serving(
         for path, (_, scene) in shelf.recordings.get(sensor, {}).items()
         if scene is None or not names or scene in names
     ]
+    broken = shelf.unreadable.get(sensor, {})
+    if not broken:
+        return readable, None
     others = {planned.scene.name for known in registry.tasks for planned in known.spec.scenes_for(split)} - names
-    for path, error in shelf.unreadable.get(sensor, {}).items():
+    for path, error in broken.items():
         if not names or path.stem.rpartition("-")[0] not in others:
             return readable, error
     return readable, None

@@ -19,6 +19,6 @@ describes the format.
 """
 
 from tactbench.core.matrix.store.folder import Store
-from tactbench.core.matrix.store.rows import Row
+from tactbench.core.matrix.store.rows import NotPlainError, Row
 
-__all__ = ["Row", "Store"]
+__all__ = ["NotPlainError", "Row", "Store"]

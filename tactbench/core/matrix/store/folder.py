@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import FormatError
-from tactbench.core.matrix.files import replace_file
+from tactbench.core.matrix.files import replace_file, write_file
 from tactbench.core.matrix.store import leftovers, limits
 from tactbench.core.matrix.store.disk import refusal, removed, sync_all, sync_folder, writing
 from tactbench.core.matrix.store.following import Following
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
-from tactbench.core.matrix.store.rows import NAMING, Row
+from tactbench.core.matrix.store.rows import NAMING, Row, plain
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
 
 if TYPE_CHECKING:
@@ -45,6 +45,8 @@ class Store:
 
     def __init__(self, folder: Path, *, recordings: tuple[Path, ...] = ()) -> None:
         self.folder = folder
+        self._cells = folder / "cells"
+        self._cells_name = str(self._cells)
         self._follow = Following(folder, recordings)
         self._lock: Lock | None = None
         self._ledger: Ledger | None = None
@@ -114,37 +116,40 @@ class Store:
         entry = self._done.get(key)
         return dict(entry.row) if entry is not None and self._size(key) == _bytes(entry) else None
 
-    def keep(self, key: str, row: Row, sets: Mapping[Role, Answers]) -> None:
+    def keep(self, key: str, row: Mapping[str, Any], sets: Mapping[Role, Answers]) -> Row:
         """Write a finished cell: its shard aside, synced; its line in the ledger; then the shard gets its name.
 
         In this order a process that is killed leaves a line without a shard, which is no finished cell, and never a
         shard beside a line that tells of another one.
 
+        Returns
+        -------
+        row
+            As the ledger will give it back.
+
         Raises
         ------
         FolderError
             If the disk refuses, or the folder is gone; what was finished before stays.
+        NotPlainError
+            If the row holds what is no plain data.
         """
         from tactbench.core.matrix.store import shard
 
         if not limits.is_key(key) or row.get("status") != "done":
             raise ValueError(f"a finished cell has the status 'done' and a key of 32 hexadecimal digits, not {key!r}")
         ledger = self._read()
-        row = {**row, "key": key}
-        image = shard.build(row, self._provenance[1], sets)
-        entry = Entry(row, (shard.digest_of(image), len(image)))
+        told, text = plain({**row, "key": key})
+        image = shard.build(text, self._provenance[1], sets)
+        entry = Entry(told, (shard.digest_of(image), len(image)))
         path = self._shard(key)
-        aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
+        aside = self._cells / f".{key}.h5.{os.getpid()}.partial"
         with self._written():
             if self._lock is None:
-                path.parent.mkdir(parents=True, exist_ok=True)
+                self._cells.mkdir(parents=True, exist_ok=True)
             due = time.monotonic() - self._synced >= _SYNC_EVERY_S
             try:
-                with aside.open("wb") as file:
-                    file.write(image)
-                    if due and not self._unsynced:  # else all are synced together below
-                        file.flush()
-                        os.fsync(file.fileno())
+                write_file(aside, image, sync=due and not self._unsynced)  # else all are synced together below
                 ledger.append(entry)
                 aside.replace(path)
             except BaseException:
@@ -155,9 +160,15 @@ class Store:
             if due:
                 self._sync()
         self._place(entry)
+        return dict(told)
 
-    def note(self, row: Row) -> None:
+    def note(self, row: Mapping[str, Any]) -> Row:
         """Write how a cell ended that did not finish: failed, crashed, skipped.
+
+        Returns
+        -------
+        row
+            As the ledger will give it back.
 
         Raises
         ------
@@ -170,14 +181,15 @@ class Store:
             name: _clipped(value) if name in ("log", "traceback", "reason") else value for name, value in row.items()
         }
         ledger = self._read()
-        before = self._latest.get(str(row.get("cell")))
-        if before is not None and before.row == row:
-            return
-        with self._written():
-            if self._lock is None:
-                self.folder.mkdir(parents=True, exist_ok=True)
-            ledger.append(Entry(row))
-        self._place(Entry(row))
+        told: Row = json.loads(canonical(row))
+        before = self._latest.get(str(told.get("cell")))
+        if before is None or before.row != told:
+            with self._written():
+                if self._lock is None:
+                    self.folder.mkdir(parents=True, exist_ok=True)
+                ledger.append(Entry(told))
+            self._place(Entry(told))
+        return dict(told)
 
     def reuse(self, row: Row) -> None:
         """Say that a finished cell was found again, under the name it has in `row`.
@@ -327,24 +339,24 @@ class Store:
             self._done[entry.key] = entry
 
     def _shard(self, key: str) -> Path:
-        return self.folder / "cells" / f"{key}.h5"
+        return self._cells / f"{key}.h5"
 
     def _size(self, key: str) -> int:
         try:
-            return os.lstat(self._shard(key)).st_size
+            return os.lstat(f"{self._cells_name}{os.sep}{key}.h5").st_size  # asked for every cell of every run
         except OSError:
             return -1
 
     def _names(self) -> set[str]:
         try:
-            with os.scandir(self.folder / "cells") as found:
+            with os.scandir(self._cells) as found:
                 return {one.name for one in found if one.name.endswith(".h5")}
         except OSError:
             return set()
 
     def _sizes(self) -> dict[str, int]:
         try:
-            with os.scandir(self.folder / "cells") as found:
+            with os.scandir(self._cells) as found:
                 return {one.name: one.stat(follow_symlinks=False).st_size for one in found if one.name.endswith(".h5")}
         except OSError:
             return {}
@@ -358,9 +370,9 @@ class Store:
 
     def _sync(self) -> None:
         if self._unsynced > 1:
-            sync_all(self.folder / "cells")
+            sync_all(self._cells)
         else:
-            sync_folder(self.folder / "cells")
+            sync_folder(self._cells)
         self._synced, self._unsynced = time.monotonic(), 0
 
     def _distrust(self) -> None:

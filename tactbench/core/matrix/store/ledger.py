@@ -157,13 +157,19 @@ def _lines(entry: Entry, known: set[str]) -> tuple[list[str], set[str]]:
 
 @contextmanager
 def _without_collecting() -> Iterator[None]:
-    """Let no garbage be looked for while millions of objects are made to stay: it would take as long again."""
+    """Let no garbage be looked for while millions of objects are made to stay: it would take as long again.
+
+    Afterwards they are among the old ones, as if it had been looked for: else the next look would go over all of them.
+    """
     before = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
         if before:
+            if not gc.get_freeze_count():
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
 
 
@@ -186,7 +192,9 @@ def _parsed(content: bytes) -> Iterator[tuple[str, Any]]:
 
 def _monstrous(line: str, said: Any) -> bool:
     """Return whether a line is nested without end, or holds half characters that cannot be printed."""
-    if line.count("[") + line.count("{") > limits.DEPTH and too_deep(said):
+    # What is empty can only be the innermost.
+    holding = line.count("[") - line.count("[]") + line.count("{") - line.count("{}")
+    if holding >= limits.DEPTH and too_deep(said):
         return True
     if "\\ud" not in line and "\\uD" not in line:
         return False

@@ -19,7 +19,7 @@ def sweep(folder: Path) -> int:
     """
     swept = 0
     for place in (folder, folder / "cells", folder / "provenance", folder / "cache"):
-        for path in _files(place):
+        for path in _files(place, ".partial"):
             named = _ASIDE.fullmatch(path.name)
             if named and not alive(named[1]):
                 swept += _remove(path)
@@ -40,10 +40,10 @@ def _sweep_recording(path: Path) -> int:
     return 0 if _being_written(journal) else _remove(path)
 
 
-def _files(place: Path) -> list[Path]:
+def _files(place: Path, ending: str = "") -> list[Path]:
     try:
         with os.scandir(place) as found:
-            return [Path(one.path) for one in found if one.is_file(follow_symlinks=False)]
+            return [Path(one.path) for one in found if one.name.endswith(ending) and one.is_file(follow_symlinks=False)]
     except OSError:
         return []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -43,6 +44,29 @@ _INSIDE: dict[str, tuple[type, ...]] = {
     "stamps": _TEXT, "remarks": _TEXT, "recordings": _TEXT, "digests": _TEXT, "plan": (dict,), "search": (dict,),
     "classes": _SCALAR, "confusion": (list,), "counts": _NUMBER, "chosen": _NUMBER, "scores": _NUMBER,
 }  # fmt: skip
+
+
+_finite = json.JSONEncoder(sort_keys=True, allow_nan=False).encode
+
+
+class NotPlainError(ValueError):
+    """The row of a finished cell holds what is no plain data: nothing of it was written."""
+
+
+def plain(row: Mapping[str, Any]) -> tuple[Row, str]:
+    """Return a row as it reads when it comes back from a file, and its text: lists for tuples, keys in order.
+
+    Raises
+    ------
+    NotPlainError
+        If it holds what JSON has no word for.
+    """
+    try:
+        text = _finite(row)
+        back: Row = json.loads(text)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise NotPlainError(str(error)) from error
+    return back, text
 
 
 def row_checker() -> Callable[[Row], str]:
@@ -92,15 +116,18 @@ def _words(types: Iterable[type]) -> str:
     return " or ".join(names[one] for one in types)
 
 
+_NESTED = {dict, list}
+
+
 def too_deep(value: Any) -> bool:
-    """Return whether lists and mappings lie in each other more than `DEPTH` deep."""
+    """Return whether lists and mappings, as JSON has them, lie in each other more than `DEPTH` deep."""
     level = [value]
     for _ in range(DEPTH):
         level = [
             inner
             for outer in level
             for inner in (outer.values() if isinstance(outer, dict) else outer)
-            if isinstance(inner, dict | list)
+            if type(inner) in _NESTED
         ]
         if not level:
             return False

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, get_args
 from tactbench.core.errors import FormatError
 from tactbench.core.matrix.store import limits
 from tactbench.core.matrix.store.rows import Row, row_checker, too_deep
-from tactbench.core.matrix.store.sharing import canonical
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -39,37 +38,29 @@ _FILTERS = {1, 2}
 _SEE = "Delete it, and the next run computes the cell again."
 
 
-def build(row: Row, provenance: str, sets: Mapping[Role, Answers]) -> bytes:
-    """Return the bytes of a shard: a table of answers for each role; row and provenance as attributes.
+def build(row: str, provenance: str, sets: Mapping[Role, Answers]) -> bytes:
+    """Return the bytes of a shard: a table of answers for each role; the texts of row and provenance as attributes.
 
     Notes
     -----
     Built in memory: HDF5 cannot give up a file on a full disk without crashing the process, and what is written is
-    known, byte by byte, before any of it is. By h5py's low level, which takes half the time of the other one: a run may
-    have ten thousand of these.
+    known, byte by byte, before any of it is. By h5py's low level, with types that are made once: they take as long as
+    all else, and a run may have ten thousand of these.
     """
-    from h5py import h5d, h5f, h5p, h5s, h5t
+    from h5py import h5d, h5f, h5s
 
-    text = canonical(row)
-    content = _Content(text, provenance)
-    access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fapl_core(_GROWTH_BYTES, False)
+    content = _Content(row, provenance)
     # The name is nobody's, but must be unique in the process.
-    file = h5f.create(f"cell-{next(_NUMBERS)}".encode(), h5f.ACC_TRUNC, fapl=access)
+    file = h5f.create(f"cell-{next(_NUMBERS)}".encode(), h5f.ACC_TRUNC, fapl=_in_memory())
     try:
         for role in sorted(sets):
             table = _table(sets[role])
             content.add(role, table)
-            stored = h5p.create(h5p.DATASET_CREATE)
-            if table.nbytes >= _COMPRESSED_BYTES:
-                stored.set_chunk((min(len(table), _CHUNK_ROWS),))
-                stored.set_shuffle()
-                stored.set_deflate(4)
-            space = h5s.create_simple(table.shape)
-            dataset = h5d.create(file, role.encode(), h5t.py_create(table.dtype), space, stored)
+            kind = _kind(table.dtype)
+            dataset = h5d.create(file, role.encode(), kind, h5s.create_simple(table.shape), _stored(table))
             if len(table):
-                dataset.write(h5s.ALL, h5s.ALL, table)
-        facts = {"format": f"{FORMAT} {VERSION}", "row": text, "provenance": provenance, "sha256": content.hexdigest()}
+                dataset.write(h5s.ALL, h5s.ALL, table, mtype=kind)
+        facts = {"format": f"{FORMAT} {VERSION}", "row": row, "provenance": provenance, "sha256": content.hexdigest()}
         for name, fact in facts.items():
             _write_text(file, name, fact)
         h5f.flush(file)
@@ -79,20 +70,68 @@ def build(row: Row, provenance: str, sets: Mapping[Role, Answers]) -> bytes:
     return image
 
 
+def _stored(table: npt.NDArray[Any]) -> Any:
+    """Return how a table is laid out: None for as it is."""
+    from h5py import h5p
+
+    if table.nbytes < _COMPRESSED_BYTES:
+        return None
+    stored = h5p.create(h5p.DATASET_CREATE)
+    stored.set_chunk((min(len(table), _CHUNK_ROWS),))
+    stored.set_shuffle()
+    stored.set_deflate(4)
+    return stored
+
+
+@lru_cache(maxsize=1)
+def _in_memory() -> Any:
+    """Return how a file is opened that is nowhere but in memory."""
+    from h5py import h5p
+
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fapl_core(_GROWTH_BYTES, False)
+    return access
+
+
+@lru_cache(maxsize=32)
+def _kind(dtype: npt.DTypeLike) -> Any:
+    """Return HDF5's type for a type of numpy; making one takes as long as writing a small table."""
+    from h5py import h5t
+
+    return h5t.py_create(dtype)
+
+
+@lru_cache(maxsize=64)
+def _text_kind(length: int) -> Any:
+    """Return HDF5's type for a text of so many bytes."""
+    from h5py import h5t
+
+    kind = h5t.C_S1.copy()
+    kind.set_size(length)
+    kind.set_cset(h5t.CSET_UTF8)
+    return kind
+
+
+@lru_cache(maxsize=1)
+def _scalar() -> Any:
+    from h5py import h5s
+
+    return h5s.create(h5s.SCALAR)
+
+
 def _write_text(file: Any, name: str, text: str) -> None:
     """Write a text as an attribute, or as a dataset where it is longer than attributes of HDF5 may be."""
+    import h5py
     import numpy as np
-    from h5py import h5a, h5d, h5s, h5t
 
     content = text.encode()
-    kind = h5t.C_S1.copy()
-    kind.set_size(len(content))
-    kind.set_cset(h5t.CSET_UTF8)
-    value = np.array(content, dtype=f"S{len(content)}")
+    kind = _text_kind(len(content))
+    value = np.frombuffer(content, dtype=f"S{len(content)}").reshape(())
     if len(content) <= _ATTRIBUTE_BYTES:
-        h5a.create(file, name.encode(), kind, h5s.create(h5s.SCALAR)).write(value, mtype=kind)
+        h5py.h5a.create(file, name.encode(), kind, _scalar()).write(value, mtype=kind)
     else:
-        h5d.create(file, name.encode(), kind, h5s.create(h5s.SCALAR)).write(h5s.ALL, h5s.ALL, value, mtype=kind)
+        everything = h5py.h5s.ALL
+        h5py.h5d.create(file, name.encode(), kind, _scalar()).write(everything, everything, value, mtype=kind)
 
 
 def _table(answers: Answers) -> npt.NDArray[Any]:

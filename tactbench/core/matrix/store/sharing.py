@@ -20,9 +20,8 @@ WORTH_CHARACTERS = 120
 _SPLIT = tuple((place, *place.partition("/")[::2]) for place in SHARED)
 
 
-def canonical(value: Any) -> str:
-    """Return plain data as one line of JSON: the same text for the same data."""
-    return json.dumps(value, sort_keys=True)
+canonical = json.JSONEncoder(sort_keys=True).encode
+"""Return plain data as one line of JSON: the same text for the same data."""
 
 
 def provenance_id(content: bytes) -> str:

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from tactbench.core.matrix.store import Store
+from tactbench.core.matrix.store import NotPlainError, Store
 
 from .made import PLAN, answers, done, ended, kept, key
 
@@ -29,6 +29,30 @@ def test_answers_come_back_by_role_bit_for_bit(tmp_path, rows):
         for name in COLUMNS:
             assert np.array_equal(getattr(found[role], name), getattr(one, name), equal_nan=True), (role, name)
             assert getattr(found[role], name).dtype == getattr(one, name).dtype
+
+
+def test_a_row_is_returned_as_it_comes_back(tmp_path):
+    store = Store(tmp_path)
+    kept_now = store.keep(key("a"), {**done("a"), "classes": (1, 2), "counts": {"b": 1, "a": 2}}, {"test": answers(3)})
+    noted_now = store.note({**ended("b"), "classes": ("one",)})
+    assert [kept_now, noted_now] == Store(tmp_path).rows()
+    assert (kept_now["classes"], list(kept_now["counts"])) == ([1, 2], ["a", "b"])
+    kept_now["baseline"] = 1.0  # whoever got it may write in it
+    assert "baseline" not in store.rows()[0]
+
+
+@pytest.mark.parametrize(
+    "lie", [float("nan"), float("inf"), object(), {1: 2, "a": 3}, (lambda n: n.append(n) or n)([])]
+)
+def test_of_a_row_that_is_no_plain_data_nothing_is_written(tmp_path, lie):
+    store = Store(tmp_path)
+    kept(store, "a")
+    before = (tmp_path / "index.jsonl").read_bytes()
+    with pytest.raises(NotPlainError):
+        kept(store, "b", chosen=lie)
+    assert (tmp_path / "index.jsonl").read_bytes() == before
+    assert [row["cell"] for row in Store(tmp_path).rows()] == ["a"]
+    assert sorted(path.name for path in (tmp_path / "cells").iterdir()) == [f"{key('a')}.h5"]
 
 
 def test_the_latest_of_each_name_is_listed_however_it_ended(tmp_path):

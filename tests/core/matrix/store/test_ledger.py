@@ -125,6 +125,20 @@ def test_a_line_that_makes_no_sense_is_left_out_and_told(tmp_path, line, says):
     assert [row["cell"] for row in Store(tmp_path).rows()] == ["before", "after"]
 
 
+@pytest.mark.parametrize("empty", ["[]", "{}", '"[]"', "[ ]", "1"])
+def test_lines_nest_as_deeply_as_is_allowed_and_no_deeper(tmp_path, empty):
+    store = Store(tmp_path)
+    inside = 0 if empty in ('"[]"', "1") else 1
+    for name, deep in (("held", limits.DEPTH - 2 - inside), ("over", limits.DEPTH - 1 - inside)):
+        store.note(ended(name))
+        row = json.dumps({"row": {**GOOD, "cell": name, "simulation": 0}})
+        nested = '{"a": ' * deep + empty + "}" * deep
+        with (tmp_path / "index.jsonl").open("a") as ledger:
+            ledger.write(row.replace('"simulation": 0', f'"simulation": {nested}') + "\n")
+    found = {row["cell"]: "simulation" in row for row in Store(tmp_path).rows()}
+    assert found == {"held": True, "over": False}
+
+
 @pytest.mark.parametrize(
     ("limit", "value", "says"),
     [("LINE_BYTES", 300, "could not be read"), ("ENTRIES", 1, "could not be read"),

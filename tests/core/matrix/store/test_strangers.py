@@ -11,6 +11,7 @@ import pytest
 
 from tactbench.core.matrix.store import Store, limits, shard
 from tactbench.core.matrix.store.ledger import Entry, whole_text
+from tactbench.core.matrix.store.sharing import canonical
 from tests.core.matrix.test_merging import record
 
 from .made import answers, done, kept, key
@@ -19,7 +20,7 @@ from .made import answers, done, kept, key
 def forged(folder, change):
     """Write a folder whose ledger vouches for a shard that was made by hand."""
     row = {**done("a"), "key": key("a")}
-    image = io.BytesIO(shard.build(row, "{}", {"test": answers(5)}))
+    image = io.BytesIO(shard.build(canonical(row), "{}", {"test": answers(5)}))
     with h5py.File(image, "r+") as file:
         change(file)
     (folder / "cells").mkdir(parents=True)
