@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.board.columns import Columns
 from tactbench.core.leaderboard.board.digits import write_digits
 from tactbench.core.leaderboard.board.pack import Column, Pack
 from tactbench.core.leaderboard.board.words import LONGEST, write_words
 from tactbench.core.leaderboard.numbers import duration
+from tactbench.core.leaderboard.sheet import Columns
 
 MANY = 5_000
 """Cells beyond which what every cell has of its own is told shortly, or left to its shard."""

@@ -6,12 +6,10 @@ import json
 from collections import Counter, defaultdict, deque
 from collections.abc import Mapping, Sequence
 from html import escape
-from operator import itemgetter
 from string import Template
 from typing import Any
 
 import tactbench
-from tactbench.core.leaderboard.board.columns import columns_of
 from tactbench.core.leaderboard.board.digits import FEW_STEPS, STEPS, write_digits
 from tactbench.core.leaderboard.board.fields import MANY, NOTHING, write_fields
 from tactbench.core.leaderboard.board.pack import Column, Pack, deflated
@@ -22,6 +20,7 @@ from tactbench.core.leaderboard.collector import collector_at_rest
 from tactbench.core.leaderboard.names import SIMULATED
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.particulars import GROUPS, TITLES
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import ABSENT, LOWER_IS_BETTER, NUMERIC, Block, Section, Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.values import VALUES
@@ -70,14 +69,14 @@ def page_of(table: Table, remarks: Sequence[str] = ()) -> str:
     remarks
         What a reader must know first.
     """
-    # By name: what neighbours share lies together.
-    rows = sorted(table.rows, key=itemgetter("cell"))
+    sheet = Sheet.by_name(table.rows)
+    rows = sheet.rows
     order = _places(rows, table)
     pack = Pack()
-    head = _head(pack, rows, table, order, remarks)
+    head = _head(pack, sheet, table, order, remarks)
     frame = _frame(rows, still(table, rows, order, remarks) if len(rows) <= MOST_STILL else "")
     taken = len(frame.encode()) + len(deflated(_json(head))) + _ROOM_FOR_FIELDS
-    head["fields"], head["leftOut"] = write_fields(pack, columns_of(rows), LARGEST - taken)
+    head["fields"], head["leftOut"] = write_fields(pack, sheet, LARGEST - taken)
     written = pack.add(_json(head))
     data = json.dumps({"head": written, "blobs": pack.blobs}, separators=(",", ":"))
     # The last one: a name may say the same.
@@ -104,12 +103,13 @@ def _places(rows: Sequence[Row], table: Table) -> list[list[int]]:
 
 def _head(
     pack: Pack,
-    rows: Sequence[Row],
+    sheet: Sheet,
     table: Table,
     order: Sequence[Sequence[int]],
     remarks: Sequence[str],
 ) -> dict[str, Any]:
     """Return all that the page's script must know, the blobs that it is in aside."""
+    rows = sheet.rows
     lines = [line for block in table.blocks for line in block.lines]
     flat = [place for block in order for place in block]
     empty = ("",) * len(table.columns)
@@ -134,7 +134,7 @@ def _head(
             for block, first in zip(table.blocks, firsts, strict=True)
         ],
         "columns": [
-            {"name": name, "numeric": name in NUMERIC, "column": _column(pack, name, shown, rows)}
+            {"name": name, "numeric": name in NUMERIC, "column": _column(pack, name, shown, sheet)}
             for name, shown in zip(table.columns, texts, strict=True)
         ],
         "sections": [_section(section) for section in table.sections],
@@ -181,14 +181,14 @@ def _roles(columns: Sequence[str]) -> dict[str, Any]:
     return {**named, "times": [name for name in DURATIONS if name in columns]}
 
 
-def _column(pack: Pack, name: str, texts: Sequence[str], rows: Sequence[Row]) -> Column:
+def _column(pack: Pack, name: str, texts: Sequence[str], sheet: Sheet) -> Column:
     if name in NUMERIC:
-        found = VALUES.get(name)
-        # A stopped cell may know a number that the table does not show: it is not sorted by it either.
-        values = (
-            [None if text in _NOTHING else found(row) for row, text in zip(rows, texts, strict=True)] if found else None
-        )
-        column = write_digits(pack, texts, values, FEW_STEPS if len(rows) > MANY else STEPS)
+        values = None
+        if name in VALUES:
+            # A stopped cell may know a number that the table does not show: it is not sorted by it either.
+            told = zip(VALUES[name](sheet), texts, strict=True)
+            values = [None if text in _NOTHING else value for value, text in told]
+        column = write_digits(pack, texts, values, FEW_STEPS if len(texts) > MANY else STEPS)
         if column is not None:
             return column
     return write_words(pack, texts) or NOTHING

@@ -11,8 +11,8 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.board.columns import columns_of
 from tactbench.core.leaderboard.board.words import tame, tame_text
+from tactbench.core.leaderboard.sheet import columns_of
 from tactbench.core.leaderboard.table import Table, build_table
 
 Row = Mapping[str, Any]

@@ -1,0 +1,102 @@
+"""Rows laid out by key: what is asked of every row is asked once, and every later look is at a list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
+from operator import itemgetter
+from typing import Any
+
+from tactbench.core.leaderboard.names import answer_name, sensor_name
+
+Row = Mapping[str, Any]
+Columns = Mapping[str, Sequence[Any]]
+
+
+def columns_of(rows: Sequence[Row]) -> Columns:
+    """Return one value a row under each key that some row has, None where a row lacks it; keys in order."""
+    keys = sorted(rows[0] if len(set(map(len, rows))) == 1 else set().union(*rows), key=str)
+    try:
+        return dict(zip(keys, zip(*map(itemgetter(*keys), rows), strict=True), strict=True))
+    except (KeyError, TypeError, ValueError):  # keys differ, or there is one, or none
+        known = sorted(set().union(*rows), key=str)
+        return {key: [row.get(key) for row in rows] for key in known}
+
+
+class Sheet(Mapping[str, Sequence[Any]]):
+    """The rows of a table and, under each of their keys, one value a row: None where a row lacks it.
+
+    Parameters
+    ----------
+    rows
+        Rows in any order.
+    columns
+        What `columns_of` returns for them.
+    """
+
+    def __init__(self, rows: Sequence[Row], columns: Columns | None = None) -> None:
+        self.rows = rows
+        self._columns = columns_of(rows) if columns is None else columns
+
+    @classmethod
+    def by_name(cls, rows: Sequence[Row]) -> Sheet:
+        """Return rows in the order of their cells' names: what neighbours share lies together."""
+        return cls(sorted(rows, key=itemgetter("cell")))
+
+    def __getitem__(self, key: str) -> Sequence[Any]:
+        """Return the values under a key; KeyError if there are rows and none has it."""
+        return self._columns[key] if self.rows else ()
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the keys."""
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        """Return the number of keys."""
+        return len(self._columns)
+
+    def known(self, key: str) -> Sequence[Any]:
+        """Return the values under a key that rows may lack."""
+        return self._columns.get(key) or (None,) * len(self.rows)
+
+    def taken(self, places: Sequence[int]) -> Sheet:
+        """Return the rows at these places, in this order."""
+        return Sheet([self.rows[place] for place in places], _Taken(self._columns, places))
+
+    def told(self, told: Callable[[Row], str], *keys: str) -> list[str]:
+        """Return what `told` returns for each row; it is asked once of those that have the same under `keys`."""
+        marks = list(zip(*map(self.known, keys), strict=True))
+        alike = {mark: told(row) for mark, row in dict(zip(marks, self.rows, strict=True)).items()}
+        return [alike[mark] for mark in marks]
+
+    @cached_property
+    def sensors(self) -> list[str]:
+        """The name of each row's sensor, as shown."""
+        return self.told(sensor_name, "sensor", "simulated")
+
+    @cached_property
+    def answers(self) -> list[str]:
+        """The name of each row's estimator, as shown."""
+        plain = self.told(lambda row: answer_name({**row, "params": {}}), "estimator")
+        given = zip(self["params"], plain, self.rows, strict=True)
+        return [answer_name(row) if params else name for params, name, row in given]
+
+
+class _Taken(Mapping[str, Sequence[Any]]):
+    """Columns of some of the rows, made when they are asked for."""
+
+    def __init__(self, columns: Columns, places: Sequence[int]) -> None:
+        self._columns = columns
+        self._places = places
+        self._made: dict[str, Sequence[Any]] = {}
+
+    def __getitem__(self, key: str) -> Sequence[Any]:
+        if key not in self._made:
+            self._made[key] = list(map(self._columns[key].__getitem__, self._places))
+        return self._made[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
