@@ -61,7 +61,7 @@ class Sheet(Mapping[str, Sequence[Any]]):
 
     def taken(self, places: Sequence[int]) -> Sheet:
         """Return the rows at these places, in this order."""
-        return Sheet([self.rows[place] for place in places], _Taken(self._columns, places))
+        return Sheet([self.rows[place] for place in places], _Taken(self, places))
 
     def told(self, told: Callable[[Row], str], *keys: str) -> list[str]:
         """Return what `told` returns for each row; it is asked once of those that have the same under `keys`."""
