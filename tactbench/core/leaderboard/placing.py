@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from tactbench.core.leaderboard import memo
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.sheet import Sheet, alike
 
 _DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
 """Packages whose code ranks."""
@@ -45,7 +45,7 @@ def places(results: Sheet) -> tuple[dict[str, Placing], str]:
     if not results.rows or reason:
         return _by_score(results), reason
     try:
-        facts = [*map(results.known, _DECIDES), list(map(memo.ordered, results["replicates"]))]
+        facts = [*map(results.known, _DECIDES), _plain(results["replicates"])]
         digest = memo.digest_of(*map(memo.source_digest, _DECIDING), facts)
         found = _believed(memo.recall(digest), results["cell"])
         if found is None:
@@ -58,6 +58,12 @@ def places(results: Sheet) -> tuple[dict[str, Placing], str]:
         # Rows of a stranger's folder: their replicates may be anything.
         return _by_score(results), f"their replicates cannot be used ({type(error).__name__})"
     return found, ""
+
+
+def _plain(replicates: Sequence[Any]) -> Any:
+    """Return replicates as lists: the same whatever the order of their keys."""
+    by_key = alike(replicates) if set(map(type, replicates)) == {dict} else None
+    return list(map(memo.ordered, replicates)) if by_key is None else memo.ordered(by_key)
 
 
 def _unrankable(results: Sheet) -> str:

@@ -13,14 +13,31 @@ Row = Mapping[str, Any]
 Columns = Mapping[str, Sequence[Any]]
 
 
-def columns_of(rows: Sequence[Row]) -> Columns:
-    """Return one value a row under each key that some row has, None where a row lacks it; keys in order."""
-    keys = sorted(rows[0] if len(set(map(len, rows))) == 1 else set().union(*rows), key=str)
+def columns_of(rows: Sequence[Row]) -> tuple[Columns, frozenset[str]]:
+    """Return one value a row under each key that some row has, and the keys that every row has.
+
+    Returns
+    -------
+    dict, frozenset
+        Keys in order; None where a row lacks one.
+    """
+    found = alike(rows)
+    if found is not None:
+        return found, frozenset(found)
+    known = sorted(set().union(*rows), key=str)
+    everywhere = frozenset(known).intersection(*rows)
+    return {key: [row.get(key) for row in rows] for key in known}, everywhere
+
+
+def alike(rows: Sequence[Row]) -> Columns | None:
+    """Return one value a row under each key, keys in order; None if there are no rows or their keys differ."""
+    if len(set(map(len, rows))) != 1 or len(rows[0]) < 2:
+        return None
+    keys = sorted(rows[0], key=str)
     try:
         return dict(zip(keys, zip(*map(itemgetter(*keys), rows), strict=True), strict=True))
-    except (KeyError, TypeError, ValueError):  # keys differ, or there is one, or none
-        known = sorted(set().union(*rows), key=str)
-        return {key: [row.get(key) for row in rows] for key in known}
+    except KeyError:
+        return None
 
 
 class Sheet(Mapping[str, Sequence[Any]]):
@@ -31,12 +48,13 @@ class Sheet(Mapping[str, Sequence[Any]]):
     rows
         Rows in any order.
     columns
-        What `columns_of` returns for them.
+        The same by key, if known already.
     """
 
     def __init__(self, rows: Sequence[Row], columns: Columns | None = None) -> None:
         self.rows = rows
-        self._columns = columns_of(rows) if columns is None else columns
+        self._columns = columns_of(rows)[0] if columns is None else columns
+        self._types: dict[str, frozenset[type]] = {}
 
     @classmethod
     def by_name(cls, rows: Sequence[Row]) -> Sheet:
@@ -59,6 +77,12 @@ class Sheet(Mapping[str, Sequence[Any]]):
         """Return the values under a key that rows may lack."""
         return self._columns.get(key) or (None,) * len(self.rows)
 
+    def types(self, key: str) -> frozenset[type]:
+        """Return the types of the values under a key."""
+        if key not in self._types:
+            self._types[key] = frozenset(map(type, self[key]))
+        return self._types[key]
+
     def taken(self, places: Sequence[int]) -> Sheet:
         """Return the rows at these places, in this order."""
         return Sheet([self.rows[place] for place in places], _Taken(self, places))
@@ -66,8 +90,8 @@ class Sheet(Mapping[str, Sequence[Any]]):
     def told(self, told: Callable[[Row], str], *keys: str) -> list[str]:
         """Return what `told` returns for each row; it is asked once of those that have the same under `keys`."""
         marks = list(zip(*map(self.known, keys), strict=True))
-        alike = {mark: told(row) for mark, row in dict(zip(marks, self.rows, strict=True)).items()}
-        return [alike[mark] for mark in marks]
+        answers = {mark: told(row) for mark, row in dict(zip(marks, self.rows, strict=True)).items()}
+        return list(map(answers.__getitem__, marks))
 
     @cached_property
     def sensors(self) -> list[str]:

@@ -58,7 +58,7 @@ def sound(rows: Sequence[Any]) -> tuple[list[Row], tuple[str, ...]]:
     kept: list[Row] = [row for row in rows if isinstance(row, Mapping)]
     told = [f"{len(rows) - len(kept)} entries are no rows and are left out."] if len(kept) < len(rows) else []
     odd: Counter[str] = Counter()
-    columns = columns_of(kept)
+    columns, _ = columns_of(kept)
     present = set(columns).intersection(*{tuple(row) for row in kept})
     copies: dict[int, dict[str, Any]] = {}
     for key, (kinds, mend) in _KINDS.items():
