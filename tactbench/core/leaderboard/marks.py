@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import chain
+from itertools import chain, compress
 from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.sheet import Sheet, marks_of
 from tactbench.core.leaderboard.text import visible
 
 DAGGER = (
@@ -26,10 +26,8 @@ def mark_notes(sheet: Sheet) -> list[str]:
     """Return what the marks of a table mean: †, ‡ and SIM, each once."""
     dagger = [DAGGER] if any(sheet["dagger"]) else []
     stamps = dict.fromkeys(f"‡ {visible(str(stamp))}" for stamp in chain.from_iterable(filter(None, sheet["stamps"])))
-    given = zip(sheet["simulated"], sheet["assumptions"], strict=True)
-    # Rows share what was assumed of a recording: each is told once.
-    assumed = {id(assumptions): assumptions for simulated, assumptions in given if simulated}
-    told = dict.fromkeys(map(_assumptions, assumed.values()))
+    assumed = list(compress(sheet["assumptions"], sheet["simulated"]))
+    told = dict.fromkeys(map(_assumptions, dict(zip(marks_of(assumed), assumed, strict=True)).values()))
     simulated = [f"SIM: simulated by the twin, never ranked against hardware. Assumed: {one}." for one in told]
     return [*dagger, *stamps, *simulated]
 

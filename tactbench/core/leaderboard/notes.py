@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import marshal
 import re
 from collections.abc import Mapping, Sequence
 from itertools import compress
@@ -13,7 +12,7 @@ from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.marks import mark_notes
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, question_name
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.sheet import Sheet, marks_of
 from tactbench.core.leaderboard.stopped import stopped_notes
 from tactbench.core.leaderboard.text import visible
 
@@ -117,14 +116,9 @@ def _left_out_notes(sheet: Sheet) -> list[str]:
     """Return what was left out of the data, and what their recordings remark; rows share these, each is told once."""
     counted: dict[str, None] = {}
     remarked: dict[str, None] = {}
-    told: set[tuple[Any, ...]] = set()
-    for sensor, task, counts in zip(sheet["sensor"], sheet["task"], sheet["counts"], strict=True):
-        if not counts:
-            continue
-        # Shared or not: equal counts are equal bytes, which nobody reads.
-        mark = (sensor, task, marshal.dumps(counts, 2))
-        if mark not in told:
-            told.add(mark)
+    asked = zip(sheet["sensor"], sheet["task"], marks_of(sheet["counts"]), strict=True)
+    for (sensor, task, _), counts in dict(zip(asked, sheet["counts"], strict=True)).items():
+        if counts:
             where = question_name({"sensor": sensor, "task": task})
             counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in told_counts(counts))
     for sensor, remarks in zip(sheet["sensor"], sheet["remarks"], strict=True):

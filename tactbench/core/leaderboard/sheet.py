@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import marshal
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
+from itertools import chain, repeat
 from operator import itemgetter
 from typing import Any
 
 from tactbench.core.leaderboard.names import answer_name, sensor_name
+from tactbench.core.spec.row import FORMAT
 
 Row = Mapping[str, Any]
 Columns = Mapping[str, Sequence[Any]]
+
+
+MOST_OTHERS = 200
+"""Keys of no format of ours that are laid out where rows differ in theirs, those that most rows have: rows of a
+stranger may have a million, each its own."""
 
 
 def columns_of(rows: Sequence[Row]) -> tuple[Columns, frozenset[str]]:
@@ -24,8 +33,10 @@ def columns_of(rows: Sequence[Row]) -> tuple[Columns, frozenset[str]]:
     found = alike(rows)
     if found is not None:
         return found, frozenset(found)
-    known = sorted(set().union(*rows), key=str)
-    everywhere = frozenset(known).intersection(*rows)
+    counts = Counter(chain.from_iterable(rows))
+    others = [key for key, _ in counts.most_common() if key not in FORMAT][:MOST_OTHERS]
+    known = sorted([*others, *(key for key in FORMAT if key in counts)], key=str)
+    everywhere = frozenset(key for key in known if counts[key] == len(rows))
     return {key: [row.get(key) for row in rows] for key in known}, everywhere
 
 
@@ -38,6 +49,24 @@ def alike(rows: Sequence[Row]) -> Columns | None:
         return dict(zip(keys, zip(*map(itemgetter(*keys), rows), strict=True), strict=True))
     except KeyError:
         return None
+
+
+def marks_of(values: Sequence[Any]) -> Sequence[Any]:
+    """Return one mark a value; values of one mark are equal, to the type. What rows share is looked at once."""
+    ids = list(map(id, values))
+    if 2 * len(set(ids)) > len(values):
+        return _content(values)
+    distinct = dict(zip(ids, values, strict=True))
+    marks = dict(zip(distinct, _content(list(distinct.values())), strict=True))
+    return list(map(marks.__getitem__, ids))
+
+
+def _content(values: Sequence[Any]) -> Sequence[Any]:
+    try:
+        # Version 2 of the format writes equal values of equal types as equal bytes; it is never read.
+        return list(map(marshal.dumps, values, repeat(2)))
+    except ValueError:  # some hold what is not plain, or are endless
+        return list(map(id, values))
 
 
 class Sheet(Mapping[str, Sequence[Any]]):

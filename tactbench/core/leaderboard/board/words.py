@@ -7,14 +7,13 @@ what is longer than anybody reads; each says so in its place.
 from __future__ import annotations
 
 import json
-import marshal
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import repeat
 from typing import Any
 
 from tactbench.core.leaderboard.board.pack import Column, Pack
+from tactbench.core.leaderboard.sheet import marks_of
 
 LONGEST = 65_536
 """Characters of a text: what a cell may print is kept to as many bytes."""
@@ -49,7 +48,7 @@ def write_words(
         return None
     # By value where that is safe: 1, 1.0 and True are equal.
     alike = len(types - {_NOTHING}) <= 1 and types <= _PLAIN
-    keys = values if alike else _marks(values)
+    keys = values if alike else marks_of(values)
     texts: dict[str, int] = {}
     places = {
         key: texts.setdefault(written(value, longest), len(texts))
@@ -59,24 +58,6 @@ def write_words(
         return None
     at = pack.zeros(len(values)) if len(texts) == 1 else pack.planes(list(map(places.__getitem__, keys)))
     return _column(pack, texts, at)
-
-
-def _marks(values: Sequence[Any]) -> Sequence[Any]:
-    """Return one mark a value: values of one mark are written alike. Shared values are looked at once."""
-    ids = list(map(id, values))
-    if 2 * len(set(ids)) > len(values):
-        return _content(values)
-    distinct = dict(zip(ids, values, strict=True))
-    marks = dict(zip(distinct, _content(list(distinct.values())), strict=True))
-    return list(map(marks.__getitem__, ids))
-
-
-def _content(values: Sequence[Any]) -> Sequence[Any]:
-    try:
-        # Version 2 of the format writes equal values of equal types as equal bytes; it is never read.
-        return list(map(marshal.dumps, values, repeat(2)))
-    except ValueError:  # some hold what is not plain, or are endless
-        return list(map(id, values))
 
 
 def _column(pack: Pack, texts: Iterable[str], at: list[int]) -> Column:
