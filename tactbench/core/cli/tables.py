@@ -67,8 +67,7 @@ def print_rows(
     check_destination(shape, to, times=times)
     if folder is not None:
         memo.load(folder)
-    with collector_at_rest():
-        table = build_table(rows, provenance, times=times)
+    table = build_table(rows, provenance, times=times)
     if folder is not None:
         memo.save(folder)
     if shape == "table" and to is None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
+from tactbench.core.leaderboard.collector import collector_at_rest
 from tactbench.core.leaderboard.columns import COLUMNS, NUMERIC, columns
 from tactbench.core.leaderboard.foot import foot_of
 from tactbench.core.leaderboard.hosts import host_letters, timing_notes
@@ -78,7 +79,11 @@ def build_table(rows: Sequence[Row] | Sheet, provenance: Sequence[Row] = (), *, 
     times
         False: the table of what a seed decides, the same on every machine; no times, no hosts, no provenance.
     """
-    known = tuple(provenance) if times else ()
+    with collector_at_rest():
+        return _arranged(rows, tuple(provenance) if times else (), times)
+
+
+def _arranged(rows: Sequence[Row] | Sheet, known: tuple[Row, ...], times: bool) -> Table:
     sheet = rows if isinstance(rows, Sheet) else Sheet.by_name(rows)
     letters = host_letters(sheet) if times else {}
     shown, blocks = blocks_of(sheet, letters, times)
