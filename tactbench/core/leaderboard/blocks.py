@@ -9,19 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
+from functools import cached_property
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.hosts import timing_mark
-from tactbench.core.leaderboard.lines import Line, done_line, stopped_line
+from tactbench.core.leaderboard.lines import Line, Shown, shown_of
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
-from tactbench.core.leaderboard.placing import places
+from tactbench.core.leaderboard.placing import Placing, places
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
 _Key = tuple[str, str, str, str, int]
-_ORIGIN = itemgetter("task", "protocol", "rig", "simulated", "status", "repeat", "split")
+_ORIGIN = ("task", "protocol", "rig", "simulated", "status", "repeat", "split")
 """All that says in which block a row stands."""
 
 
@@ -30,23 +30,45 @@ class Block:
     """Rows that may be compared."""
 
     title: str
-    lines: tuple[Line, ...]
+    shown: Shown
+    """All rows of the table."""
+    places: tuple[int, ...]
+    """Those of this block, in order."""
     unranked: str = ""
     """Why there are no rank intervals; empty where there are."""
 
+    @cached_property
+    def lines(self) -> tuple[Line, ...]:
+        """Its lines, in order."""
+        return tuple(map(self.shown.line, self.places))
 
-def blocks_of(rows: Sequence[Row], letters: Mapping[str, str], times: bool) -> tuple[Block, ...]:
-    """Arrange `rows` into blocks, ranked.
+
+def blocks_of(sheet: Sheet, letters: Mapping[str, str], times: bool) -> tuple[Shown, tuple[Block, ...]]:
+    """Arrange rows into blocks, ranked.
 
     Parameters
     ----------
+    sheet
+        Rows in the order of their cells' names.
     letters
         The mark of each host.
     times
         Whether lines have times.
+
+    Returns
+    -------
+    Shown, tuple of Block
+        All rows as text, and which of them stand together.
     """
-    groups = _grouped(rows)
-    return tuple(_block(key, groups[key], letters, times) for key in sorted(groups, key=_order))
+    groups = _grouped(sheet)
+    placings: list[Placing | None] = [None] * len(sheet.rows)
+    arranged = [(key, *_arranged(sheet, groups[key], placings)) for key in sorted(groups, key=_order)]
+    shown = shown_of(sheet, placings, letters, times)
+    blocks = [
+        Block(_title(key, [sheet.rows[place] for place in groups[key]]), shown, members, unranked)
+        for key, members, unranked in arranged
+    ]
+    return shown, tuple(blocks)
 
 
 def _order(key: _Key) -> tuple[Any, ...]:
@@ -55,14 +77,14 @@ def _order(key: _Key) -> tuple[Any, ...]:
     return task, split in ("shuffled", "in-session"), is_probe(protocol), key
 
 
-def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
-    """Group rows by what must not be mixed.
+def _grouped(sheet: Sheet) -> dict[_Key, list[int]]:
+    """Group the places of rows by what must not be mixed.
 
     A cell that was not begun knows neither its split, if nobody asked for one, nor whether it would have been
     simulated: it stands with the finished cells of its rig, if these agree.
     """
-    origins = list(map(_ORIGIN, rows))
-    alike = dict(zip(origins, rows, strict=True))  # one row of each origin: the others are asked nothing
+    origins = list(zip(*(sheet[key] for key in _ORIGIN), strict=True))
+    alike = dict(zip(origins, sheet.rows, strict=True))  # one row of each origin: the others are asked nothing
     kinds: dict[str, set[str]] = {}
     splits: dict[tuple[Any, ...], set[str]] = {}
     for row in alike.values():
@@ -72,9 +94,9 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
         if row["split"] is not None:
             splits.setdefault(_without_split(row, kinds), set()).add(row["split"])
     keys = {origin: _key(row, kinds, splits) for origin, row in alike.items()}
-    groups: dict[_Key, list[Row]] = {}
-    for row, origin in zip(rows, origins, strict=True):
-        groups.setdefault(keys[origin], []).append(row)
+    groups: dict[_Key, list[int]] = {}
+    for place, origin in enumerate(origins):
+        groups.setdefault(keys[origin], []).append(place)
     return groups
 
 
@@ -91,30 +113,30 @@ def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, s
     return row["task"], row["protocol"], kind, row["repeat"] or 0
 
 
-def _block(key: _Key, members: Sequence[Row], letters: Mapping[str, str], times: bool) -> Block:
-    sign = 1.0 if members[0]["metric"] in LOWER_IS_BETTER else -1.0
-
-    def better(row: Row) -> tuple[Any, ...]:
-        value = row["score"]
-        return (not math.isfinite(value), sign * value if math.isfinite(value) else 0.0, row["cell"])
-
-    done = [row for row in members if row["status"] == "done"]
-    results = sorted((row for row in done if not row["is_baseline"]), key=better)
-    placings, unranked = places(results)
-    results.sort(key=lambda row: placings[row["cell"]].place)  # of equal place stays the better one first
-    baselines = sorted((row for row in done if row["is_baseline"]), key=lambda row: (row["sensor"], *better(row)))
-    stopped = sorted((row for row in members if row["status"] != "done"), key=lambda row: (row["status"], row["cell"]))
-    lines = (
-        *(done_line(row, placings[row["cell"]], timing_mark(row, letters), times) for row in results),
-        *(done_line(row, None, timing_mark(row, letters), times) for row in baselines),
-        *(stopped_line(row, times) for row in stopped),
-    )
-    return Block(_title(key, members), lines, unranked)
+def _arranged(
+    sheet: Sheet, members: Sequence[int], placings: list[Placing | None]
+) -> tuple[tuple[int, ...], str]:  # fmt: skip
+    """Put members of a block in order, and note where its results stand; return why they have no intervals, if so."""
+    status, trivial, scores, sensors = (sheet[key] for key in ("status", "is_baseline", "score", "sensor"))
+    sign = 1.0 if sheet["metric"][members[0]] in LOWER_IS_BETTER else -1.0
+    done = [place for place in members if status[place] == "done"]
+    error = {place: sign * scores[place] if math.isfinite(scores[place]) else math.inf for place in done}
+    # What is equal stays in the order of the names.
+    results = sorted((place for place in done if not trivial[place]), key=error.__getitem__)
+    ranked = sheet.taken(results)
+    found, unranked = places(ranked)
+    standing = {place: found[cell] for place, cell in zip(results, ranked["cell"], strict=True)}
+    for place, placing in standing.items():
+        placings[place] = placing
+    results.sort(key=lambda place: standing[place].place)  # of equal place stays the better one first
+    baselines = sorted((place for place in done if trivial[place]), key=lambda place: (sensors[place], error[place]))
+    stopped = sorted((place for place in members if status[place] != "done"), key=status.__getitem__)
+    return (*results, *baselines, *stopped), unranked
 
 
 def _title(key: _Key, members: Sequence[Row]) -> str:
     _, protocol, split, kind, _ = key
-    first = min(members, key=lambda row: str(row["cell"]))
+    first = members[0]
     direction = "lower" if first["metric"] in LOWER_IS_BETTER else "higher"
     dagger = " †" if any(row["dagger"] for row in members) else ""
     parts = [first["task"], f"{metric_name(first)}, {direction} is better", protocol + dagger]

@@ -6,20 +6,14 @@ from collections.abc import Iterable
 from operator import itemgetter
 from typing import Any
 
-from tactbench.core.leaderboard.parquet import kind
 from tactbench.core.leaderboard.records import JSON_KEYS
+from tactbench.core.spec.row import FORMAT, in_words
 from tactbench.core.spec.status import STATUSES
 
 Row = dict[str, Any]
 
-_TABLES = frozenset({"params", "assumptions", "counts", "chosen", "scores", "fold_sizes", "replicates"})
-_LISTS = frozenset({"stamps", "remarks", "search", "classes", "recordings"})
 _LARGEST = 2**63
 """Whole numbers from here on have no place in a table; a seed may be any."""
-_NEVER_ABSENT = frozenset({
-    "cell", "sensor", "task", "rig", "protocol", "estimator", "is_baseline", "repeat", "repeats", "status", "metric",
-    "unit", "simulated", "dagger",
-}) | _TABLES | _LISTS  # fmt: skip
 
 
 def checked(rows: Iterable[object]) -> tuple[list[Row], list[str]]:
@@ -70,7 +64,7 @@ def _mistyped(row: Row) -> str:
         return f"its row is of another version (it lacks {', '.join(lacking[:3])}); run it again"
     for key in _STORED:
         if not _fits(key, row[key]):
-            return f"its {key} is {type(row[key]).__name__}, not {_EXPECTED[key]}"
+            return f"its {key} is {type(row[key]).__name__}, not {in_words(FORMAT[key].types)}"
     return ""
 
 
@@ -92,25 +86,11 @@ def _is_square(confusion: list[Any] | None) -> bool:
 
 
 def _fits(key: str, value: Any) -> bool:
-    if value is None:
-        return key not in _NEVER_ABSENT
-    expected = _EXPECTED[key]
     if type(value) is int and abs(value) >= _LARGEST and key != "seed":
         return False
-    if expected == "a number":
-        return type(value) in (int, float)
-    if expected == "a whole number":
-        return type(value) is int
-    return isinstance(value, _TYPES[expected])
+    return type(value) in FORMAT[key].types
 
 
 _STORED = tuple(key for key in JSON_KEYS if key != "key")
 _VALUES = itemgetter(*_STORED)
 _WHOLE = frozenset({int})
-_TYPES = {"a table": dict, "a list": list, "true or false": bool, "text": str}
-_EXPECTED = {
-    key: "a table" if key in _TABLES
-    else "a list" if key in (*_LISTS, "confusion")
-    else {"whole": "a whole number", "float": "a number", "boolean": "true or false", "text": "text"}[kind(key)]
-    for key in JSON_KEYS
-}  # fmt: skip

@@ -11,7 +11,6 @@ from typing import Any
 import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard import memo
-from tactbench.core.leaderboard.collector import collector_at_rest
 from tactbench.core.leaderboard.formats import TEXTS
 from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.matrix.files import replace_file
@@ -72,8 +71,7 @@ def write_tables(
 def table_of(rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
     """Return the leaderboard of `rows`; what the statistics came to is recalled from `folder`, and kept there."""
     memo.load(folder)
-    with collector_at_rest():
-        table = build_table(rows, provenance, times=times)
+    table = build_table(rows, provenance, times=times)
     memo.save(folder)
     return table
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import cut, visible
 
 Row = Mapping[str, Any]
@@ -15,24 +16,24 @@ LONGEST = 1000
 _WITHOUT = "Times, memory and hosts are left out: a seed decides all that stands here."
 
 
-def foot_of(rows: Sequence[Row], provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
+def foot_of(sheet: Sheet, provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
     """Return the sentences below a table.
 
     Parameters
     ----------
-    rows
+    sheet
         All rows of the table.
     provenance
         What is known of the runs they are from; possibly from a stranger's folder.
     times
         False: nothing is said of machines.
     """
-    seeds = _seeds(rows)
+    seeds = _seeds(sheet["seed"])
     if not times:
         return (f"{_WITHOUT} {seeds}",)
-    runs = len({row["made_by"] for row in rows if row.get("made_by")})
+    runs = len(set(filter(None, sheet.known("made_by"))))
     of_runs = f" of {runs} kind{'s' if runs != 1 else ''} of runs (versions, machine, settings)" if runs else ""
-    return (f"{len(rows)} cells{of_runs}. {seeds}", *(cut(visible(said), LONGEST) for said in _told(provenance)))
+    return (f"{len(sheet.rows)} cells{of_runs}. {seeds}", *(cut(visible(said), LONGEST) for said in _told(provenance)))
 
 
 def _told(provenance: Sequence[Row]) -> tuple[str, ...]:
@@ -46,8 +47,8 @@ def _told(provenance: Sequence[Row]) -> tuple[str, ...]:
         return ("The provenance of these rows cannot be read.",)
 
 
-def _seeds(rows: Sequence[Row]) -> str:
-    seeds = sorted({row["seed"] for row in rows if isinstance(row["seed"], int)})
+def _seeds(told: Sequence[Any]) -> str:
+    seeds = sorted({seed for seed in told if isinstance(seed, int)})
     if not seeds:
         return "Seeds are not known."
     listed = ", ".join(map(str, seeds[:MOST_SEEDS]))

@@ -2,29 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from itertools import compress
 from string import ascii_uppercase
 from typing import Any
 
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
 
 
-def host_letters(rows: Iterable[Row]) -> dict[str, str]:
-    """Return a letter for each host that timed one of `rows`, in order of their ids; none if there is but one."""
-    hosts = sorted({_host(row) for row in rows if _timed(row)})
+def host_letters(sheet: Sheet) -> dict[str, str]:
+    """Return a letter for each host that timed one of the rows, in order of their ids; none if there is but one."""
+    hosts = sorted({host for host, _ in _clocks(sheet)})
     return {host: _letter(place) for place, host in enumerate(hosts)} if len(hosts) > 1 else {}
 
 
-def timing_mark(row: Row, letters: Mapping[str, str]) -> str:
-    """Return what stands behind every time of `row`: ``[A]`` for the host, ``‖4`` for four cells at once."""
-    letter = letters.get(_host(row)) if letters else None
-    at_once = _at_once(row)
-    return (f" [{letter}]" if letter else "") + (f" ‖{at_once}" if at_once > 1 else "")
+def timing_marks(sheet: Sheet, letters: Mapping[str, str]) -> list[str]:
+    """Return what stands behind every time of each row: ``[A]`` for the host, ``‖4`` for four cells at once.
+
+    Returns
+    -------
+    list
+        One mark a row; empty where no row has any.
+    """
+    if not letters and set(sheet.known("concurrency")) <= {None, 0, 1}:
+        return []
+
+    def mark(row: Row) -> str:
+        letter = letters.get(_host(row.get("host")))
+        at_once = _at_once(row.get("concurrency"))
+        return (f" [{letter}]" if letter else "") + (f" ‖{at_once}" if at_once > 1 else "")
+
+    marks = sheet.told(mark, "host", "concurrency")
+    return marks if any(marks) else []
 
 
-def timing_notes(rows: Sequence[Row], letters: Mapping[str, str], provenance: Iterable[Row]) -> list[str]:
+def timing_notes(sheet: Sheet, letters: Mapping[str, str], provenance: Iterable[Row]) -> list[str]:
     """Return what the marks of times mean.
 
     Parameters
@@ -37,34 +52,34 @@ def timing_notes(rows: Sequence[Row], letters: Mapping[str, str], provenance: It
     if letters:
         notes.append("Times marked with different letters are of different hosts: compare none of them. Scores do not "
                      "depend on the host and are ranked together.")  # fmt: skip
-    for at_once in sorted({_at_once(row) for row in rows if _timed(row)} - {1}):
-        crowded = sorted(
-            {visible(_host(row)) for row in rows if _at_once(row) == at_once and _timed(row)
-             and at_once > _cores(machines.get(_host(row)), at_once)}
-        )  # fmt: skip
+    clocks = _clocks(sheet)
+    for at_once in sorted({at_once for _, at_once in clocks} - {1}):
+        hosts = {host for host, cells in clocks if cells == at_once}
+        crowded = sorted({visible(host) for host in hosts if at_once > _cores(machines.get(host), at_once)})
         more = f", more than the cores of host {' and of host '.join(crowded)}" if crowded else ""
         notes.append(f"‖{at_once}: timed while {at_once} cells ran at once{more}: not comparable with times measured "
                      "alone.")  # fmt: skip
     return notes
 
 
-def _timed(row: Row) -> bool:
+def _clocks(sheet: Sheet) -> set[tuple[str, int]]:
+    """Return by which hosts rows were timed, and while how many cells ran at once."""
+    keys = ("status", "fit_s", "sim_s", "predict_s", "latency_ms_p50", "latency_ms_p95")
     # One by one: of nearly every row the first is known.
-    return row["status"] == "done" and (
-        row["fit_s"] is not None
-        or row["sim_s"] is not None
-        or row["predict_s"] is not None
-        or row["latency_ms_p50"] is not None
-        or row["latency_ms_p95"] is not None
-    )
+    timed = [
+        status == "done" and not (fit is None and sim is None and predict is None and p50 is None and p95 is None)
+        for status, fit, sim, predict, p50, p95 in zip(*(sheet[key] for key in keys), strict=True)
+    ]
+    clocks = set(compress(zip(sheet.known("host"), sheet.known("concurrency"), strict=True), timed))
+    return {(_host(host), _at_once(cells)) for host, cells in clocks}
 
 
-def _host(row: Row) -> str:
-    return str(row.get("host") or "")
+def _host(told: Any) -> str:
+    return str(told or "")
 
 
-def _at_once(row: Row) -> int:
-    return int(row.get("concurrency") or 1)
+def _at_once(told: Any) -> int:
+    return int(told or 1)
 
 
 def _cores(machine: Row | None, otherwise: int) -> int:

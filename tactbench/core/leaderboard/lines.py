@@ -1,22 +1,23 @@
-"""A row as the texts that stand in a table."""
+"""Rows as the texts that stand in a table, column by column."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import add
 from typing import Any, Literal
 
 from tactbench.core.leaderboard.columns import columns
+from tactbench.core.leaderboard.hosts import timing_marks
 from tactbench.core.leaderboard.marks import score_marks
-from tactbench.core.leaderboard.names import answer_name, sensor_name
-from tactbench.core.leaderboard.numbers import duration, interval, score, whole
+from tactbench.core.leaderboard.numbers import ABSENT, duration, intervals, scores, whole
 from tactbench.core.leaderboard.placing import Placing
+from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.spec.status import STOPPED
 
 Row = Mapping[str, Any]
 Kind = Literal["result", "baseline", "failed", "skipped"]
-
-ABSENT = "–"
 
 
 @dataclass(frozen=True)
@@ -33,62 +34,79 @@ class Line:
     """The row itself: numbers in full."""
 
 
-def done_line(row: Row, placing: Placing | None, mark: str, times: bool) -> Line:
-    """Return the line of a finished cell.
+@dataclass(frozen=True)
+class Shown:
+    """All rows of a table as text."""
+
+    sheet: Sheet = field(repr=False, compare=False)
+    texts: Mapping[str, Sequence[str]]
+    """One text a row, by the name of the column."""
+    kinds: Sequence[Kind]
+    placings: Sequence[Placing | None]
+
+    def line(self, place: int) -> Line:
+        """Return the line of the row at this place of the sheet."""
+        row = self.sheet.rows[place]
+        cells = tuple(column[place] for column in self.texts.values())
+        return Line(cells, self.kinds[place], row["cell"], self.placings[place], row)
+
+
+def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool) -> Shown:
+    """Return what stands in the lines of a table.
 
     Parameters
     ----------
-    placing
-        None: a baseline.
-    mark
-        What stands behind every time.
+    placings
+        Where each row stands in its block; None: a baseline, or a cell that did not end well.
+    letters
+        The mark of each host.
     times
         Whether the table has times.
     """
-    unit = row["unit"]
-    texts: tuple[str, ...] = (
-        _place(placing),
-        sensor_name(row),
-        answer_name(row),
-        score(row["score"], unit) + score_marks(row),
-        interval(row["ci_low"], row["ci_high"], unit),
-        _places(placing),
-        score(row["published"], unit),
-        score(row["baseline"], unit),
-        whole(row["n_test"]),
-        whole(row["n_sessions"]),
-    )
+    units = sheet["unit"]
+    texts = {
+        "#": _places(placings),
+        "sensor": sheet.sensors,
+        "estimator": sheet.answers,
+        "score": list(map(add, scores(sheet["score"], units), score_marks(sheet))),
+        "95 % interval": intervals(sheet["ci_low"], sheet["ci_high"], units),
+        "rank 95 %": _ranges(placings),
+        "published": scores(sheet["published"], units),
+        "baseline": scores(sheet["baseline"], units),
+        "n test": list(map(whole, sheet["n_test"])),
+        "sessions": list(map(whole, sheet["n_sessions"])),
+    }
     if times:
-        spent, count = row["predict_s"], row["batch_rows"]
-        p50, p95 = row["latency_ms_p50"], row["latency_ms_p95"]
-        texts += (
-            _time(row["sim_s"], mark),
-            _time(row["fit_s"], mark),
-            _time(None if p50 is None else p50 / 1e3, mark),
-            _time(None if p95 is None else p95 / 1e3, mark),
-            _time(spent / count if spent is not None and count else None, mark),
-        )
-    return Line(texts, "baseline" if placing is None else "result", row["cell"], placing, row)
+        marks = timing_marks(sheet, letters)
+        texts |= {name: _times(VALUES[name](sheet), marks) for name in columns(times)[len(texts) :]}
+    status = sheet["status"]
+    for place in [place for place, ended in enumerate(status) if ended != "done"]:
+        for name, column in texts.items():
+            if name not in ("sensor", "estimator"):
+                column[place] = ABSENT
+        texts["#"][place], texts["score"][place] = "", status[place].upper()
+    return Shown(sheet, texts, list(map(_kind, status, placings)), placings)
 
 
-def stopped_line(row: Row, times: bool) -> Line:
-    """Return the line of a cell that did not end well, or was not begun: its status in place of its score."""
-    rest = (ABSENT for _ in columns(times)[4:])
-    kind: Kind = "failed" if row["status"] in STOPPED else "skipped"
-    return Line(("", sensor_name(row), answer_name(row), row["status"].upper(), *rest), kind, row["cell"], None, row)
+def _kind(status: str, placing: Placing | None) -> Kind:
+    if status == "done":
+        return "result" if placing else "baseline"
+    return "failed" if status in STOPPED else "skipped"
 
 
-def _place(placing: Placing | None) -> str:
-    if placing is None:
-        return "base"
-    return f"{placing.place}=" if placing.tied else str(placing.place)
+def _places(placings: Sequence[Placing | None]) -> list[str]:
+    return ["base" if one is None else f"{one.place}=" if one.tied else str(one.place) for one in placings]
 
 
-def _places(placing: Placing | None) -> str:
-    if placing is None or placing.low is None or placing.high is None:
-        return ABSENT
-    return str(placing.low) if placing.low == placing.high else f"{placing.low}–{placing.high}"
+def _ranges(placings: Sequence[Placing | None]) -> list[str]:
+    return [
+        ABSENT if one is None or one.low is None or one.high is None
+        else str(one.low) if one.low == one.high
+        else f"{one.low}–{one.high}"
+        for one in placings
+    ]  # fmt: skip
 
 
-def _time(seconds: float | None, mark: str) -> str:
-    return ABSENT if seconds is None else duration(seconds) + mark
+def _times(seconds: Sequence[float | None], marks: Sequence[str]) -> list[str]:
+    told = list(map(duration, seconds))
+    return [text if text == ABSENT else text + mark for text, mark in zip(told, marks, strict=True)] if marks else told

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from itertools import chain, compress
 from typing import Any
 
+from tactbench.core.leaderboard.sheet import Sheet, marks_of
 from tactbench.core.leaderboard.text import visible
-
-Row = Mapping[str, Any]
 
 DAGGER = (
     "† test-set statistics were used: the protocol drops test rows by the test set's own mean and deviation, and "
@@ -16,29 +16,22 @@ DAGGER = (
 )
 
 
-def score_marks(row: Row) -> str:
-    """Return what stands behind a score: † for test-set statistics, ‡ for what its row is stamped with."""
-    return (" †" if row["dagger"] else "") + (" ‡" if row["stamps"] else "")
+def score_marks(sheet: Sheet) -> list[str]:
+    """Return what stands behind each score: † for test-set statistics, ‡ for what its row is stamped with."""
+    given = zip(sheet["dagger"], sheet["stamps"], strict=True)
+    return [(" †" if dagger else "") + (" ‡" if stamps else "") for dagger, stamps in given]
 
 
-def mark_notes(rows: Iterable[Row]) -> list[str]:
-    """Return what the marks of `rows` mean: †, ‡ and SIM, each once."""
-    dagger: list[str] = []
-    stamps: dict[str, None] = {}
-    simulated: dict[str, None] = {}
-    told: set[int] = set()
-    for row in rows:
-        if row["dagger"]:
-            dagger = [DAGGER]
-        for stamp in row["stamps"]:
-            stamps[f"‡ {visible(str(stamp))}"] = None
-        if row["simulated"] and id(row["assumptions"]) not in told:  # rows share what was assumed of a recording
-            told.add(id(row["assumptions"]))
-            assumed = f"SIM: simulated by the twin, never ranked against hardware. Assumed: {_assumptions(row)}."
-            simulated[assumed] = None
+def mark_notes(sheet: Sheet) -> list[str]:
+    """Return what the marks of a table mean: †, ‡ and SIM, each once."""
+    dagger = [DAGGER] if any(sheet["dagger"]) else []
+    stamps = dict.fromkeys(f"‡ {visible(str(stamp))}" for stamp in chain.from_iterable(filter(None, sheet["stamps"])))
+    assumed = list(compress(sheet["assumptions"], sheet["simulated"]))
+    told = dict.fromkeys(map(_assumptions, dict(zip(marks_of(assumed), assumed, strict=True)).values()))
+    simulated = [f"SIM: simulated by the twin, never ranked against hardware. Assumed: {one}." for one in told]
     return [*dagger, *stamps, *simulated]
 
 
-def _assumptions(row: Row) -> str:
-    told = ", ".join(f"{key} {value}" for key, value in sorted(row["assumptions"].items()))
+def _assumptions(assumptions: Mapping[str, Any]) -> str:
+    told = ", ".join(f"{key} {value}" for key, value in sorted(assumptions.items()))
     return visible(told) or "see docs/twin.md"

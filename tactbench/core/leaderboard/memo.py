@@ -36,7 +36,8 @@ def digest_of(*facts: Any) -> str:
 def ordered(value: Any) -> Any:
     """Return a mapping as its pairs in order: what was just computed and what was read again have one digest."""
     if isinstance(value, dict):
-        return [(key, ordered(inner)) for key, inner in sorted(value.items())]
+        # Few are mappings: only these are asked again.
+        return [(key, ordered(inner) if isinstance(inner, dict) else inner) for key, inner in sorted(value.items())]
     return value
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import compress
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
@@ -11,6 +12,7 @@ from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.marks import mark_notes
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, question_name
+from tactbench.core.leaderboard.sheet import Sheet, marks_of
 from tactbench.core.leaderboard.stopped import stopped_notes
 from tactbench.core.leaderboard.text import visible
 
@@ -22,28 +24,33 @@ RANKS = (
 )
 
 
-def notes_of(blocks: Sequence[Block]) -> list[str]:
-    """Return the notes on the lines of `blocks`; those on whose times they are stand elsewhere."""
-    rows = [line.row for block in blocks for line in block.lines]
+def notes_of(sheet: Sheet, blocks: Sequence[Block]) -> list[str]:
+    """Return the notes on the lines of `blocks`; those on whose times they are stand elsewhere.
+
+    Parameters
+    ----------
+    sheet
+        The rows in the order of the lines.
+    """
     return [
-        *mark_notes(rows),
-        *rank_notes(blocks),
-        *_chosen_notes(rows),
-        *_no_better_notes(rows),
-        *_left_out_notes(rows),
-        *interval_notes(rows),
-        *stopped_notes(rows),
+        *mark_notes(sheet),
+        *_rank_notes(blocks),
+        *_chosen_notes(sheet),
+        *_no_better_notes(sheet),
+        *_left_out_notes(sheet),
+        *interval_notes(sheet),
+        *stopped_notes(sheet),
     ]
 
 
-def rank_notes(blocks: Sequence[Block]) -> list[str]:
+def _rank_notes(blocks: Sequence[Block]) -> list[str]:
     """Return what places and their intervals mean, and where there are none."""
     notes = []
-    if any(line.placing and line.placing.low is not None for block in blocks for line in block.lines):
+    if any(one and one.low is not None for block in blocks[:1] for one in block.shown.placings):
         notes.append(RANKS)
     reasons: dict[str, list[str]] = {}
     for block in blocks:
-        if block.unranked and sum(line.kind == "result" for line in block.lines) > 1:
+        if block.unranked and sum(block.shown.kinds[place] == "result" for place in block.places) > 1:
             reasons.setdefault(block.unranked, []).append(block.title)
     everywhere = len(blocks) == sum(len(titles) for titles in reasons.values()) and len(reasons) == 1
     for reason, titles in reasons.items():
@@ -52,22 +59,23 @@ def rank_notes(blocks: Sequence[Block]) -> list[str]:
     return [note[0].upper() + note[1:] for note in notes]
 
 
-def interval_notes(rows: Iterable[Row]) -> list[str]:
+def interval_notes(sheet: Sheet) -> list[str]:
     """Return one sentence a task and kind of interval; what is in brackets only where it is the same for all."""
     kinds: dict[str, dict[str, None]] = {}
-    for task, method in dict.fromkeys((row["task"], row["ci_method"]) for row in rows if not row["is_baseline"]):
+    answers = [not trivial for trivial in sheet["is_baseline"]]
+    for task, method in dict.fromkeys(compress(zip(sheet["task"], sheet["ci_method"], strict=True), answers)):
         if method:
             told = visible(f"{task}: interval by {method}.")
             kinds.setdefault(re.sub(r" \([^)]*\)", "", told), {})[told] = None
     return [next(iter(told)) if len(told) == 1 else short for short, told in kinds.items()]
 
 
-def _chosen_notes(rows: Iterable[Row]) -> list[str]:
+def _chosen_notes(sheet: Sheet) -> list[str]:
     """Return one sentence for all answers that chose the same on validation data."""
     names: dict[str, dict[str, None]] = {}
-    for row in rows:
-        if row["chosen"]:
-            picked = ", ".join(f"{key.rstrip('_')} = {_told(value)}" for key, value in sorted(row["chosen"].items()))
+    for chosen, row in zip(sheet["chosen"], sheet.rows, strict=True):
+        if chosen:
+            picked = ", ".join(f"{key.rstrip('_')} = {_told(value)}" for key, value in sorted(chosen.items()))
             names.setdefault(visible(picked), {})[f"{question_name(row)}/{answer_name(row)}"] = None
     return [f"{', '.join(who)}: chosen on validation data: {picked}." for picked, who in names.items()]
 
@@ -76,11 +84,11 @@ def _told(value: object) -> str:
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
-def _no_better_notes(rows: Iterable[Row]) -> list[str]:
+def _no_better_notes(sheet: Sheet) -> list[str]:
     """Return one sentence a sensor and task on the answers that are no better than the trivial one."""
     names: dict[str, dict[str, None]] = {}
-    for row in rows:
-        if _no_better(row):
+    for row in compress(sheet.rows, _no_better(sheet)):
+        if not is_probe(row["protocol"]):  # no better than trivial is what a probe should be
             names.setdefault(question_name(row), {})[answer_name(row)] = None
     return [
         f"{where}/{', '.join(who)} {'is' if len(who) == 1 else 'are'} no better than the trivial baseline: see how the "
@@ -89,30 +97,31 @@ def _no_better_notes(rows: Iterable[Row]) -> list[str]:
     ]
 
 
-def _no_better(row: Row) -> bool:
-    if row["status"] != "done" or row["is_baseline"] or row["baseline"] is None:
-        return False
-    lower = row["metric"] in LOWER_IS_BETTER
-    bound = row["ci_high"] if lower else row["ci_low"]
-    if bound is None:
-        return False
-    if not (bound >= row["baseline"] if lower else bound <= row["baseline"]):
-        return False
-    return not is_probe(row["protocol"])  # no better than trivial is what a probe should be
+def _no_better(sheet: Sheet) -> list[bool]:
+    keys = ("status", "is_baseline", "baseline", "metric", "ci_low", "ci_high")
+    return [
+        status == "done"
+        and not trivial
+        and baseline is not None
+        and (
+            (high is not None and high >= baseline)
+            if metric in LOWER_IS_BETTER
+            else (low is not None and low <= baseline)
+        )
+        for status, trivial, baseline, metric, low, high in zip(*(sheet[key] for key in keys), strict=True)
+    ]
 
 
-def _left_out_notes(rows: Iterable[Row]) -> list[str]:
+def _left_out_notes(sheet: Sheet) -> list[str]:
     """Return what was left out of the data, and what their recordings remark; rows share these, each is told once."""
     counted: dict[str, None] = {}
     remarked: dict[str, None] = {}
-    told: set[tuple[Any, ...]] = set()
-    for row in rows:
-        counts = row["counts"]
-        mark = (row["sensor"], row["task"], *counts, *counts.values(), *map(type, counts.values()))
-        if mark not in told:
-            told.add(mark)
-            where = question_name(row)
+    asked = zip(sheet["sensor"], sheet["task"], marks_of(sheet["counts"]), strict=True)
+    for (sensor, task, _), counts in dict(zip(asked, sheet["counts"], strict=True)).items():
+        if counts:
+            where = question_name({"sensor": sensor, "task": task})
             counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in told_counts(counts))
-        if row["remarks"]:
-            remarked |= dict.fromkeys(visible(f"{row['sensor']}: {remark}") for remark in row["remarks"])
+    for sensor, remarks in zip(sheet["sensor"], sheet["remarks"], strict=True):
+        if remarks:
+            remarked |= dict.fromkeys(visible(f"{sensor}: {remark}") for remark in remarks)
     return [*counted, *remarked]

@@ -2,21 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
+
+ABSENT = "–"
+
+
+def scores(values: Sequence[float | None], units: Sequence[str]) -> list[str]:
+    """Return scores: three decimals for shares; four for numbers with a unit, two from ten on."""
+    return [
+        ABSENT if value is None
+        else f"{value:.3f}" if unit == "1"
+        else f"{value:.4f}" if -10 < value < 10
+        else f"{value:.2f}"
+        for value, unit in zip(values, units, strict=True)
+    ]  # fmt: skip
 
 
 def score(value: float | None, unit: str) -> str:
-    """Return a score: three decimals for shares; four for numbers with a unit, two from ten on."""
-    if value is None:
-        return "–"
-    if unit == "1":
-        return f"{value:.3f}"
-    return f"{value:.4f}" if abs(value) < 10 else f"{value:.2f}"
+    """Return one of `scores`."""
+    return scores((value,), (unit,))[0]
+
+
+def intervals(lows: Sequence[float | None], highs: Sequence[float | None], units: Sequence[str]) -> list[str]:
+    """Return intervals in the digits of their scores."""
+    ends = zip(scores(lows, units), scores(highs, units), strict=True)
+    return [ABSENT if low == ABSENT or high == ABSENT else f"{low} … {high}" for low, high in ends]
 
 
 def interval(low: float | None, high: float | None, unit: str) -> str:
-    """Return an interval in the digits of its score."""
-    return "–" if low is None or high is None else f"{score(low, unit)} … {score(high, unit)}"
+    """Return one of `intervals`."""
+    return intervals((low,), (high,), (unit,))[0]
 
 
 def suffix(unit: str) -> str:
@@ -27,7 +43,7 @@ def suffix(unit: str) -> str:
 def duration(seconds: float | None) -> str:
     """Return a duration with three significant digits and a unit that fits."""
     if seconds is None:
-        return "–"
+        return ABSENT
     if seconds >= 0.9995:
         value, unit = seconds, "s"
     elif (value := seconds * 1e3) >= 0.9995:
@@ -44,4 +60,4 @@ def duration(seconds: float | None) -> str:
 @lru_cache(maxsize=4096, typed=True)  # rows of one data set have the same counts
 def whole(value: int | None) -> str:
     """Return a count with thin groups of three."""
-    return "–" if value is None else f"{value:,}".replace(",", "\u202f")
+    return ABSENT if value is None else f"{value:,}".replace(",", "\u202f")

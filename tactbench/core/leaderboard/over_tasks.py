@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import compress
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard import memo
-from tactbench.core.leaderboard.names import answer_name, sensor_name
 from tactbench.core.leaderboard.numbers import interval, score
 from tactbench.core.leaderboard.sections import Section
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
@@ -31,16 +32,16 @@ _DECIDES = (
 )  # fmt: skip
 
 
-def over_tasks(rows: Sequence[Row]) -> Section | None:
+def over_tasks(sheet: Sheet) -> Section | None:
     """Return the means of all answers that two tasks or more were given; None if there are none.
 
     A task that was asked under several splits is left out: none of them stands for it.
     """
     groups: dict[tuple[Any, ...], dict[str, list[Row]]] = {}
-    for row in rows:
-        if _counts(row):
-            key = (sensor_name(row), answer_name(row), visible(row["protocol"]), row["rig"], row["repeat"])
-            groups.setdefault(key, {}).setdefault(row["task"], []).append(row)
+    keys = (sheet.sensors, sheet.answers, map(visible, sheet["protocol"]), sheet["rig"], sheet["repeat"])
+    given = zip(zip(*keys, strict=True), sheet["task"], sheet.rows, strict=True)
+    for key, task, row in compress(given, _counts(sheet)):
+        groups.setdefault(key, {}).setdefault(task, []).append(row)
     alone = {
         key: [members[0] for _, members in sorted(tasks.items()) if len(members) == 1] for key, tasks in groups.items()
     }
@@ -62,15 +63,19 @@ def over_tasks(rows: Sequence[Row]) -> Section | None:
     return Section(TITLE, COLUMNS, NUMERIC, tuple(lines), tuple(notes)) if lines else None
 
 
-def _counts(row: Row) -> bool:
-    return (
-        row["status"] == "done"
-        and not row["is_baseline"]
-        and not is_probe(row["protocol"])
-        and row["split"] not in ("shuffled", "in-session")
-        and bool(row.get("replicates"))
-        and math.isfinite(row["score"])
-    )
+def _counts(sheet: Sheet) -> list[bool]:
+    """Return which rows are answers that are averaged."""
+    ours = {protocol: not is_probe(protocol) for protocol in set(sheet["protocol"])}
+    keys = ("status", "is_baseline", "protocol", "split", "replicates", "score")
+    return [
+        status == "done"
+        and not trivial
+        and ours[protocol]
+        and split not in ("shuffled", "in-session")
+        and bool(replicates)
+        and math.isfinite(score)
+        for status, trivial, protocol, split, replicates, score in zip(*map(sheet.known, keys), strict=True)
+    ]
 
 
 def _mean(members: Sequence[Row]) -> tuple[float, float, float, tuple[str, ...]] | None:

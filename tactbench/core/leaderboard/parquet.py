@@ -11,18 +11,11 @@ from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, json_text, keys, records
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.text import visible
+from tactbench.core.spec.row import FORMAT
 
 FORMAT_VERSION = "1"
 
-_WHOLE = frozenset({
-    "repeat", "repeats", "seed", "signal", "n_recordings", "n_sessions", "n_train", "n_test", "batch_rows", "latency_n",
-    "threads", "concurrency", "rank", "rank_low", "rank_high",
-})  # fmt: skip
-_BOOLEAN = frozenset({"is_baseline", "simulated", "dagger", "rank_tied"})
-_FLOAT = frozenset({
-    "score", "ci_low", "ci_high", "baseline", "published", "sim_s", "search_s", "fit_s", "predict_s", "latency_ms_p50",
-    "latency_ms_p95", "peak_rss_mb", "wall_s", "equivalence", "reference_score",
-})  # fmt: skip
+_RANKS = {"rank": "whole", "rank_low": "whole", "rank_high": "whole", "rank_tied": "boolean"}
 
 
 def parquet(table: Table) -> bytes:
@@ -66,11 +59,12 @@ def parquet(table: Table) -> bytes:
 
 
 def kind(name: str) -> str:
-    """Return what a column holds: whole, float, boolean or text."""
-    for told, members in (("whole", _WHOLE), ("boolean", _BOOLEAN), ("float", _FLOAT)):
-        if name in members:
+    """Return what a column holds: whole, float, boolean or text; lists and tables are text."""
+    types = FORMAT[name].types if name in FORMAT else frozenset()
+    for told, one in (("boolean", bool), ("float", float), ("whole", int)):
+        if one in types:
             return told
-    return "text"
+    return _RANKS.get(name, "text")
 
 
 def _stored(name: str, value: Any) -> Any:

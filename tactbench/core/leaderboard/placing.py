@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 from tactbench.core.leaderboard import memo
-
-Row = Mapping[str, Any]
+from tactbench.core.leaderboard.sheet import Sheet, alike
 
 _DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
 """Packages whose code ranks."""
@@ -23,8 +21,7 @@ MOST_RANKED = 20_000
 """Answers of one block beyond which comparing all pairs takes too long."""
 
 
-@dataclass(frozen=True)
-class Placing:
+class Placing(NamedTuple):
     """A place among the answers of a block, from 1."""
 
     place: int
@@ -36,7 +33,7 @@ class Placing:
     """Whether others share the place."""
 
 
-def places(results: Sequence[Row]) -> tuple[dict[str, Placing], str]:
+def places(results: Sheet) -> tuple[dict[str, Placing], str]:
     """Return where each of `results` stands, by the name of its cell, and why there are no rank intervals, if so.
 
     Parameters
@@ -45,56 +42,68 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Placing], str]:
         The finished answers of one block, no baselines, the best score first.
     """
     reason = _unrankable(results)
-    if not results or reason:
+    if not results.rows or reason:
         return _by_score(results), reason
     try:
-        facts = [([row.get(key) for key in _DECIDES], memo.ordered(row.get("replicates"))) for row in results]
+        facts = [*map(results.known, _DECIDES), _plain(results["replicates"])]
         digest = memo.digest_of(*map(memo.source_digest, _DECIDING), facts)
-        found = _believed(memo.recall(digest), results)
+        found = _believed(memo.recall(digest), results["cell"])
         if found is None:
             from tactbench.core.statistics.ranking import ranks
 
-            found = {cell: Placing(rank.place, rank.low, rank.high, rank.tied) for cell, rank in ranks(results).items()}
-            memo.remember(digest, [[cell, *astuple(placing)] for cell, placing in found.items()])
+            ranked = ranks(results.rows)
+            found = {cell: Placing(rank.place, rank.low, rank.high, rank.tied) for cell, rank in ranked.items()}
+            memo.remember(digest, [[cell, *placing] for cell, placing in found.items()])
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         # Rows of a stranger's folder: their replicates may be anything.
         return _by_score(results), f"their replicates cannot be used ({type(error).__name__})"
     return found, ""
 
 
-def _unrankable(results: Sequence[Row]) -> str:
+def _plain(replicates: Sequence[Any]) -> Any:
+    """Return replicates as lists: the same whatever the order of their keys."""
+    by_key = alike(replicates) if set(map(type, replicates)) == {dict} else None
+    return list(map(memo.ordered, replicates)) if by_key is None else memo.ordered(by_key)
+
+
+def _unrankable(results: Sheet) -> str:
     """Return why places have no intervals, if they have none; a row without replicates enters with its own interval."""
-    if not any(row.get("replicates") for row in results):
-        return "rows keep no replicates" if results else ""
-    if len(results) > MOST_RANKED:
+    if not any(results.known("replicates")):
+        return "rows keep no replicates" if results.rows else ""
+    if len(results.rows) > MOST_RANKED:
         return f"there are more than {MOST_RANKED} answers"
-    return "" if all(math.isfinite(row["score"]) for row in results) else "a score is no finite number"
+    return "" if all(map(math.isfinite, results["score"])) else "a score is no finite number"
 
 
-def _by_score(results: Sequence[Row]) -> dict[str, Placing]:
+def _by_score(results: Sheet) -> dict[str, Placing]:
     found: dict[str, Placing] = {}
-    many = Counter(row["score"] for row in results)
-    place = 0
-    for position, row in enumerate(results):
-        if position == 0 or row["score"] != results[position - 1]["score"]:
+    many = Counter(results["score"])
+    place, before = 0, None
+    for position, (cell, score) in enumerate(zip(results["cell"], results["score"], strict=True)):
+        if position == 0 or score != before:
             place = position + 1
-        found[row["cell"]] = Placing(place, None, None, many[row["score"]] > 1)
+        found[cell] = Placing(place, None, None, many[score] > 1)
+        before = score
     return found
 
 
-def _believed(told: Any, results: Sequence[Row]) -> dict[str, Placing] | None:
-    """Return remembered places if they can be those of `results`, the best first: a file on disk may say anything."""
-    if not isinstance(told, list) or len(told) != len(results):
+def _believed(told: Any, cells: Sequence[str]) -> dict[str, Placing] | None:
+    """Return remembered places if they can be those of `cells`, the best first: a file on disk may say anything."""
+    if not isinstance(told, list) or len(told) != len(cells):
         return None
-    found = {}
-    for entry in told:
-        if not (isinstance(entry, list) and [type(one) for one in entry] == [str, int, int, int, bool]):
-            return None
-        cell, place, low, high, tied = entry
-        if not 1 <= low <= place <= high <= len(results):
-            return None
-        found[cell] = Placing(place, low, high, tied)
-    if set(found) != {row["cell"] for row in results}:
+    if set(map(type, told)) != {list} or set(map(len, told)) != {len(_ENTRY)}:
         return None
-    places = [found[row["cell"]].place for row in results]
+    columns = list(zip(*told, strict=True))
+    if any(set(map(type, column)) != {kind} for column, kind in zip(columns, _ENTRY, strict=True)):
+        return None
+    if not all(1 <= low <= place <= high <= len(cells) for _, place, low, high, _ in told):
+        return None
+    found = {cell: Placing(*placing) for cell, *placing in told}
+    if found.keys() != set(cells):
+        return None
+    places = [found[cell].place for cell in cells]
     return found if places == sorted(places) else None
+
+
+_ENTRY = (str, int, int, int, bool)
+"""What is remembered of an answer: the name of its cell, and its placing."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from tactbench.core.leaderboard.names import answer_name, metric_name
 from tactbench.core.leaderboard.numbers import score
 from tactbench.core.leaderboard.sections import Section
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
@@ -18,16 +19,16 @@ TITLE = "Published figures · by others, with their sensors and data; not ranked
 _OTHERS = "another model than ours"
 
 
-def published_section(rows: Iterable[Row]) -> Section | None:
-    """Return the published figures that stand beside some of `rows`, each once; None if there is none."""
+def published_section(sheet: Sheet) -> Section | None:
+    """Return the published figures that stand beside some of the rows, each once; None if there is none."""
     lines: dict[tuple[str, ...], None] = {}
-    for row in rows:
-        if row["published"] is None:
+    for figure, row in zip(sheet["published"], sheet.rows, strict=True):
+        if figure is None:
             continue
         whose, remark = _whose(row)
         texts = (row["task"], metric_name(row), row["sensor"], row["protocol"], row["split"] or "", whose,
                  row["published_reference"], remark)  # fmt: skip
-        lines[(score(row["published"], row["unit"]), *(visible(str(text)) for text in texts))] = None
+        lines[(score(figure, row["unit"]), *(visible(str(text)) for text in texts))] = None
     if not lines:
         return None
     ordered = sorted(lines, key=lambda line: (line[1:], line[0]))

@@ -10,6 +10,7 @@ from typing import Any
 
 from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.table import Line, Table
+from tactbench.core.spec.row import FORMAT
 
 JSON_KEYS = (
     "cell", "sensor", "task", "rig", "protocol", "split", "estimator", "params", "is_baseline", "repeat", "repeats",
@@ -25,10 +26,7 @@ JSON_KEYS = (
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
-NESTED = frozenset({
-    "params", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "fold_sizes", "confusion",
-    "classes", "recordings", "replicates",
-})  # fmt: skip
+NESTED = frozenset(key for key in JSON_KEYS if not FORMAT[key].types.isdisjoint({list, dict}))
 """Keys whose values are lists or tables: JSON inside a cell of CSV and Parquet."""
 
 OF_THE_MACHINE = frozenset({

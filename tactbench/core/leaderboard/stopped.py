@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from tactbench.core.leaderboard.names import asked_of, question_name
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import cut, visible
 from tactbench.core.spec.status import STOPPED
 
@@ -18,11 +19,11 @@ LONGEST_REASON = 600
 """Characters of a reason in a note; JSON, CSV and Parquet have all of it."""
 
 
-def stopped_notes(rows: Iterable[Row]) -> list[str]:
+def stopped_notes(sheet: Sheet) -> list[str]:
     """Return one sentence for all cells that ended alike: which, how, why, and the command to look into it."""
     alike: dict[tuple[str, int | None, str], list[Row]] = {}
-    for row in rows:
-        if row["status"] != "done":
+    for status, row in zip(sheet["status"], sheet.rows, strict=True):
+        if status != "done":
             alike.setdefault((row["status"], row["signal"], row["reason"]), []).append(row)
     return [_told(status, signal, reason, members) for (status, signal, reason), members in alike.items()]
 

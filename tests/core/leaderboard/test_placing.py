@@ -9,6 +9,7 @@ import pytest
 
 from tactbench.core.leaderboard import memo
 from tactbench.core.leaderboard.placing import Placing, places
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.ranking import ranks
 
@@ -29,7 +30,7 @@ def rows():
 
 def test_without_replicates_places_are_by_score_and_the_table_says_so():
     rows = [row("a"), row("b"), row("c", score=0.9)]
-    found, why = places(rows)
+    found, why = places(Sheet(rows))
     assert list(found.values()) == [
         Placing(1, None, None, True),
         Placing(1, None, None, True),

@@ -35,7 +35,6 @@ FEW = 20
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 _MASKED = bytes.maketrans(b"0123456789", MASK.encode() * 10)
-_NO_DIGIT = bytes(byte for byte in range(256) if byte not in b"0123456789\n")
 _NUMBER = re.compile(r"([-−]?)(#[#\u202f]*(?:\.(#+))?)")
 _UNIT = re.compile(r"\s*(min|ms|µs|s|h)(?![A-Za-z])")
 
@@ -91,22 +90,20 @@ def write_digits(
     """
     import numpy as np
 
-    joined = "\n".join(texts)
-    if not texts or MASK in joined or joined.count("\n") != max(0, len(texts) - 1) or _unwritable(joined):
+    encoded = _encoded(texts)
+    if encoded is None:
         return None
-    encoded = joined.encode()
     masked = encoded.translate(_MASKED).decode().split("\n")
-    digits = (b"0" + encoded.translate(None, _NO_DIGIT).replace(b"\n", b"\n0")).split(b"\n")
     known = {shape: read_pattern(shape) for shape in dict.fromkeys(masked)}
-    if None in known.values():  # texts of their own
-        for place, shape in enumerate(masked):
-            if known[shape] is None:
-                masked[place], digits[place] = texts[place], b"0"
+    own = [place for place, shape in enumerate(masked) if known[shape] is None] if None in known.values() else []
+    if own:  # texts of their own
+        for place in own:
+            masked[place] = texts[place]
         known = {shape: known.get(shape) or Pattern(shape) for shape in dict.fromkeys(masked)}
     patterns = [pattern for pattern in known.values() if pattern is not None]
-    places = list(map(dict(zip(known, range(len(known)), strict=True)).__getitem__, masked))
-    whole = list(map(int, digits))
-    numbers, shown, last = _numbers(patterns, np.array(places), np.array(whole, dtype=np.int64))
+    number = dict(zip(known, range(len(known)), strict=True))
+    places = np.fromiter(map(number.__getitem__, masked), dtype=np.int64, count=len(masked))
+    numbers, shown, last = _numbers(patterns, places, _whole(encoded, len(masked), own))
     column: Column = {
         "kind": "digits",
         "patterns": [[one.text, one.counts, one.scales, one.shares] for one in patterns],
@@ -118,13 +115,32 @@ def write_digits(
     return column
 
 
-def _unwritable(text: str) -> bool:
-    """Tell whether a text has half a character, which no file in UTF-8 can hold."""
+def _encoded(texts: Sequence[str]) -> bytes | None:
+    """Return texts as lines, or None if one of them has a line break, a ``#``, or half a character."""
+    joined = "\n".join(texts)
+    if not texts or MASK in joined or joined.count("\n") != len(texts) - 1:
+        return None
     try:
-        text.encode()
-    except UnicodeEncodeError:
-        return True
-    return False
+        return joined.encode()
+    except UnicodeEncodeError:  # no file in UTF-8 can hold it
+        return None
+
+
+def _whole(encoded: bytes, count: int, own: Sequence[int]) -> NDArray[np.int64]:
+    """Return (count,) all digits of each line as one whole number; 0 for those that are texts of their `own`."""
+    import numpy as np
+
+    letters = np.frombuffer(encoded, dtype=np.uint8)
+    digits = letters - ord("0")  # anything else comes out larger than 9
+    at = np.flatnonzero(digits < 10)
+    line = np.searchsorted(np.flatnonzero(letters == ord("\n")), at)
+    ends = np.cumsum(np.bincount(line, minlength=count))
+    place = ends[line] - np.arange(1, len(at) + 1)
+    place[place >= MOST_DIGITS] = 0  # of no number of ours
+    # Of as many digits as these every sum is exact.
+    whole = np.bincount(line, weights=digits[at] * (10.0 ** np.arange(MOST_DIGITS))[place], minlength=count)
+    whole[list(own)] = 0
+    return whole.astype(np.int64)
 
 
 def _numbers(
@@ -137,7 +153,7 @@ def _numbers(
     numbers = [np.zeros(len(places), dtype=np.uint64) for _ in range(count)]
     shown = np.full(len(places), np.nan)
     last = np.ones(len(places))
-    order = np.argsort(places, kind="stable")
+    order = np.argsort(places.astype(np.min_scalar_type(len(patterns))), kind="stable")
     edges = np.searchsorted(places[order], np.arange(len(patterns) + 1))
     for place, pattern in enumerate(patterns):
         if not pattern.counts:

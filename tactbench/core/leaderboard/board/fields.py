@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.board.columns import Columns
 from tactbench.core.leaderboard.board.digits import write_digits
 from tactbench.core.leaderboard.board.pack import Column, Pack
 from tactbench.core.leaderboard.board.words import LONGEST, write_words
 from tactbench.core.leaderboard.numbers import duration
+from tactbench.core.leaderboard.sheet import Sheet
 
 MANY = 5_000
 """Cells beyond which what every cell has of its own is told shortly, or left to its shard."""
@@ -37,16 +37,16 @@ _LENGTHS = (LONGEST, 8_192, 1_024, 200)
 """Characters that a text is cut to, one after the other, until the column fits."""
 NOTHING: Column = {"kind": "nothing"}
 """A column of empty texts."""
-_HEX = re.compile(f"[0-9a-f]{{{KEY_DIGITS}}}")
+_HEX = re.compile("[0-9a-f]+")
 
 
-def write_fields(pack: Pack, rows: Columns, room: int) -> tuple[dict[str, Column], tuple[str, ...]]:
+def write_fields(pack: Pack, rows: Sheet, room: int) -> tuple[dict[str, Column], tuple[str, ...]]:
     """Write what is known of the cells into `pack`.
 
     Parameters
     ----------
     rows
-        What is known of the cells, by key.
+        What is known of the cells.
     room
         Characters that the pack may hold in the end.
 
@@ -73,11 +73,12 @@ def write_fields(pack: Pack, rows: Columns, room: int) -> tuple[dict[str, Column
 
 
 def _write(
-    pack: Pack, rows: Columns, key: str, room: int, columns: dict[str, Column], left_out: list[str], many: bool
+    pack: Pack, rows: Sheet, key: str, room: int, columns: dict[str, Column], left_out: list[str], many: bool
 ) -> None:
     """Write one column, cut as far as it must be, or not at all; a column that says nothing is not written."""
-    values = rows.get(key, ())
-    types = set(map(type, values))
+    if key not in rows:
+        return
+    values, types = rows[key], rows.types(key)
     before = len(pack.blobs)
     if many and float in types and types <= {float, int, type(None)}:
         column = write_digits(pack, _shortly(key, values))
@@ -86,7 +87,7 @@ def _write(
             return
     else:
         for longest in _LENGTHS if str in types else _LENGTHS[:1]:
-            column = write_words(pack, values, longest)
+            column = write_words(pack, values, longest, types)
             if column is None:
                 return
             if pack.size <= room:
@@ -117,7 +118,11 @@ def _names(pack: Pack, names: Sequence[str]) -> Column:
 
 def _keys(pack: Pack, values: Sequence[Any], many: bool) -> Column:
     keys = [str(value or "") for value in values]
-    if not many or not all(_HEX.match(key) or not key for key in keys):
+    heads = [key[:KEY_DIGITS] or "0" * KEY_DIGITS for key in keys]
+    told = "".join(heads)
+    if not many or set(map(len, heads)) != {KEY_DIGITS} or not _HEX.fullmatch(told):
         return write_words(pack, keys) or NOTHING
-    whole = [int(key[:KEY_DIGITS], 16) if key else 0 for key in keys]
+    import numpy as np
+
+    whole = np.frombuffer(bytes.fromhex(told), dtype=f">u{KEY_DIGITS // 2}")
     return {"kind": "hex", "digits": KEY_DIGITS, "at": pack.planes(whole)}

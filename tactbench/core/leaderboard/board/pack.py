@@ -62,7 +62,7 @@ class Pack:
         """Return the same as `planes` of zeros."""
         return [self.add(bytes(count)), 1]
 
-    def planes(self, values: Sequence[int] | NDArray[np.uint64]) -> list[int]:
+    def planes(self, values: Sequence[int] | NDArray[np.integer[Any]]) -> list[int]:
         """Return the blob of whole numbers from 0 to 2^53, and the bytes that each of them takes."""
         import numpy as np
 

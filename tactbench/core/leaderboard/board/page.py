@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections import Counter, defaultdict, deque
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from html import escape
-from operator import itemgetter
 from string import Template
 from typing import Any
 
 import tactbench
-from tactbench.core.leaderboard.board.columns import columns_of
 from tactbench.core.leaderboard.board.digits import FEW_STEPS, STEPS, write_digits
 from tactbench.core.leaderboard.board.fields import MANY, NOTHING, write_fields
 from tactbench.core.leaderboard.board.pack import Column, Pack, deflated
@@ -19,10 +17,12 @@ from tactbench.core.leaderboard.board.sound import sound, table_of
 from tactbench.core.leaderboard.board.still import still
 from tactbench.core.leaderboard.board.words import cut, tame, write_words
 from tactbench.core.leaderboard.collector import collector_at_rest
+from tactbench.core.leaderboard.lines import Shown
 from tactbench.core.leaderboard.names import SIMULATED
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.particulars import GROUPS, TITLES
-from tactbench.core.leaderboard.table import ABSENT, LOWER_IS_BETTER, NUMERIC, Block, Section, Table
+from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.table import LOWER_IS_BETTER, NUMERIC, Block, Section, Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
@@ -41,7 +41,6 @@ MOST_LINES = 500
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
 DURATIONS = ("latency p50", "p95", "fit", "sim", "batch/row")
 """Columns that a score can be drawn against."""
-_NOTHING = frozenset({"", ABSENT})
 _HOME = "tactbench.core.leaderboard.board"
 
 
@@ -70,14 +69,12 @@ def page_of(table: Table, remarks: Sequence[str] = ()) -> str:
     remarks
         What a reader must know first.
     """
-    # By name: what neighbours share lies together.
-    rows = sorted(table.rows, key=itemgetter("cell"))
-    order = _places(rows, table)
+    sheet = table.shown.sheet
     pack = Pack()
-    head = _head(pack, rows, table, order, remarks)
-    frame = _frame(rows, still(table, rows, order, remarks) if len(rows) <= MOST_STILL else "")
+    head = _head(pack, table, remarks)
+    frame = _frame(sheet, still(table, remarks) if len(sheet.rows) <= MOST_STILL else "")
     taken = len(frame.encode()) + len(deflated(_json(head))) + _ROOM_FOR_FIELDS
-    head["fields"], head["leftOut"] = write_fields(pack, columns_of(rows), LARGEST - taken)
+    head["fields"], head["leftOut"] = write_fields(pack, sheet, LARGEST - taken)
     written = pack.add(_json(head))
     data = json.dumps({"head": written, "blobs": pack.blobs}, separators=(",", ":"))
     # The last one: a name may say the same.
@@ -94,48 +91,25 @@ def _json(value: Any) -> bytes:
     return json.dumps(value, separators=(",", ":")).encode()
 
 
-def _places(rows: Sequence[Row], table: Table) -> list[list[int]]:
-    """Return the places in `rows` of each block's lines, in the table's order."""
-    places: dict[str, deque[int]] = defaultdict(deque)
-    for place, row in enumerate(rows):
-        places[row["cell"]].append(place)
-    return [[places[line.cell].popleft() for line in block.lines if places[line.cell]] for block in table.blocks]
-
-
-def _head(
-    pack: Pack,
-    rows: Sequence[Row],
-    table: Table,
-    order: Sequence[Sequence[int]],
-    remarks: Sequence[str],
-) -> dict[str, Any]:
+def _head(pack: Pack, table: Table, remarks: Sequence[str]) -> dict[str, Any]:
     """Return all that the page's script must know, the blobs that it is in aside."""
-    lines = [line for block in table.blocks for line in block.lines]
-    flat = [place for block in order for place in block]
-    empty = ("",) * len(table.columns)
-    cells: list[tuple[str, ...]] = [empty] * len(rows)
-    kinds = [""] * len(rows)
-    for place, line in zip(flat, lines, strict=True):
-        cells[place] = line.cells
-        kinds[place] = line.kind
-    texts = list(zip(*cells, strict=True)) if cells else [()] * len(table.columns)
-    firsts = [rows[block[0]] for block in order]
+    shown, sheet = table.shown, table.shown.sheet
+    firsts = [sheet.rows[block.places[0]] for block in table.blocks]
     notes = [cut(note, LONGEST_NOTE) for note in (*remarks, *table.notes)]
     if len(notes) > MOST_NOTES:
         notes = [*notes[:MOST_NOTES], f"{len(notes) - MOST_NOTES} more notes are not in this page."]
     return {
         "version": tactbench.__version__,
-        "rows": len(rows),
-        "order": pack.planes(flat),
-        "kinds": write_words(pack, kinds) or NOTHING,
+        "rows": len(sheet.rows),
+        "order": pack.planes([place for block in table.blocks for place in block.places]),
+        "kinds": write_words(pack, shown.kinds) or NOTHING,
         "blocks": [
-            {"title": block.title, "size": len(block.lines), "lower": first["metric"] in LOWER_IS_BETTER}
+            {"title": block.title, "size": len(block.places), "lower": first["metric"] in LOWER_IS_BETTER}
             | {"metric": first["metric"], "unit": first["unit"], "simulated": _is_simulated(block)}
             for block, first in zip(table.blocks, firsts, strict=True)
         ],
         "columns": [
-            {"name": name, "numeric": name in NUMERIC, "column": _column(pack, name, shown, rows)}
-            for name, shown in zip(table.columns, texts, strict=True)
+            {"name": name, "numeric": name in NUMERIC, "column": _column(pack, name, shown)} for name in table.columns
         ],
         "sections": [_section(section) for section in table.sections],
         "foot": [cut(text, LONGEST_NOTE) for text in table.foot],
@@ -149,7 +123,8 @@ def _head(
 
 def _is_simulated(block: Block) -> bool:
     """Tell whether a block stands among simulated ones; a cell that was not begun does not know it of itself."""
-    return SIMULATED in block.title.split(" · ")[2:] or any(line.row["simulated"] for line in block.lines)
+    simulated = block.shown.sheet["simulated"]
+    return SIMULATED in block.title.split(" · ")[2:] or any(simulated[place] for place in block.places)
 
 
 def _id(entry: Mapping[str, Any]) -> str:
@@ -181,26 +156,29 @@ def _roles(columns: Sequence[str]) -> dict[str, Any]:
     return {**named, "times": [name for name in DURATIONS if name in columns]}
 
 
-def _column(pack: Pack, name: str, texts: Sequence[str], rows: Sequence[Row]) -> Column:
+def _column(pack: Pack, name: str, shown: Shown) -> Column:
+    texts = shown.texts[name]
     if name in NUMERIC:
-        found = VALUES.get(name)
-        # A stopped cell may know a number that the table does not show: it is not sorted by it either.
-        values = (
-            [None if text in _NOTHING else found(row) for row, text in zip(rows, texts, strict=True)] if found else None
-        )
-        column = write_digits(pack, texts, values, FEW_STEPS if len(rows) > MANY else STEPS)
+        values = None
+        if name in VALUES:
+            # A stopped cell may know a number that the table does not show: it is not sorted by it either.
+            values = list(VALUES[name](shown.sheet))
+            for place, kind in enumerate(shown.kinds):
+                if kind in ("failed", "skipped"):
+                    values[place] = None
+        column = write_digits(pack, texts, values, FEW_STEPS if len(texts) > MANY else STEPS)
         if column is not None:
             return column
     return write_words(pack, texts) or NOTHING
 
 
-def _frame(rows: Sequence[Row], shown: str) -> str:
+def _frame(sheet: Sheet, shown: str) -> str:
     """Return the page but for its data."""
     style = house_style() + own(_HOME, "board.css")
     script = '\n"use strict";\n(() => {\n' + own(_HOME, *_SCRIPTS) + "})();\n"
     if not shown:
         shown = (
-            f"<p class='missing'>This board has {len(rows):,} cells: a script of its own draws them, and needs a "
+            f"<p class='missing'>This board has {len(sheet.rows):,} cells: a script of its own draws them, and needs a "
             "browser that allows it. Nothing is fetched from anywhere. Without scripts, read "
             "<code>leaderboard.md</code> or <code>leaderboard.csv</code> in the result folder.</p>"
         )
@@ -211,15 +189,17 @@ def _frame(rows: Sequence[Row], shown: str) -> str:
         script=script,
         style_hash=policy_hash(style),
         script_hash=policy_hash(script),
-        summary=escape(_summary(rows)),
+        summary=escape(_summary(sheet)),
         shown=shown,
         data=_DATA_HERE,
     )
 
 
-def _summary(rows: Sequence[Row]) -> str:
+def _summary(sheet: Sheet) -> str:
     """Return how many cells there are, and how they ended."""
-    ends = Counter(visible(str(row["status"])) for row in rows)
+    ends = Counter(map(visible, map(str, sheet["status"])))
     told = ", ".join(f"{count:,} {status}" for status, count in ends.most_common())
-    sensors, tasks = (len({row[key] for row in rows}) for key in ("sensor", "task"))
-    return f"{len(rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {told}." if rows else "No cells."
+    sensors, tasks = (len(set(sheet[key])) for key in ("sensor", "task"))
+    if not sheet.rows:
+        return "No cells."
+    return f"{len(sheet.rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {told}."

@@ -8,87 +8,85 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.board.columns import columns_of
 from tactbench.core.leaderboard.board.words import tame, tame_text
+from tactbench.core.leaderboard.records import JSON_KEYS
+from tactbench.core.leaderboard.sheet import Sheet, columns_of
 from tactbench.core.leaderboard.table import Table, build_table
+from tactbench.core.spec.row import FORMAT, Held
 
 Row = Mapping[str, Any]
 
 LONGEST_NAME = 300
 """Characters of a name: longer ones are cut."""
-_NOTHING = type(None)
-_TEXT = (
-    "cell", "sensor", "task", "rig", "protocol", "estimator", "status", "reason", "traceback", "log", "metric", "unit",
-    "ci_method", "published_reference", "published_remark", "host", "made_by", "key",
-)  # fmt: skip
 _NAMES = frozenset(
     {"cell", "sensor", "task", "rig", "protocol", "split", "estimator", "status", "metric", "unit", "host"}
 )
-_NUMBER = (
-    "score", "ci_low", "ci_high", "baseline", "published", "sim_s", "search_s", "fit_s", "predict_s", "latency_ms_p50",
-    "latency_ms_p95", "peak_rss_mb", "wall_s", "equivalence", "reference_score",
-)  # fmt: skip
-_WHOLE = (
-    "repeat", "repeats", "seed", "signal", "n_recordings", "n_sessions", "n_train", "n_test", "batch_rows", "latency_n",
-    "threads", "concurrency",
-)  # fmt: skip
-_FLAG = ("is_baseline", "simulated", "dagger")
-_LIST = ("stamps", "remarks", "plan", "search", "recordings", "classes")
-_TABLE = ("params", "assumptions", "counts", "chosen", "scores", "replicates", "fold_sizes")
-
-# What a key may hold, and what stands for it where it holds anything else.
-_KINDS: dict[str, tuple[frozenset[type], Callable[[Any], Any]]] = {
-    **dict.fromkeys(_TEXT, (frozenset({str}), lambda value: "" if value is None else tame_text(value))),
-    "split": (frozenset({str, _NOTHING}), lambda value: None if value is None else tame_text(value)),
-    **dict.fromkeys(_NUMBER, (frozenset({int, float, _NOTHING}), lambda value: _finite(value))),
-    **dict.fromkeys(_WHOLE, (frozenset({int, _NOTHING}), lambda value: _whole(value))),
-    **dict.fromkeys(_FLAG, (frozenset({bool}), lambda value: value is True)),
-    **dict.fromkeys(_LIST, (frozenset({list, tuple}), lambda value: [])),
-    **dict.fromkeys(_TABLE, (frozenset({dict}), lambda value: {})),
-    "confusion": (frozenset({list, tuple, _NOTHING}), lambda value: None),
-}
+_NEEDED = frozenset({*JSON_KEYS, "traceback", "log", "plan"})
+"""Keys that a page cannot do without."""
 _FALLBACK = {"repeat": 1, "repeats": 1}
 
 
-def sound(rows: Sequence[Any]) -> tuple[list[Row], tuple[str, ...]]:
+def sound(rows: Sequence[Any]) -> tuple[Sheet, tuple[str, ...]]:
     """Return the rows with what is odd set right, and a sentence on what that was; none if nothing was."""
-    kept: list[Row] = [row for row in rows if isinstance(row, Mapping)]
+    kept: list[Row] = sorted((row for row in rows if isinstance(row, Mapping)), key=_name)
     told = [f"{len(rows) - len(kept)} entries are no rows and are left out."] if len(kept) < len(rows) else []
     odd: Counter[str] = Counter()
-    columns = columns_of(kept)
-    present = set(columns).intersection(*{tuple(row) for row in kept})
+    columns, everywhere = columns_of(kept)
+    sheet = Sheet(kept, columns)
     copies: dict[int, dict[str, Any]] = {}
-    for key, (kinds, mend) in _KINDS.items():
-        places = _odd_places(kept, columns.get(key, ()), key, kinds, key not in present)
+    for key, held in FORMAT.items():
+        if not kept or (key not in columns and key not in _NEEDED):
+            continue
+        places = _odd_places(sheet, key, held, key in everywhere)
         for place in places:
             if place not in copies:
                 copies[place] = dict(kept[place])
-            copies[place][key] = _mended(kept[place], key, kinds, mend)
+            copies[place][key] = _mended(kept[place], key, held)
         if places:
             odd[key] = len(places)
-    for place, copy in copies.items():
-        kept[place] = copy
-    for place, row in enumerate(kept):
-        if row["status"] == "done" and row["score"] is None:
-            kept[place] = {**row, "status": "failed", "reason": "This row says done and holds no finite score."}
-            odd["score of a cell that is done"] += 1
+    if copies:
+        sheet = Sheet.by_name([copies.get(place, row) for place, row in enumerate(kept)])
+    if kept:
+        sheet = _with_scores(sheet, odd)
     if odd:
         listed = ", ".join(f"{key} ({count} rows)" for key, count in odd.items())
         told.append(f"Not as a run writes them, set right or left out here: {listed}.")
-    return kept, tuple(told)
+    return sheet, tuple(told)
 
 
-def _odd_places(
-    rows: Sequence[Row], values: Sequence[Any], key: str, kinds: frozenset[type], missing: bool
-) -> list[int]:
-    """Return the places of rows that lack `key` (some do if it is `missing`), or hold what does not belong there."""
-    types = set(map(type, values))
-    if types <= kinds and not missing and not _limited(values, key, types):
-        return []
-    return [place for place, row in enumerate(rows) if key not in row or not _fits(row[key], key, kinds)]
+def _name(row: Row) -> str:
+    name = row.get("cell")
+    return name if type(name) is str else ""
+
+
+def _with_scores(sheet: Sheet, odd: Counter[str]) -> Sheet:
+    """Let rows that say done and have no score say failed."""
+    ends = zip(sheet["status"], sheet["score"], strict=True)
+    places = [place for place, (status, score) in enumerate(ends) if status == "done" and score is None]
+    if not places:
+        return sheet
+    odd["score of a cell that is done"] = len(places)
+    rows = list(sheet.rows)
+    for place in places:
+        rows[place] = {**rows[place], "status": "failed", "reason": "This row says done and holds no finite score."}
+    return Sheet(rows)
+
+
+def _odd_places(sheet: Sheet, key: str, held: Held, everywhere: bool) -> list[int]:
+    """Return the places of rows that lack `key` (none does if it is `everywhere`), or hold what does not belong."""
+    kinds = _kinds(held)
+    if everywhere:
+        types = sheet.types(key)
+        if types <= kinds and not _limited(sheet[key], key, types):
+            return []
+    return [place for place, row in enumerate(sheet.rows) if key not in row or not _fits(row[key], key, kinds)]
+
+
+def _kinds(held: Held) -> frozenset[type]:
+    return held.types | {tuple} if list in held.types else held.types
 
 
 def _limited(values: Sequence[Any], key: str, types: Collection[type]) -> bool:
@@ -118,18 +116,34 @@ def _fits(value: Any, key: str, kinds: Collection[type]) -> bool:
     return True
 
 
-def _mended(row: Row, key: str, kinds: Collection[type], mend: Callable[[Any], Any]) -> Any:
+def _mended(row: Row, key: str, held: Held) -> Any:
     if key not in row:
-        return _FALLBACK.get(key, mend(None))
+        return _plain(None, key, held)
     value = row[key]
     if key in ("counts", "chosen") and type(value) is dict:
         return {name: one for name, one in value.items() if type(name) is str and _finite(one) is not None}
-    if key in ("stamps", "remarks") and type(value) in kinds:
+    if key in ("stamps", "remarks") and type(value) in _kinds(held):
         return [one if type(one) is str else tame_text(tame(one)) for one in value]
-    mended = mend(value)
+    mended = _plain(value, key, held)
     if key in _NAMES and mended is not None and len(mended) > LONGEST_NAME:
         return f"{mended[:LONGEST_NAME]}… [cut: {len(mended)} characters]"
-    return _FALLBACK.get(key) if mended is None and key in _FALLBACK else mended
+    return mended
+
+
+def _plain(value: Any, key: str, held: Held) -> Any:
+    """Return what stands for a value that does not belong there."""
+    if bool in held.types:
+        return value is True
+    if float in held.types:
+        return _finite(value)
+    if int in held.types:
+        found = _whole(value)
+        return _FALLBACK.get(key) if found is None else found
+    if value is None and type(None) in held.types:
+        return None
+    if str in held.types:
+        return "" if value is None else tame_text(value)
+    return None if type(None) in held.types else {} if dict in held.types else []
 
 
 def _finite(value: Any) -> float | None:
@@ -146,13 +160,13 @@ def _whole(value: Any) -> int | None:
     return int(found) if found is not None and found == int(found) else None
 
 
-def table_of(rows: Sequence[Row], provenance: Sequence[Row]) -> Table:
+def table_of(sheet: Sheet, provenance: Sequence[Row]) -> Table:
     """Return the table of rows; a row that no table can be made of says so in its place."""
     known = [entry for entry in provenance if isinstance(entry, Mapping)]
     try:
-        return build_table(rows, known)
+        return build_table(sheet, known)
     except Exception:
-        return build_table([_alone(row) for row in rows], known)
+        return build_table([_alone(row) for row in sheet.rows], known)
 
 
 def _alone(row: Row) -> Row:
@@ -160,7 +174,7 @@ def _alone(row: Row) -> Row:
     try:
         build_table([row])
     except Exception as error:
-        plain = {key: mend(None) for key, (_, mend) in _KINDS.items()} | _FALLBACK
+        plain = {key: _plain(None, key, held) for key, held in FORMAT.items()}
         kept = {key: row[key] for key in ("cell", "sensor", "task", "rig", "protocol", "estimator", "metric", "unit")}
         reason = f"This row cannot be shown: {type(error).__name__}: {error}"
         return {**plain, **kept, "status": "failed", "reason": reason}

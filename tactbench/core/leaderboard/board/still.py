@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
-from typing import Any
 
 from tactbench.core.leaderboard.one_file import prose
 from tactbench.core.leaderboard.table import NUMERIC, Table
 from tactbench.core.leaderboard.text import visible
 
 
-def still(
-    table: Table, rows: Sequence[Mapping[str, Any]], order: Sequence[Sequence[int]], remarks: Sequence[str]
-) -> str:
+def still(table: Table, remarks: Sequence[str]) -> str:
     """Return every block of `table` as HTML, and its notes; everything in them is escaped."""
     parts: list[str] = []
-    for block, places in zip(table.blocks, order, strict=True):
+    for block in table.blocks:
         heads = "".join(
             f'<th scope="col"{_class(name)}>{_text(name)}</th>' for name in (*table.columns, "status and reason")
         )
         lines = []
-        for line, place in zip(block.lines, places, strict=True):
-            row = rows[place]
-            why = "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")
+        for line in block.lines:
+            why = "" if line.row["status"] == "done" else visible(f"{line.row['status']}: {line.row['reason']}")
             cells = "".join(
                 f"<td{_class(name)}>{_text(text)}</td>" for name, text in zip(table.columns, line.cells, strict=True)
             )

@@ -7,13 +7,13 @@ what is longer than anybody reads; each says so in its place.
 from __future__ import annotations
 
 import json
-import marshal
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.board.pack import Column, Pack
+from tactbench.core.leaderboard.sheet import marks_of
 
 LONGEST = 65_536
 """Characters of a text: what a cell may print is kept to as many bytes."""
@@ -29,23 +29,29 @@ _PLAIN = frozenset({str, int, bool, float, _NOTHING})
 _SILENT = frozenset({"null", '""', "[]", "{}"})
 
 
-def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Column | None:
-    """Write a column of any values; None if none of them says anything."""
-    types = set(map(type, values))
+def write_words(
+    pack: Pack, values: Sequence[Any], longest: int = LONGEST, types: Collection[type] | None = None
+) -> Column | None:
+    """Write a column of any values; None if none of them says anything.
+
+    Parameters
+    ----------
+    longest
+        Characters that a text is cut to.
+    types
+        The types of the values, if known already.
+    """
+    types = frozenset(map(type, values) if types is None else types)
     if types <= _EMPTY.keys() and not any(values):
         return None
     if types == {_NOTHING} or not values:
         return None
-    # By value where that is safe (1, 1.0 and True are equal), else by identity: the values outlive this call.
+    # By value where that is safe: 1, 1.0 and True are equal.
     alike = len(types - {_NOTHING}) <= 1 and types <= _PLAIN
-    if alike and len(set(values)) == 1:
-        text = written(values[0], longest)
-        return None if text in _SILENT else _column(pack, [text], pack.zeros(len(values)))
-    keys: Sequence[Any] = values if alike else list(map(id, values))
-    write = written if alike else _Writer()
+    keys = values if alike else marks_of(values)
     texts: dict[str, int] = {}
     places = {
-        key: texts.setdefault(write(value, longest), len(texts))
+        key: texts.setdefault(written(value, longest), len(texts))
         for key, value in dict(zip(keys, values, strict=True)).items()
     }
     if texts.keys() <= _SILENT:
@@ -56,27 +62,6 @@ def write_words(pack: Pack, values: Sequence[Any], longest: int = LONGEST) -> Co
 
 def _column(pack: Pack, texts: Iterable[str], at: list[int]) -> Column:
     return {"kind": "words", "words": pack.add(("[" + ",".join(texts) + "]").encode()), "at": at}
-
-
-class _Writer:
-    """Writes values of which many are equal without being the same."""
-
-    def __init__(self) -> None:
-        self._known: dict[bytes, str] = {}
-
-    def __call__(self, value: Any, longest: int) -> str:
-        """Return `written` of the value."""
-        if not value or type(value) not in _EMPTY:
-            return written(value, longest)
-        try:
-            # Version 2 of the format writes equal values of equal types as equal bytes; it is never read.
-            mark = marshal.dumps(value, 2)
-        except ValueError:  # holds what is not plain, or is endless
-            return written(value, longest)
-        text = self._known.get(mark)
-        if text is None:
-            text = self._known[mark] = written(value, longest)
-        return text
 
 
 def written(value: Any, longest: int = LONGEST) -> str:

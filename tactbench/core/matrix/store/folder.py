@@ -241,10 +241,10 @@ class Store:
                 latest[entry.row["cell"]] = entry
             else:
                 holes.add(entry.row["cell"])
-        for name in sorted(holes - set(latest)):
-            told = f"{name!r} is left out: its shard is missing or cut; run it again"
-            if told not in ledger.troubles:
-                ledger.troubles.append(told)
+        known = set(ledger.troubles)
+        lost = sorted(holes - set(latest))
+        told = [f"{name!r} is left out: its shard is missing or cut; run it again" for name in lost]
+        ledger.troubles += [one for one in told if one not in known]
         return list(latest.values())
 
     def answers(self, key: str) -> dict[str, Answers]:

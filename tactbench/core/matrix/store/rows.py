@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from tactbench.core.matrix.store.limits import DEPTH
+from tactbench.core.spec.row import FORMAT, in_words
 from tactbench.core.spec.status import STATUSES
 
 Row = dict[str, Any]
@@ -16,35 +17,8 @@ other rows: they are never changed in place."""
 NAMING = ("cell", "repeat", "repeats")
 """What a matrix calls a cell; the key covers everything else."""
 
-_NONE = type(None)
-_TYPES: dict[tuple[type, ...], tuple[str, ...]] = {
-    (str,): (
-        "key", "cell", "sensor", "task", "rig", "protocol", "estimator", "status", "reason", "traceback", "log",
-        "metric", "unit", "ci_method", "published_reference", "published_remark", "host", "made_by",
-    ),
-    (str, _NONE): ("split",),
-    (int,): ("repeat", "repeats", "seed"),
-    (int, _NONE): (
-        "signal", "n_recordings", "n_sessions", "n_train", "n_test", "batch_rows", "latency_n", "threads",
-        "concurrency",
-    ),
-    (float, int, _NONE): (
-        "score", "ci_low", "ci_high", "baseline", "published", "sim_s", "search_s", "fit_s", "predict_s",
-        "latency_ms_p50", "latency_ms_p95", "peak_rss_mb", "wall_s",
-    ),
-    (bool,): ("is_baseline", "simulated", "dagger"),
-    (list,): ("stamps", "remarks", "plan", "search", "recordings", "digests", "classes"),
-    (list, _NONE): ("confusion",),
-    (dict,): ("params", "simulation", "assumptions", "counts", "chosen", "scores", "replicates"),
-}  # fmt: skip
-_ALLOWED: dict[str, tuple[type, ...]] = {name: types for types, names in _TYPES.items() for name in names}
-
-_NUMBER, _TEXT, _SCALAR = (int, float), (str,), (str, int, float, bool)
-_INSIDE: dict[str, tuple[type, ...]] = {
-    "stamps": _TEXT, "remarks": _TEXT, "recordings": _TEXT, "digests": _TEXT, "plan": (dict,), "search": (dict,),
-    "classes": _SCALAR, "confusion": (list,), "counts": _NUMBER, "chosen": _NUMBER, "scores": _NUMBER,
-}  # fmt: skip
-
+_INSIDE = tuple((name, held.inside) for name, held in FORMAT.items() if held.inside)
+_NESTED = {dict, list}
 
 _finite = json.JSONEncoder(sort_keys=True, allow_nan=False).encode
 
@@ -76,7 +50,6 @@ def row_checker() -> Callable[[Row], str]:
     """
     alike: set[tuple[Any, ...]] = set()
     seen: dict[int, Any] = {}
-    inner = [(name, types, frozenset(types)) for name, types in _INSIDE.items()]
 
     def wrong(row: Row) -> str:
         shape = (*row, *map(type, row.values()))
@@ -87,12 +60,12 @@ def row_checker() -> Callable[[Row], str]:
             alike.add(shape)
         if row["status"] not in STATUSES:
             return f"a cell cannot be {row['status']!r}"
-        for name, types, allowed in inner:
+        for name, allowed in _INSIDE:
             values = row.get(name)
             if values and id(values) not in seen:
                 inside: Iterable[Any] = values.values() if isinstance(values, dict) else values
                 if not allowed.issuperset(map(type, inside)):
-                    return f"{name!r} holds something else than {_words(types)}"
+                    return f"{name!r} holds something else than {in_words(allowed)}"
                 seen[id(values)] = values  # kept, so that no other object gets its id
         return ""
 
@@ -104,19 +77,10 @@ def _mistyped(row: Row) -> str:
         if name not in row:
             return f"it has no {name!r}"
     for name, value in row.items():
-        types = _ALLOWED.get(name)
-        if types is not None and type(value) not in types:
-            return f"{name!r} is {_words((type(value),))}, not {_words(types)}"
+        held = FORMAT.get(name)
+        if held is not None and type(value) not in held.types:
+            return f"{name!r} is {in_words([type(value)])}, not {in_words(held.types)}"
     return ""
-
-
-def _words(types: Iterable[type]) -> str:
-    names = {str: "text", int: "a whole number", float: "a number", bool: "yes or no", list: "a list",
-             dict: "a mapping", _NONE: "nothing"}  # fmt: skip
-    return " or ".join(names[one] for one in types)
-
-
-_NESTED = {dict, list}
 
 
 def too_deep(value: Any) -> bool:

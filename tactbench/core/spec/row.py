@@ -1,0 +1,54 @@
+"""The format of a row: what may stand under each of its keys, for whoever writes, reads or shows rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+_NOTHING = type(None)
+_WORDS = {
+    str: "text", float: "a number", int: "a whole number", bool: "yes or no", list: "a list", dict: "a mapping",
+    _NOTHING: "nothing",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Held:
+    """What may stand under a key."""
+
+    types: frozenset[type]
+    inside: frozenset[type] = frozenset()
+    """Types of what a list, or the values of a mapping, may hold; empty: any."""
+
+
+def in_words(types: Iterable[type]) -> str:
+    """Return types in words: ``a number or nothing``."""
+    given = set(types)
+    if float in given:  # any whole number is a number
+        given.discard(int)
+    return " or ".join([word for one, word in _WORDS.items() if one in given])
+
+
+def _each(names: str, types: Iterable[type], inside: Iterable[type] = ()) -> dict[str, Held]:
+    return dict.fromkeys(names.split(), Held(frozenset(types), frozenset(inside)))
+
+
+_NUMBERS = (int, float)
+
+FORMAT: Mapping[str, Held] = {
+    **_each("key cell sensor task rig protocol estimator status reason traceback log metric unit ci_method", [str]),
+    **_each("published_reference published_remark host made_by", [str]),
+    **_each("split", [str, _NOTHING]),
+    **_each("repeat repeats seed", [int]),
+    **_each("signal n_recordings n_sessions n_train n_test batch_rows latency_n threads concurrency", [int, _NOTHING]),
+    **_each("score ci_low ci_high baseline published equivalence reference_score", [*_NUMBERS, _NOTHING]),
+    **_each("sim_s search_s fit_s predict_s latency_ms_p50 latency_ms_p95 peak_rss_mb wall_s", [*_NUMBERS, _NOTHING]),
+    **_each("is_baseline simulated dagger", [bool]),
+    **_each("stamps remarks recordings digests", [list], [str]),
+    **_each("plan search", [list], [dict]),
+    **_each("classes", [list], [str, bool, *_NUMBERS]),
+    **_each("confusion", [list, _NOTHING], [list]),
+    **_each("counts chosen scores", [dict], _NUMBERS),
+    **_each("params simulation assumptions replicates fold_sizes", [dict]),
+}
+"""By key. A row may have other keys, of which nothing is asked."""
