@@ -111,7 +111,7 @@ def any_radius(case: Case) -> None:
     states = lawful(case, press, loads)
     check_reach(press, loads[-1], outer_radius_mm(skin.sheet))
     told = remarks(press, loads, outer_radius_mm(skin.sheet), pad_of(skin.sheet, press.medium.grid))
-    few = np.count_nonzero(states[-1].pressure_mpa) < 28  # pi 3²
+    few = np.count_nonzero(states[-1].pressure_mpa) < math.pi * 3**2
     case.holds(
         ("remark contact" in told) == few, "a contact below three cells in radius must be remarked on, and only it"
     )
