@@ -11,8 +11,8 @@ import click
 if TYPE_CHECKING:
     from rich.console import Console
 
-WIDTH_WITHOUT_TERMINAL = 240
-"""Wide enough for every column: a file or a pipe has no edge."""
+WITHOUT_EDGE = 240
+"""Wide enough for every column of names of ordinary length."""
 
 
 def console() -> Console:
@@ -21,8 +21,13 @@ def console() -> Console:
 
     if sys.stdout.isatty():
         return Console(highlight=False)
-    width = int(os.environ.get("COLUMNS", WIDTH_WITHOUT_TERMINAL))
-    return Console(highlight=False, width=max(width, WIDTH_WITHOUT_TERMINAL), color_system=None)
+    return Console(highlight=False, width=width_without_terminal(), color_system=None)
+
+
+def width_without_terminal() -> int:
+    """Return how wide a table may be in a file or a pipe, which have no edge; wider if ``COLUMNS`` says so."""
+    said = os.environ.get("COLUMNS", "")
+    return max(int(said) if said.isdecimal() else 0, WITHOUT_EDGE)
 
 
 def remark(text: str) -> None:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.cli.screen import console, width_without_terminal
+
 if TYPE_CHECKING:
     from tactbench.core.leaderboard.table import Table
 
@@ -48,8 +50,7 @@ def print_table(table: Table, shape: str, *, to: Path | None = None) -> None:
     """
     from tactbench.core.leaderboard.collector import collector_at_rest
 
-    if shape == "table" and to is None:
-        from tactbench.core.cli.screen import console
+    if shape == "table" and to is None and sys.stdout.isatty():
         from tactbench.core.leaderboard.terminal import show
 
         show(table, console())
@@ -60,7 +61,7 @@ def print_table(table: Table, shape: str, *, to: Path | None = None) -> None:
     elif shape == "table":
         from tactbench.core.leaderboard.terminal import plain_text
 
-        _put(plain_text(table).encode(), to)
+        _put(plain_text(table, width_without_terminal()).encode("utf-8", "backslashreplace"), to)
     else:
         from tactbench.core.leaderboard.formats import TEXTS
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from tactbench.core.leaderboard.columns import NUMERIC
@@ -18,37 +19,64 @@ _FIRST_TO_GO = (
 )  # fmt: skip
 """Columns that a narrow terminal does without, in this order; the files have them all."""
 _AROUND_A_CELL = 3
-_WITHOUT_EDGE = 240
-"""Wide enough for every column of names of ordinary length."""
+Styled = tuple[str, str]
+"""A line, and how it looks."""
 
 
 def show(table: Table, console: Console) -> None:
     """Print a leaderboard on `console`; text from plugins is never read as markup."""
     from rich.segment import Segment, Segments
 
+    style = {name: console.get_style(name) for name in {"bold", *_STYLE.values()}}
+
+    def say(lines: Iterable[Styled]) -> None:
+        said = [part for text, how in lines for part in (Segment(text, style.get(how)), Segment("\n"))]
+        console.print(Segments(said), soft_wrap=True, end="")
+
+    say(_above(table, console.width))
+    for section in table.sections:
+        _show_section(section, console)
+    say(_below(table, console.width))
+
+
+def plain_text(table: Table, width: int = 240) -> str:
+    """Return what a terminal without colours shows; the width is enough for names of ordinary length."""
+    lines = [text for text, _ in _above(table, width)]
+    if table.sections:
+        import io
+
+        from rich.console import Console
+
+        out = io.StringIO()
+        for section in table.sections:
+            _show_section(section, Console(file=out, width=width, highlight=False, color_system=None))
+        lines += out.getvalue().split("\n")[:-1]
+    lines += [text for text, _ in _below(table, width)]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _above(table: Table, width: int) -> Iterator[Styled]:
+    """Yield the lines above the sections."""
     left_out: set[str] = set()
-    said: list[Segment] = []
-    width = console.width
-    style = {name: console.get_style(name) for name in ("bold", *_STYLE.values())}
     for block in table.blocks:
         lines, gone = _block_lines(table.columns, block, width)
         left_out |= gone
-        for text, how in lines:
-            said += (Segment(text, style.get(how)), Segment("\n"))
-    console.print(Segments(said), soft_wrap=True, end="")
+        yield from lines
     notes = list(table.notes)
     if left_out:
         names = ", ".join(name for name in table.columns if name in left_out)
         notes.append(f"This terminal is too narrow for: {names}. They are in the files.")
-    _show_notes(notes, console)
-    for section in table.sections:
-        _show_section(section, console)
+    yield from _note_lines(notes, width)
+
+
+def _below(table: Table, width: int) -> Iterator[Styled]:
+    """Yield the lines below the sections."""
     if table.foot:
-        console.print()
-        _show_notes(table.foot, console)
+        yield "", ""
+        yield from _note_lines(table.foot, width)
 
 
-def _block_lines(columns: Sequence[str], block: Block, width: int) -> tuple[list[tuple[str, str]], set[str]]:
+def _block_lines(columns: Sequence[str], block: Block, width: int) -> tuple[list[Styled], set[str]]:
     """Return the lines of a block with their styles, and the columns that there was no room for.
 
     Lines are padded and cut here: a grid of rich takes a second for a thousand of them, and a text of its own for each
@@ -62,14 +90,17 @@ def _block_lines(columns: Sequence[str], block: Block, width: int) -> tuple[list
     return [*title, ("", ""), *((_cut(text, width), how) for text, how in body), ("", "")], gone
 
 
-def _folded(title: str, width: int) -> list[str]:
-    """Return `title` in lines that fit."""
-    if _width(title) <= width:
-        return [title]
+def _folded(text: str, width: int) -> list[str]:
+    """Return `text` in lines that fit, broken between words; what is twice as wide as a letter is left to rich."""
+    taken = _width(text)
+    if taken <= width:
+        return [text]
+    if taken == len(text):
+        return textwrap.wrap(text, width, break_on_hyphens=False)
     from rich.console import Console
     from rich.text import Text
 
-    return [line.plain for line in Text(title).wrap(Console(width=width), width)]
+    return [line.plain for line in Text(text).wrap(Console(width=width), width)]
 
 
 def _width(text: str) -> int:
@@ -111,15 +142,14 @@ def _show_section(section: Section, console: Console) -> None:
     for place, line in enumerate(section.lines):
         grid.add_row(*map(Text, line), style="yellow" if place in section.alarms else "")
     console.print(grid)
-    _show_notes(section.notes, console)
+    for text, how in _note_lines(section.notes, console.width):
+        console.print(Text(text, style=how), soft_wrap=True)
 
 
-def _show_notes(notes: Sequence[str], console: Console) -> None:
-    from rich.padding import Padding
-    from rich.text import Text
-
+def _note_lines(notes: Sequence[str], width: int) -> Iterator[Styled]:
     for note in notes:
-        console.print(Padding(Text(note, style="dim"), (0, 0, 0, 1), expand=False))
+        for line in _folded(note, width - 1):
+            yield f" {line}", "dim"
 
 
 def _fitting(columns: Sequence[str], block: Block, width: int) -> tuple[dict[int, int], set[str]]:
@@ -140,14 +170,3 @@ def _fitting(columns: Sequence[str], block: Block, width: int) -> tuple[dict[int
         if widths.pop(place, None) is not None:
             gone.add(name)
     return widths, gone
-
-
-def plain_text(table: Table) -> str:
-    """Return what a terminal without edge and colours shows."""
-    import io
-
-    from rich.console import Console
-
-    out = io.StringIO()
-    show(table, Console(file=out, width=_WITHOUT_EDGE, highlight=False, color_system=None))
-    return out.getvalue()

@@ -12,12 +12,12 @@ from tactbench.core.evaluation.libraries import import_libraries
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.engines.in_process import InProcess
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.solving import DATASETS, Job, our_own, prepare
+from tactbench.core.matrix.solving import DATASETS, Job, Wanted, our_own, prepare
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset
 
-Groups = Mapping[tuple[str, tuple[Path, ...]], Sequence[Job]]
+Groups = Mapping[Wanted, Sequence[Job]]
 """Cells by task and recordings."""
 
 
@@ -25,11 +25,11 @@ class Shared:
     """Yields the cells group by group; before each group, has here what several of its cells need.
 
     What it has at hand, and says so (see `tactbench.core.matrix.engines.engine.Engine`), are the cells that are left of
-    a group: the first one of the next has recordings read.
+    a group. The first one of the next is at hand only if all that it needs is here: else it has recordings read.
     """
 
     def __init__(self, groups: Groups, choice: EngineChoice) -> None:
-        self._groups = iter(groups.items())
+        self._groups = deque(groups.items())
         self._choice = choice
         self._at_hand: deque[Job] = deque()
 
@@ -37,17 +37,24 @@ class Shared:
         return self
 
     def __length_hint__(self) -> int:
+        if not self._at_hand and self._groups and _nothing_to_do_for(*self._groups[0]):
+            self._take_group()
         return len(self._at_hand)
 
     def __next__(self) -> Job:
         from tactbench.core.evaluation.thread_limit import find_libraries
 
         while not self._at_hand:
-            (task, recordings), jobs = next(self._groups)
-            trouble = self._prepared(task, recordings, jobs)
-            self._at_hand += [(cell, paths, trouble) for cell, paths, _ in jobs]
+            if not self._groups:
+                raise StopIteration
+            self._take_group()
         find_libraries()
         return self._at_hand.popleft()
+
+    def _take_group(self) -> None:
+        (task, recordings), jobs = self._groups.popleft()
+        trouble = self._prepared(task, recordings, jobs)
+        self._at_hand += [(cell, paths, trouble) for cell, paths, _ in jobs]
 
     def _prepared(self, task: str, recordings: tuple[Path, ...], jobs: Sequence[Job]) -> BaseException | None:
         """Have here what several of `jobs` need; return what is wrong with that."""
@@ -60,6 +67,12 @@ class Shared:
             return outcome
         DATASETS.keep((task, recordings), outcome)
         return None
+
+
+def _nothing_to_do_for(wanted: Wanted, jobs: Sequence[Job]) -> bool:
+    """Return whether what a group of cells shares is here."""
+    read = len(jobs) == 1 or wanted in DATASETS
+    return read and all((cell.task, cell.estimator) in _prepared for cell, _, _ in jobs)
 
 
 def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
@@ -85,5 +98,5 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
 _prepared: set[tuple[str, str]] = set()
 
 
-def _read(wanted: tuple[str, tuple[Path, ...]]) -> Dataset:
+def _read(wanted: Wanted) -> Dataset:
     return DATASETS(*wanted)

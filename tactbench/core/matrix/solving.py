@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import time
 from collections import OrderedDict
@@ -45,14 +46,30 @@ def prepare(cell: Cell) -> bool:
     registry = installed()
     descriptor = registry.estimators[cell.estimator]
     kind = registry.tasks[cell.task].spec.kind
-    make = load_object(descriptor.where)
-    make(kind=kind, seed=0, threads=1, **descriptor.params)
-    if descriptor.rehearsal is not None:
-        from tactbench.core.evaluation.rehearsal import rehearse
-
-        with suppress(Exception):  # the cells will tell
-            rehearse(make(kind=kind, seed=0, threads=1, **{**descriptor.params, **descriptor.rehearsal}), kind)
+    load_object(descriptor.where)(kind=kind, seed=0, threads=1, **descriptor.params)
+    _rehearse(cell)
     return can_fork()
+
+
+def _rehearse(cell: Cell) -> None:
+    """Have this process use a cell's estimator, if it has not yet; nothing if the estimator has no rehearsal."""
+    registry = installed()
+    descriptor = registry.estimators[cell.estimator]
+    kind = registry.tasks[cell.task].spec.kind
+    here = os.getpid(), cell.estimator, kind
+    if descriptor.rehearsal is None or here in _rehearsed:
+        return
+    _rehearsed.add(here)
+    from tactbench.core.evaluation.rehearsal import rehearse
+
+    with suppress(Exception):  # the cell will tell
+        params = {**descriptor.params, **descriptor.rehearsal}
+        rehearse(load_object(descriptor.where)(kind=kind, seed=0, threads=1, **params), kind)
+
+
+_rehearsed: set[tuple[int, str, str]] = set()
+"""By process, estimator and kind of question: a fork copies each page of memory when it is first written to, and who is
+timed meanwhile is taken for slow."""
 
 
 class Datasets:
@@ -110,11 +127,12 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     concurrency
         Cells that may be at work at once while this one is timed, where the engine does not know better.
     """
-    began = time.perf_counter()
     cell, recordings, trouble = job
     registry = installed()
     if trouble is not None:
         return unanswered(cell, trouble), {}
+    _rehearse(cell)
+    began = time.perf_counter()
     _seed_everything(cell.seed)
     row, sets = answer(cell, registry, recordings, DATASETS, working)
     timed = {"wall_s": time.perf_counter() - began, "concurrency": company(concurrency), "host": this_host()}
@@ -136,7 +154,13 @@ def _shares(job: Job) -> list[Share]:
     ]
 
 
+def _ready(job: Job) -> None:
+    """Do what a process can do for its cell before it is asked to carry it out."""
+    _rehearse(job[0])
+
+
 setattr(solve, "shares", _shares)  # noqa: B010  (type checkers know no attributes of functions)
+setattr(solve, "ready", _ready)  # noqa: B010
 
 
 def unanswered(cell: Cell, trouble: BaseException) -> dict[str, object]:

@@ -84,6 +84,10 @@ class Crew:
         with family.interrupts_held_back():
             self.waiting.append(Guarded(self._work, items, self._limits))
 
+    def announce(self, number: int) -> None:
+        """Have the process that was forked last get ready for its item `number`."""
+        self.waiting[-1].announce(number)
+
     def ask(self, number: int) -> None:
         """Have the process that was forked last carry out its item `number`."""
         one = self.waiting[-1]

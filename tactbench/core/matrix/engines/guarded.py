@@ -16,6 +16,7 @@ from tactbench.core.matrix.engines.child import WHERE_ARE_YOU, live
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.log import cut_back, flush, open_log, tail
 from tactbench.core.matrix.engines.message import Inbox, Message, Told, ask, asked
+from tactbench.core.matrix.engines.share import get_ready
 
 WORD_S = 0.1
 """Seconds that a process which is about to be ended has to say where it is."""
@@ -58,7 +59,7 @@ class Guarded:
         if self.pid == 0:
             ours = (*_open, self.link, self._orders)
             _open.clear()
-            live(work, _ordered(items, self._unread), theirs, self._log, limits, parent, ours)
+            live(work, _ordered(work, items, self._unread), theirs, self._log, limits, parent, ours)
         family.born(self.pid)
         os.close(theirs)
         os.set_blocking(self.link, False)
@@ -69,6 +70,10 @@ class Guarded:
         self._began_mb = memory.resident_mb(parent)
         self._kills = -1
         """Processes that the system had ended for want of memory when this one was first asked."""
+
+    def announce(self, number: int) -> None:
+        """Have it get ready for item `number`."""
+        ask(self._orders, ~number)
 
     def ask(self, number: int) -> None:
         """Have it carry out item `number`, which may take what it may from now on."""
@@ -223,7 +228,10 @@ class Pending:
 PENDING = Pending()
 
 
-def _ordered(items: Sequence[Any], orders: int) -> Iterator[Any]:
-    """Yield the items that the parent asks for, until it asks for no more."""
+def _ordered(work: Callable[[Any], Any], items: Sequence[Any], orders: int) -> Iterator[Any]:
+    """Yield the items that the parent asks for, until it asks for no more; get ready for those that it announces."""
     while (number := asked(orders)) is not None:
-        yield items[number]
+        if number < 0:
+            get_ready(work, items[~number])
+        else:
+            yield items[number]

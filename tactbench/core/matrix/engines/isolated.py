@@ -25,8 +25,8 @@ class Isolated:
     The calling process must be its only thread. What it holds when an item is taken, libraries and recordings, its
     child shares until one of the two writes to it.
 
-    Where there are more cores than jobs, an item that is at hand is taken, and its process forked, while others are at
-    work; and nobody waits until a process that was killed is gone.
+    While the process of an item that is over is taken apart, an item that is at hand is taken and its process forked,
+    and that one gets ready while what came of the last is dealt with: with one job, nothing is done beside an item.
     """
 
     def __init__(self, jobs: int = 1, limits: Limits = UNLIMITED) -> None:
@@ -46,16 +46,18 @@ class Isolated:
                         more = _forked(crew, coming)
                     if crew.waiting:
                         crew.ask(0)
-                if more and not crew.waiting and crew.free > 0 and length_hint(coming) > 0:
-                    more = _forked(crew, coming)
                 if not (more or crew.waiting or crew.busy):
                     return
                 if meanwhile is not None:
                     meanwhile()
                     meanwhile = None
                 for heard in crew.heard():
+                    if more and not crew.waiting and length_hint(coming) > 0:
+                        more = _forked(crew, coming)
                     if crew.waiting and crew.free > 1:  # one for it, and one for whoever hears of this outcome
                         crew.ask(0)
+                    elif crew.waiting:
+                        crew.announce(0)
                     yield heard
 
 

@@ -99,7 +99,7 @@ class Inbox:
 
 
 def ask(link: int, number: int) -> None:
-    """Ask the process at the other end for item `number`."""
+    """Ask the process at the other end for item `number`; ``~number`` only announces it."""
     os.write(link, _NUMBER.pack(number) + b"!")
 
 

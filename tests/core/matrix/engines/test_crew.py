@@ -2,7 +2,9 @@
 
 import os
 import signal
+import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -48,6 +50,13 @@ def free_cores(monkeypatch):
     monkeypatch.setattr(cores, "cores", lambda: 1000)
 
 
+@pytest.fixture
+def two_free_cores(monkeypatch):
+    """As on a machine with two cores and nobody else: the next process is there, and asked when the last is heard."""
+    monkeypatch.setattr(cores, "cores", lambda: 2)
+    monkeypatch.setattr(cores, "wanted", lambda: 1)
+
+
 @pytest.fixture(autouse=True)
 def nobody_and_nothing_left():
     """Whatever a test does: no process and no descriptor stays."""
@@ -89,12 +98,16 @@ def test_an_item_whose_taking_is_work_is_not_taken_beside_another():
     assert taken(0) == [0, 1, 2, 3]
 
 
-def test_an_item_that_is_at_hand_is_taken_while_the_one_before_is_at_work(free_cores):
+def test_an_item_that_is_at_hand_is_taken_before_the_last_outcome_is_dealt_with():
     assert taken(4) == [0, 0, 1, 2]
 
 
-def test_without_a_core_for_it_nothing_is_done_ahead(one_core):
-    assert taken(4) == [0, 1, 2, 3]
+def test_nobody_is_beside_an_item_that_is_the_only_one_at_work(free_cores):
+    def alone(item):
+        beside = Path(f"/proc/{os.getppid()}/task/{os.getppid()}/children").read_text().split()
+        return until(lambda: all(int(pid) == os.getpid() or gone(pid) for pid in beside), 5.0)  # the last is going
+
+    assert dict(Isolated(1).each(alone, range(4))) == dict.fromkeys(range(4), True)
 
 
 def test_what_an_item_has_left_is_ended_while_others_are_at_work_and_theirs_is_not(engine, tmp_path):
@@ -152,23 +165,17 @@ def test_ctrl_c_leaves_nobody_whenever_it_comes(engine, after_s):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_a_process_that_ends_before_it_is_asked_costs_no_item(number, free_cores):
-    def works(item):
-        if item == "alone":
-            return True
-        beside = []
-
-        def found():
-            children = Path(f"/proc/{os.getppid()}/task/{os.getppid()}/children").read_text().split()
-            beside[:] = {int(pid) for pid in children} - {os.getpid()}
-            return bool(beside)
-
-        assert until(found)
-        for pid in beside:
-            os.kill(pid, number)
-        return until(lambda: all(gone(pid) for pid in beside))
-
-    assert dict(Isolated(1).each(works, ["first", "second", "alone"])) == {"first": True, "second": True, "alone": True}
+def test_a_process_that_ends_before_it_is_asked_costs_no_item(number, two_free_cores):
+    found = {}
+    for item, pid in Isolated(1).each(lambda item: os.getpid(), range(3)):
+        found[item] = pid
+        ahead = family.own_children() - {pid}
+        assert len(ahead) == (item < 2)
+        for one in ahead:
+            os.kill(one, number)
+        assert until(lambda: all(gone(one) for one in ahead))  # noqa: B023  (called at once)
+    assert len(set(found.values())) == 3
+    assert not any(isinstance(pid, BaseException) for pid in found.values())
 
 
 def test_a_process_that_ends_between_two_items_costs_none(one_core):
@@ -239,3 +246,28 @@ def test_an_item_that_ends_its_process_costs_itself_only_also_where_the_next_was
             ("fine", False), (ends, True), ("fine", False), (ends, True), ("prints", False),
         ]  # fmt: skip
         assert time.monotonic() - began < 20
+
+
+def was_ready(item):
+    return READY.get(item) == os.getpid()
+
+
+READY: dict[int, int] = {}
+
+
+def _get_ready(item):
+    if item == 1:
+        sys.exit("nobody is to hear of this")
+    if item == 2:
+        os._exit(3)
+    READY[item] = os.getpid()
+
+
+was_ready.ready = _get_ready
+
+
+def test_a_process_gets_ready_for_its_item_before_it_is_asked_and_what_goes_wrong_then_costs_none(two_free_cores):
+    outcomes = dict(Isolated(1, LIMITS).each(partial(was_ready), range(5)))
+    # Nobody is there before the first; the third's process has ended, another one is asked without further ado.
+    assert outcomes == {0: False, 1: False, 2: False, 3: True, 4: True}
+    assert not READY, "it is the item's process that gets ready, not this one"
