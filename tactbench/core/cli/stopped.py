@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,14 +17,15 @@ def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
     """Name every cell of `rows` with its reason in one line, and the commands that look into it."""
     if not rows:
         return
+    from tactbench.core.leaderboard.text import command_line
+
     counts = Counter(row["status"] for row in rows)
     remark(f"\nStopped: {', '.join(f'{number} {status}' for status, number in sorted(counts.items()))}.")
     for row in rows:
         remark(f"  {row['status']:<13}  {row['cell']}: {one_line(row['reason'])}")
-    cell = shlex.quote(str(rows[0]["cell"]))
-    where = shlex.quote(str(folder))
-    remark(f"Look into one:  tactbench why {cell} --out {where}")
-    remark(f"Try it again:   tactbench rerun {cell} --out {where}")
+    which = str(rows[0]["cell"]), "--out", str(folder)
+    remark(f"Look into one:  {command_line('tactbench', 'why', *which)}")
+    remark(f"Try it again:   {command_line('tactbench', 'rerun', *which)}")
 
 
 def one_line(reason: str) -> str:

@@ -77,7 +77,9 @@ def _provenance(found: Subject) -> list[str]:
 def _try(found: Subject, why: Explanation) -> str:
     if found.row is None or (not why.hit and found.row["status"] == "done"):
         return "tactbench run: computes it"
-    return f"tactbench rerun '{found.cell.name}' --out {found.store.folder}"
+    from tactbench.core.leaderboard.text import command_line
+
+    return command_line("tactbench", "rerun", found.cell.name, "--out", str(found.store.folder))
 
 
 def _text(facts: dict[str, Any]) -> str:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from typing import Any
 
 from tactbench.core.leaderboard.names import asked_of, question_name
 from tactbench.core.leaderboard.sheet import Sheet
-from tactbench.core.leaderboard.text import cut, visible
+from tactbench.core.leaderboard.text import command_line, cut, visible
 from tactbench.core.spec.status import STOPPED
 
 Row = Mapping[str, Any]
@@ -38,4 +37,4 @@ def _told(status: str, signal: int | None, reason: str, members: list[Row]) -> s
     if status not in STOPPED:
         return told
     end = "" if told.endswith((".", "!", "?", "…")) else "."
-    return f"{told}{end} Look into it: tactbench why {visible(shlex.quote(members[0]['cell']))}"
+    return f"{told}{end} Look into it: {command_line('tactbench', 'why', members[0]['cell'])}"

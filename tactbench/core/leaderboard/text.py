@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import unicodedata
 
 
@@ -22,6 +23,11 @@ def _shown(character: str) -> str:
         return " "
     code = ord(character)
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def command_line(*words: str) -> str:
+    """Return a command as it is typed into a shell; a name that acts instead of showing is shown and not typed."""
+    return visible(shlex.join(words))
 
 
 def cut(text: str, most: int) -> str:

@@ -44,7 +44,7 @@ def test_a_finished_cell_is_a_hit_and_says_where_it_lies(here):
     assert (found["cell"], found["answer"], found["reasons"], found["status"]) == (ACME, "hit", [], "done")
     assert (here.folder / found["shard"]).is_file()
     assert all((here.folder / "results" / path).is_file() for path in found["recordings"])
-    assert found["try"] == f"tactbench rerun '{ACME}' --out results"
+    assert found["try"] == f"tactbench rerun {ACME} --out results"
     text = here("why", ACME).stdout
     assert text.startswith(f"{ACME}\nhit: ")
     assert found["shard"] in text
@@ -112,7 +112,7 @@ def test_a_stopped_cell_shows_its_reason_its_traceback_and_what_to_try(here):
     text = here("why", "acme-raises").stdout
     assert "failed: RuntimeError: the pad came off" in text
     assert "raise RuntimeError" in text
-    assert "Try: tactbench rerun 'ideal/force/twin/karl2016/acme-raises/1' --out results" in text
+    assert "Try: tactbench rerun ideal/force/twin/karl2016/acme-raises/1 --out results" in text
 
 
 def test_a_key_or_a_part_of_the_name_will_do_and_what_is_unclear_is_refused(here):

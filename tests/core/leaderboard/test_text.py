@@ -1,10 +1,12 @@
 """Text that acts instead of showing is shown."""
 
+import shlex
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.text import cut, visible
+from tactbench.core.leaderboard.text import command_line, cut, visible
 
 
 @pytest.mark.parametrize(
@@ -28,3 +30,9 @@ def test_all_text_becomes_printable_once_and_for_all(text):
 def test_long_text_is_cut_where_it_says_so():
     assert cut("abcdef", 4) == "abc…"
     assert cut("abcd", 4) == "abcd"
+
+
+def test_a_command_is_one_that_a_shell_reads_back_word_by_word():
+    words = ("tactbench", "why", "a/force,n=5/1; rm -rf ~", "--out", "two words")
+    assert shlex.split(command_line(*words)) == list(words)
+    assert "\x1b" not in command_line("tactbench", "why", "\x1b[2J")
