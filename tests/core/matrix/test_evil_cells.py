@@ -12,6 +12,7 @@ import pytest
 from tactbench.core.matrix.store import Store
 from tests.conftest import Shell
 from tests.core.cost.test_ladder import presses
+from tests.core.matrix.engines.patience import ending, until
 
 ENGINES = {
     "in-process": ("--engine", "in-process"),
@@ -111,7 +112,7 @@ def test_every_evil_cell_has_one_row_and_the_others_are_right(engine, alone, tmp
     assert beside == honest, "not a byte of an honest score has changed"
     assert "said" not in done.stdout + done.stderr
     assert "Traceback" not in done.stderr
-    assert processes_in(tmp_path) == []
+    assert until(lambda: not processes_in(tmp_path)), processes_in(tmp_path)
 
 
 def test_what_a_cell_prints_is_in_its_row(alone, tmp_path):
@@ -198,7 +199,7 @@ def test_a_rig_that_cannot_record_gives_rows_that_say_so(tmp_path, rig, says):
     assert not any(name.endswith(".partial") for name in kept)
     if rig == "evil-device":
         assert (tmp_path / "let-go-of").read_text().splitlines().count("flat-validation") == 1
-    assert processes_in(tmp_path) == []
+    assert until(lambda: not processes_in(tmp_path)), processes_in(tmp_path)
 
 
 def test_a_misspelt_split_is_refused_before_anything_is_recorded(tmp_path):
@@ -240,14 +241,11 @@ def test_a_parent_that_is_killed_takes_its_cells_with_it(alone, tmp_path):
     (tmp_path / "shelf").symlink_to(alone[1])
     env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2] / "third_party" / "evil")}
     command = [sys.executable, "-m", "tactbench", *ASKED, "--estimator", "evil-hang", "--jobs", "2"]
-    with subprocess.Popen(command, cwd=tmp_path, env=env, stderr=subprocess.PIPE, text=True) as running:
+    with ending(command, cwd=tmp_path, env=env, stderr=subprocess.PIPE, text=True) as running:
         for line in running.stderr:
             if "evaluating: 2/3" in line:  # the baselines are done: the one that hangs is under way
                 break
-        assert len(processes_in(tmp_path)) == 2
+        assert until(lambda: len(processes_in(tmp_path)) >= 2), "the run, and the process of the cell"
         running.kill()
         running.stderr.read()  # closed once nobody holds it any more
-    for _ in range(1000):
-        if not processes_in(tmp_path):
-            break
-    assert processes_in(tmp_path) == []
+        assert until(lambda: not processes_in(tmp_path))

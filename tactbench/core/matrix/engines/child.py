@@ -14,7 +14,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any, NoReturn
 
-from tactbench.core.matrix.engines.family import adopt, bury_ended, die_with_parent
+from tactbench.core.matrix.engines.family import adopt, bury_ended, die_with_parent, mark
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.log import flush, print_to
 from tactbench.core.matrix.engines.memory import data_limit, first_to_go
@@ -62,6 +62,7 @@ def live(
 def _settle(log: int, limits: Limits, parent: int) -> None:
     os.setsid()  # what it starts is found, and ended, by its group
     die_with_parent(parent)
+    mark(parent)  # whatever it starts is known for its own
     adopt()  # what it leaves behind stays below it while it lives: nobody takes it for what another item has left
     signal.set_wakeup_fd(-1)
     for number in (signal.SIGALRM, signal.SIGCHLD, signal.SIGHUP):

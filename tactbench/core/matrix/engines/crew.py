@@ -48,7 +48,6 @@ class Crew:
 
     def __enter__(self) -> Self:
         importlib.import_module("resource")  # once here, not once in every process
-        self._strangers = family.own_children()
         self._before = family.adopt()
         return self
 
@@ -65,7 +64,7 @@ class Crew:
                     one.kill()
                 for one in everyone:
                     one.bury()
-                family.bury_orphans(self._strangers)
+                family.bury_orphans()
                 family.adopt(self._before)
 
     @property
@@ -141,10 +140,10 @@ class Crew:
                 self._let_go(one)
 
     def _let_go(self, one: Guarded) -> None:
-        """Bury a process that is over, with those that it has left behind: nobody else's are below this process."""
+        """Bury a process that is over, with those that it has left behind."""
         one.bury()
         self._dying.remove(one)
-        family.bury_orphans(self._strangers)
+        family.bury_orphans()
 
     def _replace(self, one: Guarded, number: int) -> None:
         self.busy.remove(one)

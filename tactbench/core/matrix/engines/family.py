@@ -65,10 +65,25 @@ def kill_below(pid: int) -> None:
         found = set(descendants(pid)) - known
         if not found:
             return
-        for one in found:
-            with suppress(ProcessLookupError, PermissionError):
-                os.kill(one, signal.SIGKILL)
         known |= found
+        for one in found:
+            _kill_child_of({pid, *known}, one)
+
+
+def _kill_child_of(parents: set[int], pid: int) -> None:
+    """Kill process `pid` if its parent is among `parents`.
+
+    Its parent may have reaped it since it was listed, and the system may have given its number to a process that has
+    nothing to do with us. A file descriptor of a process never names another one: it is opened first, then the parent
+    is looked at, then the signal is sent by it (pidfd_open(2)).
+    """
+    with suppress(ProcessLookupError, PermissionError):
+        descriptor = os.pidfd_open(pid)
+        try:
+            if _parent(pid) in parents:
+                signal.pidfd_send_signal(descriptor, signal.SIGKILL)
+        finally:
+            os.close(descriptor)
 
 
 def buried(pid: int) -> int:
@@ -79,7 +94,7 @@ def buried(pid: int) -> int:
 
 
 def bury_ended() -> None:
-    """Bury the children of this process that have ended."""
+    """Bury the children of this process that have ended: for the process of an item only, where all are the item's."""
     with suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass
@@ -100,13 +115,41 @@ def adopt(whether: int = 1) -> int:
     return before
 
 
-def bury_orphans(spared: set[int]) -> None:
-    """End children that no engine here has started, except those `spared`: an item that is over has left them behind.
+def mark(engine: int) -> None:
+    """Mark this process, and all that it starts, as belonging to an item of the process `engine`.
+
+    What an item leaves behind becomes a child of the engine's process, and must be told from children that this
+    process started for other reasons, at whatever time. Resource limits are inherited over fork and exec whatever a
+    process does with its group, session, environment and files, and others may read them. The limit used is that of
+    POSIX message queues (getrlimit(2), RLIMIT_MSGQUEUE, bytes), which nothing here uses.
+    """
+    import resource
+
+    with suppress(AttributeError, OSError, ValueError):
+        _, hard = resource.getrlimit(resource.RLIMIT_MSGQUEUE)
+        resource.setrlimit(resource.RLIMIT_MSGQUEUE, (_mark_of(engine), hard))
+
+
+def _mark_of(engine: int) -> int:
+    return engine % 2**16
+
+
+def _marked(pid: int) -> bool:
+    """Return whether process `pid` was started by an item of this process."""
+    import resource
+
+    with suppress(AttributeError, OSError, ValueError):
+        return resource.prlimit(pid, resource.RLIMIT_MSGQUEUE)[0] == _mark_of(os.getpid())
+    return False
+
+
+def bury_orphans() -> None:
+    """End the children of this process that an item which is over has left behind; other children are left alone.
 
     A parent that is killed hands its children on: ended generation by generation.
     """
     for _ in range(_GENERATIONS):
-        orphans = own_children() - _ours - spared
+        orphans = {pid for pid in own_children() - _ours if _marked(pid)}
         if not orphans:
             return
         for pid in orphans:
@@ -119,6 +162,14 @@ def bury_orphans(spared: set[int]) -> None:
 def own_children() -> set[int]:
     """Return the children of this process."""
     return set(_children(os.getpid()))
+
+
+def _parent(pid: int) -> int:
+    """Return the parent of a process; 0 where it is not known."""
+    try:
+        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])  # proc_pid_stat(5)
+    except (OSError, IndexError, ValueError):
+        return 0
 
 
 def _children(pid: int) -> list[int]:

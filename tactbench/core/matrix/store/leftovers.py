@@ -73,7 +73,11 @@ def alive(process: str) -> bool:
         return False
     except OSError:
         return True
-    return True
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]  # proc_pid_stat(5)
+    except (OSError, IndexError):
+        return True
+    return state not in "ZX"  # ended, and only not reaped yet
 
 
 def _being_written(journal: Path) -> bool:

@@ -13,6 +13,10 @@ from pathlib import Path
 from tactbench.core.errors import FolderError
 from tactbench.core.matrix.files import replace_file
 from tactbench.core.matrix.store.disk import sync_folder
+from tactbench.core.matrix.store.leftovers import alive
+
+_FORK_S = 5.0
+"""How long a process that was being forked when its run was killed may take to let go: it does so before all else."""
 
 _HELD: set[int] = set()
 """Descriptors that a child must let go: else an orphaned worker would hold the folder after its run was killed."""
@@ -53,7 +57,7 @@ class Lock:
         """Whether the last run here was killed, or the power was cut: it did not tidy up."""
         self._descriptor = os.open(folder, os.O_RDONLY)
         try:
-            self.works = _flock(self._descriptor)
+            self.works = self._taken()
         except BlockingIOError as error:
             os.close(self._descriptor)
             raise FolderError(
@@ -71,6 +75,25 @@ class Lock:
         except BaseException:
             self._close()
             raise
+
+    def _taken(self) -> bool:
+        """Lock the folder; False where there are no locks, BlockingIOError where another run has it.
+
+        A process that was forked just before its run was killed still holds its copy of the lock until it first runs.
+        """
+        ends = time.monotonic() + _FORK_S
+        while True:
+            try:
+                return _flock(self._descriptor)
+            except BlockingIOError:
+                if time.monotonic() > ends or not self._holder_ended():
+                    raise
+            time.sleep(0.01)
+
+    def _holder_ended(self) -> bool:
+        """Return whether the run that holds the folder was one of this host, and its process is no more."""
+        found = self._noted()
+        return found is not None and found[1] == platform.node() and not alive(str(found[0]))
 
     def in_place(self) -> bool:
         """Return whether the folder still lies where it lay."""
@@ -93,12 +116,20 @@ class Lock:
             os.close(self._descriptor)
 
     def _holder(self) -> str:
+        found = self._noted()
+        if found is None:
+            return "it has not said which"
+        pid, host, since = found
+        return f"process {pid} on {host[:100]!r} since {since[:40]}"
+
+    def _noted(self) -> tuple[int, str, str] | None:
+        """Return process, host and beginning of the run that holds the folder, as it wrote them down."""
         try:
             with self._note.open("rb") as file:
                 said = json.loads(file.read(4096))
-            return f"process {int(said['pid'])} on {str(said['host'])[:100]!r} since {str(said['since'])[:40]}"
+            return int(said["pid"]), str(said["host"]), str(said["since"])
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
-            return "it has not said which"
+            return None
 
 
 def _flock(descriptor: int) -> bool:

@@ -1,8 +1,20 @@
-"""Waiting for other processes, with patience for a slow machine and no longer than needed."""
+"""Other processes: waited for with patience for a slow machine and no longer than needed, and ended with the test."""
 
+import subprocess
 import threading
 import time
+from contextlib import contextmanager
 from pathlib import Path
+
+
+@contextmanager
+def ending(command, **options):
+    """Start a process that is ended with the block, whatever happens in it."""
+    with subprocess.Popen(command, **options) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def gone(pid):

@@ -17,8 +17,12 @@ class Started:
         self._stack = ExitStack()
         file = folder / "scheduler.json"
         self.scheduler = self._start("dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
-        assert until(lambda: file.exists() and file.read_text().endswith("}"), 60)
-        self.address = json.loads(file.read_text())["address"]
+        try:
+            assert until(lambda: file.exists() and file.read_text().endswith("}"), 60)
+            self.address = json.loads(file.read_text())["address"]
+        except BaseException:
+            self.close()
+            raise
 
     def worker(self, *path, nanny=False):
         """Start a worker that sees the packages in the folders `path` first."""

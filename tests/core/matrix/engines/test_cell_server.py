@@ -14,7 +14,7 @@ from tactbench.core.matrix.engines.cell_server import CellServer, ServerEndedErr
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.request import Request, Setting, pack, unpack_reply
 from tactbench.core.matrix.engines.served import Served
-from tests.core.matrix.engines.patience import gone, until
+from tests.core.matrix.engines.patience import ending, gone, until
 from tests.core.matrix.engines.remote_work import misbehave, process, read, square, what_is_loaded
 
 
@@ -109,17 +109,13 @@ for _ in Served(1, Limits()).each(wait_for, [(Path(sys.argv[1]), Path("/no/such/
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_server_and_cell_end_with_the_process_that_started_them(tmp_path, number):
     begun = tmp_path / "begun"
-    owner = subprocess.Popen([sys.executable, "-c", OWNER, str(begun)], stderr=subprocess.PIPE)
-    try:
+    with ending([sys.executable, "-c", OWNER, str(begun)], stderr=subprocess.PIPE) as owner:
         assert until(lambda: begun.exists() and begun.read_text())
         cell = int(begun.read_text())
         server = int(Path(f"/proc/{cell}/stat").read_text().rpartition(")")[2].split()[1])
         owner.send_signal(number)
         owner.communicate(timeout=30)
         assert until(lambda: gone(cell) and gone(server))
-    finally:
-        owner.kill()
-        owner.wait()
 
 
 def test_a_server_that_cannot_start_says_why(monkeypatch):

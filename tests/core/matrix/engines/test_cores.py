@@ -1,11 +1,10 @@
 """How many cores there are for us, and how many are wanted."""
 
 import os
-import subprocess
 import sys
 
 from tactbench.core.matrix.engines.cores import cores, wanted
-from tests.core.matrix.engines.patience import until
+from tests.core.matrix.engines.patience import ending, until
 
 
 def test_only_the_cores_that_this_process_may_use_count():
@@ -19,9 +18,6 @@ def test_only_the_cores_that_this_process_may_use_count():
 
 
 def test_who_is_at_work_elsewhere_wants_a_core_as_well():
-    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as other:
-        try:
-            assert until(lambda: wanted() >= 2)
-        finally:
-            other.kill()
+    with ending([sys.executable, "-c", "while True: pass"]):
+        assert until(lambda: wanted() >= 2)
     assert wanted() >= 1

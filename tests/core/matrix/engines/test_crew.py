@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from functools import partial
@@ -14,7 +15,7 @@ from tactbench.core.matrix.engines import cores, family
 from tactbench.core.matrix.engines.isolated import Isolated
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.processes import Processes
-from tests.core.matrix.engines.patience import gone, pause, until
+from tests.core.matrix.engines.patience import ending, gone, pause, until
 from tests.core.matrix.engines.works import flees, leaves, work
 
 CORES = sorted(os.sched_getaffinity(0))
@@ -51,9 +52,12 @@ def free_cores(monkeypatch):
 
 
 @pytest.fixture
-def two_free_cores(monkeypatch):
-    """As on a machine with two cores and nobody else: the next process is there, and asked when the last is heard."""
-    monkeypatch.setattr(cores, "cores", lambda: 2)
+def one_free_core(monkeypatch):
+    """As on a machine with one core and nobody else: the next process is there, told of its item and not yet asked.
+
+    With a second core it would be asked at once, if the system was quick to take the last one apart.
+    """
+    monkeypatch.setattr(cores, "cores", lambda: 1)
     monkeypatch.setattr(cores, "wanted", lambda: 1)
 
 
@@ -146,6 +150,32 @@ def test_what_an_item_left_that_crashed_is_ended_while_others_are_at_work(engine
     assert found == {"watches": True, "looks": True}
 
 
+def test_children_that_the_caller_starts_meanwhile_are_left_alone(engine, tmp_path):
+    def works(item):
+        (tmp_path / str(item)).write_text(str(flees()))
+        if item % 2:
+            os.abort()  # what it has left behind has this process for its parent now
+
+    own = [sys.executable, "-c", "import sys; sys.exit(int(sys.stdin.read()))"]
+    running = engine.each(works, range(4))
+    next(running)
+    with ending(own, stdin=subprocess.PIPE, text=True) as child:
+        assert len(list(running)) == 3
+        assert child.poll() is None
+        child.communicate("7", timeout=30)
+        assert child.returncode == 7, "and it is this test that hears how it ended"
+    assert all(gone((tmp_path / str(item)).read_text()) for item in range(4))
+
+
+def test_who_is_no_longer_below_is_not_killed():
+    """A number read a moment ago may be a stranger's by now."""
+    with ending([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
+        family._kill_child_of({1}, child.pid)
+        assert not until(lambda: child.poll() is not None, 0.2)
+        family._kill_child_of({os.getpid()}, child.pid)
+        assert child.wait(30) == -signal.SIGKILL
+
+
 @pytest.mark.parametrize("heard", [0, 1, 2])
 def test_an_iteration_given_up_leaves_nobody(engine, heard):
     running = engine.each(work, ["fine", "flees", "leaves", "hangs", "fine"])
@@ -168,7 +198,7 @@ def test_ctrl_c_leaves_nobody_whenever_it_comes(engine, after_s):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_a_process_that_ends_before_it_is_asked_costs_no_item(number, two_free_cores):
+def test_a_process_that_ends_before_it_is_asked_costs_no_item(number, one_free_core):
     found, strangers = {}, family.own_children()
     for item, pid in Isolated(1).each(lambda item: os.getpid(), range(3)):
         found[item] = pid
@@ -269,7 +299,7 @@ def _get_ready(item):
 was_ready.ready = _get_ready
 
 
-def test_a_process_gets_ready_for_its_item_before_it_is_asked_and_what_goes_wrong_then_costs_none(two_free_cores):
+def test_a_process_gets_ready_for_its_item_before_it_is_asked_and_what_goes_wrong_then_costs_none(one_free_core):
     outcomes = dict(Isolated(1, LIMITS).each(partial(was_ready), range(5)))
     # Nobody is there before the first; the third's process has ended, another one is asked without further ado.
     assert outcomes == {0: False, 1: False, 2: False, 3: True, 4: True}

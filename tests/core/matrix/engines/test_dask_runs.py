@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 
 from tests.conftest import Shell
-from tests.core.matrix.engines.patience import until
+from tests.core.matrix.engines.patience import ending, until
 from tests.core.matrix.engines.started import started
 
 RUN = ("run", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--estimator", "lasso")
@@ -28,15 +28,12 @@ def serial(tmp_path_factory):
 def begun(shell, out, *options):
     """Start a run that finds the recordings made, in a session of its own."""
     shutil.copytree(shell.folder / "serial" / "recordings", shell.folder / out / "recordings")
-    with subprocess.Popen(
+    with ending(
         [sys.executable, "-m", "tactbench", *RUN, "--out", out, "--engine", "dask", *options],
         cwd=shell.folder, env={**os.environ, "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}, text=True,
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
     ) as running:  # fmt: skip
-        try:
-            yield running
-        finally:
-            running.kill()
+        yield running
 
 
 def said(running, beginning):

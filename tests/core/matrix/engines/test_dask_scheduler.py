@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -14,7 +13,7 @@ from tactbench.core.matrix.engines import dask_cluster, dask_crew
 from tactbench.core.matrix.engines.dask import open_dask
 from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.sight import fingerprints
-from tests.core.matrix.engines.patience import gone, until
+from tests.core.matrix.engines.patience import ending, gone, until
 from tests.core.matrix.engines.remote_work import square, wait_for
 from tests.core.matrix.engines.started import posing_as, started
 
@@ -71,14 +70,8 @@ with open_dask(sys.argv[1], 1, Limits()) as engine:
 
 def test_a_cell_ends_when_the_run_that_wanted_it_is_killed(cluster, worker, tmp_path):
     begun = tmp_path / "begun"
-    run = subprocess.Popen(
-        [sys.executable, "-c", RUN, cluster.address, str(begun)], env={**os.environ, "TMPDIR": str(tmp_path)}
-    )
-    try:
+    with ending([sys.executable, "-c", RUN, cluster.address, str(begun)], env={**os.environ, "TMPDIR": str(tmp_path)}):
         assert until(lambda: begun.exists() and begun.read_text())
-    finally:
-        run.kill()
-        run.wait()
     assert until(lambda: gone(int(begun.read_text())))
 
 
