@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -33,19 +33,20 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
         if not any(name in shelf for shelf in shelves):
             known = [known for shelf in registry.shelves().values() for known in shelf.names()]
             raise UnknownNameError("sensor, rig, task, estimator or effect", name, known)
-    for name in names:
-        _one(name, registry)
+    found = [shown for name in names for shown in _described(name, registry)]
+    click.echo(json.dumps(found[0] if len(found) == 1 else found, indent=1, ensure_ascii=False))
 
 
-def _one(name: str, registry: Registry) -> None:
-    for shelf in registry.shelves().values():
-        if name in shelf:
-            owned = shelf.owned(name)
-            shown = {
-                "brought by": f"{owned.distribution} {owned.version} ({owned.module})",
-                **owned.descriptor.model_dump(mode="json"),
-            }
-            click.echo(json.dumps(shown, indent=1, ensure_ascii=False))
+def _described(name: str, registry: Registry) -> list[dict[str, Any]]:
+    """Return what is installed under `name`, one description for each kind of plugin that has it."""
+    owners = [shelf.owned(name) for shelf in registry.shelves().values() if name in shelf]
+    return [
+        {
+            "brought by": f"{owned.distribution} {owned.version} ({owned.module})",
+            **owned.descriptor.model_dump(mode="json"),
+        }
+        for owned in owners
+    ]
 
 
 def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:

@@ -24,6 +24,11 @@ class Verdict:
     note: str = ""
     """For a miss: its cause, as far as it is known."""
 
+    def __post_init__(self) -> None:
+        """Keep plain numbers: a NumPy scalar would be no JSON."""
+        for name in ("found", "low", "high"):
+            object.__setattr__(self, name, float(getattr(self, name)))
+
     @property
     def met(self) -> bool:
         """Whether the number lies in its range; not a number never does."""

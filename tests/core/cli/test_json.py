@@ -1,0 +1,67 @@
+"""``--format json``: whatever prints it prints one JSON document and nothing else on stdout."""
+
+import json
+
+import click
+import pytest
+
+from tactbench.core.cli import cli
+from tests.conftest import Shell
+
+CELL = "ideal/force/twin/karl2016/ols/1"
+VERBS = {
+    "run": ("--sensor", "ideal", "--task", "force", "--estimator", "ols", "--protocol", "karl2016"),
+    "list": (),
+    "plugins": (),
+    "show": ("biotac", "icub", "force"),
+    "inspect": ("ideal.h5",),
+    "leaderboard": (),
+    "report": (),
+    "compare": ("ols", "mean"),
+    "why": (CELL,),
+    "rerun": (CELL,),
+    "cost": ("--sensor", "ideal", "--task", "force", "--estimator", "ols"),
+    "calibrate": ("--show",),
+    "twin explain": ("--sensor", "icub", "--task", "force", "--rounds", "1"),
+    "twin verify": tuple(
+        word for group in ("contact", "memory", "friction", "vibration") for word in ("--only", group)
+    ),
+}
+"""What is asked of each verb that knows the format."""
+
+
+@pytest.fixture(scope="module")
+def shell(tmp_path_factory):
+    shell = Shell(tmp_path_factory.mktemp("json"))
+    shell("run", *VERBS["run"])
+    shell("record", "--sensor", "ideal", "--seconds", "1", "--out", "ideal.h5")
+    return shell
+
+
+def test_every_verb_that_knows_the_format_is_asked():
+    knows = set()
+    for words, verb in _verbs(cli, ()):
+        for option in verb.params:
+            if "--format" in option.opts and "json" in getattr(option.type, "choices", ()):
+                knows.add(" ".join(words))
+    assert knows == set(VERBS)
+
+
+def _verbs(command, words):
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            yield from _verbs(command.get_command(context, name), (*words, name))
+    else:
+        yield words, command
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_what_is_printed_is_json(shell, verb):
+    found = json.loads(shell(*verb.split(), *VERBS[verb], "--format", "json").stdout)
+    assert found, "and it says something"
+
+
+def test_likeness_is_json_as_well(shell):
+    found = json.loads(shell("twin", "verify", "--real", "--sensor", "icub", "--format", "json").stdout)
+    assert {type(verdict["met"]) for verdict in found} == {bool}
