@@ -94,7 +94,8 @@ def main() -> None:
         cells = len(checked(folder / "whole", {}))
         wanted, shown = (folder / "whole" / "scores.json").read_bytes(), table(folder, "whole")
         kills = {"group": 0, "parent": 0}
-        folders, kept, alive = 0, 0, None
+        folders, kept = 0, 0
+        killed: list[subprocess.Popen[bytes]] = []
         while sum(kills.values()) < asked.kills:
             folders += 1
             name = f"out{folders}"
@@ -110,11 +111,12 @@ def main() -> None:
                     how = "group" if sum(kills.values()) % 2 == 0 else "parent"
                     kill, which = (os.killpg, process.pid) if how == "group" else (os.kill, process.pid)
                     kill(which, signal.SIGKILL)
-                    process.wait()
+                    # Not reaped yet: while a killed parent is a zombie, its number names its group and no stranger's.
+                    os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
                     kills[how] += 1
                     finished = checked(folder / name, finished)
                     kept += bool(finished)
-                    alive = process
+                    killed.append(process)
                     continue
                 finally:
                     if process.stderr is not None:
@@ -126,8 +128,9 @@ def main() -> None:
             assert table(folder, name) == shown, "the table without times differs"
             left = [path for path in (folder / name).rglob("*") if path.suffix in (".partial", ".completing")]
             assert not left, f"left behind: {left}"
-        if alive is not None:
-            _end(alive.pid)
+        for process in killed:
+            _end(process.pid)
+            process.wait()
     print(f"{sum(kills.values())} kills ({kills['group']} of the group, {kills['parent']} of the parent) of a run of "
           f"{cells} cells and {lasts:.1f} s in {folders} folders; {kept} left finished cells, all of which were kept; "
           "no corrupt file")  # fmt: skip

@@ -54,7 +54,7 @@ class Shell:
         plugins: tuple[str, ...] = (),
         code: int | None = 0,
         module: str = "tactbench",
-        timeout=120,
+        timeout=100,
     ) -> subprocess.CompletedProcess[str]:
         path = os.pathsep.join(str(THIRD_PARTY / name) for name in plugins)
         env = {**os.environ, "PYTHONPATH": path, "COLUMNS": "200", "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from tests.core.cli.test_screens import assert_one_clear_screen
+from tests.core.matrix.engines.patience import ending
 
 PROCEDURE = """
 title: Small
@@ -72,15 +73,15 @@ def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
     shell, _ = calibrated
     env = {**os.environ, "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}
     journal = shell.folder / "cut" / "calibration" / "draws.jsonl"
-    running = subprocess.Popen(
+    with ending(
         [sys.executable, "-m", "tactbench", *CALIBRATE, "--out", "cut", "--jobs", "2"],
         cwd=shell.folder, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    # Its progress tells when the first draws are down: no clock and no busy waiting.
-    first = next(line for line in running.stderr if "/14" in line)
-    assert "done" in first
-    running.send_signal(signal.SIGINT)
-    _, said = running.communicate(timeout=60)
+    ) as running:  # fmt: skip
+        # Its progress tells when the first draws are down: no clock and no busy waiting.
+        first = next(line for line in running.stderr if "/14" in line)
+        assert "done" in first
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=60)
     assert running.returncode == 130, said
     assert "goes on from there" in said
     kept = journal.read_text().count("\n") - 1

@@ -10,6 +10,8 @@ import time
 
 import pytest
 
+from tests.core.matrix.engines.patience import ending
+
 FORCE = ("run", "--sensor", "icub", "--task", "force")
 
 
@@ -127,12 +129,12 @@ def interrupted(folder, stage):
     folder.mkdir()
     env = {**os.environ, "PYTHONPATH": ""}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    running = subprocess.Popen(CURVATURE, cwd=folder, env=env, **pipes)
-    for line in running.stderr:
-        if line.startswith(f"{stage}: ") and "/" in line.partition(": ")[2].split()[0]:
-            break
-    running.send_signal(signal.SIGINT)
-    out, err = running.communicate(timeout=60)
+    with ending(CURVATURE, cwd=folder, env=env, **pipes) as running:
+        for line in running.stderr:
+            if line.startswith(f"{stage}: ") and "/" in line.partition(": ")[2].split()[0]:
+                break
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate(timeout=60)
     return running.returncode, out, err
 
 

@@ -4,12 +4,14 @@ import fcntl
 import os
 import pty
 import select
-import subprocess
 import sys
 import termios
 import time
+from contextlib import contextmanager
 
 import pytest
+
+from tests.core.matrix.engines.patience import ending
 
 COMMAND = [
     *(sys.executable, "-m", "tactbench", "run", "--sensor", "icub", "--task", "curvature"),
@@ -17,8 +19,9 @@ COMMAND = [
 ]
 
 
+@contextmanager
 def started(folder):
-    """Start the command as the foreground job of a new terminal; return the process and our end of the terminal."""
+    """Start the command as the foreground job of a new terminal; give the process and our end of the terminal."""
     ours, theirs = pty.openpty()
 
     def own_terminal():
@@ -26,10 +29,13 @@ def started(folder):
         fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
     env = {**os.environ, "COLUMNS": "140", "LINES": "40", "TERM": "xterm-256color", "PYTHONPATH": ""}
-    process = subprocess.Popen(COMMAND, cwd=folder, env=env, stdin=theirs, stdout=theirs, stderr=theirs,
-                               preexec_fn=own_terminal)  # fmt: skip
-    os.close(theirs)
-    return process, ours
+    try:
+        with ending(COMMAND, cwd=folder, env=env, stdin=theirs, stdout=theirs, stderr=theirs,
+                    preexec_fn=own_terminal) as process:  # fmt: skip
+            os.close(theirs)
+            yield process, ours
+    finally:
+        os.close(ours)
 
 
 def read_until(ours, text, seconds):
@@ -51,14 +57,13 @@ def read_until(ours, text, seconds):
 def interrupted(folder, at):
     """Press Ctrl-C once `at` is on the screen; return the exit code, the screen and the files that were left aside."""
     folder.mkdir()
-    process, ours = started(folder)
-    seen = read_until(ours, at, 60)
-    assert at in seen
-    os.write(ours, b"\x03")
-    seen += read_until(ours, "goes on from there", 60)
-    code = process.wait(60)
-    seen += read_until(ours, "\0", 1)
-    os.close(ours)
+    with started(folder) as (process, ours):
+        seen = read_until(ours, at, 60)
+        assert at in seen
+        os.write(ours, b"\x03")
+        seen += read_until(ours, "goes on from there", 60)
+        code = process.wait(60)
+        seen += read_until(ours, "\0", 1)
     return code, seen, [path for path in folder.rglob("*") if path.suffix in (".partial", ".completing")]
 
 
@@ -78,10 +83,9 @@ def test_ctrl_c_ends_it_with_one_sentence(tmp_path, at):
 
 
 def test_the_bar_shows_both_stages_and_the_table_comes_last(tmp_path):
-    process, ours = started(tmp_path)
-    seen = read_until(ours, "Try next:", 120)
-    seen += read_until(ours, "\0", 2)
-    assert process.wait(60) == 0
-    os.close(ours)
+    with started(tmp_path) as (process, ours):
+        seen = read_until(ours, "Try next:", 100)
+        seen += read_until(ours, "\0", 2)
+        assert process.wait(60) == 0
     assert "15/15" in seen
     assert seen.index("recording") < seen.index("evaluating") < seen.index("macro F1")

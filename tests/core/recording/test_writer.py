@@ -16,6 +16,7 @@ from tactbench.core.recording.reader import open_recording
 from tactbench.core.recording.salvage import rescue, salvage
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, Quality
+from tests.core.matrix.engines.patience import ending
 
 ROWS = 50
 
@@ -60,11 +61,8 @@ def test_kill_9_loses_at_most_the_block_in_flight(tmp_path, make_meta, rows, aft
     An ordinary HDF5 file does not survive this: one kill in five left chunks that could not be read.
     """
     path = tmp_path / "press.h5"
-    child = subprocess.Popen([sys.executable, "-c", CHILD, str(path), str(rows)], stdin=subprocess.PIPE,
-                             stdout=subprocess.PIPE, text=True)  # fmt: skip
-    assert child.stdin is not None
-    assert child.stdout is not None
-    with child:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with ending([sys.executable, "-c", CHILD, str(path), str(rows)], **pipes) as child:
         child.stdin.write(make_meta().model_dump_json() + "\n")
         child.stdin.flush()
         for _ in range(after):

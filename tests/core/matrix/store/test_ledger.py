@@ -14,6 +14,7 @@ from tactbench.core.errors import FolderError
 from tactbench.core.matrix.store import Store, limits
 from tactbench.core.matrix.store.ledger import Entry, read_ledger, whole_text
 from tactbench.core.matrix.store.sharing import canonical, joined, parted
+from tests.core.matrix.engines.patience import ending
 
 from .made import PLAN, ended, kept, key
 
@@ -68,8 +69,9 @@ def test_two_processes_never_write_into_each_others_lines(tmp_path):
         "for n in range(100):\n"
         "    store.note({'cell': f'{sys.argv[2]}{n}', 'status': 'failed', 'log': 'x' * (n * 50)})\n"
     )
-    both = [subprocess.Popen([sys.executable, "-c", code, str(tmp_path), name]) for name in "ab"]
-    assert [one.wait() for one in both] == [0, 0]
+    commands = [[sys.executable, "-c", code, str(tmp_path), name] for name in "ab"]
+    with ending(commands[0]) as one, ending(commands[1]) as other:
+        assert [one.wait(60), other.wait(60)] == [0, 0]
     found = Store(tmp_path)
     assert {row["cell"] for row in found.rows()} == {f"{name}{n}" for name in "ab" for n in range(100)}
     assert found.troubles == ()

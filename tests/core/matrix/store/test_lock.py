@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from contextlib import contextmanager
 
 import pytest
@@ -12,15 +13,18 @@ import pytest
 from tactbench.core.errors import FolderError
 from tactbench.core.matrix.store import Store
 from tactbench.core.recording.partial import Partial
+from tests.core.matrix.engines.patience import ending
 
 from .made import ended, kept, key
 
 HOLDER = """
 import os, sys
 from pathlib import Path
+if sys.argv[2] == "slow fork":  # before the lock's own: so long takes the system to let the child run
+    os.register_at_fork(after_in_child=sys.stdin.readline)
 from tactbench.core.matrix.store import Store
 with Store(Path(sys.argv[1])).hold():
-    child = os.fork() if sys.argv[2] == "fork" else None
+    child = os.fork() if "fork" in sys.argv[2] else None
     if child == 0:
         sys.stdin.read()  # an orphan that outlives its run
         os._exit(0)
@@ -31,14 +35,10 @@ with Store(Path(sys.argv[1])).hold():
 
 @contextmanager
 def holder(folder, how="alone"):
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLDER, str(folder), how], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as process:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with ending([sys.executable, "-c", HOLDER, str(folder), how], **pipes) as process:
         assert process.stdout.readline().startswith("held")
-        try:
-            yield process
-        finally:
-            process.kill()
+        yield process
 
 
 def test_a_second_run_is_refused_at_once_and_told_who_is_there(tmp_path):
@@ -70,6 +70,19 @@ def test_kill_9_lets_go_also_where_a_worker_lives_on(tmp_path, how):
         with Store(tmp_path).hold() as store:
             kept(store, "a")
     assert not (tmp_path / "cache" / "held.json").exists()
+
+
+def test_a_process_that_was_being_forked_when_its_run_was_killed_lets_go_before_anybody_is_refused(tmp_path):
+    with holder(tmp_path, "slow fork") as process:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        wakes = threading.Timer(0.3, process.stdin.close)
+        wakes.start()
+        try:
+            with Store(tmp_path).hold() as store:
+                kept(store, "a")
+        finally:
+            wakes.join()
 
 
 def test_who_holds_it_may_enter_again_and_lets_go_at_the_end(tmp_path):
