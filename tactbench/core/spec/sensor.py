@@ -122,9 +122,6 @@ class Nuisances(Frozen):
     """Standard deviation by which the rest level of all channels of another unit differs from the spec's."""
     unit_rest_own: Quantity | None = None
     """The same for each channel's own."""
-    largest_slope: Quantity | None = None
-    """Largest change of a reading with load [unit / force]; bounds what a slow effect on the load can do. None: not
-    known, and then no effect on the load is ever left out."""
 
     def hidden(self, noise_scale: float = 1.0) -> float:
         """Return the standard deviation that white noise and rounding hide anyway, in the channel's unit."""

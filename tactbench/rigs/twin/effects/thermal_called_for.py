@@ -28,7 +28,7 @@ def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether a contact warms or cools the core by more than an observed channel would hide.
 
     Behind a contact of conductance G the core follows the indenter, D kelvin away, by at most ``D G t / C`` and never
-    by more than D. G is at most that of a contact as wide as the sheet or the cap.
+    by more than D. G is at most that of a contact whose whole load stands as far out as the cap or the sheet allows.
     """
     observed = [kind for kind in _KINDS if kind in scene.observe]
     if not observed:
@@ -113,9 +113,12 @@ def _most_k(scene: Scene, sensor: SensorSpec) -> float:
     sheet = None if sensor.skin is None else sensor.skin.sheet
     if sheet is None:
         return 0.0
-    widest = math.sqrt((sheet.x_max.to("mm") - sheet.x_min.to("mm")) * sheet.arc.to("mm") / math.pi)
+    # The contact's radius is sqrt(5/2) times the rms distance of its load from the apex. None stands beyond the sheet's
+    # other corner, nor beyond a cap's rim, which along the arc is at most pi/2 times as far as straight.
+    farthest = math.hypot(sheet.x_max.to("mm") - sheet.x_min.to("mm"), sheet.arc.to("mm"))
     if scene.indenter.radius is not None:
-        widest = min(widest, scene.indenter.radius.to("mm"))
+        farthest = min(farthest, math.pi / 2 * scene.indenter.radius.to("mm"))
+    widest = math.sqrt(5 / 2) * farthest
     conductance = 4e-3 * sensor.parameters["contact_conductivity"].to("W/m/K") * widest
     profile = scene.profile
     # A force loop touches the skin while it waits, too.
