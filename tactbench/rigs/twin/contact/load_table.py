@@ -71,10 +71,8 @@ class LoadTable:
     curves: Interpolant
     """Depth, contact radius and fluid pressure against load."""
     solves: int
-    solved_s: float
-    """Seconds spent on the skin; what reading it took is not among them."""
-    read_s: float = 0.0
-    """Seconds spent on reading it."""
+    read_s: float
+    """Seconds spent on reading the skin; solving it is not among them."""
 
     @property
     def residual(self) -> float:
@@ -163,7 +161,6 @@ def build_table(
     clock
         Seconds, monotonic.
     """
-    began = clock()
     builder = _Builder(press, read, clock)
     if not largest_n > 0:
         rest = builder.node(0.0)
@@ -187,7 +184,6 @@ def build_table(
         interpolant=builder.interpolant(touch_down),
         curves=builder.curves(touch_down),
         solves=press.solves,
-        solved_s=clock() - began - builder.read_s,
         read_s=builder.read_s,
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, NotApplicable, Scalar
 from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
-from tactbench.rigs.twin.contact.pressing import pressed
+from tactbench.rigs.twin.contact.pressing import press_of, reader_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import check_contact, outer_radius_mm, pad_of, skin_grid
 from tactbench.rigs.twin.synthesis import Settled, Synthesis
@@ -103,9 +103,12 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     if key in _TABLES:
         _TABLES.move_to_end(key)
         return _TABLES[key]
-    made = _tabulate(run, names, largest, within_reach=not only_skin)
-    # Whoever asks first waits for the solving and the reading; they belong to the contact and to transduction.
-    for effect, spent in (("contact", made.table.solved_s), ("transduction", made.table.read_s)):
+    began = run.clock()
+    made, read_s = _tabulate(run, names, largest, within_reach=not only_skin)
+    # Whoever asks first waits for all of it; reading belongs to transduction, the rest to the contact.
+    for effect, spent in (("transduction", read_s), ("contact", run.clock() - began - read_s)):
+        if not spent:
+            continue
         run.spent_s[effect] = run.spent_s.get(effect, 0.0) + spent
         run.elsewhere_s += spent
     _TABLES[key] = made
@@ -114,9 +117,13 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     return made
 
 
-def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> _Tabulated:
+def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> tuple[_Tabulated, float]:
+    """Return the table, and the seconds that preparing to read the skin and reading it took."""
     fidelity = run.fidelity
-    press, read = pressed(run, names, fidelity)
+    press = press_of(run, fidelity)
+    began = run.clock()
+    read = reader_of(run, names, fidelity)
+    prepared_s = run.clock() - began
     table = build_table(
         press,
         read,
@@ -134,7 +141,9 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
     if within_reach:
         check_reach(press, largest, outer_mm)
     pad = None if sheet is None else pad_of(sheet, medium.grid)
-    return _Tabulated(table, press.touched_core, closing, film, remarks(press, table.loads_n.tolist(), outer_mm, pad))
+    said = remarks(press, table.loads_n.tolist(), outer_mm, pad)
+    tabulated = _Tabulated(table, press.touched_core, closing, film, said)
+    return tabulated, prepared_s + table.read_s if names else 0.0
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
