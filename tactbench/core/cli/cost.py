@@ -60,8 +60,8 @@ def command(
         if len(asked["estimators"]) > 1:
             raise UsageError("--twin has one estimator answer.", hint="Give --estimator once.")
         show_twin(
-            sensors, rig, out or Path("tactbench-results") / "cost", shape, rounds=asked["rounds"], task=task, rungs=rungs,
-            estimator=next(iter(asked["estimators"]), None), scoring=score, seed=asked["seed"],
+            sensors, rig, out or Path("tactbench-results") / "cost", shape, rounds=asked["rounds"], task=task,
+            rungs=rungs, estimator=next(iter(asked["estimators"]), None), scoring=score, seed=asked["seed"],
         )  # fmt: skip
         return
     if rungs or not score:

@@ -146,8 +146,8 @@ def _show(
         _show_scores(subject, points, scores)
     remark(study.reference)
     if scores:
-        remark("Scores are of recordings made at that rung, with the same draws of noise and place (SIM); behind a score "
-               "stands its 95 % interval, and by how much it differs from the finest rung's.")  # fmt: skip
+        remark("Scores are of recordings made at that rung, with the same draws of noise and place (SIM); behind a "
+               "score its 95 % interval, beside it how far it is from the finest rung's here.")  # fmt: skip
 
 
 def _show_scores(subject: str, points: Sequence[CostPoint], scores: Scores) -> None:
@@ -171,14 +171,15 @@ def _show_scores(subject: str, points: Sequence[CostPoint], scores: Scores) -> N
 
 
 def _score_line(one: TaskScore, finest: float | None) -> dict[str, str]:
+    from tactbench.core.cost.task_score import in_unit
     from tactbench.core.leaderboard.names import METRIC_NAMES
 
-    unit = "" if one.unit == "1" else f" {one.unit}"
     name = f"{one.task}: {METRIC_NAMES.get(one.metric, one.metric)} by {one.estimator}"
     if one.score is None:
         return {name: one.reason}
     interval = "" if one.ci_low is None or one.ci_high is None else f" [{one.ci_low:.4g}, {one.ci_high:.4g}]"
-    return {name: f"{one.score:.4g}{unit}{interval}", f"{one.task}: off by": f"{one.score - (finest or 0.0):+.2g}"}
+    apart = "" if finest is None else f"{one.score - finest:+.2g}"
+    return {name: f"{in_unit(one.score, one.unit)}{interval}", f"{one.task}: against the finest": apart}
 
 
 def _line(point: CostPoint, on_front: bool) -> dict[str, str]:

@@ -9,7 +9,7 @@ import click
 from tactbench.core.cli.grid import print_grid, print_records
 from tactbench.core.cli.progress import progress
 from tactbench.core.cli.screen import remark
-from tactbench.core.cost.task_score import quick_estimator, task_score, with_all_effects
+from tactbench.core.cost.task_score import in_unit, quick_estimator, task_score, with_all_effects
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
 from tactbench.core.leaderboard.table import METRIC_NAMES
 from tactbench.core.plugins.interfaces import RigContext
@@ -94,9 +94,7 @@ def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
     lines = [
         {
             "effects": name,
-            "score": one.reason
-            if one.score is None
-            else f"{one.score:.4g} {'' if one.unit == '1' else one.unit}".strip(),
+            "score": one.reason if one.score is None else in_unit(one.score, one.unit),
             "95 %": "" if one.ci_low is None or one.ci_high is None else f"{one.ci_low:.4g}–{one.ci_high:.4g}",
             "simulated in": "" if one.sim_s is None else f"{one.sim_s:.2f} s",
         }

@@ -101,3 +101,8 @@ def with_all_effects(simulation: Simulation | None) -> Simulation:
     """Return `simulation` with every installed effect asked for."""
     asked = simulation or Simulation()
     return asked.model_copy(update={"effects": (*asked.effects, "+all")})
+
+
+def in_unit(score: float, unit: str) -> str:
+    """Return a score as text, its unit behind it where it has one."""
+    return f"{score:.4g}" if unit in ("", "1") else f"{score:.4g} {unit}"

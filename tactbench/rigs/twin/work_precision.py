@@ -113,11 +113,8 @@ def _jobs(
     scenes = {radius: _planned(sensor, effects, radius) for radius in RADII_MM}
     truth: dict[float, FloatArray] = {}
     for family, label, fidelity in ways:
-        yield CostJob(
-            label,
-            functools.partial(_measured, sensor, scenes, family, label, fidelity, truth, clock, rounds),
-            _rung(fidelity),
-        )
+        run = functools.partial(_measured, sensor, scenes, family, label, fidelity, truth, clock, rounds)
+        yield CostJob(label, run, _rung(fidelity))
 
 
 def _measured(
