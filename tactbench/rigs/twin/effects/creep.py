@@ -7,6 +7,7 @@ import numpy as np
 from tactbench.plugin import ChannelKind, Creep, FloatArray, Nuisances
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, read_names, skin_under_load
 from tactbench.rigs.twin.effects.memory import lag
+from tactbench.rigs.twin.effects.thermal_drift import largest_stretch
 from tactbench.rigs.twin.synthesis import Load, Settled, Synthesis, Track
 
 
@@ -52,8 +53,9 @@ def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> dict[ChannelKi
 
     Behind a load that changes at most at a rate ``r`` a lag of time constant ``tau`` stays back by at most ``tau r``.
     So the force is off by at most ``r sum(c_i tau_i)``, and a reading by that times its largest slope: that of the
-    load table this recording is made from, over the forces that occur, times the channel's own gain. Nothing is known
-    (infinity) of channels that the table does not hold.
+    load table this recording is made from, over the forces that occur, times the channel's own gain, and times what a
+    drift with the fluid's temperature may make of a difference. Nothing is known (infinity) of channels that the table
+    does not hold.
     """
     rate, table, names = steepest_n_per_s(run.load), skin_under_load(run), read_names(run)
     found: dict[ChannelKind, tuple[float, float]] = {}
@@ -65,6 +67,7 @@ def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> dict[ChannelKi
             slope = (
                 _steepest(track, own, names, table.steepest(*_visited(track))) if kind in READ_FROM_THE_SKIN else np.inf
             )
+            slope *= largest_stretch(run) if kind == "taxel" else 1.0
             found[kind] = max(found.get(kind, (0.0, 0.0)), (slope * late_s * rate, slope))
     return found
 

@@ -9,7 +9,9 @@ import pytest
 
 from tactbench.plugin import ForceRamp, Indenter, Placement, RigContext, Scene, Simulation, assumed, load_registry
 from tactbench.rigs.twin import tactbench_effects
-from tactbench.rigs.twin.preparation import carried_out
+from tactbench.rigs.twin.contact.stages import skin_under_load
+from tactbench.rigs.twin.effects.thermal_called_for import widest_contact_mm
+from tactbench.rigs.twin.preparation import carried_out, prepare
 from tactbench.rigs.twin.rig import build
 from tactbench.rigs.twin.verification.omission import difference
 
@@ -130,3 +132,18 @@ def test_a_ramp_of_a_minute_does_not(twin, sensors):
     assert bound == float("inf")
     assert largest > 10 * hidden
     assert largest <= entry.change
+
+
+@pytest.mark.parametrize(
+    "drawn", [*(case for name, case in OFF_THE_NOMINAL_PLACE if name == "biotac"), {"radius": None}]
+)
+def test_no_contact_is_wider_than_the_bound_of_heat_takes_it_to_be(twin, sensors, drawn):
+    sensor = sensors["biotac"]
+    tilt = _q(drawn.get("tilt", 0.0), "deg")
+    placement = Placement(x=_q(drawn.get("x", 0.0), "mm"), s=_q(drawn.get("s", 0.0), "mm"), tilt_x=tilt)
+    scene = _slow(drawn["radius"], drawn.get("end", 12.0), placement=placement)
+    widest = widest_contact_mm(scene, sensor.spec.skin.sheet)
+    table = skin_under_load(prepare(sensor, scene, 1, twin.plan(sensor, scene)))
+    radii = table.skin(np.linspace(0.0, table.loads_n[-1], 200)).contact_radius_mm
+    # Not by more than the few times that a contact at the very rim, or across the whole sheet, would take.
+    assert widest / 10 < radii.max() <= widest
