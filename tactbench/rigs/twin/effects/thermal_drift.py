@@ -54,5 +54,5 @@ def through_divider(reading: FloatArray, gained: FloatArray, full_scale: float) 
     Readings at or beyond the ends (no resistance, or no conductance) stay as they are.
     """
     inside = (reading > 0) & (reading < full_scale)
-    ratio = full_scale / np.where(inside, reading, 0.5 * full_scale) - 1.0
-    return np.where(inside, full_scale / (1.0 + ratio / gained), reading)
+    share = np.where(inside, reading, 0.0) / full_scale
+    return np.where(inside, gained * reading / (1.0 + (gained - 1.0) * share), reading)
