@@ -132,7 +132,7 @@ def _show(
     for (subject, observable), group in diagrams(points).items():
         best = precise(group)
         lines = [_line(point, point in best) for point in group]
-        lines += [{"way": one.label, "reason": one.reason} for one in skipped if one.subject == subject]
+        lines += _lines_of(skipped, subject)
         styles = ["bold" if point.default else "" for point in group]
         styles += ["dim"] * (len(lines) - len(styles))
         print_grid(f"{subject}, {observable}: {study.title}", _COLUMNS, lines, styles=styles,
@@ -150,6 +150,18 @@ def _show(
                "score its 95 % interval, beside it how far it is from the finest rung's here.")  # fmt: skip
 
 
+def _lines_of(skipped: Sequence[Skipped], subject: str) -> list[dict[str, str]]:
+    """Return one line for each reason why a sensor cannot have a way."""
+    found: dict[str, list[str]] = {}
+    for one in skipped:
+        if one.subject == subject:
+            found.setdefault(one.reason, []).append(one.label)
+    return [
+        {"way": labels[0] + (f", and {len(labels) - 1} more" if len(labels) > 1 else ""), "reason": reason}
+        for reason, labels in found.items()
+    ]
+
+
 def _show_scores(subject: str, points: Sequence[CostPoint], scores: Scores) -> None:
     """Print a sensor's rungs: error in counts and time beside what its recordings score."""
     from tactbench.core.cli.grid import print_grid
@@ -157,7 +169,7 @@ def _show_scores(subject: str, points: Sequence[CostPoint], scores: Scores) -> N
     own = {rung: scored for (sensor, rung), scored in scores.items() if sensor == subject}
     finest = {one.task: one.score for scored in own.values() for one in scored if one.score is not None}
     lines: list[dict[str, str]] = []
-    columns: dict[str, None] = {"rung": None}
+    columns = dict.fromkeys(("rung", "time", *(f"{one.observable}, rms" for one in points if one.subject == subject)))
     for rung, scored in own.items():
         line = {"rung": rung}
         for point in points:

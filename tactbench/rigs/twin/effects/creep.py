@@ -7,7 +7,6 @@ import numpy as np
 from tactbench.plugin import ChannelKind, Creep, FloatArray, Nuisances
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, read_names, skin_under_load
 from tactbench.rigs.twin.effects.memory import lag
-from tactbench.rigs.twin.effects.thermal_drift import largest_stretch
 from tactbench.rigs.twin.synthesis import Load, Settled, Synthesis, Track
 
 
@@ -67,9 +66,17 @@ def bounds(run: Synthesis, late: dict[ChannelKind, Nuisances]) -> dict[ChannelKi
             slope = (
                 _steepest(track, own, names, table.steepest(*_visited(track))) if kind in READ_FROM_THE_SKIN else np.inf
             )
-            slope *= largest_stretch(run) if kind == "taxel" else 1.0
+            slope *= _stretch(run) if kind == "taxel" else 1.0
             found[kind] = max(found.get(kind, (0.0, 0.0)), (slope * late_s * rate, slope))
     return found
+
+
+def _stretch(run: Synthesis) -> float:
+    if run.scene.environment.indenter_temperature is None:
+        return 1.0
+    from tactbench.rigs.twin.effects.thermal_drift import largest_stretch
+
+    return largest_stretch(run)
 
 
 def _creeping(run: Synthesis, kind: ChannelKind) -> Nuisances | None:
