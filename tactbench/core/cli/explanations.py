@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from tactbench.core.spec.scene import Scene
 
 _COLUMNS = ("", "effect", "cost", "if left out", "reason")
+_WAYS = 2
+_LONGEST_S = 60.0
+"""Seconds that recordings may take for a score that nobody asked for by name."""
 _TOLD_APART = 0.1
 """Share by which two times of one run each differ on a machine that does other things as well."""
 _SCORE_COLUMNS = ("effects", "score", "95 %", "simulated in")
@@ -39,7 +42,7 @@ def print_explanations(
     rounds: int,
     shape: str,
     *,
-    scoring: bool = False,
+    scoring: bool | None = False,
     estimator: str | None = None,
     seed: int = 1,
 ) -> None:
@@ -48,7 +51,8 @@ def print_explanations(
     Parameters
     ----------
     scoring
-        Also record the whole task twice, with the effects chosen and with all, and print both scores and times.
+        Also record the whole task twice, with the effects chosen and with all, and print both scores and times. None:
+        if the recordings take less than a minute, by what one has been measured to cost.
     estimator
         What answers then; None: a quick one.
     seed
@@ -66,14 +70,19 @@ def print_explanations(
     if not hasattr(rig, "explain"):
         raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Choose another with --rig.")
     scenes = _scenes(registry, task_name, wanted, simulation)
-    answerer = (estimator or quick_estimator(registry, task_name)) if scoring else ""
+    answerer = "" if scoring is False else estimator or quick_estimator(registry, task_name)
     records: list[dict[str, Any]] = []
+    expected_s = 0.0
     for group in _alike(rig, sensor, scenes):
         rows = rig.explain(sensor, group[0], rounds=rounds)
         if shape == "table":
             _print(sensor_name, task_name, group, rows, rounds)
         records += [_record(sensor_name, task_name, group, row) for row in rows]
-    if scoring:
+        expected_s += _WAYS * len(group) * sum(row.cost_s or 0.0 for row in rows if row.entry.included)
+    if scoring is None and expected_s > _LONGEST_S:
+        remark(f"No score: recording the task with the effects chosen and with all would take about {expected_s:.0f} "
+               "s. --score does it all the same.")  # fmt: skip
+    elif scoring is not False:
         with progress() as told:
             chosen, every = (
                 task_score(

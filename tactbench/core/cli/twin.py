@@ -29,7 +29,7 @@ def command() -> None:
               help="Recordings made to measure what each effect costs; 0: only the plan.")  # fmt: skip
 @click.option("--score/--no-score", default=None,
               help="Also record the task with the effects chosen and with all, and score both: tens of seconds. "
-                   "Default: yes, unless --scene or --rounds 0 is given.")  # fmt: skip
+                   "Default: yes, if the recordings take less than a minute, unless --scene or --rounds 0 is given.")  # fmt: skip
 @click.option("--estimator", metavar="NAME", help="What answers for that score; default: a quick, linear one.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N",
               help="Of the recordings that are scored.")  # fmt: skip
@@ -63,7 +63,7 @@ def explain(
     simulation = simulation_of(registry, name, effects=effects, rung=rung, tolerance=tolerance)
     print_explanations(
         registry, name, sensor, task, wanted, simulation, rounds, shape,
-        scoring=wanted is None and rounds > 0 if score is None else score, estimator=estimator, seed=seed,
+        scoring=False if score is None and (wanted is not None or not rounds) else score, estimator=estimator, seed=seed,
     )  # fmt: skip
 
 

@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from tactbench.core.cli import explanations
+from tactbench.core.plugins.registry import load_registry
 from tests.core.cli.test_screens import assert_one_clear_screen
 
 
@@ -98,3 +100,12 @@ def test_an_oracle_can_be_run_alone(shell):
     verdicts = json.loads(done.stdout)
     assert all(verdict["met"] for verdict in verdicts)
     assert "2 of 2 within their bounds" in done.stderr
+
+
+def test_a_score_that_takes_long_is_made_only_if_asked_for(monkeypatch, capsys):
+    monkeypatch.setattr(explanations, "_LONGEST_S", 0.0)
+    explanations.print_explanations(load_registry(), "twin", "icub", "force", None, None, 1, "table", scoring=None)
+    said = capsys.readouterr()
+    assert "No score" in said.err
+    assert "--score does it all the same" in said.err
+    assert "RMSE" not in said.out
