@@ -29,7 +29,7 @@ def command() -> None:
               help="Recordings made to measure what each effect costs; 0: only the plan.")  # fmt: skip
 @click.option("--score/--no-score", default=None,
               help="Also record the task with the effects chosen and with all, and score both: tens of seconds. "
-                   "Default: yes, if the recordings take less than a minute, unless --scene or --rounds 0 is given.")  # fmt: skip
+                   "Default: if that takes less than a minute, and neither --scene nor --rounds 0 is given.")  # fmt: skip
 @click.option("--estimator", metavar="NAME", help="What answers for that score; default: a quick, linear one.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N",
               help="Of the recordings that are scored.")  # fmt: skip
@@ -61,9 +61,10 @@ def explain(
     registry = load_registry()
     name = simulated_rig(registry, rig)
     simulation = simulation_of(registry, name, effects=effects, rung=rung, tolerance=tolerance)
+    if score is None and (wanted is not None or not rounds):
+        score = False
     print_explanations(
-        registry, name, sensor, task, wanted, simulation, rounds, shape,
-        scoring=False if score is None and (wanted is not None or not rounds) else score, estimator=estimator, seed=seed,
+        registry, name, sensor, task, wanted, simulation, rounds, shape, scoring=score, estimator=estimator, seed=seed
     )  # fmt: skip
 
 
