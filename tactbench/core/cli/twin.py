@@ -29,7 +29,7 @@ def command() -> None:
               help="Recordings made to measure what each effect costs; 0: only the plan.")  # fmt: skip
 @click.option("--score/--no-score", default=None,
               help="Also record the task with the effects chosen and with all, and score both: tens of seconds. "
-                   "Default: if that takes less than a minute, and neither --scene nor --rounds 0 is given.")  # fmt: skip
+                   "Default: if it takes less than a minute, without --scene and --rounds 0.")  # fmt: skip
 @click.option("--estimator", metavar="NAME", help="What answers for that score; default: a quick, linear one.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N",
               help="Of the recordings that are scored.")  # fmt: skip
