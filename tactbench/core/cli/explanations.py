@@ -72,13 +72,14 @@ def print_explanations(
     scenes = _scenes(registry, task_name, wanted, simulation)
     answerer = "" if scoring is False else estimator or quick_estimator(registry, task_name)
     records: list[dict[str, Any]] = []
-    expected_s = 0.0
+    expected_s = left_out_s = 0.0
     for group in _alike(rig, sensor, scenes):
         rows = rig.explain(sensor, group[0], rounds=rounds)
         if shape == "table":
             _print(sensor_name, task_name, group, rows, rounds)
         records += [_record(sensor_name, task_name, group, row) for row in rows]
         expected_s += _WAYS * len(group) * sum(row.cost_s or 0.0 for row in rows if row.entry.included)
+        left_out_s += len(group) * sum(row.cost_s or 0.0 for row in rows if not row.entry.included)
     if scoring is None and expected_s > _LONGEST_S:
         remark(f"No score: recording the task with the effects chosen and with all would take about {expected_s:.0f} "
                "s. --score does it all the same.")  # fmt: skip
@@ -92,6 +93,8 @@ def print_explanations(
             )
         if shape == "table":
             _print_scores(sensor_name, chosen, every)
+            if rounds:
+                click.echo(f"Effect by effect, by the costs above, those left out take {1e3 * left_out_s:.1f} ms.")
         scores = _score_fields(chosen, every)
         records = [{**record, **scores} for record in records]
     if shape != "table":
