@@ -155,6 +155,17 @@ def test_the_ideal_sensor_has_no_nuisance_at_all(specs: dict[str, SensorSpec]) -
     assert none.creep == ()
 
 
+def test_a_spec_that_still_states_its_largest_slope_is_read(specs: dict[str, SensorSpec]) -> None:
+    """Recordings keep the spec they were made with; this field is no longer one."""
+    stated = specs["icub"].model_dump()
+    stated["nuisances"]["taxel"]["largest_slope"] = {
+        "value": 24.0,
+        "unit": "count/N",
+        "source": stated["principle_source"],
+    }
+    assert SensorSpec.model_validate(stated).nuisances == specs["icub"].nuisances
+
+
 def test_listing_the_sensors_imports_nothing_heavy() -> None:
     code = (
         "import sys\n"

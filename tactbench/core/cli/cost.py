@@ -13,9 +13,20 @@ from tactbench.core.cli.threads import keep_threads
 @click.command(name="cost")
 @click.option("--twin", is_flag=True, help="Of the simulated rig instead: error against seconds per recording.")
 @click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Of which sensor; with --twin also several.")
-@click.option("--task", metavar="NAME", help="Which question the estimators answer.")
+@click.option("--task", metavar="NAME",
+              help="Which question the estimators answer; with --twin whose score is looked at, rung by rung (default: "
+                   "the tasks of the default matrix).")  # fmt: skip
 @click.option("--estimator", "estimators", multiple=True, metavar="NAME",
-              help="What answers; may be repeated. Default: every one for this kind of question.")  # fmt: skip
+              help="What answers; may be repeated. Default: every one for this kind of question. With --twin one; "
+                   "default: a quick, linear one.")  # fmt: skip
+@click.option(
+    "--rung",
+    "rungs",
+    multiple=True,
+    metavar="NAME",
+    help="With --twin: a rung whose recordings are scored; may be repeated. Default: all but the dearest.",
+)
+@click.option("--score/--no-score", default=True, help="With --twin: whether rungs are scored at all.")
 @click.option("--rig", metavar="NAME", help="What carries out the scenes: twin (default), replay …")
 @click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings for --rig replay.")
 @click.option("--protocol", metavar="NAME", help="How recordings become X and y; default: the task's first.")
@@ -33,11 +44,12 @@ from tactbench.core.cli.threads import keep_threads
 @click.option("--format", "shape", type=click.Choice(("table", "json", "csv")), default="table", show_default=True)
 def command(
     twin: bool, sensors: tuple[str, ...], task: str | None, rig: str | None, out: Path | None, shape: str, threads: int,
-    **asked: Any,
+    rungs: tuple[str, ...], score: bool, **asked: Any,
 ) -> None:  # fmt: skip
     """Measure what accuracy costs in time, and draw it.
 
-    Of estimators: score against fit time and latency, for one sensor and task. Of the simulated rig: --twin.
+    Of estimators: score against fit time and latency, for one sensor and task. Of the simulated rig: --twin, error in
+    counts against seconds, and what its rungs do to the score.
     """
     keep_threads(1 if twin else threads)
     from tactbench.core.errors import UsageError
@@ -45,10 +57,15 @@ def command(
     if twin:
         from tactbench.core.cli.cost_twin import show_twin
 
-        if task is not None:
-            raise UsageError("--twin asks no task of anybody.", hint="Leave out --task, or --twin.")
-        show_twin(sensors, rig, out or Path("tactbench-results") / "cost", shape)
+        if len(asked["estimators"]) > 1:
+            raise UsageError("--twin has one estimator answer.", hint="Give --estimator once.")
+        show_twin(
+            sensors, rig, out or Path("tactbench-results") / "cost", shape, rounds=asked["rounds"], task=task,
+            rungs=rungs, estimator=next(iter(asked["estimators"]), None), scoring=score, seed=asked["seed"],
+        )  # fmt: skip
         return
+    if rungs or not score:
+        raise UsageError("--rung and --no-score belong to --twin.", hint="Leave them out, or add --twin.")
     if len(sensors) != 1 or task is None:
         raise UsageError(
             "Say what the cost is asked of.",

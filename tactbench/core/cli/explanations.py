@@ -4,19 +4,32 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from tactbench.core.cli.grid import print_grid, print_records
+from tactbench.core.cli.progress import progress
 from tactbench.core.cli.screen import remark
+from tactbench.core.cost.task_score import in_unit, quick_estimator, task_score, with_all_effects
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
+from tactbench.core.leaderboard.table import METRIC_NAMES
 from tactbench.core.plugins.interfaces import RigContext
 from tactbench.core.plugins.registry import load_object
+from tactbench.core.spec.scene import Simulation
 
 if TYPE_CHECKING:
+    from tactbench.core.cost.task_score import TaskScore
     from tactbench.core.plugins.interfaces import Explained, Explaining
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.rig import SensorDescriptor
-    from tactbench.core.spec.scene import Scene, Simulation
+    from tactbench.core.spec.scene import Scene
 
 _COLUMNS = ("", "effect", "cost", "if left out", "reason")
+_WAYS = 2
+_LONGEST_S = 60.0
+"""Seconds that recordings may take for a score that nobody asked for by name."""
+_TOLD_APART = 0.1
+"""Share by which two times of one run each differ on a machine that does other things as well."""
+_SCORE_COLUMNS = ("effects", "score", "95 %", "simulated in")
 
 
 def print_explanations(
@@ -28,8 +41,22 @@ def print_explanations(
     simulation: Simulation | None,
     rounds: int,
     shape: str,
+    *,
+    scoring: bool | None = False,
+    estimator: str | None = None,
+    seed: int = 1,
 ) -> None:
     """Print the plans of a task's scenes, one table for each different set of effects.
+
+    Parameters
+    ----------
+    scoring
+        Also record the whole task twice, with the effects chosen and with all, and print both scores and times. None:
+        if the recordings take less than a minute, by what one has been measured to cost.
+    estimator
+        What answers then; None: a quick one.
+    seed
+        Of those recordings.
 
     Raises
     ------
@@ -43,14 +70,74 @@ def print_explanations(
     if not hasattr(rig, "explain"):
         raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Choose another with --rig.")
     scenes = _scenes(registry, task_name, wanted, simulation)
+    answerer = "" if scoring is False else estimator or quick_estimator(registry, task_name)
     records: list[dict[str, Any]] = []
+    expected_s = left_out_s = 0.0
     for group in _alike(rig, sensor, scenes):
         rows = rig.explain(sensor, group[0], rounds=rounds)
         if shape == "table":
             _print(sensor_name, task_name, group, rows, rounds)
         records += [_record(sensor_name, task_name, group, row) for row in rows]
+        expected_s += _WAYS * len(group) * sum(row.cost_s or 0.0 for row in rows if row.entry.included)
+        left_out_s += len(group) * sum(row.cost_s or 0.0 for row in rows if not row.entry.included)
+    if scoring is None and expected_s > _LONGEST_S:
+        remark(f"No score: recording the task with the effects chosen and with all would take about {expected_s:.0f} "
+               "s. --score does it all the same.")  # fmt: skip
+    elif scoring is not False:
+        with progress() as told:
+            chosen, every = (
+                task_score(
+                    registry, rig_name, sensor_name, task_name, asked, estimator=answerer, seed=seed, progress=told
+                )
+                for asked in (simulation or Simulation(), with_all_effects(simulation))
+            )
+        if shape == "table":
+            _print_scores(sensor_name, chosen, every)
+            if rounds:
+                click.echo(f"Effect by effect, by the costs above, those left out take {1e3 * left_out_s:.1f} ms.")
+        scores = _score_fields(chosen, every)
+        records = [{**record, **scores} for record in records]
     if shape != "table":
         print_records(records, shape)
+
+
+def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
+    """Print the score with the effects chosen beside that with all, and what leaving the others out saved."""
+    lines = [
+        {
+            "effects": name,
+            "score": one.reason if one.score is None else in_unit(one.score, one.unit),
+            "95 %": "" if one.ci_low is None or one.ci_high is None else f"{one.ci_low:.4g}–{one.ci_high:.4g}",
+            "simulated in": "" if one.sim_s is None else f"{one.sim_s:.2f} s",
+        }
+        for name, one in (("chosen", chosen), ("all", every))
+    ]
+    title = f"{sensor}, {chosen.task}: {METRIC_NAMES.get(chosen.metric, chosen.metric)} by {chosen.estimator} (SIM)"
+    print_grid(title, _SCORE_COLUMNS, lines, numeric=("score", "95 %", "simulated in"))
+    if chosen.score is None or every.score is None:
+        return
+    moved = every.score - chosen.score
+    same = "All effects instead of those chosen: the very same score."
+    click.echo(same if not moved else f"All effects instead of those chosen move the score by {moved:+.2g}.")
+    if chosen.sim_s is not None and every.sim_s:
+        saved = every.sim_s - chosen.sim_s
+        seconds = f"{saved:.2f} of {every.sim_s:.2f} s of the processor for {every.recordings} recordings"
+        if abs(saved) < _TOLD_APART * every.sim_s:
+            click.echo(f"Leaving out the others saved {seconds}: no more than one run each tells apart.")
+        else:
+            click.echo(f"Leaving out the others saved {seconds}, {100 * saved / every.sim_s:.0f} %.")
+
+
+def _score_fields(chosen: TaskScore, every: TaskScore) -> dict[str, Any]:
+    return {
+        "score": chosen.score,
+        "score_all_effects": every.score,
+        "score_metric": chosen.metric,
+        "score_estimator": chosen.estimator,
+        "score_reason": chosen.reason or every.reason,
+        "sim_s": chosen.sim_s,
+        "sim_s_all_effects": every.sim_s,
+    }
 
 
 def _scenes(registry: Registry, task: str, wanted: str | None, simulation: Simulation | None) -> list[Scene]:

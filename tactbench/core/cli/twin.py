@@ -27,6 +27,12 @@ def command() -> None:
 @click.option("--rig", metavar="NAME", help="Which simulated rig; default: the first.")
 @click.option("--rounds", type=click.IntRange(min=0), default=5, show_default=True, metavar="N",
               help="Recordings made to measure what each effect costs; 0: only the plan.")  # fmt: skip
+@click.option("--score/--no-score", default=None,
+              help="Also record the task with the effects chosen and with all, and score both: tens of seconds. "
+                   "Default: if it takes less than a minute, without --scene and --rounds 0.")  # fmt: skip
+@click.option("--estimator", metavar="NAME", help="What answers for that score; default: a quick, linear one.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N",
+              help="Of the recordings that are scored.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(FORMATS), default="table", show_default=True)
 @simulation_options
 def explain(
@@ -35,12 +41,18 @@ def explain(
     wanted: str | None,
     rig: str | None,
     rounds: int,
+    score: bool | None,
+    estimator: str | None,
+    seed: int,
     shape: str,
     effects: str | None,
     rung: str | None,
     tolerance: float | None,
 ) -> None:
-    """Say which effects a task's scenes get, which they do not, why, and what each costs or would cost."""
+    """Say which effects a task's scenes get, which they do not, why, and what each costs or would cost.
+
+    It ends with the task's score with the effects chosen beside that with all of them, and what leaving out saved.
+    """
     one_thread()
     from tactbench.core.cli.explanations import print_explanations
     from tactbench.core.cli.simulation import simulation_of
@@ -49,7 +61,11 @@ def explain(
     registry = load_registry()
     name = simulated_rig(registry, rig)
     simulation = simulation_of(registry, name, effects=effects, rung=rung, tolerance=tolerance)
-    print_explanations(registry, name, sensor, task, wanted, simulation, rounds, shape)
+    if score is None and (wanted is not None or not rounds):
+        score = False
+    print_explanations(
+        registry, name, sensor, task, wanted, simulation, rounds, shape, scoring=score, estimator=estimator, seed=seed
+    )  # fmt: skip
 
 
 @command.command(name="verify")

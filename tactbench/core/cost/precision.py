@@ -4,9 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from tactbench.core.cost.front import front
-from tactbench.core.plugins.cost import CostPoint
+from tactbench.core.errors import TactbenchError
+from tactbench.core.matrix.progress import Progress
+from tactbench.core.plugins.cost import CostPoint, CostStudy
+
+
+class Skipped(NamedTuple):
+    """A way that a sensor cannot have."""
+
+    subject: str
+    label: str
+    rung: str
+    """Name of the rung that it is; empty: none."""
+    reason: str
+
+
+def measured(study: CostStudy, subject: str, progress: Progress) -> tuple[list[CostPoint], list[Skipped]]:
+    """Carry out the jobs of a study, and say of those that its subject cannot have why not."""
+    points: list[CostPoint] = []
+    skipped: list[Skipped] = []
+    progress.begin(subject, study.total)
+    for job in study.jobs:
+        progress.working(job.label)
+        try:
+            points += job.run()
+        except TactbenchError as error:
+            skipped.append(Skipped(subject, job.label, job.rung, str(error)))
+        progress.advance(job.label)
+    return points, skipped
 
 
 def diagrams(points: Sequence[CostPoint]) -> dict[tuple[str, str], list[CostPoint]]:

@@ -30,6 +30,8 @@ class CostPoint:
     """Standard deviation of the noise the observable has anyway; infinity where it has none."""
     default: bool = False
     """This is what users get who ask for nothing."""
+    rung: str = ""
+    """Name of the rig's rung that this way is; empty: it is none."""
     settings: Mapping[str, Scalar] = field(default_factory=dict)
     """What was set."""
 
@@ -39,6 +41,9 @@ class CostJob(NamedTuple):
 
     label: str
     run: Callable[[], list[CostPoint]]
+    """Raises a TactbenchError if this sensor cannot have it: the reason becomes a row."""
+    rung: str = ""
+    """As CostPoint's."""
 
 
 class CostStudy(NamedTuple):

@@ -54,7 +54,8 @@ class RigDescriptor(Frozen):
     verification: str | None = Field(default=None, pattern=_WHERE)
     """``module:callable``, called without arguments: the simulation against its oracles, a sequence of Check."""
     work_precision: str | None = Field(default=None, pattern=_WHERE)
-    """``module:callable``, called with a SensorDescriptor: a CostStudy of error against seconds per recording."""
+    """``module:callable``, called with a SensorDescriptor and, by name, ``rounds`` (how often a recording is timed): a
+    CostStudy of error against seconds per recording."""
     likeness: str | None = Field(default=None, pattern=_WHERE)
     """``module:callable``, called with (SensorDescriptor, folder of recordings or None): Checks of the simulated
     sensor against what was measured on real ones, or of recordings against the same ranges."""

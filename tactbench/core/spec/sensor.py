@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
@@ -122,9 +122,14 @@ class Nuisances(Frozen):
     """Standard deviation by which the rest level of all channels of another unit differs from the spec's."""
     unit_rest_own: Quantity | None = None
     """The same for each channel's own."""
-    largest_slope: Quantity | None = None
-    """Largest change of a reading with load [unit / force]; bounds what a slow effect on the load can do. None: not
-    known, and then no effect on the load is ever left out."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_largest_slope(cls, given: Any) -> Any:
+        """Pass over a field of recordings written before slopes came from the scene's own load table."""
+        if isinstance(given, dict) and "largest_slope" in given:
+            return {name: value for name, value in given.items() if name != "largest_slope"}
+        return given
 
     def hidden(self, noise_scale: float = 1.0) -> float:
         """Return the standard deviation that white noise and rounding hide anyway, in the channel's unit."""

@@ -34,14 +34,18 @@ def tactbench_effects() -> list[EffectDescriptor]:
     """Offer the twin's own effects."""
     return [
         _effect("force-loop", "Motor under force control", "effects.force_loop:apply", (), (*_LOAD, *_TOLD), _FORCE),
-        _effect("creep", "Creep of the skin", "effects.creep:apply", ("load",), ("effective-force",)),
-        _effect(
-            "contact", "Normal contact", "contact.stages:press_skin", ("load", "effective-force", "core"), ("skin",)
-        ),
+        _effect("contact", "Normal contact", "contact.stages:press_skin", ("load", "core"), ("skin",)),
         _effect("core", "Touch-down on the core", "contact.core:with_core", (), ("core",)),
         _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure", "fluid")),
         _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
-        _effect("transduction", "Transduction", "contact.stages:read_skin", ("skin", "gain"), ("taxel", "reading")),
+        _effect("creep", "Creep of the skin", "effects.creep:apply", ("load", "skin", "gain"), ("effective-force",)),
+        _effect(
+            "transduction",
+            "Transduction",
+            "contact.stages:read_skin",
+            ("skin", "gain", "effective-force"),
+            ("taxel", "reading"),
+        ),
         _effect(
             "contact-heat", "Heat through the contact", "effects.contact_heat:apply", ("skin",), ("warmth",), _HEAT
         ),

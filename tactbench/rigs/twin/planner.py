@@ -22,6 +22,7 @@ from tactbench.plugin import (
     UsageError,
     load_object,
 )
+from tactbench.rigs.twin.synthesis import Settled
 
 STORED = "stored"
 """Token of what a recording always needs: stored samples."""
@@ -45,18 +46,10 @@ class Plan:
     lent: Mapping[str, str]
     """What the solver may call upon: name -> ``module:callable``."""
 
-    def settled(self, decided: Mapping[str, tuple[bool, str]]) -> tuple[PlanEntry, ...]:
+    def settled(self, decided: Mapping[str, Settled]) -> tuple[PlanEntry, ...]:
         """Return the entries with those that only the solve could decide replaced."""
         entries = [
-            entry.model_copy(
-                update={
-                    "included": decided[entry.effect][0],
-                    "reason": decided[entry.effect][1],
-                    "change": None if decided[entry.effect][0] else 0.0,
-                }
-            )
-            if entry.effect in decided
-            else entry
+            entry.model_copy(update=decided[entry.effect]._asdict()) if entry.effect in decided else entry
             for entry in self.entries
         ]
         return tuple(sorted(entries, key=lambda entry: not entry.included))

@@ -48,6 +48,7 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidel
         contact=Contact(radius_mm(scene.indenter), 0.0, 0.0),
         reference_n=load.at(t_s),
         lent=dict(plan.lent),
+        asked=frozenset(entry.effect for entry in plan.entries if entry.asked and entry.included),
         fidelity=fidelity if scene.simulation.rung is None else rung(scene.simulation.rung),
     )
     run.contact = _place(run)

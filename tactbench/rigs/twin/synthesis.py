@@ -62,6 +62,16 @@ class Tangential(NamedTuple):
     """Radius of the part that sticks over that of the contact, 0 to 1."""
 
 
+class Settled(NamedTuple):
+    """What only the solve could decide about an effect."""
+
+    included: bool
+    reason: str
+    change: float | None = 0.0
+    """What leaving it out changes in an observed channel [the plan entry's unit]: at most, if it was; about, if it was
+    not; None: not known."""
+
+
 @dataclass
 class Track:
     """The channels that share one clock."""
@@ -127,8 +137,10 @@ class Synthesis:
     """What happens along the skin at any (n,) seconds; None: nothing."""
     lent: dict[str, str] = field(default_factory=dict)
     """Effects that are called upon while solving, if at all: name -> ``module:callable``."""
-    settled: dict[str, tuple[bool, str]] = field(default_factory=dict)
-    """Plan entries that only the solve could decide: name -> (included, reason)."""
+    settled: dict[str, Settled] = field(default_factory=dict)
+    """Plan entries that only the solve could decide, by name."""
+    asked: frozenset[str] = frozenset()
+    """Effects that the scene asks for by name: they are applied whatever the solve says."""
     fidelity: Fidelity = DEFAULT
     """How finely the contact is resolved."""
     rung: str = ""

@@ -9,7 +9,6 @@ from __future__ import annotations
 from tactbench.plugin import ChannelKind, Creep, Nuisances, Quantity, assumed, derived, measured
 
 _STEP = measured(1.0, "count", "raw channels of RF, DX and RG move in steps of one count")
-_SLOPE = "this model, caps of 5 to 40 mm and flat pressed to 5 N at the nominal contact point"
 _NONE_KNOWN = "no recording shows it; left at 0 rather than invented"
 
 _CREEP = (
@@ -58,7 +57,6 @@ TAXEL = Nuisances(
     unit_rest_own=measured(
         125.0, "count", "RG: two BioTac SP differ by sd 87, the third by 163 after a shift; the middle"
     ),
-    largest_slope=derived(200.0, "count/N", f"{_SLOPE}: 192"),
 )
 
 PDC = Nuisances(

@@ -71,9 +71,6 @@ NUISANCES = Nuisances(
     unit_gain=assumed(0.1, "1", "as for the BioTac; not measured on this sensor"),
     unit_rest_shared=measured(1.0, "count", f"fingers' medians 241-244; each taxel's own is `rest_spread`; {_GRASP}"),
     step=sourced(1.0, "count", "8-bit values on the bus; robotology/icub-firmware"),
-    largest_slope=derived(
-        24.0, "count/N", "this model, caps of 5 to 40 mm and flat pressed to 5 N at the nominal contact point: 23.1"
-    ),
     creep=(
         Creep(
             fraction=measured(0.15, "1", "tacman-fp7/tactile-control: at most 16 % [4, 29], motor and tendon included"),

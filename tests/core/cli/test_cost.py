@@ -60,7 +60,10 @@ def test_the_table_states_what_its_times_mean(shell):
             ("cost", "--sensor", "icub", "--task", "curvature", "--protocol", "deployable", "--split", "few-shot"),
             "one split, not",
         ),
-        (("cost", "--twin", "--task", "force"), "Leave out --task"),
+        (("cost", "--twin", "--task", "forse"), "Did you mean 'force'"),
+        (("cost", "--twin", "--rung", "defaut"), "Did you mean 'default'"),
+        (("cost", "--twin", "--estimator", "ols", "--estimator", "lasso"), "once"),
+        (("cost", "--sensor", "icub", "--task", "force", "--rung", "fine"), "add --twin"),
     ],
 )
 def test_wrong_words_are_answered_with_the_next_step(shell, arguments, says):

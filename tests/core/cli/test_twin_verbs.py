@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from tactbench.core.cli import explanations
+from tactbench.core.plugins.registry import load_registry
 from tests.core.cli.test_screens import assert_one_clear_screen
 
 
@@ -16,6 +18,43 @@ def test_a_plan_is_explained_with_reasons_costs_and_bounds(shell):
     assert rows["core"]["change"] == 0
     assert all(row["reason"] for row in rows.values())
     assert rows["creep"]["scenes"] == 3
+
+
+def test_it_ends_with_the_score_with_all_effects_beside_that_with_those_chosen(shell):
+    done = shell("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1")
+    said = done.stdout[done.stdout.index("RMSE by ols (SIM)") :]
+    assert "chosen" in said
+    assert "all" in said
+    # Nothing that the plan leaves out touches these scenes: not a digit of the score.
+    assert "the very same score" in said
+    assert "Leaving out the others saved" in said
+    assert "recording: " in done.stderr
+
+
+def test_what_an_effect_that_is_left_out_does_to_the_score_shows(shell):
+    words = ("twin", "explain", "--sensor", "icub", "--task", "force", "--effects=-force-noise", "--rounds", "0")
+    (row, *_) = json.loads(shell(*words, "--score", "--estimator", "ols", "--format", "json").stdout)
+    # Its 0.69 N are most of the error.
+    assert row["score"] < 0.3 < 0.6 < row["score_all_effects"]
+    assert row["sim_s"] > 0
+    assert row["sim_s_all_effects"] > 0
+    (row, *_) = json.loads(shell(*words, "--format", "json").stdout)
+    assert "score" not in row
+
+
+def test_the_twins_cost_says_what_a_rung_scores_and_what_a_sensor_cannot_have(shell):
+    words = ("cost", "--twin", "--sensor", "bonded-pad", "--rounds", "1", "--task", "force", "--format", "json")
+    done = shell(*words, "--rung", "closed-form", "--rung", "default", plugins=("bonded",), timeout=300)
+    rows = {row["way"].rpartition(", up")[0] + (row["rung"] or ""): row for row in json.loads(done.stdout)}
+    default = rows["newton, 32 x 32default"]
+    assert default["error_rms"] > 0
+    assert default["score_force"] > 0
+    closed = rows["closed form, 32 x 32closed-form"]
+    assert closed["seconds"] is None
+    assert "Poisson's ratio 0.45" in closed["reason"]
+    assert closed["score_force"] is None
+    assert "Poisson's ratio 0.45" in closed["score_force_reason"]
+    assert (shell.folder / "tactbench-results/cost/twin.png").exists()
 
 
 def test_what_was_asked_for_shows(shell):
@@ -61,3 +100,12 @@ def test_an_oracle_can_be_run_alone(shell):
     verdicts = json.loads(done.stdout)
     assert all(verdict["met"] for verdict in verdicts)
     assert "2 of 2 within their bounds" in done.stderr
+
+
+def test_a_score_that_takes_long_is_made_only_if_asked_for(monkeypatch, capsys):
+    monkeypatch.setattr(explanations, "_LONGEST_S", 0.0)
+    explanations.print_explanations(load_registry(), "twin", "icub", "force", None, None, 1, "table", scoring=None)
+    said = capsys.readouterr()
+    assert "No score" in said.err
+    assert "--score does it all the same" in said.err
+    assert "RMSE" not in said.out

@@ -34,7 +34,7 @@ def test_every_effect_has_one_entry_with_a_reason(specs):
 def test_producers_come_before_consumers_whatever_the_order_given(specs):
     for effects in (EFFECTS, EFFECTS[::-1]):
         names = [effect.name for effect in plan_scene(effects, Scene(name="s"), specs["biotac"]).stages]
-        assert names.index("creep") < names.index("contact") < names.index("transduction") < names.index("converter")
+        assert names.index("contact") < names.index("creep") < names.index("transduction") < names.index("converter")
         assert names.index("gain") < names.index("transduction")
         assert names.index("white-noise") < names.index("converter")
 

@@ -51,6 +51,8 @@ def _spline_slopes(h: FloatArray, secant: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
+_PIECES = 8
+"""Pieces of an interval on each of which a slope is bounded."""
 _ROUNDING_N = 0.05
 """Added under the power: its slope at the break would be infinite, and no reading's is."""
 
@@ -98,6 +100,35 @@ class Interpolant:
             out *= t
             out += lower[at]
         return out
+
+    def steepest(self, low: float, high: float) -> FloatArray:
+        """Return the (c,) largest absolute slopes between two loads within the nodes' range, at least: bounds.
+
+        A cubic's slope is a parabola: on each piece its ends and its vertex. Where the cubics run in a power of the
+        load the factor between the two slopes is monotone, so that its larger end bounds it on a piece.
+        """
+        inner = np.linspace(self.loads[:-1], self.loads[1:], _PIECES, endpoint=False).T.reshape(-1)
+        inside = (inner > low) & (inner < high)
+        edges = np.concatenate([[low], inner[inside], [high]])
+        first, last = edges[:-1], edges[1:]
+        at = np.clip(np.searchsorted(self.loads, 0.5 * (first + last), side="right") - 1, 0, self.loads.size - 2)
+        _, b, c, d = self._cubics[:, at]
+        t0, t1 = ((self._bent(load) - self._x[at])[:, None] for load in (first, last))
+        curved = d != 0
+        vertex = np.clip(np.where(curved, -c / np.where(curved, 3 * d, 1.0), t0), t0, t1)
+        parabola = [np.abs(b + t * (2 * c + 3 * d * t)) for t in (t0, vertex, t1)]
+        factor = np.maximum(self._stretch(first), self._stretch(last))[:, None]
+        out: FloatArray = (np.maximum.reduce(parabola) * factor).max(axis=0)
+        return out
+
+    def _stretch(self, load: FloatArray) -> FloatArray:
+        """Return the (m,) slope of the variable in which the cubics run against the load."""
+        beyond = load - self.loads[self._bent_from]
+        if self._power == 1.0:
+            return np.ones_like(load)
+        bent = self._power * (np.maximum(beyond, 0.0) + _ROUNDING_N) ** (self._power - 1.0)
+        # At the break itself either side may be meant: the steeper.
+        return np.asarray(np.where(beyond < 0, 1.0, np.where(beyond > 0, bent, np.maximum(bent, 1.0))))
 
     def _bent(self, load: FloatArray) -> FloatArray:
         if self._power == 1.0:

@@ -71,8 +71,8 @@ class LoadTable:
     curves: Interpolant
     """Depth, contact radius and fluid pressure against load."""
     solves: int
-    solved_s: float
-    """Seconds spent on the skin; what reading it took is not among them."""
+    read_s: float
+    """Seconds spent on reading the skin; solving it is not among them."""
 
     @property
     def residual(self) -> float:
@@ -82,6 +82,14 @@ class LoadTable:
     def __call__(self, force_n: FloatArray) -> FloatArray:
         """Return the (m, channels) readings at (m,) forces; forces beyond the table are held at its ends."""
         return self.interpolant(np.clip(force_n, 0.0, self.loads_n[-1]))
+
+    def steepest(self, low_n: float, high_n: float) -> FloatArray:
+        """Return the (channels,) largest changes of a reading with force between two forces, per newton.
+
+        Of this table as it is used, the ends at which it is held included.
+        """
+        low, high = np.clip([low_n, high_n], 0.0, self.loads_n[-1])
+        return self.interpolant.steepest(float(low), float(high))
 
     def skin(self, force_n: FloatArray) -> SkinCurves:
         """Return what the skin as a whole does at (m,) forces, held at the table's ends like the readings."""
@@ -153,7 +161,6 @@ def build_table(
     clock
         Seconds, monotonic.
     """
-    began = clock()
     builder = _Builder(press, read, clock)
     if not largest_n > 0:
         rest = builder.node(0.0)
@@ -177,7 +184,7 @@ def build_table(
         interpolant=builder.interpolant(touch_down),
         curves=builder.curves(touch_down),
         solves=press.solves,
-        solved_s=clock() - began - builder.read_s,
+        read_s=builder.read_s,
     )
 
 

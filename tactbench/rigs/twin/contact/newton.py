@@ -26,6 +26,7 @@ MAX_STEPS = 40
 """Newton steps before giving up; the hard cases of the tests take up to 25 from a cold start."""
 _ARMIJO = 1e-4
 _HALVINGS = 12
+_EPS = float(np.finfo(np.float64).eps)
 _BALANCED = 1e-12
 """Relative force balance of what is handed out: rounding of a sum over thousands of cells."""
 
@@ -98,12 +99,13 @@ class NewtonSolver:
         guess
             State of a neighbouring load (its ``vector``).
         tolerance
-            Largest relative residual.
+            Largest relative residual. Where rounding of the equations' terms alone is more, what rounding leaves is
+            handed out, up to :data:`TOLERANCE`; the solution's residual says so.
 
         Raises
         ------
         RigError
-            If the residual stays above `tolerance`; a result that is not one is never returned.
+            If the residual stays above that; a result that is not one is never returned.
         """
         if not force_n > 0 or not math.isfinite(force_n):
             raise RigError(
@@ -116,10 +118,15 @@ class NewtonSolver:
         energy, gradient = self._evaluate(vector, load)
         residual = self._residual(gradient, load)
         for steps in range(MAX_STEPS + 1):
-            if residual < tolerance:
+            if residual < max(tolerance, min(self._rounding(vector, load), TOLERANCE)):
                 return self._solution(force_n, vector, residual, steps, products)
             if steps == MAX_STEPS:
                 break
+            if not self._contact.any():
+                # Without contact the energy is straight in the approach: no curvature, and no Newton step.
+                vector[-1], _ = self._balanced(vector, load)
+                energy, gradient = self._evaluate(vector, load)
+                residual = self._residual(gradient, load)
             stiffness = self._tangent + self._contact
             self._precondition.update(stiffness, self._contact)
             # Solve each linear system only as well as this Newton step can use: its own error is of second order.
@@ -183,6 +190,39 @@ class NewtonSolver:
         field = gradient[:-1]
         return (abs(float(gradient[-1])) + math.sqrt(float(field @ field))) / load
 
+    def _rounding(self, vector: FloatArray, load: float) -> float:
+        """Return what rounding alone makes of the residual at the state last evaluated, relative to the load.
+
+        The terms are the skin's own stiffness times its deflection, the contact's pressure, and what that pressure is
+        the difference of: the contact's stiffness times the approach, and times gap and deflection, which are as large.
+        A fast transform of n numbers rounds by about eps log2 n of their norm (Gentleman and Sande 1966).
+        """
+        stiff = self._diagonal * vector[:-1]
+        touched = int(np.count_nonzero(self._contact))
+        apart = 2 * self._k * math.sqrt(touched) * abs(float(vector[-1]))
+        pressed = self._pressure.reshape(-1)
+        terms = math.sqrt(float(stiff @ stiff)) + math.sqrt(float(pressed @ pressed)) + apart
+        return _EPS * math.log2(vector.size) * (terms + load) / load
+
+    def _balanced(self, vector: FloatArray, load: float) -> tuple[float, FloatArray]:
+        """Return the approach that balances `load` on the skin held still, and the (nx, ns) overlap at it.
+
+        The load is a convex, piecewise linear function of the approach: a few Newton steps on one number balance it to
+        rounding, from wherever they start.
+        """
+        surface = self.gap_mm + self._spectrum.field(vector[:-1])
+        approach = float(vector[-1])
+        if not approach > float(surface.min()):
+            approach = float(surface.min()) + load / self._k
+        for _ in range(_HALVINGS):
+            lift = np.maximum(approach - surface, 0.0)
+            touched = np.count_nonzero(lift)
+            lacking = load - self._k * float(lift.sum())
+            if abs(lacking) <= _BALANCED * load or not touched:
+                break
+            approach += lacking / (self._k * touched)
+        return approach, lift
+
     def _multiply(self, direction: FloatArray, stiffness: FloatArray) -> FloatArray:
         """Return the Hessian times `direction`: the tangent stiffness, bordered by the approach."""
         out, approach = self._product, float(direction[-1])
@@ -199,7 +239,11 @@ class NewtonSolver:
     def _conjugate_gradients(
         self, gradient: FloatArray, stiffness: FloatArray, forcing: float
     ) -> tuple[FloatArray, int]:
-        """Return the Newton step for `gradient`, to a residual of `forcing` in the preconditioner's norm."""
+        """Return the Newton step for `gradient`, to a residual of `forcing` in the preconditioner's norm.
+
+        It ends sooner, and keeps the step so far, at a direction along which the energy curves by no more than rounding
+        of what the preconditioner says: how far to go along it is not known, and dividing by it would overflow.
+        """
         self._coupling = float(self._contact.sum())
         step = np.zeros_like(gradient)
         remainder = -gradient
@@ -207,6 +251,7 @@ class NewtonSolver:
         direction = conditioned.copy()
         rho = float(remainder @ conditioned)
         goal = rho * forcing**2
+        expected = rho  # the curvature along `direction` if the preconditioner were the Hessian's inverse
         products = 0
         if not rho > 0:
             return step, products
@@ -214,7 +259,7 @@ class NewtonSolver:
             products += 1
             product = self._multiply(direction, stiffness)
             curvature = float(direction @ product)
-            if not curvature > 0:
+            if not curvature > _EPS * expected:
                 break
             alpha = rho / curvature
             step += alpha * direction
@@ -225,29 +270,21 @@ class NewtonSolver:
                 break
             direction *= rho_next / rho
             direction += conditioned
+            expected = rho_next + (rho_next / rho) ** 2 * expected
             rho = rho_next
         return step, products
 
     def _solution(self, force_n: float, vector: FloatArray, residual: float, steps: int, products: int) -> Solution:
         """Return the converged state, its approach moved by what the force balance still lacks.
 
-        The skin held still, the load is a convex, piecewise linear function of the approach: a few Newton steps on one
-        number balance it to rounding. The residual summed both equations, so the field's stays below it.
+        The residual summed both equations, so the field's stays below it.
         """
-        deflection = self._spectrum.field(vector[:-1])
-        load, vector = force_n / self._spectrum.area_mm2, vector.copy()
-        surface = self.gap_mm + deflection
-        for _ in range(_HALVINGS):
-            lift = np.maximum(vector[-1] - surface, 0.0)
-            touched = np.count_nonzero(lift)
-            lacking = load - self._k * float(lift.sum())
-            if abs(lacking) <= _BALANCED * load or not touched:
-                break
-            vector[-1] += lacking / (self._k * touched)
+        vector = vector.copy()
+        vector[-1], lift = self._balanced(vector, force_n / self._spectrum.area_mm2)
         return Solution(
             force_n=force_n,
             vector=vector,
-            deflection_mm=deflection,
+            deflection_mm=self._spectrum.field(vector[:-1]),
             pressure_mpa=self._k * lift,
             residual=residual,
             steps=steps,

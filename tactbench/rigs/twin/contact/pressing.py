@@ -14,6 +14,7 @@ from tactbench.plugin import (
     PluginContractError,
     RigError,
     SensorDescriptor,
+    Skin,
     SkinGrid,
     SkinState,
     load_object,
@@ -38,20 +39,38 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
     RigError
         If this rung is known to be wrong for this skin.
     """
-    spec, skin = run.sensor.spec, run.sensor.spec.skin
-    if skin is None or run.sensor.transducer is None:
+    press = press_of(run, fidelity)
+    return press, reader_of(run, names, fidelity)
+
+
+def reader_of(run: Synthesis, names: list[str], fidelity: Fidelity) -> Read:
+    """Return what reads the channels in `names` from a solved skin of `run`; raises as :func:`pressed`."""
+    skin = _skin(run)
+    if not names:
+        return no_channels
+    return _reader(run.sensor, skin_grid(skin.sheet, fidelity.cells(skin.sheet)), names, fidelity)
+
+
+def _skin(run: Synthesis) -> Skin:
+    spec = run.sensor.spec
+    if spec.skin is None or run.sensor.transducer is None:
         raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
+    return spec.skin
+
+
+def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
+    """Return what solves the loads of `run`; raises as :func:`pressed`."""
+    skin = _skin(run)
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
     gap = gap_mm(grid, run.contact, outer_radius_mm(skin.sheet), skin.sheet.dome)
-    read = _reader(run.sensor, grid, names, fidelity) if names else no_channels
     if fidelity.solver == "local":
         from tactbench.rigs.twin.contact.local import LocalPress
 
-        return LocalPress(skin, medium_of(skin, grid), gap, run.contact), read
+        return LocalPress(skin, medium_of(skin, grid), gap, run.contact)
     if fidelity.solver == "elements" and isinstance(skin, BondedLayer):
         from tactbench.rigs.twin.contact.elements import ElementsPress
 
-        return ElementsPress(skin, medium_of(skin, grid), gap, run.contact), read
+        return ElementsPress(skin, medium_of(skin, grid), gap, run.contact)
     core: Callable[[Medium], Medium] | None = None
     if "core" in run.lent and isinstance(skin, FluidBackedShell):
         where = run.lent["core"]
@@ -60,7 +79,7 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
             made: Medium = load_object(where)(medium, skin)
             return made
 
-    press = Press(
+    return Press(
         medium_of(skin, grid),
         gap,
         run.contact,
@@ -68,7 +87,6 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
         fluid_pressure=run.fluid_pressure,
         tolerance=fidelity.newton_tolerance,
     )
-    return press, read
 
 
 def _reader(

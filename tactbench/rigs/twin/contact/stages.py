@@ -13,10 +13,10 @@ import numpy as np
 from tactbench.plugin import FloatArray, NotApplicable, Scalar
 from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
-from tactbench.rigs.twin.contact.pressing import pressed
+from tactbench.rigs.twin.contact.pressing import press_of, reader_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import check_contact, outer_radius_mm, pad_of, skin_grid
-from tactbench.rigs.twin.synthesis import Synthesis
+from tactbench.rigs.twin.synthesis import Settled, Synthesis
 
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
 """Kinds of channels a sensor's transducer answers for."""
@@ -56,7 +56,7 @@ def watch_fluid(run: Synthesis) -> None:
 def read_skin(run: Synthesis) -> None:
     """Add each channel's response: gain times its reading under the effective force, less its reading at rest."""
     table = skin_under_load(run)
-    names = _read_names(run)
+    names = read_names(run)
     for track in run.tracks:
         for kind, own in track.by_kind().items():
             if kind not in READ_FROM_THE_SKIN:
@@ -73,7 +73,7 @@ def skin_under_load(run: Synthesis) -> LoadTable:
 
     Whether the fluid's pressure belongs to it must be settled before it is first asked for.
     """
-    largest, names = run.load.largest_n, _read_names(run)
+    largest, names = run.load.largest_n, read_names(run)
     if run.scene.simulation.tolerance is not None and run.rung_error is None:
         choose_rung(run, names, largest)
     tabulated = _tabulated(run, names, largest)
@@ -89,7 +89,7 @@ def bare_skin(run: Synthesis, largest_n: float) -> LoadTable:
     return _tabulated(run, [], largest_n, only_skin=True).table
 
 
-def _read_names(run: Synthesis) -> list[str]:
+def read_names(run: Synthesis) -> list[str]:
     """Return the names of the channels that the sensor's transducer answers for, in the sensor's order."""
     return [channel.name for track in run.tracks for channel in track.channels if channel.kind in READ_FROM_THE_SKIN]
 
@@ -103,19 +103,27 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     if key in _TABLES:
         _TABLES.move_to_end(key)
         return _TABLES[key]
-    made = _tabulate(run, names, largest, within_reach=not only_skin)
-    # Whoever asks first waits for the solving; it belongs to the contact.
-    run.spent_s["contact"] = run.spent_s.get("contact", 0.0) + made.table.solved_s
-    run.elsewhere_s += made.table.solved_s
+    began = run.clock()
+    made, read_s = _tabulate(run, names, largest, within_reach=not only_skin)
+    # Whoever asks first waits for all of it; reading belongs to transduction, the rest to the contact.
+    for effect, spent in (("transduction", read_s), ("contact", run.clock() - began - read_s)):
+        if not spent:
+            continue
+        run.spent_s[effect] = run.spent_s.get(effect, 0.0) + spent
+        run.elsewhere_s += spent
     _TABLES[key] = made
     if len(_TABLES) > _MOST_TABLES:
         _TABLES.popitem(last=False)
     return made
 
 
-def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> _Tabulated:
+def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach: bool) -> tuple[_Tabulated, float]:
+    """Return the table, and the seconds that preparing to read the skin and reading it took."""
     fidelity = run.fidelity
-    press, read = pressed(run, names, fidelity)
+    press = press_of(run, fidelity)
+    began = run.clock()
+    read = reader_of(run, names, fidelity)
+    prepared_s = run.clock() - began
     table = build_table(
         press,
         read,
@@ -133,7 +141,9 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
     if within_reach:
         check_reach(press, largest, outer_mm)
     pad = None if sheet is None else pad_of(sheet, medium.grid)
-    return _Tabulated(table, press.touched_core, closing, film, remarks(press, table.loads_n.tolist(), outer_mm, pad))
+    said = remarks(press, table.loads_n.tolist(), outer_mm, pad)
+    tabulated = _Tabulated(table, press.touched_core, closing, film, said)
+    return tabulated, prepared_s + table.read_s if names else 0.0
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
@@ -182,7 +192,7 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
     if table.touch_down_n is not None:
         low, high = table.touch_down_n
         run.drawn["touch_down_n"] = (low + high) / 2
-        run.settled["core"] = (True, f"the film closes at {(low + high) / 2:.2f} N, within 0.01 N")
+        run.settled["core"] = Settled(True, f"the film closes at {(low + high) / 2:.2f} N, within 0.01 N", None)
     elif not tabulated.touched_core:
         sure = deepest.depth_mm < tabulated.film_mm
         number = (
@@ -190,4 +200,4 @@ def _report(run: Synthesis, tabulated: _Tabulated) -> None:
             if sure
             else f"{-tabulated.closing_mm:.2f} mm of film are left above the asperities"
         )
-        run.settled["core"] = (False, f"never touches the core below {force:g} N: {number}")
+        run.settled["core"] = Settled(False, f"never touches the core below {force:g} N: {number}")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tactbench.plugin import ChannelKind, Reason, Scene, SensorSpec
+from tactbench.plugin import ChannelKind, Reason, Scene, SensorSpec, SkinSheet
 from tactbench.rigs.twin.effects import thermistor
 from tactbench.rigs.twin.effects.heated_core import NEEDED, HeatedCore
 
@@ -28,7 +28,7 @@ def contact_heat(scene: Scene, sensor: SensorSpec) -> Reason:
     """Answer whether a contact warms or cools the core by more than an observed channel would hide.
 
     Behind a contact of conductance G the core follows the indenter, D kelvin away, by at most ``D G t / C`` and never
-    by more than D. G is at most that of a contact as wide as the sheet or the cap.
+    by more than D. G is at most that of a contact whose whole load stands as far out as the cap or the sheet allows.
     """
     observed = [kind for kind in _KINDS if kind in scene.observe]
     if not observed:
@@ -109,13 +109,23 @@ def _apart(scene: Scene, sensor: SensorSpec) -> str:
     )
 
 
+def widest_contact_mm(scene: Scene, sheet: SkinSheet) -> float:
+    """Return what a contact's radius is never above, mm.
+
+    It is sqrt(5/2) times the rms distance of the load from the apex. None of it stands beyond the sheet's other corner,
+    nor beyond a cap's rim, which along the arc is at most pi/2 times as far as straight.
+    """
+    farthest = math.hypot(sheet.x_max.to("mm") - sheet.x_min.to("mm"), sheet.arc.to("mm"))
+    if scene.indenter.radius is not None:
+        farthest = min(farthest, math.pi / 2 * scene.indenter.radius.to("mm"))
+    return math.sqrt(5 / 2) * farthest
+
+
 def _most_k(scene: Scene, sensor: SensorSpec) -> float:
     sheet = None if sensor.skin is None else sensor.skin.sheet
     if sheet is None:
         return 0.0
-    widest = math.sqrt((sheet.x_max.to("mm") - sheet.x_min.to("mm")) * sheet.arc.to("mm") / math.pi)
-    if scene.indenter.radius is not None:
-        widest = min(widest, scene.indenter.radius.to("mm"))
+    widest = widest_contact_mm(scene, sheet)
     conductance = 4e-3 * sensor.parameters["contact_conductivity"].to("W/m/K") * widest
     profile = scene.profile
     # A force loop touches the skin while it waits, too.

@@ -144,3 +144,27 @@ def test_no_cubic_crosses_a_break():
     exact = np.where(fine < 1, fine, 1 + 10 * (fine - 1))
     np.testing.assert_allclose(Interpolant(x, y, breaks=[4])(fine)[:, 0], exact, atol=1e-12)
     assert np.abs(Interpolant(x, y)(fine)[:, 0] - exact).max() > 0.05
+
+
+@given(
+    st.lists(st.floats(0.05, 1.0), min_size=3, max_size=9),
+    st.integers(0, 2**32 - 1),
+    st.floats(0, 1),
+    st.floats(0, 1),
+    st.sampled_from([0.75, 1.0]),
+)
+def test_no_slope_is_steeper_than_the_steepest_and_one_comes_near(gaps, seed, one, other, power):
+    loads = np.concatenate([[0.0], np.cumsum(gaps)])
+    values = np.random.default_rng(seed).standard_normal((loads.size, 3)).cumsum(axis=0)
+    curve = Interpolant(loads, values, [1, 2] if power != 1.0 else [], power)
+    low, high = sorted((one * loads[-1], other * loads[-1]))
+    bound = curve.steepest(low, high)
+    if high - low < 1e-3:
+        assert np.all(np.isfinite(bound))
+        return
+    at = np.linspace(low, high, 4001)
+    seen = np.abs(np.diff(curve(at), axis=0)).max(axis=0) / (at[1] - at[0])
+    # Rounding of the values over the step between two loads.
+    assert np.all(seen <= bound + 1e-13 * np.abs(values).max() / (at[1] - at[0]))
+    # Between pieces of an eighth of an interval the power's factor changes by at most 1.6 to 1.
+    assert np.all(bound <= 1.75 * seen + 1e-9)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import Quantity, RigError
+from tactbench.rigs.twin.contact import newton
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.geometry import Contact, gap_mm
 
@@ -187,9 +188,20 @@ def test_what_is_no_load_is_refused(solver, force):
         solver("icub", 5.0, 0.0).solve(force)
 
 
-def test_an_unreachable_tolerance_is_an_error_and_not_a_result(solver):
+def test_what_did_not_converge_is_an_error_and_not_a_result(solver, monkeypatch):
+    monkeypatch.setattr(newton, "MAX_STEPS", 3)
     with pytest.raises(RigError, match="residual"):
-        solver("biotac", 5.0, -5.0).solve(1.0, tolerance=1e-17)
+        solver("biotac", 5.0, -5.0).solve(1.0)
+
+
+@pytest.mark.parametrize(("name", "radius"), [("biotac", 5.0), ("icub", FLAT)])
+def test_a_tolerance_below_rounding_gives_what_rounding_leaves_and_says_so(solver, name, radius):
+    best = solver(name, radius, PLACES[name]).solve(1.0, tolerance=1e-17)
+    # Above what was asked for, and far below what is handed out by default.
+    assert 1e-17 < best.residual < 1e-9
+    usual = solver(name, radius, PLACES[name]).solve(1.0)
+    # The residual is relative to the load: the energy's curvature makes of 1e-6 of it less than 1e-5 mm.
+    np.testing.assert_allclose(best.deflection_mm, usual.deflection_mm, atol=1e-5)
 
 
 @given(

@@ -132,11 +132,12 @@ def test_what_the_drive_is_made_of_is_printed_with_the_recording(sensors):
     assert said["loop_delay_s"] == pytest.approx(0.01)
 
 
-def test_creep_is_never_left_out_behind_a_loop(specs):
-    slow = {"duration": _q(1e5, "s")}
-    for drive, called in ((None, False), (ForceLoop(), True)):
-        plan = plan_scene(EFFECTS, _scene(drive, **slow), specs["icub"])
-        assert next(entry for entry in plan.entries if entry.effect == "creep").included is called
+def test_creep_is_never_left_out_behind_a_loop(sensors):
+    slow = {"duration": _q(1e5, "s"), "samples": 200}
+    rig = build(RigContext(effects=tuple(EFFECTS)))
+    for drive, called in ((None, False), (ForceLoop(rate=_q(0.01, "Hz")), True)):
+        with rig.open(sensors["icub"], _scene(drive, **slow), seed=1) as recording:
+            assert next(entry for entry in recording.plan if entry.effect == "creep").included is called
 
 
 @pytest.mark.parametrize("wrong", [{"cutoff": 0.0}, {"delay": -1.0}, {"speed": 0.0}, {"integral": float("nan")}])

@@ -1,0 +1,108 @@
+"""The score of one task with recordings that a simulated rig makes for it: what a way of simulating does to it."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from tactbench.core.errors import UsageError
+from tactbench.core.evaluation.metrics import metric_called
+from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.run import carry_out
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.scene import Simulation
+
+
+@dataclass(frozen=True)
+class TaskScore:
+    """A score, and what making its recordings took."""
+
+    task: str
+    estimator: str
+    metric: str
+    unit: str
+    higher_is_better: bool
+    score: float | None
+    """None: there is none, and `reason` says why."""
+    ci_low: float | None
+    ci_high: float | None
+    """95 % interval."""
+    sim_s: float | None
+    """The processor's seconds for all recordings, files not counted."""
+    recordings: int
+    reason: str = ""
+
+
+def quick_estimator(registry: Registry, task: str) -> str:
+    """Return the name of an estimator for `task` that costs little: a linear one that searches no parameters.
+
+    The task's own come first, then those installed, then the task's own whatever they are.
+
+    Raises
+    ------
+    UsageError
+        If nothing that is no trivial answer is installed for this kind of question.
+    """
+    spec = registry.tasks[task].spec
+    fitting = [one for one in registry.estimators if spec.kind in one.kinds and not one.baseline]
+    own = [registry.estimators[name] for name in spec.estimators]
+    for one in (*own, *fitting):
+        if one.linear and not one.grid:
+            return one.name
+    if not (own or fitting):
+        raise UsageError(f"No estimator for task {task!r} is installed.", hint="See `tactbench list estimators`.")
+    return (own or fitting)[0].name
+
+
+def task_score(
+    registry: Registry,
+    rig: str,
+    sensor: str,
+    task: str,
+    simulation: Simulation,
+    *,
+    estimator: str,
+    seed: int,
+    progress: Progress,
+) -> TaskScore:
+    """Record every scene of `task` as `simulation` asks, and answer it; nothing is kept.
+
+    Everything is made anew, in processes of its own: no table of an earlier call makes a later one quicker.
+
+    Raises
+    ------
+    UsageError
+        If a name is unknown or the estimator cannot answer the task.
+    """
+    choice = TaskChoice(name=task, estimators=(EstimatorChoice(name=estimator),))
+    matrix = MatrixSpec(rig=rig, seed=seed, sensors=(sensor,), tasks=(choice,), simulation=simulation, latency=False)
+    with tempfile.TemporaryDirectory(prefix="tactbench-score-") as folder:
+        outcome = carry_out(matrix, Store(Path(folder)), progress=progress)
+    row = next(row for row in outcome.rows if row["estimator"] == estimator)
+    return TaskScore(
+        task=task,
+        estimator=estimator,
+        metric=row["metric"],
+        unit=row["unit"],
+        higher_is_better=metric_called(row["metric"]).higher_is_better,
+        score=row["score"],
+        ci_low=row["ci_low"],
+        ci_high=row["ci_high"],
+        sim_s=row["sim_s"],
+        recordings=len(row["recordings"]),
+        reason=row["reason"],
+    )
+
+
+def with_all_effects(simulation: Simulation | None) -> Simulation:
+    """Return `simulation` with every installed effect asked for."""
+    asked = simulation or Simulation()
+    return asked.model_copy(update={"effects": (*asked.effects, "+all")})
+
+
+def in_unit(score: float, unit: str) -> str:
+    """Return a score as text, its unit behind it where it has one."""
+    return f"{score:.4g}" if unit in ("", "1") else f"{score:.4g} {unit}"

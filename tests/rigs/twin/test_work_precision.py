@@ -1,0 +1,96 @@
+"""The work-precision diagram of every sensor there is: what one cannot have is a row with its reason."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from tactbench.core.cost.precision import measured
+from tactbench.core.matrix.progress import Silence
+from tactbench.plugin import (
+    FluidBackedShell,
+    Indenter,
+    Placement,
+    RigContext,
+    Scene,
+    SensorDescriptor,
+    Simulation,
+    assumed,
+    load_registry,
+)
+from tactbench.rigs.twin import tactbench_effects, work_precision
+from tactbench.rigs.twin.contact.stages import skin_under_load
+from tactbench.rigs.twin.fidelity import RUNGS
+from tactbench.rigs.twin.preparation import prepare
+from tactbench.rigs.twin.rig import build
+from tests.conftest import THIRD_PARTY
+
+
+@pytest.fixture
+def bonded(monkeypatch) -> SensorDescriptor:
+    """A third party's pad: E 0.5 MPa, nu 0.45, 4 mm thick, contact stiffness 10 MPa/mm."""
+    monkeypatch.syspath_prepend(str(THIRD_PARTY / "bonded"))
+    import bonded_tactile
+
+    yield bonded_tactile.tactbench_sensors()[0]
+    for name in [name for name in sys.modules if name.partition(".")[0] == "bonded_tactile"]:
+        del sys.modules[name]
+
+
+@pytest.fixture
+def _little(monkeypatch):
+    """The same diagram with one contact, two loads and few ways: its rows are judged here, not its numbers."""
+    monkeypatch.setattr(work_precision, "RADII_MM", (10.0,))
+    monkeypatch.setattr(work_precision, "LOADS", 2)
+    monkeypatch.setattr(work_precision, "GRIDS", (0.5, 1.0))
+    monkeypatch.setattr(work_precision, "_REFERENCE", RUNGS["default"])
+
+
+@pytest.mark.usefixtures("_little")
+def test_it_runs_for_every_installed_sensor_and_says_what_each_cannot_have(bonded):
+    sensors = list(load_registry().sensors)
+    assert {"biotac", "icub", "ideal", bonded.name} <= {sensor.name for sensor in sensors}
+    for sensor in sensors:
+        points, skipped = measured(work_precision.study(sensor, rounds=1), sensor.name, Silence())
+        assert any(point.default and point.rung == "default" for point in points)
+        none_of_it = isinstance(sensor.spec.skin, FluidBackedShell) or sensor.name == bonded.name
+        assert bool(skipped) is none_of_it
+        assert all(one.label.startswith("closed form") and one.reason for one in skipped)
+        assert ("closed-form" in {one.rung for one in skipped}) is none_of_it
+        assert ("closed-form" in {point.rung for point in points}) is not none_of_it
+
+
+RADII = (None, 2.0, 5.0, 10.0, 40.0)
+
+
+@pytest.mark.parametrize("radius", RADII)
+@pytest.mark.parametrize("rung", ["default", "fine", "reference"])
+def test_a_third_partys_thick_soft_pad_is_solved_without_a_warning(bonded, radius, rung):
+    # Warnings are errors here. Flat, a guess from neighbouring loads leaves the contact altogether.
+    table = _table(bonded, radius, rung)
+    assert np.all(np.isfinite(table.readings))
+    assert table.residual < 2e-6
+
+
+@pytest.mark.parametrize("radius", RADII)
+def test_it_reads_what_the_reference_rung_reads(bonded, radius):
+    loads = np.linspace(0.0, 5.0, 23)
+    own, reference = (_table(bonded, radius, rung)(loads) for rung in ("default", "reference"))
+    if radius is None:
+        # Within a count, of 25: in fact to the tolerance of the solver.
+        assert np.abs(own - reference).max() < 1e-3
+    # The pad's declared contact stiffness is part of the default rung only: 1 % of the signal is what it gives way.
+    assert np.abs(own - reference).max() < 0.01 * np.ptp(reference) + 1e-3
+
+
+def _table(sensor, radius, rung):
+    twin = build(RigContext(effects=tuple(tactbench_effects())))
+    scene = Scene(
+        name="pressed",
+        indenter=Indenter(radius=None if radius is None else assumed(radius, "mm", "test")),
+        placement=Placement(x=assumed(0.1, "mm", "test"), scatter=assumed(0.0, "mm", "test")),
+        simulation=Simulation(rung=rung),
+    )
+    return skin_under_load(prepare(sensor, scene, 1, twin.plan(sensor, scene)))

@@ -1,0 +1,74 @@
+"""A sensor maker's plugin: four taxels on a thick, nearly incompressible layer."""
+
+from tactbench.plugin import (
+    BondedLayer,
+    ChannelSpec,
+    Nuisances,
+    SensorDescriptor,
+    SensorSpec,
+    SkinSheet,
+    Source,
+    StreamSpec,
+    assumed,
+    hookimpl,
+)
+
+TACTBENCH_API = 1
+MINE = "its maker"
+PLACES_MM = ((-1.5, -1.5), (-1.5, 1.5), (1.5, -1.5), (1.5, 1.5))
+
+SPEC = SensorSpec(
+    name="bonded-pad",
+    title="Bonded pad",
+    principle="capacitive",
+    principle_source=Source(tag="sourced", reference=MINE),
+    streams=(
+        StreamSpec(
+            name="taxels",
+            rate_hz=100.0,
+            dtype="uint16",
+            channels=tuple(
+                ChannelSpec(
+                    name=f"t{place}",
+                    kind="taxel",
+                    lower=0,
+                    upper=4095,
+                    rest=assumed(100, "count", MINE),
+                    sign=1,
+                    position_m=(x / 1e3, y / 1e3, 0.0),
+                    normal=(0.0, 0.0, 1.0),
+                )
+                for place, (x, y) in enumerate(PLACES_MM, 1)
+            ),
+        ),
+    ),
+    skin=BondedLayer(
+        sheet=SkinSheet(
+            x_min=assumed(-6, "mm", MINE), x_max=assumed(6, "mm", MINE), arc=assumed(12, "mm", MINE), cells=(32, 32)
+        ),
+        young=assumed(0.5, "MPa", MINE),
+        poisson=assumed(0.45, "1", MINE),
+        thickness=assumed(4, "mm", MINE),
+        contact_stiffness=assumed(10, "MPa/mm", MINE),
+    ),
+    nuisances={
+        "taxel": Nuisances(
+            white=assumed(1, "count", MINE),
+            offset_shared=assumed(0, "count", MINE),
+            offset_own=assumed(1, "count", MINE),
+            offset_session=assumed(0, "count", MINE),
+            gain_scatter=assumed(0, "1", MINE),
+            warm_up=assumed(0, "count", MINE),
+            warm_up_tau=assumed(100, "s", MINE),
+            warm_up_scatter=assumed(0, "1", MINE),
+            wander=assumed(0, "count", MINE),
+            wander_tau=assumed(60, "s", MINE),
+            step=assumed(1, "count", MINE),
+        )
+    },
+)
+
+
+@hookimpl
+def tactbench_sensors():
+    return [SensorDescriptor(spec=SPEC, transducer="bonded_tactile.transduction:build")]
