@@ -42,7 +42,7 @@ def pressed(run: Synthesis, names: list[str], fidelity: Fidelity) -> tuple[AnyPr
     if skin is None or run.sensor.transducer is None:
         raise NotApplicable(f"{spec.name} has no skin and transducer: it can be recorded or replayed, not simulated.")
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
-    gap = gap_mm(grid, run.contact, outer_radius_mm(skin.sheet), skin.sheet.dome)
+    gap = gap_mm(grid, run.contact, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
     read = _reader(run.sensor, grid, names, fidelity) if names else no_channels
     if fidelity.solver == "local":
         from tactbench.rigs.twin.contact.local import LocalPress

@@ -7,7 +7,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, FluidBackedShell, SkinGrid
 from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_poisson, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
-from tactbench.rigs.twin.geometry import film_at_rest_mm
+from tactbench.rigs.twin.geometry import outer_radius_mm
 
 
 class Clamp:
@@ -37,7 +37,7 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
         thickness=thickness,
         mid_radius=skin.mid_radius.to("mm"),
         contact_stiffness=contact_stiffness,
-        gap=skin.gap.to("mm"),
+        thinnest_film=skin.film.least_mm,
         clamp_length=skin.clamp_length.to("mm"),
     )
     require_poisson(poisson)
@@ -48,7 +48,6 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
     hoop = young * thickness / skin.mid_radius.to("mm") ** 2
     stiffness = bending * k2**2 + skin.tension.to("N/mm") * k2 + hoop * spectrum.kx**4 / k2**2
     stiffness[0, 0] = 0.0
-    outer = skin.sheet.outer_radius
     return Medium(
         grid=grid,
         spectrum=spectrum,
@@ -56,12 +55,9 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
         respond=clamp(skin, grid),
         contact_stiffness=contact_stiffness,
         zero_mean=True,
-        rest_thickness_mm=film_at_rest_mm(
-            grid,
-            np.inf if outer is None else outer.to("mm"),
-            gap=skin.gap.to("mm"),
-            gap_side=skin.gap_side.to("mm"),
-            side_fraction=skin.gap_side_fraction.to("1"),
+        # The asperities that keep a film open under load do so without.
+        rest_thickness_mm=np.maximum(
+            skin.film.at(grid.x_mm, grid.s_mm / outer_radius_mm(skin.sheet)), skin.residual_film.to("mm")
         ),
         least_thickness_mm=skin.residual_film.to("mm"),
         low_modes=60,
@@ -80,7 +76,15 @@ def clamp(skin: FluidBackedShell, grid: SkinGrid) -> LocalLaw:
     length, sheet = skin.clamp_length.to("mm"), skin.sheet
     x_min, x_max = sheet.x_min.to("mm"), sheet.x_max.to("mm")
     inset = (x_max - x_min) / sheet.cells[0] / 2
-    inside = np.minimum(grid.x_mm - (x_min + inset), (x_max - inset) - grid.x_mm)
+    inside = (x_max - inset) - grid.x_mm
+    if skin.seal is None:
+        inside = np.minimum(grid.x_mm - (x_min + inset), inside)
     ends = np.exp(-np.maximum(inside, 0.0) / length)
     seam = np.exp(-(skin.sheet.arc.to("mm") / 2 - np.abs(grid.s_mm)) / length)
-    return Clamp(skin.clamp_stiffness.to("MPa/mm") * (ends[:, None] + seam[None, :]))
+    foundation = skin.clamp_stiffness.to("MPa/mm") * (ends[:, None] + seam[None, :])
+    if skin.seal is not None:
+        place, bond = skin.seal[0].to("mm"), skin.seal[1].to("MPa/mm")
+        dx, _ = grid.cell_mm
+        behind = np.clip((place - grid.x_mm) / dx + 0.5, 0.0, 1.0)[:, None]
+        foundation = behind * bond + (1.0 - behind) * foundation
+    return Clamp(foundation)

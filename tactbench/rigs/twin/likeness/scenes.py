@@ -169,7 +169,7 @@ def gives(sensor: SensorDescriptor, kind: ChannelKind) -> bool:
 def _plate(sensor: SensorDescriptor) -> Evidence:
     """Press flat plates, tilted towards the tip as a hand held them."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
-    surface = finger_surface_mm(bench.grid, outer, bench.dome)
+    surface = finger_surface_mm(bench.grid, outer, bench.sheet.dome, bench.sheet.relief)
     normals = np.array([channel.normal for channel in sensor.spec.channels("taxel")])
     changes, pressures, angles = [], [], []
     for tilt in TILTS_DEG:
@@ -188,23 +188,20 @@ def _plate(sensor: SensorDescriptor) -> Evidence:
 
 
 def _pointed(sensor: SensorDescriptor) -> Evidence:
-    """Press a blunt point over electrode 1, at the sheet's own place for it."""
+    """Press a blunt point over electrode 1, radially above it: it lies on the cylinder."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
-    par = sensor.spec.parameters
     place = sensor.spec.channels("taxel")[0].position_m
     if place is None:
         raise NotApplicable(f"the first taxel of {sensor.name} has no place")
     x, y, z = (1e3 * component for component in place)
-    core = par["core_radius"].to("mm")
-    axial = x if x <= 0 else par["dome_shortening"].value * core * math.asin(min(x / core, 1.0))
-    change, pressure = bench.press_cap(POINT_RADIUS_MM, axial, outer * math.atan2(y, -z), POINT_N)
+    change, pressure = bench.press_cap(POINT_RADIUS_MM, x, outer * math.atan2(y, -z), POINT_N)
     return Evidence(_names(sensor.spec), change=change, pressure=pressure)
 
 
 def _release(sensor: SensorDescriptor) -> Evidence:
     """Hold plates for ten seconds and release them: what creep leaves one second later, with the spec's own terms."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
-    surface = finger_surface_mm(bench.grid, outer, bench.dome)
+    surface = finger_surface_mm(bench.grid, outer, bench.sheet.dome, bench.sheet.relief)
     held, after_s, loads = 10.0, 1.0, (2.0, 5.0, 10.0)
     share = sum(
         term.fraction.to("1") * -math.expm1(-held / term.tau.to("s")) * math.exp(-after_s / term.tau.to("s"))
