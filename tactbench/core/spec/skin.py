@@ -117,11 +117,8 @@ class FluidBackedShell(Frozen):
     """The fluid film at rest."""
     residual_film: Quantity
     """Film that asperities keep open at touch-down [length]."""
-    seal: tuple[Quantity, Quantity] | None = None
-    """Axial coordinate of a seal behind which the skin is bonded to the core [length], and the stiffness with which it
-    is held there [pressure / length]; None: the film goes on to the sheet's end."""
     clamp_stiffness: Quantity
-    """Soft clamp at the sleeve's ends and seam [pressure / length]."""
+    """Clamp at the sleeve's ends and seam [pressure / length]."""
     clamp_length: Quantity
     """Decay length of that clamp [length]."""
 

@@ -8,7 +8,10 @@ from tactbench.plugin import FloatArray, SheetTable, SkinGrid, Source
 from tactbench.sensors.biotac.surface import MESHES, RAYS_FROM_MM, core_mm, ray_length, ray_on_sheet
 
 REFINEMENT = 2
-"""Conduction cells per skin cell and axis: the mechanics converges at 64 x 64 cells, the conduction does not."""
+"""Steps of refinement from the skin's grid to the conduction's."""
+_CELLS_PER_STEP = 0.75, 0.515
+"""Conduction cells along and across, for one of the skin's and one step: about square on the film, whose arc is shorter
+than the outer surface's. At two steps, 96 x 66 cells, changes are off by 0.6 % of their rms; at three, by 0.5 %."""
 
 ANGLES_DEG = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
 AT_X_MM: dict[float, tuple[float, ...]] = {
@@ -104,17 +107,13 @@ def _places(outer_mm: float, dome_mm: float) -> tuple[float, ...]:
     return (*AT_X_MM, *rays)
 
 
-def refined(grid: SkinGrid, factor: int = REFINEMENT, shrink_s: float = 1.0) -> SkinGrid:
-    """Return the same sheet with `factor` cells per cell and axis; centres of cells, not nodes.
-
-    Along the arc there are `shrink_s` times as many, rounded: cells about as square on a film whose arc is that much
-    shorter than the outer surface's.
-    """
-    across = max(2, round(grid.s_mm.size * factor * shrink_s))
-    return SkinGrid(
-        x_mm=_divided_axis(grid.x_mm, grid.x_mm.size * factor),
-        s_mm=_divided_axis(grid.s_mm, across),
+def refined(grid: SkinGrid, factor: int = REFINEMENT) -> SkinGrid:
+    """Return the same sheet in the conduction's cells; centres of cells, not nodes."""
+    along, across = (
+        max(2, round(axis.size * factor * cells))
+        for axis, cells in zip((grid.x_mm, grid.s_mm), _CELLS_PER_STEP, strict=True)
     )
+    return SkinGrid(x_mm=_divided_axis(grid.x_mm, along), s_mm=_divided_axis(grid.s_mm, across))
 
 
 def edges(centres: FloatArray) -> FloatArray:

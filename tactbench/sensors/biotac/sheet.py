@@ -112,7 +112,7 @@ class FilmSheet:
             right = _forward(factor, right)
             coupled += right.T @ right
             # Of the elimination only the last row touches the separator.
-            edge = _forward(factor[:, -width:], np.diag(link))
+            edge = _last_block(factor, width) * link
             passed, lost = edge.T @ right[-width:], edge.T @ edge
             separator -= lost[::-1, ::-1] if reverse else lost
             gathered += passed[::-1] if reverse else passed
@@ -178,6 +178,17 @@ def _forward(factor: npt.NDArray[np.float64], right: FloatArray) -> FloatArray:
             found, _ = lapack.dtbtrs(factor[:, first:], right[first:, column : column + 1], uplo="L")
             out[first:, column] = found[:, 0]
     return out
+
+
+def _last_block(factor: npt.NDArray[np.float64], width: int) -> FloatArray:
+    """Return the (width, width) inverse of the factor's last block."""
+    from scipy.linalg import lapack
+
+    lower = np.zeros((width, width), order="F")
+    for below in range(width):
+        np.fill_diagonal(lower[below:], factor[below, factor.shape[1] - width : factor.shape[1] - below])
+    found, _ = lapack.dtrtri(lower, lower=1)
+    return np.asarray(found)
 
 
 def _unsolved() -> RigError:

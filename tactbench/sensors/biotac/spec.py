@@ -26,12 +26,9 @@ from tactbench.sensors.biotac.thermal import THERMAL
 _MESH = MESHES
 
 _OUTER_MM, _DOME_MM, _SKIN_MM = 7.8, 1.4, 1.6
-_CELL_MM = (9.2 + 17.2) / 61
-"""Three of the sheet's 64 cells along the finger lie behind the seal."""
-
 SKIN = FluidBackedShell(
     sheet=SkinSheet(
-        x_min=assumed(-17.2 - 3 * _CELL_MM, "mm", "three cells of bonded skin behind the seal"),
+        x_min=derived(-17.2, "mm", f"the seal, where the film ends; {_MESH}"),
         x_max=derived(_DOME_MM + _OUTER_MM, "mm", "the dome's end"),
         arc=derived(math.pi * _OUTER_MM, "mm", "half of the circumference at the outer radius"),
         dome=Dome(
@@ -58,12 +55,8 @@ SKIN = FluidBackedShell(
     core_stiffness=assumed(6.0, "MPa/mm", "penalty, stiff beside the skin"),
     film=film_table(_OUTER_MM, _DOME_MM),
     residual_film=assumed(0.06, "mm", "asperities of the inner skin keep a film open at touch-down"),
-    seal=(
-        derived(-17.2, "mm", f"the film ends there; {_MESH}"),
-        derived(4.39, "MPa/mm", "E (1 - nu) / ((1 + nu) (1 - 2 nu) t): skin bonded to the core, pressed through its thickness"),
-    ),
-    clamp_stiffness=assumed(0.5, "MPa/mm", "soft clamp instead of the real seam and nail"),
-    clamp_length=assumed(1.0, "mm", "soft clamp instead of the real seam and nail"),
+    clamp_stiffness=assumed(0.5, "MPa/mm", "soft clamp instead of the real seal, seam and nail"),
+    clamp_length=assumed(1.0, "mm", "soft clamp instead of the real seal, seam and nail"),
 )
 
 _EXCITATION = (
@@ -76,7 +69,7 @@ PARAMETERS: dict[str, Quantity] = {
     "contact_s": assumed(0.0, "mm", "on the midline"),
     "core_radius": sourced(5.08, "mm", "radius on which the electrode table lies, e.g. sqrt(3.513^2 + 3.670^2)"),
     "conductivity": assumed(
-        0.3908, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
+        0.3904, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
     ),
     "reference_resistor": sourced(10e3, "ohm", f"10 kOhm; {MANUAL}"),
     "electrode_radius": assumed(0.6, "mm", "no source"),

@@ -15,7 +15,7 @@ from tactbench.sensors.biotac.discs import discs_on, dome_mm, outer_radius_mm, s
 from tactbench.sensors.biotac.electrodes import NAMES
 from tactbench.sensors.biotac.film import REFINEMENT, edges, refined, spectral_interpolation
 from tactbench.sensors.biotac.sheet import FilmSheet, faces_between
-from tactbench.sensors.biotac.surface import CORE_MM, mid_film_mm
+from tactbench.sensors.biotac.surface import mid_film_mm
 
 
 class Preparation:
@@ -25,12 +25,9 @@ class Preparation:
         self.skin = shell_of(sensor)
         outer, dome = outer_radius_mm(sensor), dome_mm(sensor)
         self.coarse_film = self.skin.film.at(grid.x_mm, grid.s_mm / outer)
-        whole = refined(grid, refinement, shrink_s=CORE_MM / outer)
-        # Behind the seal there is no film.
-        filled = slice(0 if self.skin.seal is None else int(np.searchsorted(whole.x_mm, self.skin.seal[0].to("mm"))), None)
-        fine = SkinGrid(x_mm=whole.x_mm[filled], s_mm=whole.s_mm)
+        fine = refined(grid, refinement)
         self.film = self.skin.film.at(fine.x_mm, fine.s_mm / outer)
-        self.to_fine_x = spectral_interpolation(len(grid.x_mm), len(whole.x_mm))[filled]
+        self.to_fine_x = spectral_interpolation(len(grid.x_mm), len(fine.x_mm))
         self.to_fine_s = np.ascontiguousarray(spectral_interpolation(len(grid.s_mm), len(fine.s_mm)).T)
         self.residual_film = self.skin.residual_film.to("mm")
         # S/m times ohm is 1/m: a length, the only electrical scale of the problem.

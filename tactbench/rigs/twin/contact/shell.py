@@ -76,15 +76,7 @@ def clamp(skin: FluidBackedShell, grid: SkinGrid) -> LocalLaw:
     length, sheet = skin.clamp_length.to("mm"), skin.sheet
     x_min, x_max = sheet.x_min.to("mm"), sheet.x_max.to("mm")
     inset = (x_max - x_min) / sheet.cells[0] / 2
-    inside = (x_max - inset) - grid.x_mm
-    if skin.seal is None:
-        inside = np.minimum(grid.x_mm - (x_min + inset), inside)
+    inside = np.minimum(grid.x_mm - (x_min + inset), (x_max - inset) - grid.x_mm)
     ends = np.exp(-np.maximum(inside, 0.0) / length)
     seam = np.exp(-(skin.sheet.arc.to("mm") / 2 - np.abs(grid.s_mm)) / length)
-    foundation = skin.clamp_stiffness.to("MPa/mm") * (ends[:, None] + seam[None, :])
-    if skin.seal is not None:
-        place, bond = skin.seal[0].to("mm"), skin.seal[1].to("MPa/mm")
-        dx, _ = grid.cell_mm
-        behind = np.clip((place - grid.x_mm) / dx + 0.5, 0.0, 1.0)[:, None]
-        foundation = behind * bond + (1.0 - behind) * foundation
-    return Clamp(foundation)
+    return Clamp(skin.clamp_stiffness.to("MPa/mm") * (ends[:, None] + seam[None, :]))
