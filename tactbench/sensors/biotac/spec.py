@@ -69,7 +69,7 @@ PARAMETERS: dict[str, Quantity] = {
     "contact_s": assumed(0.0, "mm", "on the midline"),
     "core_radius": sourced(5.08, "mm", "radius on which the electrode table lies, e.g. sqrt(3.513^2 + 3.670^2)"),
     "conductivity": assumed(
-        0.3904, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
+        0.391, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
     ),
     "reference_resistor": sourced(10e3, "ohm", f"10 kOhm; {MANUAL}"),
     "electrode_radius": assumed(0.6, "mm", "no source"),

@@ -50,8 +50,10 @@ def medium() -> Callable[..., Medium]:
 def solver(medium: Callable[..., Medium]) -> SolverOf:
     def make(name: str, radius: float, x: float, s: float = 0.0, **more: object) -> NewtonSolver:
         made = medium(name, **more)
-        outer = SPECS[name].skin.sheet.outer_radius.to("mm")
-        return NewtonSolver(made, gap_mm(made.grid, Contact(radius, x, s), outer))
+        sheet = SPECS[name].skin.sheet
+        return NewtonSolver(
+            made, gap_mm(made.grid, Contact(radius, x, s), sheet.outer_radius.to("mm"), sheet.dome, sheet.relief)
+        )
 
     return make
 
