@@ -26,7 +26,7 @@ from tactbench.rigs.twin.contact.preconditioner import Preconditioner
 
 TOLERANCE = 1e-6
 """Largest relative residual of a solution that is handed out."""
-ROUGH_TOLERANCE = 3e-3
+ROUGH_TOLERANCE = 1e-3
 """The same for passes whose pressure only lowers the gap of the next."""
 MAX_STEPS = 40
 """Newton steps before giving up; the hard cases of the tests take up to 25 from a cold start."""
