@@ -63,7 +63,7 @@ from tactbench.core.spec.sensor import (
     SensorSpec,
     StreamSpec,
 )
-from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPad, Skin, SkinSheet
+from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPad, SheetTable, Skin, SkinSheet
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
 
 if TYPE_CHECKING:
@@ -120,6 +120,7 @@ __all__ = [
     "Scene",
     "SensorDescriptor",
     "SensorSpec",
+    "SheetTable",
     "Shelf",
     "Simulation",
     "Skin",

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tactbench.plugin import BondedLayer, FloatArray, FluidBackedShell, FoamPad, SensorSpec, SkinGrid, SkinState
-from tactbench.sensors.biotac.film import film_at_rest
 
 
 def grid_of(spec: SensorSpec, factor: float = 1.0) -> SkinGrid:
@@ -26,7 +25,10 @@ def state_of(spec: SensorSpec, grid: SkinGrid, deflection: FloatArray, **facts: 
     skin = spec.skin
     match skin:
         case FluidBackedShell():
-            left = np.maximum(film_at_rest(skin, grid.s_mm)[None, :] - deflection, skin.residual_film.to("mm"))
+            least = skin.residual_film.to("mm")
+            assert skin.sheet.outer_radius is not None
+            rest = np.maximum(skin.film.at(grid.x_mm, grid.s_mm / skin.sheet.outer_radius.to("mm")), least)
+            left = np.maximum(rest - deflection, least)
         case FoamPad() | BondedLayer():
             left = skin.thickness.to("mm") - deflection
         case None:

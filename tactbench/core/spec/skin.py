@@ -5,20 +5,75 @@ A third party's sensor runs on the twin by declaring one of these media. The equ
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import itertools
+import math
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from tactbench.core.spec.quantity import Frozen, Quantity
+from tactbench.core.spec.quantity import Frozen, Quantity, Source
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 
 class Dome(Frozen):
-    """A finger's tip: where its cylinder ends in a dome of the same radius."""
+    """A finger's tip: where its cylinder ends in a hemisphere of the same radius.
+
+    On the sheet a point of the dome keeps its axial coordinate: cylinder and hemisphere then have the sheet's own area
+    everywhere (Archimedes; Lambert's cylindrical projection), so that loads and volumes are the finger's.
+    """
 
     start: Quantity
-    """Axial coordinate of the sheet at which the dome begins; towards positive x [length]."""
-    arc_per_radian: Quantity
-    """Length of the sheet for one radian of the dome's meridian [length]."""
+    """Axial coordinate at which the dome begins; towards positive x [length]."""
+
+
+class SheetTable(Frozen):
+    """A length over the sheet, symmetric about the midline: a film's thickness, or a surface's relief.
+
+    Straight between the entries, and even beyond the outermost: it never leaves the range of its neighbours.
+    """
+
+    x_mm: tuple[float, ...]
+    """Axial coordinates of the sheet, ascending."""
+    angle_deg: tuple[float, ...]
+    """Angles around the finger from its midline, ascending."""
+    value_mm: tuple[tuple[float, ...], ...]
+    """A row for each of `x_mm`, a column for each of `angle_deg`."""
+    source: Source
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> SheetTable:
+        shape = {len(self.angle_deg)} == {len(row) for row in self.value_mm}
+        ascending = all(a < b for axis in (self.x_mm, self.angle_deg) for a, b in itertools.pairwise(axis))
+        finite = all(math.isfinite(value) for row in self.value_mm for value in row)
+        if not (shape and self.x_mm and len(self.value_mm) == len(self.x_mm) and ascending and finite):
+            raise ValueError("a table over a sheet needs ascending axes and one finite length for each pair of them")
+        return self
+
+    @property
+    def least_mm(self) -> float:
+        """The smallest entry."""
+        return min(map(min, self.value_mm))
+
+    @property
+    def most_mm(self) -> float:
+        """The largest entry."""
+        return max(map(max, self.value_mm))
+
+    def at(self, x_mm: npt.NDArray[np.float64], angle_rad: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return the (nx, ns) lengths [mm] at (nx,) axial coordinates and (ns,) angles from the midline."""
+        import numpy as np
+
+        rows, angle = np.array(self.value_mm), np.abs(np.degrees(angle_rad))
+        around = np.stack([np.interp(angle, self.angle_deg, row) for row in rows])
+        place = np.interp(x_mm, self.x_mm, np.arange(rows.shape[0], dtype=np.float64))
+        low = np.minimum(place.astype(np.intp), max(rows.shape[0] - 2, 0))
+        share = (place - low)[:, None]
+        above = np.minimum(low + 1, rows.shape[0] - 1)
+        found: npt.NDArray[np.float64] = (1.0 - share) * around[low] + share * around[above]
+        return found
 
 
 class SkinSheet(Frozen):
@@ -34,6 +89,8 @@ class SkinSheet(Frozen):
     """Radius of the finger's outer surface [length]; None for a flat pad."""
     dome: Dome | None = None
     """The tip, where the finger ends in one; None: a cylinder (or a flat pad) throughout."""
+    relief: SheetTable | None = None
+    """How far the finger's unloaded surface lies inside that cylinder and dome; None: nowhere."""
     cells: tuple[int, int] = (48, 64)
     """Default grid, axial x arc."""
     pad: tuple[Quantity, Quantity, Quantity] | None = None
@@ -56,16 +113,12 @@ class FluidBackedShell(Frozen):
     """Through-thickness stiffness of the skin under an indenter [pressure / length]."""
     core_stiffness: Quantity
     """Penalty of the core once the film is closed [pressure / length]."""
-    gap: Quantity
-    """Film thickness at rest under the pad [length]."""
-    gap_side: Quantity
-    """Film thickness at rest at the sides [length]."""
-    gap_side_fraction: Quantity
-    """How much of the gap is lost at the sides before `gap_side` holds [1]."""
+    film: SheetTable
+    """The fluid film at rest."""
     residual_film: Quantity
     """Film that asperities keep open at touch-down [length]."""
     clamp_stiffness: Quantity
-    """Soft clamp at the sleeve's ends and seam [pressure / length]."""
+    """Clamp at the sleeve's ends and seam [pressure / length]."""
     clamp_length: Quantity
     """Decay length of that clamp [length]."""
 

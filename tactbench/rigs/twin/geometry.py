@@ -1,4 +1,4 @@
-"""The unrolled skin: its grid, the gap to an indenter, the film at rest. Millimetres.
+"""The unrolled skin: its grid, the gap to an indenter. Millimetres.
 
 ``x`` runs along the finger, ``s`` along the arc of its outer surface; ``theta = s / outer radius``.
 """
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import Dome, FloatArray, Indenter, RigError, SkinGrid, SkinSheet
+from tactbench.plugin import Dome, FloatArray, Indenter, RigError, SheetTable, SkinGrid, SkinSheet
 
 STEEPEST = 1.0
 """Largest slope of an indenter, 45 degrees: the gap is taken along the press axis and the deflection along the skin's
@@ -90,19 +90,25 @@ def radius_mm(indenter: Indenter) -> float:
     return math.inf if indenter.radius is None else indenter.radius.to("mm")
 
 
-def gap_mm(grid: SkinGrid, contact: Contact, outer_radius_mm: float = math.inf, dome: Dome | None = None) -> FloatArray:
+def gap_mm(
+    grid: SkinGrid,
+    contact: Contact,
+    outer_radius_mm: float = math.inf,
+    dome: Dome | None = None,
+    relief: SheetTable | None = None,
+) -> FloatArray:
     """Return the (nx, ns) gap between the unloaded skin and the indenter at zero approach.
 
     The press axis is the skin's normal at the contact, on the dome as on the cylinder. The fall-away of the finger
     (``2 Ro sin²(theta/2)`` on the cylinder) and the sag of the cap ``r² / (R + sqrt(R² - r²))`` are written so that
     nothing cancels: R = 1e9 mm and a flat surface agree to rounding. With a tilt the smallest gap is subtracted, so
-    that the approach keeps its origin.
+    that the approach keeps its origin. With a relief the press axis stays that normal.
     """
     if math.isinf(outer_radius_mm):
         x, y = grid.x_mm[:, None] - contact.x_mm, grid.s_mm[None, :] - contact.s_mm
         fall = np.zeros((1, 1))
     else:
-        x, y, fall = _around(grid, contact, outer_radius_mm, dome)
+        x, y, fall = _around(grid, contact, outer_radius_mm, dome, relief)
     gap: FloatArray = fall + _sag(x**2 + y**2, contact.radius_mm)
     if contact.tilt_x or contact.tilt_s:
         gap = gap + contact.tilt_x * x + contact.tilt_s * y
@@ -111,12 +117,12 @@ def gap_mm(grid: SkinGrid, contact: Contact, outer_radius_mm: float = math.inf, 
 
 
 def _around(
-    grid: SkinGrid, contact: Contact, outer_radius_mm: float, dome: Dome | None
+    grid: SkinGrid, contact: Contact, outer_radius_mm: float, dome: Dome | None, relief: SheetTable | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return where the finger's surface lies as seen from the contact: along, across, and below its tangent plane.
 
     A point at meridian angle phi (0 on the cylinder) and angle theta from the contact lies at ``(X, Ro cos(phi)
-    sin(theta), -Ro cos(phi) cos(theta))`` with ``X = x`` up to the dome and ``Ro sin(phi)`` more on it; the differences
+    sin(theta), -Ro cos(phi) cos(theta))`` with ``sin(phi) = (X - start) / Ro`` on the dome; the differences
     to the contact's own point are turned by its meridian angle.
     """
     radius = outer_radius_mm
@@ -128,6 +134,12 @@ def _around(
     # cos(phi0) - cos(phi) cos(theta), without the difference of two numbers near one.
     below = 2.0 * radius * np.sin((phi + phi0) / 2) * np.sin((phi - phi0) / 2) + 2.0 * ring * np.sin(theta / 2) ** 2
     across = ring * np.sin(theta)
+    if relief is not None:
+        own = relief.at(np.array([contact.x_mm]), np.array([contact.s_mm / radius]))[0, 0]
+        inside = relief.at(grid.x_mm, grid.s_mm / radius)
+        along = along - inside * np.sin(phi) + own * np.sin(phi0)
+        across = across - inside * np.cos(phi) * np.sin(theta)
+        below = below + inside * np.cos(phi) * np.cos(theta) - own * np.cos(phi0)
     return (
         np.cos(phi0) * along + np.sin(phi0) * below,
         across,
@@ -136,22 +148,22 @@ def _around(
 
 
 def finger_surface_mm(
-    grid: SkinGrid, outer_radius_mm: float, dome: Dome | None = None
+    grid: SkinGrid, outer_radius_mm: float, dome: Dome | None = None, relief: SheetTable | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the (nx, ns) places of the cells on the unloaded finger: axial, across, and height (the pad is below)."""
     theta = grid.s_mm[None, :] / outer_radius_mm
     phi, axial = _meridian(grid.x_mm[:, None], outer_radius_mm, dome)
-    ring = outer_radius_mm * np.cos(phi)
-    return axial + np.zeros_like(theta), ring * np.sin(theta), -ring * np.cos(theta)
+    inside = 0.0 if relief is None else relief.at(grid.x_mm, grid.s_mm / outer_radius_mm)
+    ring = (outer_radius_mm - inside) * np.cos(phi)
+    return axial - inside * np.sin(phi) + np.zeros_like(theta), ring * np.sin(theta), -ring * np.cos(theta)
 
 
 def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[FloatArray, FloatArray]:
-    """Return the meridian angle at `x_mm` and the true axial place."""
+    """Return the meridian angle at `x_mm` and the axial place on the finger's surface: its own up to the dome's end."""
     if dome is None:
         return np.zeros_like(x_mm), x_mm
     start = dome.start.to("mm")
-    phi = np.clip((x_mm - start) / dome.arc_per_radian.to("mm"), 0.0, math.pi / 2)
-    return phi, np.minimum(x_mm, start) + radius * np.sin(phi)
+    return np.arcsin(np.clip((x_mm - start) / radius, 0.0, 1.0)), np.minimum(x_mm, start + radius)
 
 
 def _sag(r2: FloatArray, radius: float) -> FloatArray:
@@ -160,20 +172,6 @@ def _sag(r2: FloatArray, radius: float) -> FloatArray:
     exists = r2 < (RIM * radius) ** 2
     inside = np.where(exists, r2, 0.0)
     return np.where(exists, inside / (radius + np.sqrt(radius**2 - inside)), radius + BEYOND_THE_CAP_MM)
-
-
-def film_at_rest_mm(
-    grid: SkinGrid, outer_radius_mm: float, *, gap: float, gap_side: float, side_fraction: float
-) -> FloatArray:
-    """Return the (nx, ns) film thickness with nothing touching.
-
-    ``max(gap (1 - f c²), gap_side)`` with ``c = clip((|theta| - 0.6) / 1.0, 0, 1)``: fitted by eye to the public
-    meshes of skin and core.
-    """
-    theta = np.abs(grid.s_mm) / outer_radius_mm
-    side = np.clip(theta - 0.6, 0.0, 1.0)
-    film = np.maximum(gap * (1.0 - side_fraction * side**2), gap_side)
-    return np.broadcast_to(film, (grid.x_mm.size, grid.s_mm.size)).copy()
 
 
 def check_contact(grid: SkinGrid, contact: Contact) -> None:

@@ -12,7 +12,10 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, FluidBackedShell, RigError, SensorSpec, SkinGrid
 from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
+from tactbench.sensors.biotac.surface import mid_film_mm, sheet_x
 
+_STEP_MM = 0.1
+"""Over which the film's stretch under a disc is taken: an eighth of the disc or less."""
 DEPTH_AVERAGE = 3.0
 """Contact conductance of a thin film times h / (sigma A)."""
 
@@ -118,11 +121,8 @@ def disc_overlap(
     return overlap
 
 
-def discs_on(sensor: SensorSpec, grid: SkinGrid) -> tuple[RimmedDiscs, tuple[float, float]]:
-    """Return electrodes and excitation on the cells of `grid`, and the cells' size in the film.
-
-    Places on the core are taken over by angle, axial places on the dome by a shortened meridian arc. Lengths along
-    the arc are those at the film's own radius, not at the outer surface, on which `grid` is laid out.
+def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:
+    """Return electrodes and excitation on the cells of `grid`, round in the metric of the film's middle.
 
     Raises
     ------
@@ -130,24 +130,31 @@ def discs_on(sensor: SensorSpec, grid: SkinGrid) -> tuple[RimmedDiscs, tuple[flo
         If an electrode has no position, or lies outside the sheet.
     """
     par = sensor.parameters
-    core, film = par["core_radius"].to("mm"), par["film_radius"].to("mm")
-    outer = outer_radius_mm(sensor)
-    s_film = grid.s_mm * (film / outer)
-    dx, ds = grid.cell_mm
     electrode_radius, excitation_radius = par["electrode_radius"].to("mm"), par["excitation_radius"].to("mm")
+    outer, dome = outer_radius_mm(sensor), dome_mm(sensor)
     electrodes = []
     for channel in sensor.channels("taxel"):
         if channel.position_m is None:
             raise RigError(f"{channel.name} of {sensor.name} has no position.", hint="Give ChannelSpec.position_m.")
         x, y, z = (1e3 * component for component in channel.position_m)
-        axial = x if x <= 0.0 else par["dome_shortening"].value * core * np.arcsin(min(x / core, 1.0))
-        centre = (float(axial), float(film * np.arctan2(y, -z)))
-        electrodes.append(Disc(*centre, electrode_radius))
+        place = sheet_x(x, float(np.hypot(y, z)), outer, dome)
+        electrodes.append(_disc(sensor, place, float(np.arctan2(y, -z)), electrode_radius))
     excitation = []
     for pair in ("front", "back"):
-        x, arc = par[f"excitation_x_{pair}"].to("mm"), par[f"excitation_arc_{pair}"].to("mm") * film / core
-        excitation += [Disc(x, side, excitation_radius) for side in (-arc, arc)]
-    return RimmedDiscs(grid.x_mm, s_film, electrodes, excitation), (dx, ds * film / outer)
+        x = par[f"excitation_x_{pair}"].to("mm")
+        angle = par[f"excitation_arc_{pair}"].to("mm") / par["core_radius"].to("mm")
+        excitation += [_disc(sensor, x, side, excitation_radius) for side in (-angle, angle)]
+    return RimmedDiscs(grid.x_mm, grid.s_mm, electrodes, excitation)
+
+
+def _disc(sensor: SensorSpec, x_mm: float, angle_rad: float, radius_mm: float) -> Disc:
+    """Return a disc at a place of the sheet, with the stretch of the film's middle there."""
+    outer = outer_radius_mm(sensor)
+    x, angle = x_mm + _STEP_MM * np.array([-1.0, 1.0]), angle_rad + _STEP_MM / outer * np.array([-1.0, 1.0])
+    corners = mid_film_mm(x, angle, shell_of(sensor).film.at(x, angle), outer, dome_mm(sensor))
+    along, across = corners[1] - corners[0], corners[:, 1] - corners[:, 0]
+    stretch = tuple(float(np.linalg.norm(way.mean(axis=0))) / (2 * _STEP_MM) for way in (along, across))
+    return Disc(x_mm, angle_rad * outer, radius_mm, (stretch[0], stretch[1]))
 
 
 def shell_of(sensor: SensorSpec) -> FluidBackedShell:
@@ -166,3 +173,11 @@ def outer_radius_mm(sensor: SensorSpec) -> float:
     if radius is None:
         raise RigError(f"The skin of {sensor.name} states no outer radius.", hint="Give SkinSheet.outer_radius.")
     return radius.to("mm")
+
+
+def dome_mm(sensor: SensorSpec) -> float:
+    """Return where the finger's dome begins; raises RigError if the sheet states none."""
+    dome = shell_of(sensor).sheet.dome
+    if dome is None:
+        raise RigError(f"The skin of {sensor.name} states no dome.", hint="Give SkinSheet.dome.")
+    return dome.start.to("mm")

@@ -34,11 +34,14 @@ _THICK = 1e4
 
 
 class Disc(NamedTuple):
-    """A round contact on the core, millimetres in the film's own metric."""
+    """A round contact on the core; its place in the grid's coordinates."""
 
     x_mm: float
     s_mm: float
     radius_mm: float
+    """In the film's own metric."""
+    stretch: tuple[float, float] = (1.0, 1.0)
+    """Millimetres of the film for one of the grid's, along x and s, there."""
 
 
 class RimmedDiscs:
@@ -47,7 +50,7 @@ class RimmedDiscs:
     Parameters
     ----------
     x_mm, s_mm
-        (nx,), (ns,) centres of the cells in the film's own metric.
+        (nx,), (ns,) centres of the cells.
     electrodes, excitation
         The discs.
 
@@ -59,18 +62,17 @@ class RimmedDiscs:
 
     def __init__(self, x_mm: FloatArray, s_mm: FloatArray, electrodes: Sequence[Disc], excitation: Sequence[Disc]):
         self.count = len(electrodes)
-        step = (float(x_mm[1] - x_mm[0]), float(s_mm[1] - s_mm[0]))
-        self._area = step[0] * step[1]
+        cell = (float(x_mm[1] - x_mm[0]), float(s_mm[1] - s_mm[0]))
         discs = [*electrodes, *excitation]
         owner, row, column = [], [], []
         offset: list[npt.NDArray[np.float64]] = []
         for number, disc in enumerate(discs):
-            along, across = x_mm - disc.x_mm, s_mm - disc.s_mm
+            along, across = (x_mm - disc.x_mm) * disc.stretch[0], (s_mm - disc.s_mm) * disc.stretch[1]
             i, j = np.nonzero(along[:, None] ** 2 + across[None, :] ** 2 < disc.radius_mm**2)
             if i.size == 0:
                 raise RigError(
                     f"An electrode of {disc.radius_mm:g} mm at {disc.x_mm:.2f}, {disc.s_mm:.2f} mm covers no cell of "
-                    f"a conduction grid of {step[0]:.2f} x {step[1]:.2f} mm.",
+                    f"a conduction grid of {cell[0]:.2f} x {cell[1]:.2f} mm.",
                     hint="Correct the sensor's electrode positions or its SkinSheet, or ask for more cells.",
                 )
             owner.append(np.full(i.size, number))
@@ -79,12 +81,15 @@ class RimmedDiscs:
             offset.append(np.stack([along[i], across[j]]))
         whose, i, j = np.concatenate(owner), np.concatenate(row), np.concatenate(column)
         self._radius = np.array([disc.radius_mm for disc in discs])[whose]
+        # Of each cell, as large as its disc's own stretch makes it.
+        step = np.array(cell)[:, None] * np.array([disc.stretch for disc in discs])[whose].T
+        self._area = step[0] * step[1]
         self._cell = i * s_mm.size + j
         electrode = whose < self.count
         self.owner, self.under = whose[electrode], self._cell[electrode]
         self._driven = self._cell[~electrode]
         self._rims(np.concatenate(offset, axis=1), whose, i, j, step, (x_mm.size, s_mm.size))
-        plain = np.full(whose.size, self._area)
+        plain = self._area.copy()
         plain[self._beside] = self._beside_rim(np.full(self._beside.size, _THICK)) * _THICK**2
         true_area = np.array([np.pi * disc.radius_mm**2 for disc in discs])
         # A staircase of cells has the disc's area only roughly.
@@ -96,7 +101,7 @@ class RimmedDiscs:
         whose: npt.NDArray[np.intp],
         i: npt.NDArray[np.intp],
         j: npt.NDArray[np.intp],
-        step: tuple[float, float],
+        step: FloatArray,
         shape: tuple[int, int],
     ) -> None:
         """Find the faces that cross a rim, and what plane each cell beside one sees."""
@@ -109,6 +114,7 @@ class RimmedDiscs:
         inner: list[list[npt.NDArray[np.intp]]] = [[], []]
         ways: list[list[FloatArray]] = [[], []]
         slopes: list[list[FloatArray]] = [[], []]
+        lengths: list[list[FloatArray]] = [[], []]
         for place, (axis, sign) in enumerate(_DIRECTIONS):
             beyond = offset[axis] + sign * step[axis]
             there = (i, j)[axis] + sign
@@ -118,6 +124,7 @@ class RimmedDiscs:
             crossing[place] = out
             rim = np.sqrt(np.maximum(radius**2 - offset[1 - axis] ** 2, 0.0))
             way = np.clip(sign * beyond - rim, _LEAST_WAY * step[axis], step[axis])
+            lengths[axis].append(step[axis][out])
             first = i - (axis == 0) * (sign < 0), j - (axis == 1) * (sign < 0)
             # Faces along x are numbered like cells, those along s have a column less.
             faces[axis].append((first[0] * (shape[1] - axis) + first[1])[out])
@@ -128,15 +135,15 @@ class RimmedDiscs:
         self._inner = [np.concatenate(found) for found in inner]
         self._way = [np.concatenate(found) for found in ways]
         self._slope = [np.concatenate(found) for found in slopes]
-        self._step = step
+        self._length = [np.concatenate(found) for found in lengths]
         self._beside = np.flatnonzero(crossing.any(axis=0))
         self._crossing = crossing[:, self._beside]
         self._exists = exists[:, self._beside]
         self._depth = (radius - distance)[self._beside]
         # Of each face: width over distance, and how far it leads along the normal.
         self._outward = np.stack([sign * normal[axis][self._beside] for axis, sign in _DIRECTIONS])
-        self._width = np.array([step[1 - axis] for axis, _ in _DIRECTIONS])[:, None]
-        self._reach = np.array([step[axis] for axis, _ in _DIRECTIONS])[:, None]
+        self._width = np.stack([step[1 - axis][self._beside] for axis, _ in _DIRECTIONS])
+        self._reach = np.stack([step[axis][self._beside] for axis, _ in _DIRECTIONS])
 
     def _decay(self, film: FloatArray, cells: npt.NDArray[np.intp] | slice = slice(None)) -> FloatArray:
         """Return lambda, for a film given at the discs' cells."""
@@ -165,7 +172,7 @@ class RimmedDiscs:
         """Shorten the way of the faces that cross a rim; changes the (nx-1, ns) and (nx, ns-1) conductances."""
         flat = film_mm.reshape(-1)
         for axis, conductance in enumerate((along_x.reshape(-1), along_s.reshape(-1))):
-            inner, step, slope, way = self._inner[axis], self._step[axis], self._slope[axis], self._way[axis]
+            inner, step, slope, way = self._inner[axis], self._length[axis], self._slope[axis], self._way[axis]
             decay = self._decay(flat[self._cell[inner]], inner)
             inside = (decay / slope) * -np.expm1(-(step - way) * slope / decay)
             conductance[self._faces[axis]] *= step / np.maximum(way + inside, _LEAST_WAY * step)

@@ -17,38 +17,48 @@ from tactbench.plugin import (
     sourced,
 )
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
+from tactbench.sensors.biotac.film import film_table, relief_table
 from tactbench.sensors.biotac.likeness import LIKENESS
 from tactbench.sensors.biotac.nuisances import NUISANCES
+from tactbench.sensors.biotac.surface import MESHES
 from tactbench.sensors.biotac.thermal import THERMAL
 
-_MESH = "NVlabs/biotac_sim int_ext_skin_combined_ftw.tet and top_side_core_bc.obj"
+_MESH = MESHES
 
+_OUTER_MM, _DOME_MM, _SKIN_MM = 7.8, 1.4, 1.6
 SKIN = FluidBackedShell(
     sheet=SkinSheet(
-        x_min=assumed(-14.5, "mm", "covers electrodes 1-19 with a margin; the core ends at -19.3 mm"),
-        x_max=assumed(5.5, "mm", "covers electrode 7 on the shortened arc of the dome"),
-        arc=derived(math.pi * 8.2, "mm", "half of the circumference at the outer radius"),
+        x_min=derived(-17.2, "mm", f"the seal, where the film ends; {_MESH}"),
+        x_max=derived(_DOME_MM + _OUTER_MM, "mm", "the dome's end"),
+        arc=derived(math.pi * _OUTER_MM, "mm", "half of the circumference at the outer radius"),
         dome=Dome(
-            start=sourced(0.0, "mm", f"the core is a cylinder from -12 to 0 mm; {_MESH}"),
-            arc_per_radian=derived(
-                0.75 * 5.08, "mm", "the core's meridian, shortened as the places of its electrodes are"
+            start=derived(
+                _DOME_MM,
+                "mm",
+                f"so that the dome ends where the skin does, core 7.13, film .45 and skin 1.6 mm: 9.2 mm; {_MESH}",
             ),
         ),
-        outer_radius=derived(8.2, "mm", f"{_MESH}: 8.08-8.31 mm at the pad"),
+        outer_radius=derived(
+            _OUTER_MM, "mm", f"of a cylinder with as long an arc from flank to flank: 24.2-24.7 mm; {_MESH}"
+        ),
+        relief=relief_table(_OUTER_MM, _DOME_MM, _SKIN_MM),
+        cells=(64, 64),
     ),
     young=assumed(0.8, "MPa", "silicone of the skin alone; 0.4-1.55 tried. Shore A 26 by the maker"),
     poisson=assumed(0.48, "1", "nearly incompressible silicone"),
-    thickness=derived(1.6, "mm", f"{_MESH}: inner 6.47-6.69, outer 8.08-8.31 mm"),
-    mid_radius=derived(7.4, "mm", "outer radius less half of the thickness"),
+    thickness=derived(_SKIN_MM, "mm", f"{_MESH}: inner 6.47-6.69, outer 8.08-8.31 mm"),
+    mid_radius=derived(
+        6.31,
+        "mm",
+        f"outer surface, a circle of 7.11 mm about 1.1 mm below the core's axis, less half of the thickness; {_MESH}",
+    ),
     tension=assumed(0.02, "N/mm", "no source"),
     contact_stiffness=assumed(1.299, "MPa/mm", "2 E / ((1 - nu^2) t); the factor 2 has no source"),
     core_stiffness=assumed(6.0, "MPa/mm", "penalty, stiff beside the skin"),
-    gap=derived(1.27, "mm", f"{_MESH}: inner skin minus core 1.2-1.3 mm at the pad"),
-    gap_side=derived(0.25, "mm", f"{_MESH}: 0.15-0.7 mm near 70 degrees, fitted by eye"),
-    gap_side_fraction=derived(0.85, "1", f"{_MESH}: fitted by eye"),
+    film=film_table(_OUTER_MM, _DOME_MM),
     residual_film=assumed(0.06, "mm", "asperities of the inner skin keep a film open at touch-down"),
-    clamp_stiffness=assumed(0.5, "MPa/mm", "soft clamp instead of the real seam and nail"),
-    clamp_length=assumed(1.0, "mm", "soft clamp instead of the real seam and nail"),
+    clamp_stiffness=assumed(0.5, "MPa/mm", "soft clamp instead of the real seal, seam and nail"),
+    clamp_length=assumed(1.0, "mm", "soft clamp instead of the real seal, seam and nail"),
 )
 
 _EXCITATION = (
@@ -60,10 +70,8 @@ PARAMETERS: dict[str, Quantity] = {
     "contact_x": assumed(-5.0, "mm", "middle of the pad; the paper does not state where its caps touch"),
     "contact_s": assumed(0.0, "mm", "on the midline"),
     "core_radius": sourced(5.08, "mm", "radius on which the electrode table lies, e.g. sqrt(3.513^2 + 3.670^2)"),
-    "film_radius": derived(5.965, "mm", f"half way between core 5.33 and inner skin 6.6 mm; {_MESH}"),
-    "dome_shortening": assumed(0.75, "1", "meridian arc of the dome, shortened to keep electrode 7 on the sheet"),
     "conductivity": assumed(
-        1.225, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
+        0.391, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
     ),
     "reference_resistor": sourced(10e3, "ohm", f"10 kOhm; {MANUAL}"),
     "electrode_radius": assumed(0.6, "mm", "no source"),
@@ -71,11 +79,6 @@ PARAMETERS: dict[str, Quantity] = {
     "excitation_x_front": derived(-3.9, "mm", f"12.48 mm on the map; {_EXCITATION}"),
     "excitation_x_back": derived(-15.9, "mm", f"24.48 mm on the map; {_EXCITATION}"),
     "excitation_arc_front": derived(6.85, "mm", f"arc on the core, 6.45 mm on the map: 77 degrees; {_EXCITATION}"),
-    "film_tail": assumed(
-        10 / 3,
-        "mm",
-        "film behind the skin that can be pressed, up to the rear excitations: it stays as at rest",
-    ),
     "excitation_arc_back": derived(3.99, "mm", f"arc on the core, 3.75 mm on the map: 45 degrees; {_EXCITATION}"),
     "skin_mode_frequency": derived(
         330.0, "Hz", "Fishel and Loeb 2012: the smallest vibrations are felt near 330 Hz; read as the skin's mode"

@@ -11,63 +11,56 @@ from functools import lru_cache
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError, SensorSpec, SkinGrid, SkinState
-from tactbench.sensors.biotac.discs import discs_on, outer_radius_mm, shell_of
+from tactbench.sensors.biotac.discs import discs_on, dome_mm, outer_radius_mm, shell_of
 from tactbench.sensors.biotac.electrodes import NAMES
-from tactbench.sensors.biotac.film import REFINEMENT, film_at_rest, refined, spectral_interpolation, with_tail
-from tactbench.sensors.biotac.sheet import TOLERANCE, FilmSheet
-
-NEIGHBOURS = 2
-"""Potentials of the nearest loads to begin the next one with; more do not save steps."""
-MOST_KEPT = 16
-"""Loads whose potentials are kept: those of a table."""
+from tactbench.sensors.biotac.film import REFINEMENT, edges, refined, spectral_interpolation
+from tactbench.sensors.biotac.sheet import FilmSheet, faces_between
+from tactbench.sensors.biotac.surface import mid_film_mm
 
 
 class Preparation:
-    """What does not depend on the load: geometry, interpolation and the factor of the film at rest."""
+    """What does not depend on the load: geometry and interpolation."""
 
     def __init__(self, sensor: SensorSpec, grid: SkinGrid, refinement: int) -> None:
         self.skin = shell_of(sensor)
-        self.coarse_film = film_at_rest(self.skin, grid.s_mm)[None, :]
-        film_radius = sensor.parameters["film_radius"].to("mm")
-        under_skin = refined(grid, refinement, shrink_s=film_radius / outer_radius_mm(sensor))
-        fine, tail = with_tail(under_skin, sensor.parameters["film_tail"].to("mm"))
-        self.film = np.broadcast_to(film_at_rest(self.skin, fine.s_mm), (len(fine.x_mm), len(fine.s_mm))).copy()
-        # Behind the sheet the skin is not pressed: no deflection.
-        self.to_fine_x = np.vstack(
-            [np.zeros((tail, len(grid.x_mm))), spectral_interpolation(len(grid.x_mm), len(under_skin.x_mm))]
-        )
+        outer, dome = outer_radius_mm(sensor), dome_mm(sensor)
+        self.coarse_film = self.skin.film.at(grid.x_mm, grid.s_mm / outer)
+        fine = refined(grid, refinement)
+        self.film = self.skin.film.at(fine.x_mm, fine.s_mm / outer)
+        self.to_fine_x = spectral_interpolation(len(grid.x_mm), len(fine.x_mm))
         self.to_fine_s = np.ascontiguousarray(spectral_interpolation(len(grid.s_mm), len(fine.s_mm)).T)
         self.residual_film = self.skin.residual_film.to("mm")
-        contacts, cell_mm = discs_on(sensor, fine)
         # S/m times ohm is 1/m: a length, the only electrical scale of the problem.
         conductivity = sensor.parameters["conductivity"].to("S/m")
-        leak_mm = 1e3 / (conductivity * sensor.parameters["reference_resistor"].to("ohm"))
-        self.sheet = FilmSheet(cell_mm, contacts, leak_mm, np.maximum(self.film, self.residual_film))
-        self.rest = self.sheet.at_rest
+        self.reference_per_mm = 1e-3 * conductivity * sensor.parameters["reference_resistor"].to("ohm")
+        corner_x, corner_angle = edges(fine.x_mm), edges(fine.s_mm) / outer
+        corners = mid_film_mm(corner_x, corner_angle, self.skin.film.at(corner_x, corner_angle), outer, dome)
+        self.sheet = FilmSheet(faces_between(corners), discs_on(sensor, fine))
 
     def film_under(self, state: SkinState) -> FloatArray:
         """Return the film on the conduction grid: h0 evaluated there exactly, the deflection interpolated."""
         deflection = self.to_fine_x @ state.deflection_mm @ self.to_fine_s
         return np.asarray(np.maximum(self.film - deflection, self.residual_film))
 
+    def shares(self, state: SkinState) -> FloatArray:
+        """Return (n_electrodes,) the share of the drive across the reference resistor, electrodes read one at a time.
+
+        ``R_ref / (R_ref + Z_ee)``, the divider of the maker's formula ``Z = (4095 / E - 1) 10 kOhm``. That the others
+        carry no current while one is sampled is derived: the commands address one channel, and no public text says
+        how it is switched.
+        """
+        resistances = np.diag(self.sheet.resistances(self.film_under(state)))
+        return np.asarray(self.reference_per_mm / (self.reference_per_mm + resistances))
+
 
 class BioTacTransducer:
-    """Readings in counts, before noise, rounding and clipping.
+    """Readings in counts, before noise, rounding and clipping."""
 
-    Each call begins with the potentials of the calls before, which saves a third of the steps if loads come in order.
-    Its answer depends on them by no more than the solver's tolerance, 0.12 counts; the same calls in the same order
-    give the same bits.
-    """
-
-    def __init__(
-        self, prepared: Preparation, sensor: SensorSpec, wanted: Sequence[str], tolerance: float = TOLERANCE
-    ) -> None:
+    def __init__(self, prepared: Preparation, sensor: SensorSpec, wanted: Sequence[str]) -> None:
         self._prepared = prepared
-        self._tolerance = tolerance
         self._electrodes = [(place, NAMES.index(name)) for place, name in enumerate(wanted) if name in NAMES]
         self._pressures = [place for place, name in enumerate(wanted) if name == "PDC"]
         self._n_wanted = len(wanted)
-        self._earlier: dict[float, FloatArray] = {}
         channels = {channel.name: channel for channel in sensor.channels()}
         self._full_scale = channels[NAMES[0]].upper or 0.0
         pdc = channels["PDC"]
@@ -86,14 +79,9 @@ class BioTacTransducer:
         readings = np.empty(self._n_wanted)
         if self._electrodes:
             self._check(state)
-            nearest = sorted(self._earlier, key=lambda force: abs(force - state.force_n))[:NEIGHBOURS]
-            neighbours = [self._earlier[force] for force in nearest]
-            answer = self._prepared.sheet.solve(self._prepared.film_under(state), neighbours, self._tolerance)
-            self._earlier[state.force_n] = answer.unknowns
-            while len(self._earlier) > MOST_KEPT:
-                del self._earlier[next(iter(self._earlier))]
+            shares = self._prepared.shares(state)
             for place, electrode in self._electrodes:
-                readings[place] = self._full_scale * answer.electrodes[electrode]
+                readings[place] = self._full_scale * shares[electrode]
         for place in self._pressures:
             readings[place] = self._pdc_rest + 1e6 * state.fluid_pressure_mpa / self._pa_per_count
         return readings
@@ -113,7 +101,6 @@ def build(
     wanted: Sequence[str],
     *,
     refinement: int = REFINEMENT,
-    tolerance: float = TOLERANCE,
 ) -> BioTacTransducer:
     """Prepare the BioTac's transduction.
 
@@ -127,8 +114,6 @@ def build(
         Names of channels: E1 to E19 and PDC.
     refinement
         Conduction cells per skin cell and axis.
-    tolerance
-        Relative error, in the energy norm, at which the conduction's iteration stops.
 
     Raises
     ------
@@ -141,7 +126,7 @@ def build(
                 f"{name} of {sensor.name} is not read from the skin.",
                 hint=f"Ask for {NAMES[0]} to {NAMES[-1]} and PDC.",
             )
-    return BioTacTransducer(prepared(sensor, grid, refinement), sensor, tuple(wanted), tolerance)
+    return BioTacTransducer(prepared(sensor, grid, refinement), sensor, tuple(wanted))
 
 
 def prepared(sensor: SensorSpec, grid: SkinGrid, refinement: int = REFINEMENT) -> Preparation:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
+from typing import Any
 
+import numpy as np
 import pytest
 
-from tactbench.plugin import BondedLayer, SensorDescriptor, SensorSpec, SkinSheet, assumed
+from tactbench.plugin import BondedLayer, SensorDescriptor, SensorSpec, SheetTable, SkinSheet, assumed
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.newton import NewtonSolver
@@ -50,8 +53,38 @@ def medium() -> Callable[..., Medium]:
 def solver(medium: Callable[..., Medium]) -> SolverOf:
     def make(name: str, radius: float, x: float, s: float = 0.0, **more: object) -> NewtonSolver:
         made = medium(name, **more)
-        outer = SPECS[name].skin.sheet.outer_radius.to("mm")
-        return NewtonSolver(made, gap_mm(made.grid, Contact(radius, x, s), outer))
+        sheet = SPECS[name].skin.sheet
+        return NewtonSolver(
+            made, gap_mm(made.grid, Contact(radius, x, s), sheet.outer_radius.to("mm"), sheet.dome, sheet.relief)
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def prototype() -> Callable[..., tuple[Medium, Any]]:
+    """The skins that an independent implementation's published depths hold for: even film, cylinder, one penalty."""
+
+    def make(name: str, *, core: bool = True) -> tuple[Medium, Any]:
+        skin = SPECS[name].skin
+        given = {"contact_stiffness": 3.6} if name == "icub" else {"mid_radius": 7.4}
+        change = {key: assumed(value, getattr(skin, key).unit, "test") for key, value in given.items()}
+        sheet = skin.sheet
+        if name == "biotac":
+            angle = np.arange(0.0, 90.1, 0.25)
+            side = np.clip(np.radians(angle) - 0.6, 0.0, 1.0)
+            film = np.maximum(1.27 * (1.0 - 0.85 * side**2), 0.25)
+            change["film"] = SheetTable(
+                x_mm=(0.0,), angle_deg=tuple(angle), value_mm=(tuple(film),), source=skin.film.source
+            )
+            edges = {"x_min": -14.5, "x_max": 5.5, "arc": math.pi * 8.2, "outer_radius": 8.2}
+            edges = {key: assumed(value, "mm", "test") for key, value in edges.items()}
+            sheet = sheet.model_copy(update={**edges, "dome": None, "relief": None, "cells": (48, 64)})
+        skin = skin.model_copy(update={**change, "sheet": sheet})
+        made = medium_of(skin, skin_grid(sheet))
+        if made.has_core and core:
+            made = with_core(made, skin)
+        return dataclasses.replace(made, contact_updates=0), skin
 
     return make
 

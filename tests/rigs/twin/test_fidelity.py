@@ -14,8 +14,8 @@ SCENE = Scene(name="cap", indenter=Indenter(radius=assumed(10.0, "mm", "test")),
 
 
 def test_the_default_leaves_the_sheets_own_cells(specs):
-    assert DEFAULT.cells(specs["biotac"].skin.sheet) == (48, 64)
-    assert FINE.cells(specs["biotac"].skin.sheet) == (144, 192)
+    assert DEFAULT.cells(specs["biotac"].skin.sheet) == (64, 64)
+    assert FINE.cells(specs["biotac"].skin.sheet) == (192, 192)
     # 44 and 48 times 1.3 are 57.2 and 62.4: the nearest even numbers.
     assert Fidelity(cells_factor=1.3).cells(specs["icub"].skin.sheet) == (58, 62)
 

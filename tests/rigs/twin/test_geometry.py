@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import Dome, RigError, SkinGrid, SkinSheet, assumed
-from tactbench.rigs.twin.geometry import Contact, check_contact, film_at_rest_mm, gap_mm, skin_grid
+from tactbench.plugin import Dome, RigError, SheetTable, SkinGrid, SkinSheet, assumed
+from tactbench.rigs.twin.geometry import Contact, check_contact, finger_surface_mm, gap_mm, skin_grid
 
 SHEET = SkinSheet(
     x_min=assumed(-10, "mm", "t"), x_max=assumed(10, "mm", "t"), arc=assumed(20, "mm", "t"), cells=(40, 50)
@@ -55,14 +55,6 @@ def test_tilt_keeps_the_origin_of_the_approach():
     assert tilted.min() == 0.0
 
 
-def test_the_film_thins_towards_the_sides():
-    film = film_at_rest_mm(GRID, 8.2, gap=1.27, gap_side=0.25, side_fraction=0.85)
-    assert film.shape == (40, 50)
-    assert film[0, 25] == 1.27
-    assert np.all(np.diff(film[0, 25:]) <= 0)
-    assert film.min() >= 0.25
-
-
 @pytest.mark.parametrize(
     ("contact", "says"),
     [
@@ -95,20 +87,66 @@ def test_an_indenter_on_its_side_is_refused(slope):
         check_contact(GRID, Contact(5.0, 0.0, 0.0, tilt_s=slope))
 
 
-DOME = Dome(start=assumed(0.0, "mm", "test"), arc_per_radian=assumed(8.0, "mm", "test"))
+DOME = Dome(start=assumed(0.0, "mm", "test"))
 
 
 def test_a_dome_falls_away_along_its_meridian_as_the_finger_does_around():
-    # Sheet length per radian = radius: one sphere octant, pressed at 0.5 rad up its meridian.
+    # One sphere octant, pressed half a radian up its meridian.
     grid = SkinGrid(x_mm=np.linspace(-4.0, 8.0, 25), s_mm=np.linspace(-8.0, 8.0, 33))
-    gap = gap_mm(grid, Contact(math.inf, 4.0, 0.0), 8.0, DOME)
+    x = 8.0 * math.sin(0.5)
+    gap = gap_mm(grid, Contact(math.inf, x, 0.0), 8.0, DOME)
     on_it = grid.x_mm >= 0
-    expected = 2 * 8.0 * np.sin((grid.x_mm[on_it] - 4.0) / 16.0) ** 2
+    expected = 2 * 8.0 * np.sin((np.arcsin(grid.x_mm[on_it] / 8.0) - 0.5) / 2) ** 2
     np.testing.assert_allclose(gap[on_it, 16], expected, atol=1e-14)
     # Around the pole of the press axis a sphere looks the same to all sides.
-    sphere = gap_mm(grid, Contact(math.inf, 4.0, 0.0), 8.0, DOME)[16]
+    around = SkinGrid(x_mm=np.array([x, x + 0.1]), s_mm=grid.s_mm)
+    sphere = gap_mm(around, Contact(math.inf, x, 0.0), 8.0, DOME)[0]
     ring = 8.0 * math.cos(0.5)
     np.testing.assert_allclose(sphere, math.cos(0.5) * 2 * ring * np.sin(grid.s_mm / 16.0) ** 2, atol=1e-14)
+
+
+def test_the_sheet_has_the_domes_own_area():
+    # Archimedes: a strip of the sheet has the area of the sphere's zone.
+    x, s = np.linspace(0.0, 8.0, 4001), np.linspace(-8.0, 8.0, 401)
+    place = np.stack(finger_surface_mm(SkinGrid(x_mm=x, s_mm=s), 8.0, DOME), axis=-1)
+    along, around = np.diff(place, axis=0)[:, :-1], np.diff(place, axis=1)[:-1]
+    area = np.linalg.norm(np.cross(along, around), axis=-1).sum(axis=1)
+    # Flat pieces of a sphere, on cells of 0.002 mm; the last rings by the pole are the worst.
+    np.testing.assert_allclose(area[:-80], 0.002 * 16.0, rtol=5e-3)
+
+
+def relief(value):
+    return SheetTable(x_mm=(0.0,), angle_deg=(0.0,), value_mm=((value,),), source=assumed(0, "1", "test").source)
+
+
+def test_an_even_relief_is_a_thinner_finger():
+    grid = SkinGrid(x_mm=np.linspace(-4.0, 0.0, 9), s_mm=np.linspace(-8.0, 8.0, 33))
+    thinner = gap_mm(SkinGrid(x_mm=grid.x_mm, s_mm=grid.s_mm * 7.5 / 8.0), Contact(20.0, -2.0, 0.75), 7.5)
+    with_relief = gap_mm(grid, Contact(20.0, -2.0, 0.8), 8.0, DOME, relief(0.5))
+    np.testing.assert_allclose(with_relief, thinner, atol=1e-14)
+
+
+def test_a_table_is_met_at_its_entries_straight_between_and_even_beyond():
+    table = SheetTable(
+        x_mm=(-1.0, 1.0), angle_deg=(0.0, 90.0), value_mm=((1.0, 3.0), (2.0, 8.0)), source=relief(0.0).source
+    )
+    found = table.at(np.array([-5.0, -1.0, 0.0, 1.0, 9.0]), np.radians([-120.0, -90.0, 0.0, 45.0]))
+    np.testing.assert_allclose(
+        found, [[3, 3, 1, 2], [3, 3, 1, 2], [5.5, 5.5, 1.5, 3.5], [8, 8, 2, 5], [8, 8, 2, 5]], atol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"x_mm": (1.0, 1.0)}, {"angle_deg": (0.0,)}, {"value_mm": ((1.0, 2.0),)}, {"x_mm": (), "value_mm": ()},
+        {"value_mm": ((1.0, math.nan), (1.0, 1.0))},
+    ],
+)  # fmt: skip
+def test_a_table_that_is_none_is_refused(wrong):
+    given_ = {"x_mm": (0.0, 1.0), "angle_deg": (0.0, 9.0), "value_mm": ((1.0, 1.0), (1.0, 1.0))}
+    with pytest.raises(ValueError, match="ascending axes"):
+        SheetTable(**{**given_, **wrong}, source=relief(0.0).source)
 
 
 def test_the_cylinder_does_not_know_of_the_dome_and_joins_it_smoothly():

@@ -1,4 +1,4 @@
-"""The film at rest and its way to the finer grid."""
+"""The film at rest and its way to the conduction's grid."""
 
 from __future__ import annotations
 
@@ -7,42 +7,83 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import FluidBackedShell, SkinGrid, UsageError
-from tactbench.sensors.biotac.film import film_at_rest, refined, spectral_interpolation
+from tactbench.plugin import SkinGrid
+from tactbench.sensors.biotac.electrodes import ELECTRODES
+from tactbench.sensors.biotac.film import refined, spectral_interpolation
+from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
+from tactbench.sensors.biotac.sheet import FilmSheet, faces_between, flat_faces
 from tactbench.sensors.biotac.spec import SKIN
+from tactbench.sensors.biotac.surface import CORE_MM, ELECTRODES_MM, core_mm, mid_film_mm, ray_on_sheet, sheet_x
+
+OUTER, DOME = SKIN.sheet.outer_radius.to("mm"), SKIN.sheet.dome.start.to("mm")
 
 
-@given(s=st.floats(0.0, 12.8), further=st.floats(0.0, 2.0))
-def test_the_film_is_a_mirror_image_and_narrows_towards_the_sides(s, further):
-    film = film_at_rest(SKIN, np.array([-s, s, s + further]))
-    assert film[0] == film[1]
-    assert film[2] <= film[1]
-    assert SKIN.gap_side.to("mm") <= film[2]
-    assert film[1] <= SKIN.gap.to("mm")
+def test_the_film_follows_the_law_that_was_read_from_the_meshes():
+    # max(min(.13, g), .05 + (g - .05) cos): rms .026 mm, largest error .076, through the table for x <= 0.
+    places = [-17.2, -16.2, -15.2, -14.2, -13.2, -12.2, -11.2, -9.2, -7.2, -3.2, -1.2, 0.0]
+    g = np.array([0.10, 0.31, 0.57, 0.78, 0.95, 1.08, 1.18, 1.28, 1.34, 1.34, 1.28, 1.22])[:, None]
+    angle = np.radians(np.arange(0.0, 91.0, 10.0))
+    law = np.maximum(np.minimum(0.13, g), 0.05 + (g - 0.05) * np.cos(angle))
+    off = SKIN.film.at(np.array(places), angle) - law
+    # Both figures are the table's own; straight lines between its rows add hundredths.
+    assert np.sqrt(np.mean(off**2)) < 0.035
+    assert np.abs(off).max() < 0.09
 
 
-def test_the_film_has_the_measured_thickness_at_the_pad_and_at_the_sides():
-    pad, side = film_at_rest(SKIN, np.array([0.0, np.radians(77.0) * 8.2]))
-    # Inner skin minus core in the public meshes. They have 0.15-0.7 mm near 70 degrees; the fit comes there at 77,
-    # where the side electrodes are, and has 0.85 mm at 70.
-    assert 1.2 <= pad <= 1.3
-    assert 0.15 <= side <= 0.7
+def test_every_electrode_is_let_into_the_core_by_the_same_depth():
+    # The facet's distance is set by electrode 7 alone; the tip's other three and the rest must follow.
+    for electrode in ELECTRODES:
+        height, angle = np.hypot(electrode.y_mm, electrode.z_mm), np.arctan2(electrode.y_mm, -electrode.z_mm)
+        behind = min(electrode.x_mm, 1.8)
+        ray = np.arctan2(electrode.x_mm - behind, height)
+        let_in = core_mm(np.array(behind), np.array(ray), np.array(angle)) - np.hypot(electrode.x_mm - behind, height)
+        # Along the ray, which leans on the facet by up to 22 degrees; electrode 1 has a bevel of its own.
+        assert 0.9 * (CORE_MM - ELECTRODES_MM) < let_in < 1.4 * (CORE_MM - ELECTRODES_MM)
 
 
-def test_a_flat_sheet_has_no_film():
-    flat = SKIN.model_copy(update={"sheet": SKIN.sheet.model_copy(update={"outer_radius": None})})
-    assert isinstance(flat, FluidBackedShell)
-    with pytest.raises(UsageError, match="outer radius"):
-        film_at_rest(flat, np.zeros(1))
+def test_the_inner_skin_ends_where_the_meshes_do():
+    (tip,) = mid_film_mm(np.array([OUTER + DOME]), np.zeros(1), np.zeros((1, 1)), OUTER, DOME)[0]
+    assert tip == pytest.approx([7.13, 0.0, 0.0], abs=0.03)
+
+
+@given(x=st.floats(-17.0, 1.8), height=st.floats(4.0, 5.4))
+def test_behind_the_tip_what_faces_a_point_lies_radially_above(x, height):
+    assert sheet_x(x, height, OUTER, DOME) == x
+
+
+@given(ray=st.floats(0.0, 1.55), further=st.floats(0.001, 0.01))
+def test_rays_meet_the_sheet_in_order_and_on_it(ray, further):
+    here, there = (ray_on_sheet(angle, OUTER, DOME) for angle in (ray, ray + further))
+    assert 1.8 <= here < there <= OUTER + DOME
+
+
+def test_a_curved_film_conducts_as_its_middle_is_long():
+    # A half cylinder of film, current along the arc: L / (h W) with L at the film's middle.
+    x, angle = np.linspace(-10.0, -5.0, 6), np.linspace(-1.2, 1.2, 60)
+    faces = faces_between(mid_film_mm(x, angle, np.full((6, 60), 0.4), OUTER, DOME))
+    step = (CORE_MM + 0.2) * (angle[1] - angle[0])
+    # Chords of a fortieth of a radian, and a facet that begins at x = -0.07.
+    np.testing.assert_allclose(faces.along_s, 1.0 / step, rtol=1e-3)
+    np.testing.assert_allclose(faces.along_x, step, rtol=1e-3)
+
+
+def test_a_stretched_disc_is_the_disc_on_the_stretched_grid():
+    x, film = (np.arange(40) + 0.5) * 0.2, np.full((40, 40), 0.5)
+    plain = RimmedDiscs(x, x, [Disc(2.0, 3.1, 0.6)], [Disc(6.0, 5.0, 0.8)])
+    squeezed = RimmedDiscs(x / 2, 4 * x, [Disc(1.0, 12.4, 0.6, (2.0, 0.25))], [Disc(3.0, 20.0, 0.8, (2.0, 0.25))])
+    sheets = [FilmSheet(flat_faces((40, 40), (0.2, 0.2)), discs) for discs in (plain, squeezed)]
+    one, other = (sheet.resistances(film)[0, 0] for sheet in sheets)
+    assert one == pytest.approx(other, rel=1e-12)
 
 
 def test_refined_cells_fill_the_same_sheet():
-    grid = SkinGrid(np.arange(6) + 0.5, np.arange(4) * 0.5)
-    fine = refined(grid, 3)
-    assert fine.cell_mm == pytest.approx((1 / 3, 0.5 / 3))
-    # The mean of the three parts of a cell is its centre.
-    assert fine.x_mm.reshape(6, 3).mean(axis=1) == pytest.approx(grid.x_mm)
-    assert fine.s_mm.reshape(4, 3).mean(axis=1) == pytest.approx(grid.s_mm)
+    grid = SkinGrid((np.arange(64) + 0.5) * 0.4, (np.arange(64) - 31.5) * 0.4)
+    fine = refined(grid, 2)
+    assert (fine.x_mm.size, fine.s_mm.size) == (96, 66)
+    for coarse, cells in ((grid.x_mm, fine.x_mm), (grid.s_mm, fine.s_mm)):
+        step = cells[1] - cells[0]
+        assert step * cells.size == pytest.approx(64 * 0.4)
+        assert cells[0] - step / 2 == pytest.approx(coarse[0] - 0.2)
 
 
 @pytest.mark.parametrize("n", [16, 48, 64])

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tactbench.plugin import RigError
 from tactbench.sensors.biotac.discs import Discs, disc_overlap
 from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
-from tactbench.sensors.biotac.sheet import FilmSheet
+from tactbench.sensors.biotac.sheet import FilmSheet, flat_faces
 
 HALF, RADIUS, RING = 4.0, 0.6, 3.0
 
@@ -41,12 +41,10 @@ def exact(film):
 
 
 def found(film, cells, centre, contacts):
-    leak = 0.3
     x = -HALF + (np.arange(cells) + 0.5) * 2 * HALF / cells
     thickness = np.full((cells, cells), film)
-    sheet = FilmSheet((2 * HALF / cells, 2 * HALF / cells), contacts(x, centre), leak, thickness)
-    potential = sheet.at_rest.electrodes[0]
-    return (1 - potential) / (leak * potential)
+    sheet = FilmSheet(flat_faces(thickness.shape, (2 * HALF / cells, 2 * HALF / cells)), contacts(x, centre))
+    return float(sheet.resistances(thickness)[0, 0])
 
 
 def overlapping(x, centre):

@@ -40,6 +40,8 @@ class Medium:
     """What stays open when pressed flat; 0 where there is no such limit."""
     low_modes: int
     """Pairs of soft modes that the preconditioner solves exactly: chosen for speed, without effect on the result."""
+    contact_updates: int = 0
+    """Times that what the indenter penetrates is taken back; 0 where the contact's stiffness is the skin's own."""
     has_core: bool = False
     """There is a core to touch down on when less than `least_thickness_mm` would be left."""
 

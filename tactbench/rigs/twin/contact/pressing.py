@@ -62,7 +62,7 @@ def press_of(run: Synthesis, fidelity: Fidelity) -> AnyPress:
     """Return what solves the loads of `run`; raises as :func:`pressed`."""
     skin = _skin(run)
     grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
-    gap = gap_mm(grid, run.contact, outer_radius_mm(skin.sheet), skin.sheet.dome)
+    gap = gap_mm(grid, run.contact, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
     if fidelity.solver == "local":
         from tactbench.rigs.twin.contact.local import LocalPress
 

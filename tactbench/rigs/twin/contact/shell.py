@@ -7,7 +7,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, FluidBackedShell, SkinGrid
 from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_poisson, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
-from tactbench.rigs.twin.geometry import film_at_rest_mm
+from tactbench.rigs.twin.geometry import outer_radius_mm
 
 
 class Clamp:
@@ -37,7 +37,7 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
         thickness=thickness,
         mid_radius=skin.mid_radius.to("mm"),
         contact_stiffness=contact_stiffness,
-        gap=skin.gap.to("mm"),
+        thinnest_film=skin.film.least_mm,
         clamp_length=skin.clamp_length.to("mm"),
     )
     require_poisson(poisson)
@@ -48,7 +48,6 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
     hoop = young * thickness / skin.mid_radius.to("mm") ** 2
     stiffness = bending * k2**2 + skin.tension.to("N/mm") * k2 + hoop * spectrum.kx**4 / k2**2
     stiffness[0, 0] = 0.0
-    outer = skin.sheet.outer_radius
     return Medium(
         grid=grid,
         spectrum=spectrum,
@@ -56,12 +55,9 @@ def medium(skin: FluidBackedShell, grid: SkinGrid) -> Medium:
         respond=clamp(skin, grid),
         contact_stiffness=contact_stiffness,
         zero_mean=True,
-        rest_thickness_mm=film_at_rest_mm(
-            grid,
-            np.inf if outer is None else outer.to("mm"),
-            gap=skin.gap.to("mm"),
-            gap_side=skin.gap_side.to("mm"),
-            side_fraction=skin.gap_side_fraction.to("1"),
+        # The asperities that keep a film open under load do so without.
+        rest_thickness_mm=np.maximum(
+            skin.film.at(grid.x_mm, grid.s_mm / outer_radius_mm(skin.sheet)), skin.residual_film.to("mm")
         ),
         least_thickness_mm=skin.residual_film.to("mm"),
         low_modes=60,

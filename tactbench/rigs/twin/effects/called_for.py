@@ -36,7 +36,7 @@ def core(scene: Scene, sensor: SensorSpec) -> Reason:
         return Reason(False, "the skin has no core under a fluid film", 0.0)
     if not scene.profile.largest_n > 0:
         return Reason(False, "the scene has no load: 0 N throughout", 0.0)
-    left = sensor.skin.gap.to("mm") - sensor.skin.residual_film.to("mm")
+    left = sensor.skin.film.most_mm - sensor.skin.residual_film.to("mm")
     return Reason(True, f"taken into the solve from the load that leaves no more than the film's {left:g} mm")
 
 

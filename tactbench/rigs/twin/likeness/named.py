@@ -123,6 +123,12 @@ def _per_pressure(evidence: Evidence, figure: RealFigure, sign: float) -> float:
     return float(np.median(largest / evidence.pressure[evidence.within(figure)]))
 
 
+def _median_per_pressure(evidence: Evidence, figure: RealFigure) -> float:
+    if evidence.pressure is None:
+        raise NotApplicable("there is no channel of the fluid's pressure")
+    return float(np.median(evidence.states(figure) / evidence.pressure[evidence.within(figure)][:, None]))
+
+
 def _angles(evidence: Evidence, figure: RealFigure) -> FloatArray:
     inside = evidence.within(figure)
     if evidence.angle_deg is None:
@@ -178,6 +184,8 @@ STATISTICS: Mapping[str, Statistic] = {
     "warm-up-share": lambda e, f: float(statistics.component_shares(_by_seconds(*_long(e))[1])[0]),
     "warm-up-scatter": _warm_up_scatter,
     "abs-change": lambda e, f: float(np.median(np.abs(e.states(f)))),
+    "change": lambda e, f: float(np.median(e.states(f))),
+    "change-per-pressure": _median_per_pressure,
     "largest-drop": lambda e, f: float(np.median((-e.states(f)).max(axis=1))),
     "largest-rise": lambda e, f: float(np.median(e.states(f).max(axis=1))),
     "deepest-drop": lambda e, f: float((-e.states(f)).max()),

@@ -1,8 +1,8 @@
 """A flat plate of any orientation against a finger that ends in a dome.
 
 A tilted contact touches near its commanded place; a plate in a hand touches where the finger faces it. What is
-approximated: the dome is a hemisphere of the finger's outer radius, laid out on the sheet by the sensor's own shortened
-meridian (half of the real arc); the gap is measured along the plate's normal, and the skin gives way along its own.
+approximated: the dome is a hemisphere of the finger's outer radius, laid out on the sheet by its axial coordinate; the
+gap is measured along the plate's normal, and the skin gives way along its own.
 """
 
 from __future__ import annotations

@@ -28,9 +28,8 @@ class Bench:
         skin = sensor.spec.skin
         if skin is None or sensor.transducer is None:
             raise NotApplicable(f"{sensor.name} declares no skin and transducer: the twin cannot press it")
-        self._skin = skin
+        self._skin, self.sheet = skin, skin.sheet
         self.grid = skin_grid(skin.sheet)
-        self.dome = skin.sheet.dome
         self._outer = outer_radius_mm(skin.sheet)
         taxels = [channel.name for channel in sensor.spec.channels("taxel")]
         pressure = [channel.name for channel in sensor.spec.channels("dc_pressure")]
@@ -59,4 +58,6 @@ class Bench:
         self, radius_mm: float, x_mm: float, s_mm: float, forces_n: Sequence[float]
     ) -> tuple[FloatArray, FloatArray]:
         """Return the same for a cap, or a flat surface of infinite radius, at a place of the sheet."""
-        return self.press(gap_mm(self.grid, Contact(radius_mm, x_mm, s_mm), self._outer, self.dome), forces_n)
+        return self.press(
+            gap_mm(self.grid, Contact(radius_mm, x_mm, s_mm), self._outer, self.sheet.dome, self.sheet.relief), forces_n
+        )

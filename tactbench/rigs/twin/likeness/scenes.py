@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -38,6 +38,9 @@ TILTS_DEG = (10.0, 20.0, 29.0, 40.0, 51.0)
 """10th percentile to 90th of the hand-held plate's tilt; median 29."""
 AZIMUTHS_DEG = (-40.0, 0.0, 40.0)
 """Mostly towards the tip."""
+LEVEL_TILTS_DEG = (0.0, 6.5, 13.0)
+LEVEL_AZIMUTHS_DEG = (0.0, 90.0, 180.0, -90.0)
+"""Plates within 13 degrees of the pad's normal, to all sides."""
 PLATE_N = (0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0, 10.0, 13.0, 16.0, 20.0, 25.0)
 """No real recording has a force: states are ordered by the fluid's pressure, and these reach its range."""
 POINT_N = (2.0, 6.0, 10.0, 16.0, 20.0, 25.0, 30.0)
@@ -168,17 +171,25 @@ def gives(sensor: SensorDescriptor, kind: ChannelKind) -> bool:
 
 def _plate(sensor: SensorDescriptor) -> Evidence:
     """Press flat plates, tilted towards the tip as a hand held them."""
+    return _plates(sensor, [(tilt, azimuth) for tilt in TILTS_DEG for azimuth in AZIMUTHS_DEG])
+
+
+def _level_plate(sensor: SensorDescriptor) -> Evidence:
+    """Press flat plates that lie nearly along the pad."""
+    return _plates(sensor, [(0.0, 0.0)] + [(t, a) for t in LEVEL_TILTS_DEG if t for a in LEVEL_AZIMUTHS_DEG])
+
+
+def _plates(sensor: SensorDescriptor, orientations_deg: Sequence[tuple[float, float]]) -> Evidence:
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
-    surface = finger_surface_mm(bench.grid, outer, bench.dome)
+    surface = finger_surface_mm(bench.grid, outer, bench.sheet.dome, bench.sheet.relief)
     normals = np.array([channel.normal for channel in sensor.spec.channels("taxel")])
     changes, pressures, angles = [], [], []
-    for tilt in TILTS_DEG:
-        for azimuth in AZIMUTHS_DEG:
-            normal = plate_normal(math.radians(tilt), math.radians(azimuth))
-            change, pressure = bench.press(plate_gap_mm(surface, normal), PLATE_N)
-            changes.append(change)
-            pressures.append(pressure)
-            angles.append(np.tile(np.degrees(np.arccos(np.clip(normals @ normal, -1.0, 1.0))), (len(change), 1)))
+    for tilt, azimuth in orientations_deg:
+        normal = plate_normal(math.radians(tilt), math.radians(azimuth))
+        change, pressure = bench.press(plate_gap_mm(surface, normal), PLATE_N)
+        changes.append(change)
+        pressures.append(pressure)
+        angles.append(np.tile(np.degrees(np.arccos(np.clip(normals @ normal, -1.0, 1.0))), (len(change), 1)))
     return Evidence(
         _names(sensor.spec),
         change=np.concatenate(changes),
@@ -188,23 +199,20 @@ def _plate(sensor: SensorDescriptor) -> Evidence:
 
 
 def _pointed(sensor: SensorDescriptor) -> Evidence:
-    """Press a blunt point over electrode 1, at the sheet's own place for it."""
+    """Press a blunt point over electrode 1, radially above it: it lies on the cylinder."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
-    par = sensor.spec.parameters
     place = sensor.spec.channels("taxel")[0].position_m
     if place is None:
         raise NotApplicable(f"the first taxel of {sensor.name} has no place")
     x, y, z = (1e3 * component for component in place)
-    core = par["core_radius"].to("mm")
-    axial = x if x <= 0 else par["dome_shortening"].value * core * math.asin(min(x / core, 1.0))
-    change, pressure = bench.press_cap(POINT_RADIUS_MM, axial, outer * math.atan2(y, -z), POINT_N)
+    change, pressure = bench.press_cap(POINT_RADIUS_MM, x, outer * math.atan2(y, -z), POINT_N)
     return Evidence(_names(sensor.spec), change=change, pressure=pressure)
 
 
 def _release(sensor: SensorDescriptor) -> Evidence:
     """Hold plates for ten seconds and release them: what creep leaves one second later, with the spec's own terms."""
     bench, outer = Bench(sensor), _shell_radius_mm(sensor.spec)
-    surface = finger_surface_mm(bench.grid, outer, bench.dome)
+    surface = finger_surface_mm(bench.grid, outer, bench.sheet.dome, bench.sheet.relief)
     held, after_s, loads = 10.0, 1.0, (2.0, 5.0, 10.0)
     share = sum(
         term.fraction.to("1") * -math.expm1(-held / term.tau.to("s")) * math.exp(-after_s / term.tau.to("s"))
@@ -248,6 +256,7 @@ CONDITIONS: Mapping[str, Callable[[SensorDescriptor], Evidence]] = {
     "rest": _rest,
     "long-rest": _long_rest,
     "plate": _plate,
+    "level-plate": _level_plate,
     "pointed": _pointed,
     "release": _release,
     "slide": _slide,

@@ -50,8 +50,8 @@ def test_a_contact_of_a_few_cells_says_so(press):
         ("icub", 10.0, 50.0, 0.0, {"remark load"}),
         ("biotac", 10.0, 500.0, -5.0, {"remark load", "remark core"}),
         ("icub", 10.0, 2.0, 8.5, {"remark edge"}),
-        ("icub", 1e3, 500.0, 3.0, {"remark load", "remark depth", "remark edge"}),
-        ("icub", 2.0, 2.0, 0.0, {"remark flank"}),
+        ("icub", 1e3, 2000.0, 3.0, {"remark load", "remark depth"}),
+        ("icub", 2.0, 4.0, 0.0, {"remark flank"}),
     ],
 )
 def test_what_a_reader_must_know(press, name, radius, force, x, expected):
