@@ -18,7 +18,7 @@ from tactbench.plugin import (
 )
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.likeness import LIKENESS
-from tactbench.sensors.biotac.nuisances import NUISANCES
+from tactbench.sensors.biotac.nuisances import HARD_HANDLED, NUISANCES
 from tactbench.sensors.biotac.thermal import THERMAL
 
 _MESH = "NVlabs/biotac_sim int_ext_skin_combined_ftw.tet and top_side_core_bc.obj"
@@ -101,6 +101,7 @@ SPEC = SensorSpec(
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances=NUISANCES,
+    scenarios={"hard-handled": HARD_HANDLED},
     likeness=LIKENESS,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",

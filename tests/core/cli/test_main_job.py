@@ -47,6 +47,8 @@ def test_a_row_says_what_section_six_promises(ran):
     (lasso,) = [row for row in rows if row["estimator"] == "lasso" and not row["params"]]
     assert lasso["published"] == 0.7659
     assert {"placement_scatter_mm", "drift_scale", "noise_scale"} <= set(lasso["assumptions"])
+    # Where the cap meets the skin stands beside how far it misses that place.
+    assert (lasso["assumptions"]["contact_x_mm"], lasso["assumptions"]["contact_s_mm"]) == (-0.3, 0.0)
 
 
 def test_the_time_index_sees_the_label_noise_and_lasso_lies_above_it(ran):
