@@ -13,7 +13,7 @@ from typing import cast
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.calibration.draw import Draw, parameters_of
-from tactbench.core.calibration.placing import with_parameters
+from tactbench.core.calibration.placing import procedures, with_parameters
 from tactbench.core.calibration.readoff import read_off, thinned
 from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.evaluation.cell import CellResult, evaluate
@@ -107,6 +107,8 @@ def checked(spec: CalibrationSpec) -> None:
                     f"The nuisance {nuisance.name!r} is of sensor {sensor!r}, which no output asks.",
                     hint=f"Sensors with outputs: {', '.join(sorted(known))}.",
                 )
+    for setting in procedures(spec):
+        checked(setting)
 
 
 def _record(

@@ -46,11 +46,16 @@ def own(sensors):
     return np.array([_levels(_without_shared(sensors["biotac"]), seed) for seed in range(SEEDS)])
 
 
-def _explained(rows):
-    """The share of variance over electrodes that a quadratic in (x, arc angle), fitted to each row, explains."""
+def _quadratics():
+    """(electrodes, 6) the monomials of a quadratic in (x, arc angle)."""
     x = np.array([place.x_mm for place in ELECTRODES])
     angle = np.array([np.arctan2(place.y_mm, -place.z_mm) for place in ELECTRODES])
-    design = np.stack([np.ones_like(x), x, angle, x * x, x * angle, angle * angle], axis=1)
+    return np.stack([np.ones_like(x), x, angle, x * x, x * angle, angle * angle], axis=1)
+
+
+def _explained(rows):
+    """The share of variance over electrodes that a quadratic, fitted to each row, explains."""
+    design = _quadratics()
     left = rows.T - design @ np.linalg.lstsq(design, rows.T, rcond=None)[0]
     centred = rows - rows.mean(axis=1, keepdims=True)
     return 1.0 - np.sum(left**2) / np.sum(centred**2)
@@ -102,6 +107,9 @@ def test_the_space_of_fields_does_not_depend_on_how_places_are_written(sensors):
     assert basis.shape == (19, 5)
     np.testing.assert_allclose(basis.T @ basis, np.eye(5), atol=1e-12)
     np.testing.assert_allclose(basis.sum(axis=0), 0.0, atol=1e-12)
+    # It holds every quadratic over the finger, and so nothing else.
+    centred = _quadratics()[:, 1:] - _quadratics()[:, 1:].mean(axis=0)
+    np.testing.assert_allclose(basis @ (basis.T @ centred), centred, rtol=0, atol=1e-10 * np.abs(centred).max())
     # Shifted and stretched along the finger, the quadratics are the same functions of the electrodes.
     channels = tuple(
         channel.model_copy(
