@@ -161,3 +161,13 @@ def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path,
     for name, content in finished.items():
         (path,) = results.rglob(name)
         assert path.read_bytes() == content, "what was finished is reused, not made again"
+
+
+def test_a_row_over_several_places_states_all_of_them(shell):
+    asked = ("--sensor", "icub", "--task", "force", "--split", "placement", "--protocol", "deployable")
+    rows = json.loads(shell("run", *asked, "--estimator", "ols", "--no-latency", "--format", "json").stdout)
+    (row,) = [row for row in rows if row["estimator"] == "ols"]
+    # Nominal at (-0.3, 0), and 1.5 mm either way along and across.
+    assert row["assumptions"]["contact_x_mm"] == "-1.8 to 1.2"
+    assert row["assumptions"]["contact_s_mm"] == "-1.5 to 1.5"
+    assert row["assumptions"]["placement_scatter_mm"] == 0.1
