@@ -60,6 +60,7 @@ from tactbench.core.spec.sensor import (
     Creep,
     Nuisances,
     PhysicalRange,
+    Scenario,
     SensorSpec,
     StreamSpec,
 )
@@ -117,6 +118,7 @@ __all__ = [
     "RigError",
     "Role",
     "Scalar",
+    "Scenario",
     "Scene",
     "SensorDescriptor",
     "SensorSpec",

@@ -17,8 +17,8 @@ settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
 
-# Threads of numerical libraries wait for each other in a loop: beside other work each wait costs a time slice. Set before
-# any of them is loaded; tests of several threads ask for them.
+# Threads of numerical libraries wait for each other in a loop: beside other work each wait costs a time slice. Set
+# before any of them is loaded; tests of several threads ask for them.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 # A shell's background jobs are deaf to Ctrl-C, and so is all that they start: tests that send one would wait for ever.

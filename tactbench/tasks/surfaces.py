@@ -1,9 +1,9 @@
 """The recordings behind the tasks: which surface is pressed where, on which unit, in which session.
 
 One campaign serves several tasks: each takes the surfaces it asks about, and a scene that two of them name is recorded
-once. The paper's own three sessions are as Karl et al. 2016 describe them. The campaigns beyond the paper begin an hour
-after power-on, so that a placement, a unit or a session differs by itself and not by the sensor's warm-up, and take
-1000 samples in the paper's 60 s: neighbouring rows of a slow ramp tell little new.
+once. The paper's own three sessions are as Karl et al. 2016 describe them. The campaigns beyond the paper take 1000
+samples in the paper's 60 s: neighbouring rows of a slow ramp tell little new. All begin an hour after power-on, a
+scene's default, so that a cap, a placement, a unit or a session differs by itself and not by the sensor's warm-up.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from tactbench.plugin import (
-    Environment,
     ForceRamp,
     Indenter,
     Placement,
@@ -44,7 +43,6 @@ TEST_SESSIONS = 5
 FEW = (1, 2, 5, 10)
 """Training sessions of the few-shot splits."""
 
-WARM = Environment(since_power_on=assumed(3600.0, "s", "an hour: warm; what is compared is not the warm-up"))
 SHORT = ForceRamp(samples=1000)
 NOMINAL = Placement()
 NOTHING: Mapping[str, str] = MappingProxyType({})
@@ -70,10 +68,15 @@ def surface_name(radius_mm: float | None) -> str:
 
 
 def papers_caps() -> tuple[PlannedScene, ...]:
-    """Return the paper's curvature recordings: every cap once in each of three sessions, one after the other."""
+    """Return the paper's curvature recordings: every cap once in each of three sessions, one after the other.
+
+    The paper does not state in which order the caps followed each other: it is drawn, session by session, so that a cap
+    is not told by how far the sensor has warmed up.
+    """
     return tuple(
         PlannedScene(
             role=role,
+            drawn_order=f"caps-{role}",
             scene=Scene(
                 name=f"{surface_name(radius)}-{role}",
                 indenter=indenter(radius),
@@ -144,7 +147,6 @@ def _planned(
         indenter=indenter(radius_mm),
         placement=placement,
         profile=SHORT,
-        environment=WARM,
         session=session,
         unit=unit,
         starts_after_s=SLOT_S * (first_slot + SURFACES.index(radius_mm)),

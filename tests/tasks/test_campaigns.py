@@ -2,6 +2,7 @@
 
 import itertools
 
+import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
@@ -12,6 +13,7 @@ from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
 from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
 from tactbench.core.spec.scene import Simulation
+from tactbench.core.spec.task import in_drawn_order
 from tactbench.plugin import ForceRamp, RigContext, load_object, load_registry
 
 REGISTRY = load_registry()
@@ -99,3 +101,57 @@ def test_both_sensors_can_carry_out_every_place_and_another_unit(sensor):
         # A smallest cap is pressed deep, and a flat surface overlaps the soft margin a little: both are said.
         assert remarks <= ALLOWED | (UNITS if scene.unit != "1" else set()), (scene.name, remarks)
         assert remarks >= UNITS or scene.unit == "1"
+
+
+def in_time(task, seed):
+    """Names of a task's caps in the order in which they follow each other, session by session."""
+    planned = in_drawn_order(TASKS[task].scenes, seed)
+    caps = [item.scene for item in planned if item.drawn_order]
+    assert caps == sorted(caps, key=lambda scene: scene.starts_after_s)
+    return [scene.name for scene in caps]
+
+
+def test_the_order_of_the_caps_belongs_to_the_seed():
+    assert in_time("curvature", 3) == in_time("curvature", 3)
+    assert len({tuple(in_time("curvature", seed)) for seed in range(20)}) == 20
+    # A session's caps stay in it, the sessions in their order, and nothing but the order is changed.
+    declared, drawn = TASKS["curvature"].scenes, in_drawn_order(TASKS["curvature"].scenes, 3)
+    assert [item.role for item in drawn] == [item.role for item in declared]
+    assert [item.scene.starts_after_s for item in drawn] == [item.scene.starts_after_s for item in declared]
+    without = {item.scene.name: item.scene.model_copy(update={"starts_after_s": 0.0}) for item in declared}
+    assert {item.scene.name: item.scene.model_copy(update={"starts_after_s": 0.0}) for item in drawn} == without
+
+
+def test_every_cap_comes_at_every_place_alike():
+    seeds = 600
+    orders = [in_time("curvature", seed)[:5] for seed in range(seeds)]
+    counts = np.array([[order.count(name) for order in zip(*orders, strict=True)] for name in sorted(orders[0])])
+    # 600 draws of one in five: 120, sd 9.8; 25 counts and four and a half of those.
+    assert np.abs(counts - seeds / 5).max() < 44
+    # Sessions are drawn each by itself.
+    same = sum(a[:4] == b[:4] for a, b in (_sessions(seed) for seed in range(seeds)))
+    assert same < 0.05 * seeds
+
+
+def _sessions(seed):
+    whole = [name.rsplit("-", 1)[0] for name in in_time("curvature", seed)]
+    return whole[:5], whole[5:10]
+
+
+def test_tasks_that_share_the_caps_share_their_order(tmp_path):
+    assert in_time("curvature", 5) == in_time("inverse-radius", 5)
+    cells = plan_cells(
+        MatrixSpec(seed=5, tasks=(TaskChoice(name="curvature", protocol="karl2016"),)), ["icub"], REGISTRY
+    )
+    (orders,) = orders_for(
+        cells, REGISTRY, SourceDigests(tmp_path / "s.json"), Store(tmp_path), Simulation()
+    ).values()  # fmt: skip
+    # What is to be recorded holds the drawn order: a recording keeps its scene.
+    assert [order.scene.name for order in orders] == in_time("curvature", 5)
+
+
+def test_what_is_not_to_be_drawn_stays_where_it_is():
+    force = TASKS["force"].scenes
+    assert in_drawn_order(force, 9) == force
+    flats = [item for item in in_drawn_order(TASKS["inverse-radius"].scenes, 9) if not item.drawn_order]
+    assert flats == [item for item in TASKS["inverse-radius"].scenes if not item.drawn_order]

@@ -31,6 +31,10 @@ class Draw:
     """Why it failed."""
 
 
+Varied = Mapping[str, tuple[tuple[Draw, ...], ...]]
+"""By name of a variation, the draws of each of its settings: one a seed."""
+
+
 def parameters_of(spec: CalibrationSpec, seed: int, number: int) -> tuple[int, dict[str, float]]:
     """Return the recordings' seed of draw `number` and its value of every nuisance.
 

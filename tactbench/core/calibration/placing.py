@@ -1,14 +1,14 @@
-"""Putting a drawn value where it stands in a scene."""
+"""Putting a value, drawn or given by a setting, where it stands in a scene."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from tactbench.core.errors import UnknownNameError, UsageError
-from tactbench.core.spec.calibration import CalibrationSpec
+from tactbench.core.spec.calibration import CalibrationSpec, Fixed, Nuisance, Setting, Variation
 from tactbench.core.spec.quantity import Quantity, assumed
 from tactbench.core.spec.scene import Scene
 
@@ -60,3 +60,23 @@ def _placed(model: M, path: str, way: tuple[str, ...], quantity: Quantity) -> M:
         raise UsageError(
             f"{path} cannot be {quantity}: {error.errors()[0]['msg']}.", hint="Narrow the nuisance's prior."
         ) from error
+
+
+def as_procedure(spec: CalibrationSpec, variation: Variation, setting: Setting) -> CalibrationSpec:
+    """Return the procedure whose draws are the seeds of one setting: what it gives is fixed, nothing is drawn."""
+    given = tuple(
+        Nuisance(
+            name=f"given_{place}", path=one.path, unit=one.unit, sensors=one.sensors,
+            prior=Fixed(kind="fixed", value=one.value), reason=setting.label, source="assumed",
+        )
+        for place, one in enumerate(setting.given, start=1)
+    )  # fmt: skip
+    outputs = tuple(spec.output(name) for name in variation.outputs)
+    return spec.model_copy(update={"nuisances": given, "outputs": outputs, "variations": ()})
+
+
+def procedures(spec: CalibrationSpec) -> Iterator[CalibrationSpec]:
+    """Yield the procedure of every setting."""
+    for variation in spec.variations:
+        for setting in variation.settings:
+            yield as_procedure(spec, variation, setting)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tactbench.core.calibration.acceptance import accept, by_fitted
-from tactbench.core.calibration.draw import Draw, output_values, parameter_values
+from tactbench.core.calibration.draw import Draw, finished, output_values, parameter_values
 from tactbench.core.samples import FloatArray
 from tactbench.core.spec.calibration import CalibrationSpec, Fixed, PublishedNumber
 
@@ -97,3 +97,10 @@ def _predicted(spec: CalibrationSpec, draws: Sequence[Draw], kept: Sequence[Draw
     output = spec.output(one.output)
     before, after, left_out = (range_of(output_values(some, one.output)) for some in (draws, kept, others.draws))
     return Predicted(one.output, output.title, output.unit, one.value, one.use, before, after, left_out, others.reach)
+
+
+def median_and_ends(draws: Sequence[Draw], output: str) -> tuple[float, float, float] | None:
+    """Return median, least and largest of an output over the draws that have it; None if none has."""
+    values = output_values(finished(draws), output)
+    values = values[np.isfinite(values)]
+    return (float(np.median(values)), float(values.min()), float(values.max())) if values.size else None

@@ -1,13 +1,14 @@
-"""Carrying out the draws that are still missing."""
+"""Carrying out the draws that are still missing, and the settings that are looked at beside them."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from tactbench.core.calibration.draw import Draw
+from tactbench.core.calibration.draw import Draw, Varied
 from tactbench.core.calibration.journal import Journal
+from tactbench.core.calibration.placing import as_procedure
 from tactbench.core.calibration.trial import Trial, carry_out
 from tactbench.core.errors import TactbenchError
 from tactbench.core.matrix.engines.choice import EngineChoice
@@ -54,3 +55,35 @@ def carry_out_missing(
                 journal.append(*outcome)
                 told.advance(f"draw {trial.number}: {outcome[0].status}, {outcome[1]:.1f} s")
     return [journal.draws[number] for number in range(draws)]
+
+
+def carry_out_variations(
+    spec: CalibrationSpec,
+    seed: int,
+    folder: Path,
+    made_by: Mapping[str, str],
+    *,
+    jobs: int,
+    told: Progress,
+    work: Work = carry_out,
+) -> Varied:
+    """Carry out what `folder` does not hold yet, and return all of it; each setting has a journal of its own there.
+
+    Draw n has the same seed in every setting, so that settings differ by what they give and by nothing else.
+
+    Raises
+    ------
+    TactbenchError
+        If a process was ended from outside, or a journal is of another procedure; what was finished is kept.
+    """
+    found: dict[str, tuple[tuple[Draw, ...], ...]] = {}
+    for variation in spec.variations:
+        own = []
+        for place, setting in enumerate(variation.settings, start=1):
+            procedure = as_procedure(spec, variation, setting)
+            journal = Journal(folder / f"{variation.name}-{place}.jsonl", procedure, seed, made_by)
+            own.append(
+                tuple(carry_out_missing(procedure, seed, variation.seeds, journal, jobs=jobs, told=told, work=work))
+            )
+        found[variation.name] = tuple(own)
+    return found

@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tactbench.core.calibration.draw import finished
+from tactbench.core.calibration.ranges import median_and_ends
 from tactbench.core.calibration.result import CalibrationResult
-from tactbench.core.calibration.summary import Summary, acceptance, records
-from tactbench.core.spec.calibration import CalibrationSpec
+from tactbench.core.calibration.summary import Summary, acceptance, records, summary
+from tactbench.core.spec.calibration import CalibrationSpec, Fixed, Prior, Variation
 
 Line = Mapping[str, Any]
 
@@ -34,6 +36,8 @@ def text_tables(result: CalibrationResult, told: Summary) -> list[TextTable]:
         _findings(lines["findings"]),
         _sensitivity(result.spec, lines["sensitivity"]),
         _agreement(result.spec, lines["agreement"], lines["same_verdict"]),
+        *(_variation(result, one) for one in result.spec.variations),
+        *(() if result.earlier is None else (_beside(result, lines, result.earlier),)),
     )
     return [table for table in tables if table.rows]
 
@@ -134,6 +138,63 @@ def _agreement(spec: CalibrationSpec, lines: Sequence[Line], verdicts: Sequence[
             for line in verdicts
         ),
     )  # fmt: skip
+
+
+def _variation(result: CalibrationResult, variation: Variation) -> TextTable:
+    """Return a table of one variation; no row where nothing was carried out."""
+    settings = result.varied.get(variation.name, ())
+    titles = {name: result.spec.output(name).title for name in variation.outputs}
+    rows = []
+    for setting, draws in zip(variation.settings, settings, strict=False):
+        found = {name: median_and_ends(draws, name) for name in variation.outputs}
+        cells = {titles[name]: _spread(one) for name, one in found.items()}
+        rows.append({"setting": setting.label, "seeds": str(len(finished(draws))), **cells})
+    return TextTable(
+        f"{variation.title}: median (least … largest) over seeds",
+        ("setting", "seeds", *titles.values()),
+        tuple(rows),
+        numeric=("seeds",),
+        below=(f"{variation.reason} Nothing is drawn from a prior here; the seeds are the same in every setting.",),
+    )
+
+
+def _spread(one: tuple[float, float, float] | None) -> str:
+    return "none" if one is None else f"{one[0]:.3g} ({one[1]:.3g} … {one[2]:.3g})"
+
+
+def _beside(result: CalibrationResult, lines: Mapping[str, Sequence[Line]], earlier: CalibrationResult) -> TextTable:
+    """Return published numbers and findings beside those of an earlier calibration that had them too."""
+    told = summary(earlier)
+    before = records(told)
+    rows = [
+        {"number or finding": line[title], "earlier prior": show(old, "prior"), "prior": show(line, "prior"),
+         "earlier accepted": show(old, "accepted"), "accepted": show(line, "accepted")}
+        for table, key, title, show in (
+            ("published", "output", "title", _range), ("findings", "name", "statement", _share),
+        )
+        for line in lines[table]
+        for old in before[table]
+        if old[key] == line[key]
+    ]  # fmt: skip
+    then = {one.name: one.prior for one in earlier.spec.nuisances}
+    now = {one.name: one.prior for one in result.spec.nuisances}
+    other = [
+        f"{name} {_bounds(then.get(name))} then, {_bounds(now.get(name))} now"
+        for name in dict.fromkeys((*then, *now))
+        if then.get(name) != now.get(name)
+    ]
+    return TextTable(
+        f"Beside the earlier {len(told.draws)} draws",
+        ("number or finding", "earlier prior", "prior", "earlier accepted", "accepted"),
+        tuple(rows),
+        below=(f"Priors that differ: {'; '.join(other) or 'none'}. Earlier: {acceptance(earlier.spec, told)}",),
+    )
+
+
+def _bounds(prior: Prior | None) -> str:
+    if prior is None:
+        return "not drawn"
+    return f"{prior.value:g}" if isinstance(prior, Fixed) else f"{prior.low:g} to {prior.high:g}"
 
 
 def _range(line: Line, name: str) -> str:

@@ -13,7 +13,7 @@ from typing import cast
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.calibration.draw import Draw, parameters_of
-from tactbench.core.calibration.placing import with_parameters
+from tactbench.core.calibration.placing import procedures, with_parameters
 from tactbench.core.calibration.readoff import read_off, thinned
 from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.evaluation.cell import CellResult, evaluate
@@ -22,8 +22,8 @@ from tactbench.core.matrix.installed import rig_of
 from tactbench.core.plugins.interfaces import Rig
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.spec.calibration import CalibrationSpec, Output
-from tactbench.core.spec.scene import Scene, Simulation
-from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.scene import Simulation
+from tactbench.core.spec.task import PlannedScene, TaskSpec, in_drawn_order
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,17 @@ def simulated_outputs(trial: Trial, seed: int, values: dict[str, float]) -> dict
     return {output.name: found[output.name] for output in wanted}
 
 
-def scenes_of(spec: CalibrationSpec, sensor: str, task: TaskSpec, values: dict[str, float]) -> list[Scene]:
-    """Return the task's scenes with the drawn values in their places."""
-    scenes = [with_parameters(planned.scene, spec, sensor, values) for planned in task.scenes]
-    if spec.simulation != Simulation():
-        scenes = [scene.model_copy(update={"simulation": spec.simulation}) for scene in scenes]
-    return scenes
+def scenes_of(
+    spec: CalibrationSpec, sensor: str, task: TaskSpec, values: dict[str, float], seed: int
+) -> list[PlannedScene]:
+    """Return the task's scenes with the drawn values in their places, in the order that belongs to the draw's seed."""
+    found = []
+    for planned in in_drawn_order(task.scenes, seed):
+        scene = with_parameters(planned.scene, spec, sensor, values)
+        if spec.simulation != Simulation():
+            scene = scene.model_copy(update={"simulation": spec.simulation})
+        found.append(planned.model_copy(update={"scene": scene}))
+    return found
 
 
 def checked(spec: CalibrationSpec) -> None:
@@ -87,13 +92,13 @@ def checked(spec: CalibrationSpec) -> None:
         raise UsageError(
             f"The rig {spec.rig!r} is not simulated: nothing can be drawn for it.", hint="Name one in `rig:`."
         )
-    _, values = parameters_of(spec, spec.seed, 0)
+    seed, values = parameters_of(spec, spec.seed, 0)
     for output in spec.outputs:
         sensor, task = registry.sensors[output.sensor].name, registry.tasks[output.task].spec
         registry.estimators[output.estimator.name]
         if not task.scenes:
             raise UsageError(f"Task {task.name!r} plans no scenes.", hint="Name another in `outputs:`.")
-        scenes_of(spec, sensor, task, values)
+        scenes_of(spec, sensor, task, values, seed)
     known = {output.sensor for output in spec.outputs}
     for nuisance in spec.nuisances:
         for sensor in nuisance.sensors:
@@ -102,6 +107,8 @@ def checked(spec: CalibrationSpec) -> None:
                     f"The nuisance {nuisance.name!r} is of sensor {sensor!r}, which no output asks.",
                     hint=f"Sensors with outputs: {', '.join(sorted(known))}.",
                 )
+    for setting in procedures(spec):
+        checked(setting)
 
 
 def _record(
@@ -109,7 +116,8 @@ def _record(
 ) -> list[Path]:
     rig = _rig(trial.spec.rig, registry)
     paths = []
-    for planned, scene in zip(task.scenes, scenes_of(trial.spec, sensor, task, values), strict=True):
+    for planned in scenes_of(trial.spec, sensor, task, values, seed):
+        scene = planned.scene
         path = folder / f"{scene.name}.h5"
         acquire(
             rig, registry.sensors[sensor], registry.rigs[trial.spec.rig], scene, role=planned.role, seed=seed,

@@ -67,7 +67,7 @@ def _procedure(config: Path | None) -> CalibrationSpec:
 def _drawn(spec: CalibrationSpec, draws: int | None, seed: int | None, jobs: int, out: Path) -> CalibrationResult:
     from tactbench.core.calibration.journal import Journal
     from tactbench.core.calibration.result import CalibrationResult
-    from tactbench.core.calibration.run import carry_out_missing, made_by
+    from tactbench.core.calibration.run import carry_out_missing, carry_out_variations, made_by
     from tactbench.core.calibration.trial import checked
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.screen import remark
@@ -84,9 +84,11 @@ def _drawn(spec: CalibrationSpec, draws: int | None, seed: int | None, jobs: int
     try:
         with progress() as told:
             done = carry_out_missing(spec, chosen, wanted, journal, jobs=jobs, told=told)
+            beside = out / "calibration" / "variations"
+            varied = carry_out_variations(spec, chosen, beside, makers, jobs=jobs, told=told)
     except OSError as error:
         raise UnwritableError(f"{journal.path} cannot be written: {error}.", hint="Give another --out.") from error
-    return CalibrationResult(spec, chosen, tuple(done), journal.made_by, journal.seconds)
+    return CalibrationResult(spec, chosen, tuple(done), journal.made_by, journal.seconds, varied=varied)
 
 
 def _write(result: CalibrationResult, told: Summary, folder: Path) -> None:
@@ -123,5 +125,6 @@ def _write(result: CalibrationResult, told: Summary, folder: Path) -> None:
             save(figure, [folder / f"{name}.png", folder / f"{name}.pdf"])
     except OSError as error:
         raise UnwritableError(f"{folder} cannot be written: {error}.", hint="Give another --out.") from error
-    remark(f"Files: {folder}/draws.jsonl, draws.csv, run.json, ranges.json, findings.json, sensitivity.json, "
+    beside = " variations.csv," if result.varied else ""
+    remark(f"Files: {folder}/draws.jsonl, draws.csv,{beside} run.json, ranges.json, findings.json, sensitivity.json, "
            "draws.png, .pdf, sensitivity.png, .pdf")  # fmt: skip

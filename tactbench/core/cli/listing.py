@@ -6,14 +6,15 @@ import json
 
 import click
 
-FAMILIES = ("sensors", "rigs", "tasks", "estimators", "effects")
+SCENARIOS = "scenarios"
+FAMILIES = ("sensors", "rigs", "tasks", "estimators", "effects", SCENARIOS)
 
 
 @click.command(name="list")
 @click.argument("family", type=click.Choice(FAMILIES), required=False)
 @click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
 def command(family: str | None, shape: str) -> None:
-    """List sensors, rigs, tasks, estimators and effects."""
+    """List sensors, rigs, tasks, estimators, effects, and the scenarios that sensors state."""
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()
@@ -24,7 +25,14 @@ def command(family: str | None, shape: str) -> None:
             for descriptor in registry.shelves()[name]
         }
         for name in families
+        if name != SCENARIOS
     }
+    if SCENARIOS in families:
+        stated = [(name, sensor) for sensor in registry.sensors for name in sensor.spec.scenarios]
+        found[SCENARIOS] = {
+            name: "; ".join(f"{one.name}: {one.spec.scenarios[name].title}" for also, one in stated if also == name)
+            for name, _ in stated
+        }
     if shape == "json":
         click.echo(json.dumps(found, indent=1, ensure_ascii=False))
         return

@@ -47,6 +47,7 @@ def command(
     effects: str | None,
     rung: str | None,
     tolerance: float | None,
+    scenario: str | None,
 ) -> None:
     """Carry out one scene into one recording."""
     import time
@@ -61,7 +62,7 @@ def command(
     scene = _scene(out.stem, cap_mm, force_n, seconds, descriptor)
     if slide_mm_s is not None:
         scene = _sliding(scene, slide_mm_s, descriptor)
-    simulation = simulation_of(registry, rig, effects=effects, rung=rung, tolerance=tolerance)
+    simulation = simulation_of(registry, rig, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario)
     if simulation is not None:
         scene = scene.model_copy(update={"simulation": simulation})
     built = _built(registry, rig)

@@ -51,6 +51,7 @@ def matrix_asked(
     effects: str | None,
     rung: str | None,
     tolerance: float | None,
+    scenario: str | None,
     latency: bool | None,
     **asked: Any,
 ) -> tuple[MatrixSpec, Path | None]:
@@ -62,7 +63,7 @@ def matrix_asked(
         If a file, a name or a combination of options is wrong.
     """
     matrix = _matrix(**asked, replaying=recordings is not None)
-    simulation = simulation_of(registry, matrix.rig, effects=effects, rung=rung, tolerance=tolerance)
+    simulation = simulation_of(registry, matrix.rig, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario)
     if probe:
         matrix = matrix.model_copy(update={"probe": True})
     if latency is not None:

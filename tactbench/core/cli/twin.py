@@ -48,6 +48,7 @@ def explain(
     effects: str | None,
     rung: str | None,
     tolerance: float | None,
+    scenario: str | None,
 ) -> None:
     """Say which effects a task's scenes get, which they do not, why, and what each costs or would cost.
 
@@ -60,7 +61,7 @@ def explain(
 
     registry = load_registry()
     name = simulated_rig(registry, rig)
-    simulation = simulation_of(registry, name, effects=effects, rung=rung, tolerance=tolerance)
+    simulation = simulation_of(registry, name, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario)
     if score is None and (wanted is not None or not rounds):
         score = False
     print_explanations(

@@ -13,7 +13,7 @@ from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.samples import Answers
-from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
 
@@ -187,10 +187,25 @@ def _told_by(metas: Sequence[RecordingMeta]) -> Row:
     return {
         "simulated": any(meta.simulated for meta in metas),
         "sim_s": sum(seconds) if seconds else None,
-        "assumptions": dict(first.assumptions) if first else {},
+        "assumptions": _assumed(metas),
         "plan": [entry.model_dump() for entry in first.plan] if first else [],
         "remarks": sorted({remark for meta in metas for remark in meta.remarks}),
     }
+
+
+def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
+    """Return what a simulation assumed in all recordings; of what differs among them, the range or every value."""
+    found: dict[str, Scalar] = {}
+    for name in dict.fromkeys(name for meta in metas for name in meta.assumptions):
+        values = list(dict.fromkeys(meta.assumptions[name] for meta in metas if name in meta.assumptions))
+        numbers = [value for value in values if isinstance(value, int | float)]
+        if len(values) == 1:
+            found[name] = values[0]
+        elif len(numbers) == len(values):
+            found[name] = f"{min(numbers):g} to {max(numbers):g}"
+        else:
+            found[name] = ", ".join(str(value) for value in values)
+    return found
 
 
 def _scored(result: CellResult) -> Row:

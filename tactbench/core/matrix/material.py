@@ -12,6 +12,7 @@ from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.scene import Role, Scene, Simulation
+from tactbench.core.spec.task import in_drawn_order
 
 Need = tuple[str, str, str | None, int]
 """Sensor, task, split and seed: what decides which recordings a cell needs."""
@@ -39,6 +40,7 @@ def orders_for(
 ) -> dict[Need, list[Order]]:
     """Return the recordings needed, in the campaign's order, carried out as `simulation` asks.
 
+    Where the campaign leaves the order to be drawn, it is drawn with the cell's seed.
     Tasks and campaigns that ask for the same scene in the same role share the recording.
     """
     orders: dict[Need, list[Order]] = {}
@@ -47,7 +49,7 @@ def orders_for(
         if wanted in orders:
             continue
         orders[wanted] = []
-        for planned in registry.tasks[cell.task].spec.scenes_for(wanted[2]):
+        for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(wanted[2]), cell.seed):
             scene = planned.scene
             if simulation != Simulation():
                 scene = scene.model_copy(update={"simulation": simulation})

@@ -13,6 +13,7 @@ from tactbench.core.spec.matrix import EstimatorChoice
 from tactbench.core.spec.quantity import Frozen, Source, Tag
 from tactbench.core.spec.scene import Simulation
 
+_PATH = r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$"
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 
 
@@ -58,7 +59,7 @@ class Nuisance(Frozen):
     """One number of the scene that no source states well enough."""
 
     name: Name
-    path: str = Field(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$")
+    path: str = Field(pattern=_PATH)
     """Where it stands in a scene: ``placement.scatter``, ``environment.noise_scale`` …"""
     unit: str = "1"
     """Unit of the prior's numbers."""
@@ -150,6 +151,38 @@ class Finding(Frozen):
     source: Source
 
 
+class Given(Frozen):
+    """One number of the scene, as a setting has it."""
+
+    path: str = Field(pattern=_PATH)
+    """Where it stands in a scene, as for a nuisance."""
+    value: float
+    unit: str = "1"
+    sensors: tuple[str, ...] = ()
+    """Whose scenes get it; empty: those of all sensors."""
+
+
+class Setting(Frozen):
+    """What is set otherwise than the scenes state it, nothing drawn."""
+
+    label: str
+    """For people: ``1.8 mm towards the tip``."""
+    given: tuple[Given, ...] = Field(min_length=1)
+
+
+class Variation(Frozen):
+    """One thing in several settings, all else as the scenes state it: what it alone does to some of the outputs."""
+
+    name: Name
+    title: str
+    outputs: tuple[Name, ...] = Field(min_length=1)
+    seeds: int = Field(ge=1)
+    """How many: the same in every setting."""
+    settings: tuple[Setting, ...] = Field(min_length=1)
+    reason: str
+    """Why these settings are looked at."""
+
+
 class CalibrationSpec(Frozen):
     """The whole procedure."""
 
@@ -169,10 +202,15 @@ class CalibrationSpec(Frozen):
     at_least: int = Field(default=0, ge=0)
     """Where fewer draws are near, so many nearest ones are accepted instead; how far they reach is told with them."""
     findings: tuple[Finding, ...] = ()
+    variations: tuple[Variation, ...] = ()
+    """Looked at beside the draws, and no part of them."""
 
     @model_validator(mode="after")
     def _names_fit_together(self) -> CalibrationSpec:
-        for what, named in (("nuisance", self.nuisances), ("output", self.outputs), ("finding", self.findings)):
+        for what, named in (
+            ("nuisance", self.nuisances), ("output", self.outputs), ("finding", self.findings),
+            ("variation", self.variations),
+        ):  # fmt: skip
             _once(what, (one.name for one in named))
         _once("published number", (one.output for one in self.published))
         known = [output.name for output in self.outputs]
@@ -181,6 +219,7 @@ class CalibrationSpec(Frozen):
             *(one.output for one in self.published),
             *(name for comparison in compared for name in (comparison.above, comparison.below)),
             *(output.stands_for for output in self.outputs if output.stands_for is not None),
+            *(name for variation in self.variations for name in variation.outputs),
         ]
         for name in asked:
             if name not in known:

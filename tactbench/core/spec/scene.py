@@ -64,7 +64,7 @@ class Environment(Frozen):
     """What surrounds the contact, and how far the assumed nuisances are scaled."""
 
     since_power_on: Quantity = assumed(
-        600.0, "s", "ten minutes: not yet quite warm; the paper does not say: docs/calibration.md draws it from a prior"
+        3600.0, "s", "an hour: warm; the paper does not say: docs/calibration.md draws it from a prior"
     )
     """Time from switching the sensor on to the first sample of the session [time]."""
     noise_scale: float = Field(default=1.0, ge=0)
@@ -167,6 +167,8 @@ class Simulation(Frozen):
     tolerance: float | None = Field(default=None, gt=0)
     """Largest error of an observed channel, in its own unit; the cheapest rung that keeps it is taken. None: the
     rung's own."""
+    scenario: str | None = None
+    """Name of one of the sensor's scenarios, whose nuisances take the place of the usual ones; None: the usual ones."""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Simulation:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from tactbench.core.errors import NotApplicable
 from tactbench.core.spec import units
 from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.quantity import Frozen, Quantity, Source
@@ -98,7 +99,7 @@ class Nuisances(Frozen):
     offset_shared: Quantity
     """Standard deviation of an offset that all channels of one recording share."""
     offset_own: Quantity
-    """Standard deviation of each channel's own offset in a recording."""
+    """Each channel's own offset in a recording: its root mean square over channels and recordings."""
     offset_session: Quantity
     """Standard deviation of each channel's own offset between sessions."""
     gain_scatter: Quantity
@@ -122,6 +123,9 @@ class Nuisances(Frozen):
     """Standard deviation by which the rest level of all channels of another unit differs from the spec's."""
     unit_rest_own: Quantity | None = None
     """The same for each channel's own."""
+    offset_smooth: Quantity | None = None
+    """Share of the own offsets' variance that is a quadratic of the channels' places [1]; None: all of it is each
+    channel's by itself."""
 
     @model_validator(mode="before")
     @classmethod
@@ -134,6 +138,15 @@ class Nuisances(Frozen):
     def hidden(self, noise_scale: float = 1.0) -> float:
         """Return the standard deviation that white noise and rounding hide anyway, in the channel's unit."""
         return math.hypot(noise_scale * self.white.value, self.step.value / math.sqrt(12.0))
+
+
+class Scenario(Frozen):
+    """Other nuisances than the usual ones, for a way of handling the sensor that has a name."""
+
+    title: str
+    """What is done to the sensor, in a few words."""
+    nuisances: dict[ChannelKind, Nuisances] = Field(min_length=1)
+    """By kind of channel, in place of the spec's own; kinds that are not here keep theirs."""
 
 
 class SensorSpec(Frozen):
@@ -151,6 +164,9 @@ class SensorSpec(Frozen):
     """What the sensor's own transduction needs."""
     nuisances: dict[ChannelKind, Nuisances] = Field(default_factory=dict)
     """Noise and drift by kind of channel, for the twin."""
+    scenarios: dict[Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")], Scenario] = Field(default_factory=dict)
+    """Ways of handling the sensor that its usual nuisances do not cover, by name; used where a scene's simulation asks
+    for one."""
     references: tuple[str, ...] = ()
     likeness: tuple[RealFigure, ...] = Field(default=(), exclude=True)
     """Figures of real units, to judge by. Left out of recordings and keys: no sample depends on them."""
@@ -170,3 +186,20 @@ class SensorSpec(Frozen):
         """Return the channels of the given kinds (all of them without arguments), in order of the streams."""
         every = (channel for stream in self.streams for channel in stream.channels)
         return tuple(channel for channel in every if not kinds or channel.kind in kinds)
+
+    def handled(self, scenario: str | None) -> SensorSpec:
+        """Return the spec with the nuisances of one of its scenarios; None: as it is.
+
+        Raises
+        ------
+        NotApplicable
+            If the sensor states no scenario of that name.
+        """
+        if scenario is None:
+            return self
+        if scenario not in self.scenarios:
+            raise NotApplicable(
+                f"{self.name} states no scenario {scenario!r}; it states {', '.join(self.scenarios) or 'none'}.",
+                hint="Leave the scenario out, or state it in the sensor's spec.",
+            )
+        return self.model_copy(update={"nuisances": {**self.nuisances, **self.scenarios[scenario].nuisances}})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -16,6 +18,31 @@ class PlannedScene(Frozen):
 
     scene: Scene
     role: Role
+    drawn_order: str = ""
+    """Name of a group whose scenes follow each other in an order drawn with the seed; empty: as declared."""
+
+
+def in_drawn_order(planned: Sequence[PlannedScene], seed: int) -> tuple[PlannedScene, ...]:
+    """Return the scenes with those of each group of `drawn_order` in an order drawn with `seed`.
+
+    The members of a group share out their own places in the sequence and their own starting times, so that what the
+    scene is of and how warm the sensor is by then are independent. Members are ordered by a hash (BLAKE2) of seed,
+    group and name: uniform over all orders, the same everywhere, and the same in every task that has the group.
+    """
+    found = list(planned)
+    groups = dict.fromkeys(item.drawn_order for item in planned if item.drawn_order)
+    for group in groups:
+        places = [place for place, item in enumerate(planned) if item.drawn_order == group]
+        times = sorted(planned[place].scene.starts_after_s for place in places)
+        members = sorted((planned[place] for place in places), key=lambda item: _draw(seed, group, item.scene.name))
+        for place, start, item in zip(places, times, members, strict=True):
+            scene = item.scene.model_copy(update={"starts_after_s": start})
+            found[place] = item.model_copy(update={"scene": scene})
+    return tuple(found)
+
+
+def _draw(seed: int, *names: str) -> bytes:
+    return hashlib.blake2b("\x1f".join((str(seed), *names)).encode(), digest_size=16).digest()
 
 
 class ChannelTarget(Frozen):
@@ -105,5 +132,5 @@ class TaskSpec(Frozen):
         return min(fitting, key=lambda one: (one.sensor is None, one.estimator is None), default=None)
 
     def scenes_for(self, split: str | None) -> tuple[PlannedScene, ...]:
-        """Return what a rig should record to answer under `split`; None is the default split."""
+        """Return what a rig should record to answer under `split`, as declared; None is the default split."""
         return self.scenes if split is None else self.campaigns.get(split, self.scenes)

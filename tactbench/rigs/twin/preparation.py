@@ -34,9 +34,10 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidel
     RigError
         If a number of the scene is none, or its force profile or its clocks cannot be carried out.
     NotApplicable
-        If the sensor declares no skin.
+        If the sensor declares no skin, or no scenario of the name that the scene's simulation asks for.
     """
     check_numbers(scene)
+    sensor = handled(sensor, scene)
     t_s, load = _load(scene)
     run = Synthesis(
         sensor=sensor,
@@ -53,6 +54,13 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidel
     )
     run.contact = _place(run)
     return run
+
+
+def handled(sensor: SensorDescriptor, scene: Scene) -> SensorDescriptor:
+    """Return the sensor with the nuisances of the scenario that the scene asks for, if any; raises NotApplicable."""
+    if scene.simulation.scenario is None:
+        return sensor
+    return sensor.model_copy(update={"spec": sensor.spec.handled(scene.simulation.scenario)})
 
 
 def carried_out(
@@ -114,16 +122,27 @@ def _rest(channel: ChannelSpec) -> float:
 
 def _place(run: Synthesis) -> Contact:
     """Return where the indenter meets the skin: nominal point, commanded offset, and this mounting's own scatter."""
-    placement, spec = run.scene.placement, run.sensor.spec
-    if spec.skin is None:
-        raise NotApplicable(f"{spec.name} declares no skin.")
-    sheet = spec.skin.sheet
-    middle = (sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2
-    nominal_x = spec.parameters["contact_x"].to("mm") if "contact_x" in spec.parameters else middle
-    nominal_s = spec.parameters["contact_s"].to("mm") if "contact_s" in spec.parameters else 0.0
-    scatter = placement.scatter.to("mm")
-    off_x, off_s = scatter * run.of_recording("placement").standard_normal(2)
-    x, s = nominal_x + placement.x.to("mm") + off_x, nominal_s + placement.s.to("mm") + off_s
+    placement = run.scene.placement
+    commanded_x, commanded_s = commanded_place_mm(run.sensor.spec, run.scene)
+    off_x, off_s = placement.scatter.to("mm") * run.of_recording("placement").standard_normal(2)
+    x, s = commanded_x + off_x, commanded_s + off_s
     run.drawn.update(placement_x_mm=float(x), placement_s_mm=float(s))
     tilt_x, tilt_s = (math.tan(tilt.to("rad")) for tilt in (placement.tilt_x, placement.tilt_s))
     return Contact(run.contact.radius_mm, float(x), float(s), tilt_x, tilt_s)
+
+
+def commanded_place_mm(spec: SensorSpec, scene: Scene) -> tuple[float, float]:
+    """Return where the apex of the indenter is to meet the skin, (x, s): the nominal point and the scene's offset.
+
+    Raises
+    ------
+    NotApplicable
+        If the sensor declares no skin.
+    """
+    if spec.skin is None:
+        raise NotApplicable(f"{spec.name} declares no skin.")
+    sheet, placement = spec.skin.sheet, scene.placement
+    middle = (sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2
+    nominal_x = spec.parameters["contact_x"].to("mm") if "contact_x" in spec.parameters else middle
+    nominal_s = spec.parameters["contact_s"].to("mm") if "contact_s" in spec.parameters else 0.0
+    return nominal_x + placement.x.to("mm"), nominal_s + placement.s.to("mm")

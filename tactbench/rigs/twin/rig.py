@@ -28,7 +28,7 @@ from tactbench.plugin import (
 )
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
-from tactbench.rigs.twin.preparation import carried_out
+from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
 from tactbench.rigs.twin.synthesis import Synthesis
 
 ROWS_PER_BLOCK = 1000
@@ -106,7 +106,7 @@ class Twin:
                 f"{sensor.name} declares no {missing}: it can be recorded or replayed, not simulated.",
                 hint="Declare a skin and a transducer in the sensor's plugin.",
             )
-        return plan_scene(self.effects, scene, sensor.spec)
+        return plan_scene(self.effects, scene, handled(sensor, scene).spec)
 
     @contextmanager
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[TwinAcquisition]:
@@ -126,7 +126,7 @@ class Twin:
         """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""
         from tactbench.rigs.twin.costing import explained
 
-        return explained(self.effects, sensor, scene, self.plan(sensor, scene), rounds)
+        return explained(self.effects, handled(sensor, scene), scene, self.plan(sensor, scene), rounds)
 
 
 def build(context: RigContext) -> Twin:
@@ -162,11 +162,14 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     measured = np.column_stack([run.reference_n, *(values for _, values in run.reference_more.values())])
     samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), measured, None)
     environment = run.scene.environment
+    contact_x, contact_s = commanded_place_mm(run.sensor.spec, run.scene)
     return TwinAcquisition(
         streams=tuple(streams),
         reference=(reference,),
         plan=plan.settled(run.settled),
         assumptions={
+            "contact_x_mm": contact_x,
+            "contact_s_mm": contact_s,
             "placement_scatter_mm": run.scene.placement.scatter.to("mm"),
             "drift_scale": environment.drift_scale,
             "noise_scale": environment.noise_scale,
@@ -215,6 +218,8 @@ def _asked(scene: Scene) -> dict[str, Scalar]:
         asked["rung"] = scene.simulation.rung
     if scene.simulation.tolerance is not None:
         asked["tolerance_count"] = scene.simulation.tolerance
+    if scene.simulation.scenario is not None:
+        asked["scenario"] = scene.simulation.scenario
     return asked
 
 

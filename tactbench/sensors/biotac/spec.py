@@ -19,7 +19,7 @@ from tactbench.plugin import (
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.film import film_table, relief_table
 from tactbench.sensors.biotac.likeness import LIKENESS
-from tactbench.sensors.biotac.nuisances import NUISANCES
+from tactbench.sensors.biotac.nuisances import HARD_HANDLED, NUISANCES
 from tactbench.sensors.biotac.surface import MESHES
 from tactbench.sensors.biotac.thermal import THERMAL
 
@@ -104,6 +104,7 @@ SPEC = SensorSpec(
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances=NUISANCES,
+    scenarios={"hard-handled": HARD_HANDLED},
     likeness=LIKENESS,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",

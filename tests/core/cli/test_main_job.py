@@ -49,6 +49,8 @@ def test_a_row_says_what_section_six_promises(ran):
     (lasso,) = [row for row in rows if row["estimator"] == "lasso" and not row["params"]]
     assert lasso["published"] == 0.7659
     assert {"placement_scatter_mm", "drift_scale", "noise_scale"} <= set(lasso["assumptions"])
+    # Where the cap meets the skin stands beside how far it misses that place.
+    assert (lasso["assumptions"]["contact_x_mm"], lasso["assumptions"]["contact_s_mm"]) == (-0.3, 0.0)
 
 
 def test_the_time_index_sees_the_label_noise_and_lasso_lies_above_it(ran):
@@ -161,3 +163,13 @@ def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path,
     for name, content in finished.items():
         (path,) = results.rglob(name)
         assert path.read_bytes() == content, "what was finished is reused, not made again"
+
+
+def test_a_row_over_several_places_states_all_of_them(shell):
+    asked = ("--sensor", "icub", "--task", "force", "--split", "placement", "--protocol", "deployable")
+    rows = json.loads(shell("run", *asked, "--estimator", "ols", "--no-latency", "--format", "json").stdout)
+    (row,) = [row for row in rows if row["estimator"] == "ols"]
+    # Nominal at (-0.3, 0), and 1.5 mm either way along and across.
+    assert row["assumptions"]["contact_x_mm"] == "-1.8 to 1.2"
+    assert row["assumptions"]["contact_s_mm"] == "-1.5 to 1.5"
+    assert row["assumptions"]["placement_scatter_mm"] == 0.1

@@ -75,6 +75,28 @@ def test_asked_effects_and_rungs_are_kept_with_the_recording(shell):
     assert "rung = closed-form" in shown
 
 
+def test_a_scenario_is_listed_and_kept_with_the_recording(shell):
+    listed = shell("list", "scenarios").stdout
+    assert "hard-handled" in listed
+    assert "biotac: pressed hard" in listed
+    shell("record", "--sensor", "biotac", "--out", "a.h5", "--seconds", "1", "--scenario", "hard-handled")
+    assert "scenario = hard-handled" in shell("inspect", "a.h5").stdout
+
+
+def test_a_scenario_is_asked_for_by_a_matrix_file(shell):
+    matrix = {
+        "sensors": ["biotac", "icub"], "tasks": [{"name": "force", "estimators": ["ols"]}], "latency": False,
+        "simulation": {"scenario": "hard-handled"},
+    }  # fmt: skip
+    (shell.folder / "hard.yaml").write_text(json.dumps(matrix))
+    rows = json.loads(shell("run", "--config", "hard.yaml", "--format", "json").stdout)
+    of = {row["sensor"]: row for row in rows if row["estimator"] == "ols"}
+    assert of["biotac"]["assumptions"]["scenario"] == "hard-handled"
+    # Nobody has handled an iCub's fingertip hard and watched it: no row, and the reason.
+    assert of["icub"]["status"] == "skipped"
+    assert "states no scenario 'hard-handled'" in of["icub"]["reason"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -87,6 +109,8 @@ def test_asked_effects_and_rungs_are_kept_with_the_recording(shell):
         (("run", "--effects", "+creeep"), "Did you mean 'creep'"),
         (("run", "--rung", "defaut"), "Did you mean 'default'"),
         (("run", "--rung", "fine", "--tolerance", "1"), "give one"),
+        (("run", "--scenario", "hard-handed"), "Did you mean 'hard-handled'"),
+        (("run", "--rig", "replay", "--recordings", ".", "--scenario", "hard-handled"), "for simulated rigs"),
         (("run", "--rig", "replay", "--recordings", ".", "--rung", "fine"), "for simulated rigs"),
         (("cost",), "--twin"),
     ],

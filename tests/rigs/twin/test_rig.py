@@ -21,6 +21,7 @@ from tactbench.plugin import (
     RigContext,
     RigError,
     Scene,
+    Simulation,
     assumed,
 )
 from tactbench.rigs.twin import tactbench_effects
@@ -78,8 +79,8 @@ def test_a_recording_has_the_shape_it_promises(rig, sensors):
     np.testing.assert_array_equal(streams["force_torque"][0], t_ns)
     assert streams["force_torque"][1].dtype == np.float64
     assert dict(acquisition.assumptions) == {
-        "placement_scatter_mm": 0.1, "drift_scale": 1.0, "noise_scale": 1.0, "force_noise_n": 0.6875,
-        "session_offset_scale": 0.0, "since_power_on_s": 600.0,
+        "contact_x_mm": -0.3, "contact_s_mm": 0.0, "placement_scatter_mm": 0.1, "drift_scale": 1.0, "noise_scale": 1.0,
+        "force_noise_n": 0.6875, "session_offset_scale": 0.0, "since_power_on_s": 3600.0,
     }  # fmt: skip
     assert acquisition.drawn["solver_residual"] < 1e-6
     assert acquisition.drawn["table_error_count"] < 1.0
@@ -112,6 +113,29 @@ def test_another_process_draws_the_same(sensors, rig):
 
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
     assert answer == hashlib.sha256(generator(4, "icub", "unit").standard_normal(9).tobytes()).hexdigest()
+
+
+def test_the_place_of_contact_is_stated_with_the_commanded_offset(rig, sensors):
+    moved = Placement(x=_q(1.5, "mm"), s=_q(-0.5, "mm"), scatter=_q(0.2, "mm"))
+    acquisition, _ = _record(rig, sensors["biotac"], _scene(placement=moved, profile=ForceRamp(samples=20)))
+    assumed_x, assumed_s = (acquisition.assumptions[f"contact_{axis}_mm"] for axis in "xs")
+    assert (assumed_x, assumed_s) == (-3.5, -0.5)
+    # Where this recording met the skin is drawn about it.
+    drawn_x, drawn_s = (acquisition.drawn[f"placement_{axis}_mm"] for axis in "xs")
+    assert 0 < np.hypot(drawn_x - assumed_x, drawn_s - assumed_s) < 5 * 0.2
+
+
+def test_a_scenario_changes_the_recording_and_is_stated(rig, sensors):
+    hard = _scene(profile=ForceRamp(samples=50), simulation=Simulation(scenario="hard-handled"))
+    acquisition, streams = _record(rig, sensors["biotac"], hard)
+    usual, others = _record(rig, sensors["biotac"], _scene(profile=ForceRamp(samples=50)))
+    assert acquisition.assumptions["scenario"] == "hard-handled"
+    assert "scenario" not in usual.assumptions
+    assert not np.array_equal(streams["electrodes"][1], others["electrodes"][1])
+    offsets = {entry.effect: entry.reason for entry in acquisition.plan}["offset"]
+    assert "15 count" in offsets
+    with pytest.raises(NotApplicable, match="states no scenario"):
+        _record(rig, sensors["icub"], hard)
 
 
 def test_a_quiet_unloaded_sensor_reads_its_rest_exactly(rig, sensors):
