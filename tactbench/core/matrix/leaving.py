@@ -9,7 +9,9 @@ from tactbench.core.matrix.store import Row
 from tactbench.core.matrix.store.sharing import canonical
 
 SEED_DECIDES = (
-    "cell", "status", "metric", "score", "ci_low", "ci_high", "ci_method", "n_recordings", "n_train", "n_test",
+    "cell", "status", "metric", "score", "ci_low", "ci_high", "ci_method", "reference_floor",
+    "score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high", "true_score", "tare_s", "n_recordings",
+    "n_train", "n_test",
     "counts", "chosen", "scores", "confusion", "classes", "split", "stamps", "dagger",
 )  # fmt: skip
 """Keys of a row that do not depend on machine or hour: ``scores.json`` holds these."""
