@@ -22,9 +22,10 @@ from typing import Any
 
 import numpy as np
 
+from tactbench.core.errors import UnknownNameError
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.interval import block_length, enough, loss_of, strata_of
-from tactbench.core.evaluation.metrics import Metric, metric_called
+from tactbench.core.evaluation.metrics import EXCESS, SUMMED, Metric
 from tactbench.core.evaluation.reference_floor import Floor, floor_sums
 from tactbench.core.evaluation.replication import Units
 from tactbench.core.samples import Answers, FloatArray, IntArray
@@ -151,12 +152,19 @@ def tables_of(several: list[dict[str, Any]], metric: str, n_classes: int) -> Flo
         If there is no such metric.
     ValueError
         If the sums of some row have another shape than its metric's.
+    KeyError
+        If the mean square beyond the floor is asked for, and a row keeps no floor.
     """
-    found = metric_called(metric)
+    if metric not in SUMMED:
+        raise UnknownNameError("metric", metric, SUMMED)
+    found = SUMMED[metric]
     if found.kind == "regression":
         dense = np.array([one["sums"] for one in several], dtype=np.float64)
         if dense.ndim != 3:
             raise ValueError(f"sums of shape {dense.shape} are not (rows, replicates, summands)")
+        if found is EXCESS:
+            held = np.array([one["floor"] for one in several], dtype=np.float64)
+            return np.concatenate([dense[..., :2], held], axis=2)
         return dense
     replicates, columns = len(several[0]["names"]), n_classes * n_classes
     lines = [line for one in several for line in one["sums"]]

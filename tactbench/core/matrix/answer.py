@@ -70,6 +70,7 @@ def answer(
     row.update(_scored(result))
     row["remarks"] = [*row["remarks"], *result.remarks]
     row.update(_published(cell, task, result.split))
+    row["looks_at"] = registry.estimators[cell.estimator].looks_at
     row["recordings"] = [str(path) for path in material.paths]
     row["status"] = "done"
     return row, dict(result.sets)
@@ -87,6 +88,7 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
         "estimator": cell.estimator,
         "params": dict(cell.params),
         "is_baseline": cell.baseline,
+        "looks_at": "",
         "repeat": cell.repeat,
         "repeats": cell.repeats,
         "seed": cell.seed,

@@ -35,9 +35,12 @@ def _each(names: str, types: Iterable[type], inside: Iterable[type] = ()) -> dic
 
 _NUMBERS = (int, float)
 
+LOWER_IS_BETTER = frozenset({"rmse", "mae"})
+"""Metrics of a row's score that are errors."""
+
 FORMAT: Mapping[str, Held] = {
     **_each("key cell sensor task rig protocol estimator status reason traceback log metric unit ci_method", [str]),
-    **_each("published_reference published_remark host made_by", [str]),
+    **_each("published_reference published_remark host made_by looks_at", [str]),
     **_each("split", [str, _NOTHING]),
     **_each("repeat repeats seed", [int]),
     **_each("signal n_recordings n_sessions n_train n_test batch_rows latency_n threads concurrency", [int, _NOTHING]),
