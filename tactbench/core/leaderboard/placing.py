@@ -18,7 +18,7 @@ from tactbench.core.leaderboard.sheet import Sheet, alike
 _DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
 """Packages whose code ranks."""
 _DECIDES = (
-    "cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes", "score_beyond_floor",
+    "cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes", "reference_floor",
     "beyond_floor_ci_low", "beyond_floor_ci_high",
 )  # fmt: skip
 MOST_RANKED = 20_000
@@ -67,11 +67,13 @@ def places(results: Sheet) -> tuple[dict[str, Placing], str]:
 def errors(results: Sheet) -> list[float]:
     """Return what answers of one metric are ordered by, the lower the better.
 
-    The score; of errors of force what is beyond the floor of the reference, if all of them have one.
+    The score; of errors of force the mean square beyond the floor of the reference, if all of them have one. It may be
+    below zero, where the error beyond the floor is 0: two answers of one sensor differ by more than its floor tells.
     """
-    beyond = results.known("score_beyond_floor")
-    if all(metric == "rmse" for metric in results["metric"]) and all(one is not None for one in beyond):
-        return [one if math.isfinite(one) else math.inf for one in beyond]
+    floors = results.known("reference_floor")
+    if all(metric == "rmse" for metric in results["metric"]) and None not in floors:
+        found = [score * score - floor * floor for score, floor in zip(results["score"], floors, strict=True)]
+        return [one if math.isfinite(one) else math.inf for one in found]
     signs = [1.0 if metric in LOWER_IS_BETTER else -1.0 for metric in results["metric"]]
     return [
         sign * score if math.isfinite(score) else math.inf

@@ -88,15 +88,15 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
 
 def beyond_floor(rows: Sequence[Row]) -> bool:
     """Return whether rows are ranked by their errors beyond the floor: all have one."""
-    return all(row["metric"] == "rmse" and row.get("score_beyond_floor") is not None for row in rows)
+    return all(row["metric"] == "rmse" and row.get("reference_floor") is not None for row in rows)
 
 
 def _excess(row: Row) -> Row:
-    """Return a row of a RMSE as that of its mean square beyond the floor."""
-    found = {"score": row["score_beyond_floor"], "ci_low": row["beyond_floor_ci_low"]}
-    found["ci_high"] = row["beyond_floor_ci_high"]
-    squares = {key: None if value is None else value**2 for key, value in found.items()}
-    return {**row, **squares, "metric": EXCESS.name}
+    """Return a row of a RMSE as that of its mean square beyond the floor, which may be below zero."""
+    ends = {"ci_low": row["beyond_floor_ci_low"], "ci_high": row["beyond_floor_ci_high"]}
+    squares = {key: None if value is None else value * value for key, value in ends.items()}
+    excess = row["score"] * row["score"] - row["reference_floor"] * row["reference_floor"]
+    return {**row, **squares, "score": excess, "metric": EXCESS.name}
 
 
 def _places(low: IntArray, error: FloatArray) -> IntArray:
@@ -115,7 +115,7 @@ def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray
     same = float(rows[0].get("equivalence") or 0.0)
     near_to = np.full(n, same)
     if rows[0]["metric"] == EXCESS.name:
-        near_to = (np.sqrt(error) + same) ** 2 - error
+        near_to = (np.sqrt(np.maximum(error, 0.0)) + same) ** 2 - np.maximum(error, 0.0)
     better, worse = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     for start in range(0, n, _STRIP):
         stop = min(start + _STRIP, n)
