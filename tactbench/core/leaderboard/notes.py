@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import compress
@@ -80,17 +81,14 @@ def _tare_notes(sheet: Sheet) -> list[str]:
 
 def _floor_notes(sheet: Sheet) -> list[str]:
     """Return the floors of the references, once each, and what stands beyond them."""
-    floors: dict[str, dict[str, None]] = {}
-    asked = dict.fromkeys(
-        zip(sheet["sensor"], sheet["task"], sheet.known("reference_floor"), sheet["unit"], strict=True)
-    )
-    for sensor, task, floor, unit in asked:
+    floors: dict[tuple[str, str], dict[float, None]] = {}
+    known = zip(sheet.rows, sheet.known("reference_floor"), strict=True)
+    for row, floor in known:
         if floor is not None:
-            said = f"{score(floor, unit)}{suffix(unit)}"
-            floors.setdefault(said, {})[question_name({"sensor": sensor, "task": task})] = None
+            floors.setdefault((question_name(row), str(row["unit"])), {})[floor] = None
     told = []
     if floors:
-        each = "; ".join(f"{', '.join(names)} {floor}" for floor, names in floors.items())
+        each = "; ".join(f"{where} {_floor(list(found), unit)}" for (where, unit), found in floors.items())
         told.append(
             f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond "
             "floor is sqrt(max(0, RMSE² − floor²)); ranks go by it where all answers of a block have it."
@@ -98,6 +96,14 @@ def _floor_notes(sheet: Sheet) -> list[str]:
     if any(one is not None for one in sheet.known("true_score")):
         told.append("True error (SIM): against the force that the twin exerted, free of the reference's noise.")
     return told
+
+
+def _floor(found: Sequence[float], unit: str) -> str:
+    """Return a floor; of several campaigns the root of their mean square."""
+    told = f"{score(math.sqrt(sum(one * one for one in found) / len(found)), unit)}{suffix(unit)}"
+    return (
+        told if len(found) == 1 else f"{told} (of {len(found)}: {score(min(found), unit)} … {score(max(found), unit)})"
+    )
 
 
 def interval_notes(sheet: Sheet) -> list[str]:

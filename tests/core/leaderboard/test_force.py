@@ -26,9 +26,9 @@ def test_the_floor_is_said_once_and_the_error_beyond_it_stands_beside_the_score(
     cells = dict(zip(table.columns, line.cells, strict=True))
     assert [cells[name] for name in OF_FORCE] == ["0.1234", "0.0000 … 0.2000", "0.0512"]
     (note,) = told(table, "Floor")
-    assert "a/question, b/question 0.6875 N" in note
+    assert "a/question 0.6875 N; b/question 0.6875 N." in note
     assert told(table, "True error (SIM)")
-    assert to_markdown(rows).count("0.6875") == 1
+    assert to_markdown(rows).count("Floor") == 1
     (first, shown), _ = records(table)
     assert {key: first[key] for key in KNOWN} == KNOWN
     assert shown["beyond_floor"] == "0.1234"
@@ -70,3 +70,9 @@ def test_both_are_told_in_one_line():
     rows = [row("a", tare_s=7.2), row("b", protocol="deployable-untared")]
     (note,) = told(build_table(rows), "tared on its own")
     assert note.endswith("(7.2 s); `deployable-untared`: readings as they are.")
+
+
+def test_floors_of_several_campaigns_are_one_number_with_their_range():
+    rows = [row("a", cell=str(n), repeat=n, repeats=2, **KNOWN | {"reference_floor": n / 5}) for n in (3, 4)]
+    (note,) = told(build_table(rows), "Floor")
+    assert "a/question 0.7071 N (of 2: 0.6000 … 0.8000)" in note
