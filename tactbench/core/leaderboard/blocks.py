@@ -122,9 +122,11 @@ def _arranged(
     sign = 1.0 if sheet["metric"][members[0]] in LOWER_IS_BETTER else -1.0
     done = [place for place in members if status[place] == "done"]
     error = {place: sign * scores[place] if math.isfinite(scores[place]) else math.inf for place in done}
-    answers = [place for place in done if not trivial[place]]
-    below = [place for place in answers if no_better(error[place], sign, bars[place])]
-    answers = [place for place in answers if place not in set(below)]
+    answers: list[int] = []
+    below: list[int] = []
+    for place in done:
+        if not trivial[place]:
+            (below if no_better(error[place], sign, bars[place]) else answers).append(place)
     order = dict(zip(answers, errors(sheet.taken(answers)), strict=True))
     # What is equal stays in the order of the names.
     results = sorted(answers, key=lambda place: (order[place], error[place]))
