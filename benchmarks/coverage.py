@@ -2,7 +2,7 @@
 
 ::
 
-    python benchmarks/coverage.py [--trials 1000] [--seed 1] [--only scores|time|differences|ranks|errors]
+    python benchmarks/coverage.py [--trials 1000] [--seed 1] [--only scores|time|differences|ranks|errors|floor]
 
 A synthetic sensor's error has a part that stays for a session (another in the next one; "session sd" is its deviation,
 that of the rest is 1) and a part that moves slowly within it, first order with memory 0.9. The truth is the score over
@@ -26,7 +26,9 @@ from scipy.signal import lfilter
 
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.metrics import METRICS
+from tactbench.core.evaluation.reference_floor import Floor, beyond_floor, hold_of
 from tactbench.core.evaluation.replicate_sums import summed_in_time
+from tactbench.core.evaluation.replication import Units
 from tactbench.core.samples import Answers
 from tactbench.core.statistics.overlap import corrected_t
 from tactbench.core.statistics.paired import difference
@@ -251,7 +253,43 @@ def errors(trials: int, seed: int) -> None:
     table("Differences found [%] where there is none, over folds", ["folds", "corrected", "naive t"], lines)
 
 
-PARTS = {"scores": scores, "time": in_time, "differences": differences, "ranks": ranking, "errors": errors}
+def beyond(trials: int, seed: int) -> None:
+    """Cover an answer's own error, slow in time, under a reference with the noise and the holds of the paper."""
+    sigma, hold, n = 0.6875, 600, 4400
+    lines = []
+    for sessions in (1, 8):
+        for own in (0.05, 0.1, 0.2, 0.5):
+            rng = np.random.default_rng([seed, sessions, int(100 * own)])
+            ours = fixed = clear = 0
+            for trial in range(trials):
+                noise = sigma * rng.normal(size=(sessions, hold + n))
+                wrong = own * slow(rng, sessions, n)
+                y, answered = noise[:, hold:].ravel(), wrong.ravel()
+                session = np.repeat(np.arange(sessions), n)
+                row = np.tile(np.arange(hold, hold + n), sessions)
+                answers = Answers(y, answered, session, row, np.zeros_like(row), row.astype(np.float64), y)
+                floor = Floor({place: hold_of(noise[place, :hold]) for place in range(sessions)})
+                unit = Units("session", session, tuple(map(str, range(sessions))))
+                found = beyond_floor(floor, answers, unit, trial)
+                ours += found.low <= own <= found.high
+                clear += found.low > 0
+                whole = score_interval(METRICS["rmse"], y, answered, session, session, "session", 0, trial)
+                low, high = (np.sqrt(max(0.0, end**2 - floor.value**2)) for end in (whole.low, whole.high))
+                fixed += low <= own <= high
+            share = [f"{100 * count / trials:.1f}" for count in (ours, fixed, clear)]
+            lines.append([str(sessions), f"{own:g}", *share])
+    columns = ["sessions", "own error [N]", "ours", "ends of the RMSE", "clear of 0"]
+    table("Coverage [%] of the error beyond a floor of 0.6875 N", columns, lines)
+
+
+PARTS = {
+    "scores": scores,
+    "time": in_time,
+    "differences": differences,
+    "ranks": ranking,
+    "errors": errors,
+    "floor": beyond,
+}
 
 
 def main() -> None:

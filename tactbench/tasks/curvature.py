@@ -21,7 +21,7 @@ SPEC = TaskSpec(
     equivalence=SAME_F1,
     scenes=papers_caps(),
     campaigns={"placement": at_places(RADII_MM), "unit": on_units(RADII_MM), **few_shots(RADII_MM)},
-    protocols=("karl2016", "karl2016-training-scale", "deployable"),
+    protocols=("karl2016", "karl2016-training-scale", "deployable", "deployable-untared"),
     splits=(
         *("roles", "session", "placement", "unit"),
         *("few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "shuffled"),

@@ -46,7 +46,7 @@ SPEC = TaskSpec(
     equivalence=SAME_N,
     scenes=SCENES,
     campaigns={"placement": at_places(_FLAT), "unit": on_units(_FLAT), **few_shots(_FLAT)},
-    protocols=("karl2016", "karl2016-training-scale", "deployable"),
+    protocols=("karl2016", "karl2016-training-scale", "deployable", "deployable-untared"),
     splits=(
         *("roles", "session", "press", "in-session", "placement", "unit"),
         *("few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "shuffled"),

@@ -43,7 +43,7 @@ SPEC = TaskSpec(
     equivalence=SAME_PER_M,
     scenes=(*papers_caps(), *FLATS),
     campaigns={"cap_radius_mm": in_sessions(5), "placement": at_places(), "unit": on_units(), **few_shots()},
-    protocols=("deployable", "karl2016", "karl2016-training-scale"),
+    protocols=("deployable", "deployable-untared", "karl2016", "karl2016-training-scale"),
     splits=(
         *("roles", "session", "cap_radius_mm", "placement", "unit"),
         *("few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10", "shuffled"),

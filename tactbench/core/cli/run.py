@@ -97,7 +97,7 @@ def _suggest(row: Mapping[str, Any]) -> None:
     if row["simulated"]:
         tries = {
             "tactbench run": "the paper's whole matrix",
-            f"tactbench run --task {row['task']} --protocol deployable": "without looking at test-set statistics",
+            f"tactbench run --task {row['task']} --protocol deployable": "as in use: tared before each press",
             f"tactbench show {row['sensor']}": "what the sensor is, and who says so",
         }
     else:

@@ -20,6 +20,7 @@ Keys of the JSON file; those that nobody could measure are null:
 ``rows``              one for each estimator, the best score first:
 
     ``estimator, title, family, is_baseline, params, chosen``     what answered; `family` groups kindred ones
+    ``looks_at``                features, the time of a sample, or nothing
     ``status, reason``          done, or skipped or failed and why
     ``score, ci_low, ci_high, ci_method``      of the cell, over all folds
     ``search_s``                of the cell: choosing hyper-parameters
@@ -29,7 +30,8 @@ Keys of the JSON file; those that nobody could measure are null:
     ``latency_ms_p50, latency_ms_p95, latency_ms_q1, latency_ms_q3, latency_n``    single rows, quantiles of all calls
     ``data_s, data_kind``       seconds that the training recordings took, ``simulated`` or ``acquired``
     ``loop_100_hz, loop_1000_hz``      whether p95 is below the period
-    ``front_fit, front_latency``       whether nobody is both better and quicker; baselines do not compete
+    ``front_fit, front_latency``       whether nobody is both better and quicker; baselines do not compete, nor
+                                who is no better than the best of them that looks at nothing
     ``notes``                   what a reader of the row must know
 """
 
@@ -57,7 +59,8 @@ DEFINITIONS = {
     "wall's",
     "loop": "an estimator keeps up with a loop on this machine if latency p95 at batch 1 is below the loop's period "
     "(10 ms at 100 Hz, 1 ms at 1 kHz); reading the sensor and making features come on top",
-    "front": "nobody else is both better by the score itself and quicker; trivial answers do not compete; scores whose "
+    "front": "nobody else is both better by the score itself and quicker; trivial answers do not compete, nor what is "
+    "no better than the best of them that looks at nothing; scores whose "
     "intervals overlap may be told apart by luck",
 }
 

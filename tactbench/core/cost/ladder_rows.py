@@ -41,6 +41,7 @@ def opening(row: Row, descriptor: EstimatorDescriptor) -> Record:
         "title": descriptor.title,
         "family": descriptor.where.partition(":")[0].rpartition(".")[2],
         "is_baseline": row["is_baseline"],
+        "looks_at": descriptor.looks_at,
         "params": {**descriptor.params, **row["params"]},
         "chosen": row["chosen"],
         **{key: row[key] for key in ("status", "reason", "score", "ci_low", "ci_high", "ci_method", "search_s")},
@@ -125,9 +126,16 @@ def _acquisition(metas: Sequence[RecordingMeta]) -> tuple[str | None, float | No
 
 
 def mark_fronts(rows: Sequence[Record], *, higher_is_better: bool) -> None:
-    """Mark who is beaten by nobody. Trivial answers compete with nobody: they do not look at the sensor."""
+    """Mark who is beaten by nobody.
+
+    Trivial answers compete with nobody: they do not look at the sensor. Nor does who is no better than the best of
+    those that look at nothing.
+    """
     sign = -1.0 if higher_is_better else 1.0
-    able = [row for row in rows if row["status"] == "done" and not row["is_baseline"]]
+    done = [row for row in rows if row["status"] == "done"]
+    trivial = (row for row in done if row["is_baseline"] and row.get("looks_at") != "time")
+    bar = min((sign * row["score"] for row in trivial), default=float("inf"))
+    able = [row for row in done if not row["is_baseline"] and sign * row["score"] < bar]
     for mark, time in (("front_fit", "fit_s"), ("front_latency", "latency_ms_p50")):
         for row in front(able, seconds=lambda row, key=time: row[key], error=lambda row: sign * row["score"]):  # type: ignore[misc]
             row[mark] = True

@@ -19,8 +19,9 @@ from tactbench.core.evaluation.interval import LEVEL, score_interval
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
 from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
+from tactbench.core.evaluation.reference_floor import BeyondFloor, beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import summed
-from tactbench.core.evaluation.replication import replicates
+from tactbench.core.evaluation.replication import Units, replicates
 from tactbench.core.evaluation.selection import Build, Choice, features_of, select
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
@@ -30,6 +31,7 @@ from tactbench.core.evaluation.splits import (
 )
 from tactbench.core.evaluation.thread_limit import thread_limit
 from tactbench.core.evaluation.timing import peak_rss_mb, single_row_latency_s
+from tactbench.core.evaluation.unloaded import tare_s
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import Answers, FloatArray, Fold, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
@@ -80,6 +82,14 @@ class CellResult:
     """answers by role: test always; validation, and for regression train, where the split has one fold"""
     replicates: Mapping[str, Any]
     """the primary metric's sums over each replicate; see replicate_sums"""
+    beyond: BeyondFloor | None = None
+    """of an error of force: what is beyond the noise of the reference; None where that is not known"""
+    true: tuple[float, float, float] | None = None
+    """the metric against the force that was exerted, and its interval; None where that is not known"""
+    tare_s: float | None = None
+    """seconds of unloaded hold that each recording was tared on, the shortest of all; None: none was tared"""
+    remarks: tuple[str, ...] = ()
+    """what could not be done, and why"""
 
 
 @dataclass
@@ -150,6 +160,8 @@ def evaluate(
     rules = protocol_called(protocol)
     metric = metric_called(task.metric)
     chosen_split = choose_split(task, rules, data, split)
+    if rules.tare:
+        tare_s(data)  # refuses recordings of which only some can be tared
     assignments = assigned(task, estimator, data, chosen_split, seed)
     assert_disjoint(assignments)
     build = builder(estimator, params, task, seed, threads)
@@ -270,6 +282,9 @@ def _result(
     tested = sets["test"]
     y, predicted, recording, row = tested.y_true, tested.y_pred, tested.recording, tested.row
     n_classes = len(data.classes)
+    held = tare_s(data) if rules.tare else 0.0
+    floor, no_floor = reference_floor(task, metric, data, tested)
+    truth = true_force(task, data, tested) if metric.kind == "regression" else None
     unit = replicates(data, task, split, y, recording, row)
     score = metric.of(y, predicted, n_classes)
     if not np.isfinite(score):
@@ -322,8 +337,21 @@ def _result(
         peak_rss_mb=peak_rss_mb(),
         search=_search(total.chosen, total.names),
         sets=sets,
-        replicates=summed(metric, tested, unit, data),
+        replicates=summed(metric, tested, unit, data, floor),
+        beyond=None if floor is None else beyond_floor(floor, tested, unit, seed),
+        true=None if truth is None else _against(truth, metric, tested, unit, seed),
+        tare_s=held or None,
+        remarks=tuple(one for one in (no_floor, NOT_TARED if rules.tare and not held else "") if one),
     )
+
+
+NOT_TARED = "not tared: no recording states an unloaded hold"
+
+
+def _against(truth: FloatArray, metric: Metric, tested: Answers, unit: Units, seed: int) -> tuple[float, float, float]:
+    """Return the metric against (n,) another truth than the recorded one, and its interval."""
+    found = score_interval(metric, truth, tested.y_pred, tested.recording, unit.codes, unit.name, 0, seed)
+    return metric.of(truth, tested.y_pred), found.low, found.high
 
 
 def _chosen(choices: Sequence[Choice], folds: Sequence[str]) -> dict[str, float]:

@@ -66,7 +66,7 @@ def score_interval(
     .. [3] Patton, Politis and White 2009, correction to [2]_.
     .. [4] Cameron, Gelbach and Miller 2008, Bootstrap-based improvements for inference with clustered errors.
     """
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))
+    rng = generator(seed)
     rows = metric.rows(y, predicted, n_classes)
     names, number = np.unique(cluster, return_inverse=True)
     if enough(y, number, n_classes):
@@ -84,7 +84,7 @@ def score_interval(
         length = block_length(loss)
         lengths.append(length)
         sizes.append(len(mine) / length)
-        total += _circular_blocks(mine, length, rng)
+        total += circular_blocks(mine, length, rng)
     spread = f"{min(lengths)}" if min(lengths) == max(lengths) else f"{min(lengths)}–{max(lengths)}"
     many = f"{len(lengths)} recording" + ("s" if len(lengths) > 1 else "")
     method = f"block bootstrap in time within {many} (blocks of {spread} rows): spread between sessions is not in it"
@@ -95,6 +95,11 @@ def score_interval(
     freedom = max(sum(sizes) - len(lengths), 1.0)
     widened = np.sqrt(sum(sizes) / freedom)  # a variance of so many blocks is that much too small
     return _student(metric, score, float(resampled.std()) * widened, freedom, scale, method)
+
+
+def generator(seed: int) -> np.random.Generator:
+    """Return what blocks of time are drawn with: the same blocks for every figure of a cell."""
+    return np.random.default_rng(np.random.SeedSequence([seed, 0xC1]))
 
 
 def _of_clusters(
@@ -119,10 +124,14 @@ def _student(metric: Metric, score: float, deviation: float, freedom: float, sca
     """Return Student's interval of a score whose standard error on `scale` is `deviation`."""
     if metric.kind == "classification" and score in (0.0, 1.0):
         deviation = NOT_ONE
-    quantile = float(importlib.import_module("scipy.special").stdtrit(freedom, 0.5 + LEVEL / 2))
-    reach = quantile * deviation
+    reach = student_reach(freedom) * deviation
     ends = [float(scale.back(scale.there(score) + one * reach)) for one in (-1.0, 1.0)]
     return Interval(min(*ends, score), max(*ends, score), method)
+
+
+def student_reach(freedom: float) -> float:
+    """Return how many standard errors Student's interval reaches to either side."""
+    return float(importlib.import_module("scipy.special").stdtrit(freedom, 0.5 + LEVEL / 2))
 
 
 def _of_too_few(metric: Metric, rows: FloatArray, n_classes: int) -> Interval:
@@ -166,7 +175,7 @@ def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) ->
     return np.asarray((predicted - y) ** 2)
 
 
-def _circular_blocks(rows: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
+def circular_blocks(rows: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
     """Return (RESAMPLES, m) sums of `rows` resampled in circular blocks, each resample as long as the original."""
     n = len(rows)
     blocks = -(-n // length)
@@ -197,10 +206,31 @@ def block_length(loss: FloatArray) -> int:
     # The length knows no unit: scaled, so that the fourth power of an absurd error does not overflow.
     loss = loss / max(float(np.abs(loss).max()), np.finfo(np.float64).tiny)
     centred = loss - loss.mean()
-    variance = float(np.mean(centred**2))
     shortest = int(np.ceil(n ** (1 / 3)))
-    if n < 8 or variance <= 1e-30 * float(np.mean(loss**2)):
+    if n < 8 or float(np.mean(centred**2)) <= 1e-30 * float(np.mean(loss**2)):
         return shortest
+    _, g0, g = _lag_window(centred)
+    if g0 == 0.0:
+        return shortest
+    length = (2.0 * (g / g0) ** 2 / (4.0 / 3.0)) ** (1 / 3) * n ** (1 / 3)
+    return int(np.clip(np.ceil(length), shortest, max(shortest, min(np.ceil(3 * np.sqrt(n)), n // 3))))
+
+
+def integrated_correlation(centred: FloatArray) -> float:
+    """Return the sum of all correlations of (n,) numbers about their mean, at least that of white noise: 1.
+
+    The mean of n of them varies by so many times ``variance / n``. By the window of :func:`block_length`.
+    """
+    if len(centred) < 8 or not (np.abs(centred) > 0).any():
+        return 1.0
+    variance, g0, _ = _lag_window(centred / np.abs(centred).max())
+    return max(g0 / variance, 1.0)
+
+
+def _lag_window(centred: FloatArray) -> tuple[float, float, float]:
+    """Return variance, ``g(0) = sum c(k)`` and ``G = sum |k| c(k)`` of autocovariances c under the flat-top window."""
+    n = len(centred)
+    variance = float(np.mean(centred**2))
     reach = max(5, int(np.ceil(np.sqrt(np.log10(n)))))
     longest = int(np.ceil(np.sqrt(n))) + reach
     longest = min(longest, n - 1)
@@ -217,12 +247,7 @@ def block_length(loss: FloatArray) -> int:
     ratio = np.abs(lags) / bandwidth
     window = np.where(ratio <= 0.5, 1.0, 2.0 * (1.0 - ratio))
     weighted = window * covariance[np.abs(lags)]
-    g0 = float(weighted.sum())
-    g = float((np.abs(lags) * weighted).sum())
-    if g0 == 0.0:
-        return shortest
-    length = (2.0 * (g / g0) ** 2 / (4.0 / 3.0)) ** (1 / 3) * n ** (1 / 3)
-    return int(np.clip(np.ceil(length), shortest, max(shortest, min(np.ceil(3 * np.sqrt(n)), n // 3))))
+    return variance, float(weighted.sum()), float((np.abs(lags) * weighted).sum())
 
 
 def _autocovariance(centred: FloatArray, lags: int) -> FloatArray:

@@ -112,6 +112,18 @@ METRICS = {
 }
 
 
+def _excess(sums: FloatArray, _: int) -> FloatArray:
+    return np.asarray(sums[..., 0] / sums[..., 1] - sums[..., 2] / sums[..., 3])
+
+
+EXCESS = Metric("excess_square", "regression", False, _squares, _excess)
+"""Mean square beyond the floor of the reference, below zero where chance has it so: what errors of force are ranked by.
+Its sums are a RMSE's, then squares and degrees of freedom of the unloaded holds; no task may ask for it.
+"""
+SUMMED = {**METRICS, EXCESS.name: EXCESS}
+"""What replicates may be summed for."""
+
+
 def metric_called(name: str) -> Metric:
     """Return a metric by name; raises UnknownNameError."""
     if name not in METRICS:

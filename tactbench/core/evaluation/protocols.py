@@ -19,6 +19,8 @@ class ProtocolSpec(Frozen):
     """Samples dropped at the start of every recording."""
     discard_hold: bool = False
     """Drop the scene's stated hold (the set-up's initialization, before any load) where a recording has a scene."""
+    tare: bool = False
+    """Subtract from each recording its own mean over the unloaded hold that its scene states; see `unloaded`."""
     three_sigma: bool = False
     """Drop a sample if a feature or the reference force lies beyond three standard deviations of its set."""
     scaled_by: Literal["each set", "training set"]
@@ -63,16 +65,28 @@ still drops test rows by the test set's own statistics.
 
 DEPLOYABLE = ProtocolSpec(
     name="deployable",
-    title="Everything fitted on training sessions",
+    title="Each recording tared on its own unloaded hold, everything fitted on training sessions",
     discard_hold=True,
+    tare=True,
     scaled_by="training set",
     window_over="consecutive samples",
 )
-"""What a sensor in use can do: no statistic of the test set, causal windows, no row dropped by its label."""
+"""What a sensor in use can do: tared before it is pressed, no statistic of the test set, causal windows, no row dropped
+by its label.
+"""
+
+DEPLOYABLE_UNTARED = DEPLOYABLE.model_copy(
+    update={
+        "name": "deployable-untared",
+        "title": "Everything fitted on training sessions, readings as they are",
+        "tare": False,
+    }
+)
+"""The same without the tare: beside it, what taring is worth."""
 
 FIRST_FRAME = ProtocolSpec(
     name="first-frame",
-    title="The first row of each recording alone, everything else as deployable",
+    title="The first row of each recording alone, everything else as deployable-untared",
     scaled_by="training set",
     window_over="consecutive samples",
     first_row_only=True,
@@ -80,7 +94,10 @@ FIRST_FRAME = ProtocolSpec(
 )
 """What does the reading before anything happened already tell? The hold is not dropped: it is what is asked about."""
 
-PROTOCOLS = {protocol.name: protocol for protocol in (KARL2016, KARL2016_TRAINING_SCALE, DEPLOYABLE, FIRST_FRAME)}
+PROTOCOLS = {
+    protocol.name: protocol
+    for protocol in (KARL2016, KARL2016_TRAINING_SCALE, DEPLOYABLE, DEPLOYABLE_UNTARED, FIRST_FRAME)
+}
 
 
 def is_probe(name: str) -> bool:

@@ -6,7 +6,9 @@
      "names": ["s1", "s2", …],           in order of the names: two rows with the same names can be paired
      "strata": [0, 0, 1, …] or None,     which replicates may stand in for each other; None: all
      "run": 1,                           how many neighbouring blocks of time depend on each other
-     "sums": [[…], …]}                   the metric's summands over each replicate
+     "sums": [[…], …]                    the metric's summands over each replicate
+     "floor": [[…, …], …]}               of a RMSE whose reference has a floor: squares and degrees of freedom of its
+                                         unloaded holds over each replicate
 
 A classification's summands are a table of true and given classes, mostly empty: a line of sums then is ``column, count,
 column, count …``. Scores follow exactly: :attr:`Metric.score` of the sum of all lines is the row's score.
@@ -20,9 +22,11 @@ from typing import Any
 
 import numpy as np
 
+from tactbench.core.errors import UnknownNameError
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.interval import block_length, enough, loss_of, strata_of
-from tactbench.core.evaluation.metrics import Metric, metric_called
+from tactbench.core.evaluation.metrics import EXCESS, SUMMED, Metric
+from tactbench.core.evaluation.reference_floor import Floor, floor_sums
 from tactbench.core.evaluation.replication import Units
 from tactbench.core.samples import Answers, FloatArray, IntArray
 
@@ -34,7 +38,9 @@ BLOCKS_IN_ALL = 200
 FEWEST = 4
 
 
-def summed(metric: Metric, tested: Answers, unit: Units, data: Dataset) -> dict[str, Any]:
+def summed(
+    metric: Metric, tested: Answers, unit: Units, data: Dataset, floor: Floor | None = None
+) -> dict[str, Any]:  # fmt: skip
     """Return what a row keeps of its replicates.
 
     Parameters
@@ -44,6 +50,8 @@ def summed(metric: Metric, tested: Answers, unit: Units, data: Dataset) -> dict[
     unit
         What was repeated. Where there are too few of them, the replicates are blocks of time within recordings, and
         the spread between sessions is not in them.
+    floor
+        What the holds of the tested recordings say of the reference.
     """
     n_classes = len(data.classes)
     summands = metric.rows(tested.y_true, tested.y_pred, n_classes)
@@ -58,11 +66,18 @@ def summed(metric: Metric, tested: Answers, unit: Units, data: Dataset) -> dict[
             "strata": number.tolist() if len(strata) > 1 else None,
             "run": 1,
             "sums": _lines(summands, unit.codes, len(unit.labels), n_classes),
+            **_floor(floor, tested, unit.codes, len(unit.labels)),
         }
-    return summed_in_time(metric, tested, _recording_names(data), n_classes)
+    return summed_in_time(metric, tested, _recording_names(data), n_classes, floor)
 
 
-def summed_in_time(metric: Metric, tested: Answers, names: Sequence[str], n_classes: int) -> dict[str, Any]:
+def _floor(floor: Floor | None, tested: Answers, code: IntArray, n: int) -> dict[str, Any]:
+    return {} if floor is None else {"floor": floor_sums(floor, tested.recording, code, n, tested.row).tolist()}
+
+
+def summed_in_time(
+    metric: Metric, tested: Answers, names: Sequence[str], n_classes: int, floor: Floor | None = None
+) -> dict[str, Any]:  # fmt: skip
     """Return what a row keeps where time is all there is to resample: sums over blocks of each recording.
 
     Parameters
@@ -95,6 +110,7 @@ def summed_in_time(metric: Metric, tested: Answers, names: Sequence[str], n_clas
         "strata": strata,
         "run": max(runs),
         "sums": _lines(summands, code, len(labels), n_classes),
+        **_floor(floor, tested, code, len(labels)),
     }
 
 
@@ -136,12 +152,19 @@ def tables_of(several: list[dict[str, Any]], metric: str, n_classes: int) -> Flo
         If there is no such metric.
     ValueError
         If the sums of some row have another shape than its metric's.
+    KeyError
+        If the mean square beyond the floor is asked for, and a row keeps no floor.
     """
-    found = metric_called(metric)
+    if metric not in SUMMED:
+        raise UnknownNameError("metric", metric, SUMMED)
+    found = SUMMED[metric]
     if found.kind == "regression":
         dense = np.array([one["sums"] for one in several], dtype=np.float64)
         if dense.ndim != 3:
             raise ValueError(f"sums of shape {dense.shape} are not (rows, replicates, summands)")
+        if found is EXCESS:
+            held = np.array([one["floor"] for one in several], dtype=np.float64)
+            return np.concatenate([dense[..., :2], held], axis=2)
         return dense
     replicates, columns = len(several[0]["names"]), n_classes * n_classes
     lines = [line for one in several for line in one["sums"]]

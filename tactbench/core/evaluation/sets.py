@@ -12,6 +12,7 @@ import numpy.typing as npt
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.evaluation.unloaded import tared
 from tactbench.core.evaluation.windows import causal_mean
 from tactbench.core.samples import FloatArray, IntArray, Part
 
@@ -88,7 +89,8 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     if sum(sizes) == 0:
         raise DataError(f"The {what} set has no rows.", hint="Check roles, sessions and the length of the recordings.")
     tables = data.tables
-    X = np.concatenate([table.X[mask] for table, mask in zip(tables, chosen, strict=True)])
+    readings = [tared(table) if protocol.tare else table.X for table in tables]
+    X = np.concatenate([column[mask] for column, mask in zip(readings, chosen, strict=True)])
     recording = np.repeat(np.arange(len(tables)), sizes)
     row = np.concatenate([table.row[mask] for table, mask in zip(tables, chosen, strict=True)])
     place = np.concatenate([np.flatnonzero(mask) for mask in chosen])

@@ -15,7 +15,7 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.lines import Line, Shown, shown_of
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
-from tactbench.core.leaderboard.placing import Placing, places
+from tactbench.core.leaderboard.placing import Placing, errors, places
 from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
 
@@ -118,11 +118,18 @@ def _arranged(
 ) -> tuple[tuple[int, ...], str]:  # fmt: skip
     """Put members of a block in order, and note where its results stand; return why they have no intervals, if so."""
     status, trivial, scores, sensors = (sheet[key] for key in ("status", "is_baseline", "score", "sensor"))
+    bars = sheet.known("baseline")
     sign = 1.0 if sheet["metric"][members[0]] in LOWER_IS_BETTER else -1.0
     done = [place for place in members if status[place] == "done"]
     error = {place: sign * scores[place] if math.isfinite(scores[place]) else math.inf for place in done}
+    answers: list[int] = []
+    below: list[int] = []
+    for place in done:
+        if not trivial[place]:
+            (below if no_better(error[place], sign, bars[place]) else answers).append(place)
+    order = dict(zip(answers, errors(sheet.taken(answers)), strict=True))
     # What is equal stays in the order of the names.
-    results = sorted((place for place in done if not trivial[place]), key=error.__getitem__)
+    results = sorted(answers, key=lambda place: (order[place], error[place]))
     ranked = sheet.taken(results)
     found, unranked = places(ranked)
     standing = {place: found[cell] for place, cell in zip(results, ranked["cell"], strict=True)}
@@ -131,7 +138,19 @@ def _arranged(
     results.sort(key=lambda place: standing[place].place)  # of equal place stays the better one first
     baselines = sorted((place for place in done if trivial[place]), key=lambda place: (sensors[place], error[place]))
     stopped = sorted((place for place in members if status[place] != "done"), key=status.__getitem__)
-    return (*results, *baselines, *stopped), unranked
+    below.sort(key=error.__getitem__)
+    return (*results, *below, *baselines, *stopped), unranked
+
+
+def no_better(error: float, sign: float, baseline: float | None) -> bool:
+    """Return whether an answer is no better than the trivial one: it gets no place.
+
+    Parameters
+    ----------
+    error
+        ``sign`` times its score, the lower the better.
+    """
+    return baseline is not None and error >= sign * baseline
 
 
 def _title(key: _Key, members: Sequence[Row]) -> str:

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 COLUMNS = (
-    "#", "sensor", "estimator", "score", "95 % interval", "rank 95 %", "published", "baseline", "n test", "sessions",
-    "sim", "fit", "latency p50", "p95", "batch/row",
+    "#", "sensor", "estimator", "score", "95 % interval", "beyond floor", "95 % beyond", "true error", "rank 95 %",
+    "published", "baseline", "n test", "sessions", "sim", "fit", "latency p50", "p95", "batch/row",
 )  # fmt: skip
 NUMERIC = frozenset(COLUMNS) - {"sensor", "estimator"}
-TIMED = frozenset({"sim", "fit", "latency p50", "p95", "batch/row"})
+TIMED_COLUMNS = ("sim", "fit", "latency p50", "p95", "batch/row")
+TIMED = frozenset(TIMED_COLUMNS)
 """Columns that no seed decides: they belong to the host that was timed."""
+OF_FORCE = {
+    "beyond floor": "score_beyond_floor", "95 % beyond": "score_beyond_floor", "true error": "true_score",
+}  # fmt: skip
+"""Columns that a table has where a row has this key: of errors of force, whose reference errs too."""
 
 SHOWN = {
     "#": "rank", "sensor": "sensor", "estimator": "estimator", "score": "score", "95 % interval": "interval",
+    "beyond floor": "beyond_floor", "95 % beyond": "beyond_floor_interval", "true error": "true_error",
     "rank 95 %": "rank_interval", "published": "published", "baseline": "baseline", "n test": "n_test",
     "sessions": "sessions", "sim": "sim", "fit": "fit", "latency p50": "latency_p50", "p95": "latency_p95",
     "batch/row": "batch_row",
@@ -19,6 +28,13 @@ SHOWN = {
 """What each column is called where programs read its text: ``shown`` in JSON, ``shown_…`` in CSV and Parquet."""
 
 
-def columns(times: bool) -> tuple[str, ...]:
-    """Return the columns of a table with times, or of one without."""
-    return COLUMNS if times else tuple(name for name in COLUMNS if name not in TIMED)
+def columns(known: Mapping[str, Sequence[Any]], *, times: bool) -> tuple[str, ...]:
+    """Return the columns of a table with times, or of one without.
+
+    Parameters
+    ----------
+    known
+        What its rows have under each key.
+    """
+    lacking = {name for name, key in OF_FORCE.items() if all(one is None for one in known.get(key) or ())}
+    return tuple(name for name in COLUMNS if name not in lacking and (times or name not in TIMED))

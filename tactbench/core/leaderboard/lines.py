@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from operator import add
 from typing import Any, Literal
 
-from tactbench.core.leaderboard.columns import columns
+from tactbench.core.leaderboard.columns import TIMED_COLUMNS, columns
 from tactbench.core.leaderboard.hosts import timing_marks
 from tactbench.core.leaderboard.marks import score_marks
 from tactbench.core.leaderboard.numbers import ABSENT, duration, intervals, scores, whole
@@ -29,7 +29,7 @@ class Line:
     cell: str = ""
     """Name of the cell."""
     placing: Placing | None = None
-    """Where it stands in its block; results only."""
+    """Where it stands in its block; results better than the trivial answer only."""
     row: Row = field(default_factory=dict, repr=False, compare=False)
     """The row itself: numbers in full."""
 
@@ -65,37 +65,47 @@ def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[
     """
     units = sheet["unit"]
     texts = {
-        "#": _places(placings),
+        "#": _places(placings, sheet["is_baseline"]),
         "sensor": sheet.sensors,
         "estimator": sheet.answers,
         "score": list(map(add, scores(sheet["score"], units), score_marks(sheet))),
         "95 % interval": intervals(sheet["ci_low"], sheet["ci_high"], units),
+        "beyond floor": scores(sheet.known("score_beyond_floor"), units),
+        "95 % beyond": intervals(sheet.known("beyond_floor_ci_low"), sheet.known("beyond_floor_ci_high"), units),
+        "true error": scores(sheet.known("true_score"), units),
         "rank 95 %": _ranges(placings),
         "published": scores(sheet["published"], units),
         "baseline": scores(sheet["baseline"], units),
         "n test": list(map(whole, sheet["n_test"])),
         "sessions": list(map(whole, sheet["n_sessions"])),
     }
+    texts = {name: texts[name] for name in columns(sheet, times=False)}
     if times:
         marks = timing_marks(sheet, letters)
-        texts |= {name: _times(VALUES[name](sheet), marks) for name in columns(times)[len(texts) :]}
+        texts |= {name: _times(VALUES[name](sheet), marks) for name in TIMED_COLUMNS}
     status = sheet["status"]
     for place in [place for place, ended in enumerate(status) if ended != "done"]:
         for name, column in texts.items():
             if name not in ("sensor", "estimator"):
                 column[place] = ABSENT
         texts["#"][place], texts["score"][place] = "", status[place].upper()
-    return Shown(sheet, texts, list(map(_kind, status, placings)), placings)
+    return Shown(sheet, texts, list(map(_kind, status, sheet["is_baseline"])), placings)
 
 
-def _kind(status: str, placing: Placing | None) -> Kind:
+def _kind(status: str, trivial: bool) -> Kind:
     if status == "done":
-        return "result" if placing else "baseline"
+        return "baseline" if trivial else "result"
     return "failed" if status in STOPPED else "skipped"
 
 
-def _places(placings: Sequence[Placing | None]) -> list[str]:
-    return ["base" if one is None else f"{one.place}=" if one.tied else str(one.place) for one in placings]
+def _places(placings: Sequence[Placing | None], trivial: Sequence[bool]) -> list[str]:
+    """Return places; an answer that is no better than the trivial one has none."""
+    return [
+        ("base" if plain else ABSENT) if one is None
+        else f"{one.place}=" if one.tied
+        else str(one.place)
+        for one, plain in zip(placings, trivial, strict=True)
+    ]  # fmt: skip
 
 
 def _ranges(placings: Sequence[Placing | None]) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.text import visible
+from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
 
 Row = Mapping[str, Any]
 
@@ -16,7 +17,6 @@ _name = lru_cache(maxsize=4096)(visible)
 
 SIMULATED = "SIM (twin)"
 """What is said of simulated rows in place of a rig."""
-LOWER_IS_BETTER = frozenset({"rmse", "mae"})
 METRIC_NAMES = {
     "rmse": "RMSE",
     "mae": "MAE",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import compress
@@ -12,6 +13,7 @@ from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.marks import mark_notes
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, question_name
+from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.leaderboard.sheet import Sheet, marks_of
 from tactbench.core.leaderboard.stopped import stopped_notes
 from tactbench.core.leaderboard.text import visible
@@ -34,9 +36,12 @@ def notes_of(sheet: Sheet, blocks: Sequence[Block]) -> list[str]:
     """
     return [
         *mark_notes(sheet),
+        *_tare_notes(sheet),
+        *_floor_notes(sheet),
         *_rank_notes(blocks),
         *_chosen_notes(sheet),
         *_no_better_notes(sheet),
+        *_other_knowledge_notes(sheet),
         *_left_out_notes(sheet),
         *interval_notes(sheet),
         *stopped_notes(sheet),
@@ -57,6 +62,48 @@ def _rank_notes(blocks: Sequence[Block]) -> list[str]:
         where = "" if everywhere else f"In {'; in '.join(titles)}: "
         notes.append(f"{where}places are by score alone, without intervals, since {reason}.")
     return [note[0].upper() + note[1:] for note in notes]
+
+
+def _tare_notes(sheet: Sheet) -> list[str]:
+    """Return one sentence on which recordings were tared, where some row's protocol is one that may."""
+    asked = dict.fromkeys(zip(sheet["protocol"], sheet.known("tare_s"), sheet["status"], strict=True))
+    held = sorted({f"{tare:g} s" for _, tare, _ in asked if tare})
+    names = {str(protocol) for protocol, _, status in asked if status == "done"}
+    told = []
+    if held:
+        told.append(
+            f"`deployable`: each recording is tared on its own unloaded hold before its press ({', '.join(held)})"
+        )
+    if "deployable-untared" in names:
+        told.append("`deployable-untared`: readings as they are")
+    return [f"{'; '.join(told)}."] if told else []
+
+
+def _floor_notes(sheet: Sheet) -> list[str]:
+    """Return the floors of the references, once each, and what stands beyond them."""
+    floors: dict[tuple[str, str], dict[float, None]] = {}
+    known = zip(sheet.rows, sheet.known("reference_floor"), strict=True)
+    for row, floor in known:
+        if floor is not None:
+            floors.setdefault((question_name(row), str(row["unit"])), {})[floor] = None
+    told = []
+    if floors:
+        each = "; ".join(f"{where} {_floor(list(found), unit)}" for (where, unit), found in floors.items())
+        told.append(
+            f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond "
+            "floor is sqrt(max(0, RMSE² − floor²)); ranks go by it where all answers of a block have it."
+        )
+    if any(one is not None for one in sheet.known("true_score")):
+        told.append("True error (SIM): against the force that the twin exerted, free of the reference's noise.")
+    return told
+
+
+def _floor(found: Sequence[float], unit: str) -> str:
+    """Return a floor; of several campaigns the root of their mean square."""
+    told = f"{score(math.sqrt(sum(one * one for one in found) / len(found)), unit)}{suffix(unit)}"
+    return (
+        told if len(found) == 1 else f"{told} (of {len(found)}: {score(min(found), unit)} … {score(max(found), unit)})"
+    )
 
 
 def interval_notes(sheet: Sheet) -> list[str]:
@@ -86,14 +133,37 @@ def _told(value: object) -> str:
 
 def _no_better_notes(sheet: Sheet) -> list[str]:
     """Return one sentence a sensor and task on the answers that are no better than the trivial one."""
-    names: dict[str, dict[str, None]] = {}
+    names: dict[tuple[str, str], dict[str, None]] = {}
     for row in compress(sheet.rows, _no_better(sheet)):
         if not is_probe(row["protocol"]):  # no better than trivial is what a probe should be
-            names.setdefault(question_name(row), {})[answer_name(row)] = None
+            names.setdefault((question_name(row), _probing(row)), {})[f"{answer_name(row)} ({row['protocol']})"] = None
     return [
-        f"{where}/{', '.join(who)} {'is' if len(who) == 1 else 'are'} no better than the trivial baseline: see how the "
-        "recordings differ before blaming the sensor."
-        for where, who in names.items()
+        visible(
+            f"{where}/{', '.join(who)} {'is' if len(who) == 1 else 'are'} no better than the trivial baseline, and "
+            "where the score itself is none has no place: see how the recordings differ before blaming the sensor, "
+            f"`{command}`."
+        )
+        for (where, command), who in names.items()
+    ]
+
+
+def _probing(row: Row) -> str:
+    """Return the command that shows what the recordings of a row give away."""
+    if row["rig"] == "twin":
+        return f"tactbench run --sensor {row['sensor']} --task {row['task']} --probe"
+    return f"tactbench run --sensor {row['sensor']} --task {row['task']} --rig {row['rig']} --recordings DIR --probe"
+
+
+def _other_knowledge_notes(sheet: Sheet) -> list[str]:
+    """Return which trivial answers knew more than readings tell."""
+    names: dict[str, dict[str, None]] = {}
+    for row in compress(sheet.rows, (looks == "time" for looks in sheet.known("looks_at"))):
+        if row["is_baseline"] and row["status"] == "done":
+            names.setdefault(answer_name(row), {})[f"{question_name(row)} {score(row['score'], row['unit'])}"] = None
+    return [
+        f"{who} looks at the time of a sample and at no reading: it knows that every recording is pressed alike, and "
+        f"is no bar for answers from readings: {', '.join(where)}."
+        for who, where in names.items()
     ]
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 GROUPS: dict[str, tuple[str, ...]] = {
     "Configuration": (
         "cell", "key", "sensor", "task", "rig", "simulated", "protocol", "dagger", "split", "estimator", "is_baseline",
-        "repeat", "repeats", "seed", "threads",
+        "looks_at", "repeat", "repeats", "seed", "threads",
     ),
     "Answer": (
-        "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method", "baseline",
+        "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method",
+        "reference_floor", "score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high", "true_score",
+        "true_ci_low", "true_ci_high", "tare_s", "baseline",
         "published", "published_reference", "published_remark", "equivalence", "reference_score", "n_recordings",
         "n_sessions", "n_train", "n_test",
     ),

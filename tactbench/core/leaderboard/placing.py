@@ -12,11 +12,15 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from tactbench.core.leaderboard import memo
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER
 from tactbench.core.leaderboard.sheet import Sheet, alike
 
 _DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
 """Packages whose code ranks."""
-_DECIDES = ("cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes")
+_DECIDES = (
+    "cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes", "reference_floor",
+    "beyond_floor_ci_low", "beyond_floor_ci_high",
+)  # fmt: skip
 MOST_RANKED = 20_000
 """Answers of one block beyond which comparing all pairs takes too long."""
 
@@ -60,6 +64,23 @@ def places(results: Sheet) -> tuple[dict[str, Placing], str]:
     return found, ""
 
 
+def errors(results: Sheet) -> list[float]:
+    """Return what answers of one metric are ordered by, the lower the better.
+
+    The score; of errors of force the mean square beyond the floor of the reference, if all of them have one. It may be
+    below zero, where the error beyond the floor is 0: two answers of one sensor differ by more than its floor tells.
+    """
+    floors = results.known("reference_floor")
+    if all(metric == "rmse" for metric in results["metric"]) and None not in floors:
+        found = [score * score - floor * floor for score, floor in zip(results["score"], floors, strict=True)]
+        return [one if math.isfinite(one) else math.inf for one in found]
+    signs = [1.0 if metric in LOWER_IS_BETTER else -1.0 for metric in results["metric"]]
+    return [
+        sign * score if math.isfinite(score) else math.inf
+        for sign, score in zip(signs, results["score"], strict=True)
+    ]  # fmt: skip
+
+
 def _plain(replicates: Sequence[Any]) -> Any:
     """Return replicates as lists: the same whatever the order of their keys."""
     by_key = alike(replicates) if set(map(type, replicates)) == {dict} else None
@@ -77,13 +98,14 @@ def _unrankable(results: Sheet) -> str:
 
 def _by_score(results: Sheet) -> dict[str, Placing]:
     found: dict[str, Placing] = {}
-    many = Counter(results["score"])
+    ordered = errors(results)
+    many = Counter(ordered)
     place, before = 0, None
-    for position, (cell, score) in enumerate(zip(results["cell"], results["score"], strict=True)):
-        if position == 0 or score != before:
+    for position, (cell, error) in enumerate(zip(results["cell"], ordered, strict=True)):
+        if position == 0 or error != before:
             place = position + 1
-        found[cell] = Placing(place, None, None, many[score] > 1)
-        before = score
+        found[cell] = Placing(place, None, None, many[error] > 1)
+        before = error
     return found
 
 

@@ -13,9 +13,12 @@ from tactbench.core.leaderboard.table import Line, Table
 from tactbench.core.spec.row import FORMAT
 
 JSON_KEYS = (
-    "cell", "sensor", "task", "rig", "protocol", "split", "estimator", "params", "is_baseline", "repeat", "repeats",
-    "seed", "status", "reason", "signal", "metric", "unit", "equivalence", "reference_score", "score", "ci_low",
-    "ci_high", "ci_method", "baseline", "published", "published_reference", "published_remark", "n_recordings",
+    "cell", "sensor", "task", "rig", "protocol", "split", "estimator", "params", "is_baseline", "looks_at",
+    "repeat", "repeats", "seed", "status", "reason", "signal", "metric", "unit", "equivalence", "reference_score",
+    "score", "ci_low", "ci_high", "ci_method", "reference_floor", "score_beyond_floor", "beyond_floor_ci_low",
+    "beyond_floor_ci_high",
+    "true_score", "true_ci_low", "true_ci_high", "tare_s", "baseline", "published",
+    "published_reference", "published_remark", "n_recordings",
     "n_sessions", "n_train", "n_test", "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50",
     "latency_ms_p95", "latency_n", "threads", "peak_rss_mb", "wall_s", "concurrency", "host", "made_by", "simulated",
     "dagger", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "fold_sizes", "confusion",

@@ -96,7 +96,7 @@ def _arranged(rows: Sequence[Row] | Sheet, known: tuple[Row, ...], times: bool) 
         shown,
         blocks,
         tuple(notes),
-        columns(times),
+        columns(sheet, times=times),
         tuple(section for section in sections if section is not None),
         foot_of(sheet, known, times),
         known,

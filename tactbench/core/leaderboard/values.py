@@ -15,12 +15,21 @@ def _per_row(known: Columns) -> Values:
 
 
 def _midpoint(known: Columns) -> Values:
-    ends = zip(known["ci_low"], known["ci_high"], strict=True)
+    return _between(known, "ci_low", "ci_high")
+
+
+def _between(known: Columns, first: str, last: str) -> Values:
+    ends = zip(_if_known(first)(known), _if_known(last)(known), strict=True)
     return [None if low is None or high is None else (low + high) / 2 for low, high in ends]
 
 
 def _as_is(key: str) -> Callable[[Columns], Values]:
     return lambda known: known[key]
+
+
+def _if_known(key: str) -> Callable[[Columns], Values]:
+    """Return the values under a key that rows of older folders may lack."""
+    return lambda known: known.get(key) or [None] * len(known["score"])
 
 
 def _from_ms(key: str) -> Callable[[Columns], Values]:
@@ -30,6 +39,9 @@ def _from_ms(key: str) -> Callable[[Columns], Values]:
 VALUES: dict[str, Callable[[Columns], Values]] = {
     "score": _as_is("score"),
     "95 % interval": _midpoint,
+    "beyond floor": _if_known("score_beyond_floor"),
+    "95 % beyond": lambda known: _between(known, "beyond_floor_ci_low", "beyond_floor_ci_high"),
+    "true error": _if_known("true_score"),
     "published": _as_is("published"),
     "baseline": _as_is("baseline"),
     "n test": _as_is("n_test"),

@@ -68,7 +68,9 @@ def answer(
     metas = [material.metas[place] for place in range(len(material.metas))]
     row.update(_told_by(metas))
     row.update(_scored(result))
+    row["remarks"] = [*row["remarks"], *result.remarks]
     row.update(_published(cell, task, result.split))
+    row["looks_at"] = registry.estimators[cell.estimator].looks_at
     row["recordings"] = [str(path) for path in material.paths]
     row["status"] = "done"
     return row, dict(result.sets)
@@ -86,6 +88,7 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
         "estimator": cell.estimator,
         "params": dict(cell.params),
         "is_baseline": cell.baseline,
+        "looks_at": "",
         "repeat": cell.repeat,
         "repeats": cell.repeats,
         "seed": cell.seed,
@@ -103,6 +106,8 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
         "ci_low": None,
         "ci_high": None,
         "ci_method": "",
+        **dict.fromkeys(_OF_FORCE),
+        "tare_s": None,
         "baseline": None,
         **_published(cell, task, cell.split),
         "n_recordings": None,
@@ -208,6 +213,19 @@ def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
     return found
 
 
+_OF_FORCE = (
+    "reference_floor", "score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high", "true_score",
+    "true_ci_low", "true_ci_high",
+)  # fmt: skip
+"""What an error of force has besides its score; None where it cannot be said."""
+
+
+def _of_force(result: CellResult) -> tuple[float | None, ...]:
+    beyond = result.beyond
+    known = (None,) * 4 if beyond is None else (beyond.floor, beyond.score, beyond.low, beyond.high)
+    return *known, *(result.true or (None,) * 3)
+
+
 def _scored(result: CellResult) -> Row:
     return {
         "split": result.split,
@@ -215,6 +233,8 @@ def _scored(result: CellResult) -> Row:
         "ci_low": result.ci_low,
         "ci_high": result.ci_high,
         "ci_method": result.ci_method,
+        **dict(zip(_OF_FORCE, _of_force(result), strict=True)),
+        "tare_s": result.tare_s,
         "n_recordings": result.n_recordings,
         "n_sessions": result.n_sessions,
         "n_train": result.n_train,

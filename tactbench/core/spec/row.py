@@ -35,13 +35,18 @@ def _each(names: str, types: Iterable[type], inside: Iterable[type] = ()) -> dic
 
 _NUMBERS = (int, float)
 
+LOWER_IS_BETTER = frozenset({"rmse", "mae"})
+"""Metrics of a row's score that are errors."""
+
 FORMAT: Mapping[str, Held] = {
     **_each("key cell sensor task rig protocol estimator status reason traceback log metric unit ci_method", [str]),
-    **_each("published_reference published_remark host made_by", [str]),
+    **_each("published_reference published_remark host made_by looks_at", [str]),
     **_each("split", [str, _NOTHING]),
     **_each("repeat repeats seed", [int]),
     **_each("signal n_recordings n_sessions n_train n_test batch_rows latency_n threads concurrency", [int, _NOTHING]),
     **_each("score ci_low ci_high baseline published equivalence reference_score", [*_NUMBERS, _NOTHING]),
+    **_each("reference_floor score_beyond_floor beyond_floor_ci_low beyond_floor_ci_high", [*_NUMBERS, _NOTHING]),
+    **_each("true_score true_ci_low true_ci_high tare_s", [*_NUMBERS, _NOTHING]),
     **_each("sim_s search_s fit_s predict_s latency_ms_p50 latency_ms_p95 peak_rss_mb wall_s", [*_NUMBERS, _NOTHING]),
     **_each("is_baseline simulated dagger", [bool]),
     **_each("stamps remarks recordings digests", [list], [str]),

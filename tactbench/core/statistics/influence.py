@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.jackknife import influences
-from tactbench.core.evaluation.metrics import METRICS, Metric
+from tactbench.core.evaluation.metrics import SUMMED, Metric
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
 
@@ -60,7 +60,7 @@ def together(rows: Sequence[Row]) -> list[Together]:
             groups.setdefault(mark, []).append(place)
     found = []
     for (names, strata, in_time, n_classes, metric), places in groups.items():
-        one = _group([rows[place]["replicates"] for place in places], METRICS[metric], n_classes, strata, len(names))
+        one = _group([rows[place]["replicates"] for place in places], SUMMED[metric], n_classes, strata, len(names))
         if one is not None:
             good, influence, freedom, runs = one
             codes = np.array(strata or [0] * len(names), dtype=np.int64)
@@ -72,7 +72,7 @@ def together(rows: Sequence[Row]) -> list[Together]:
 def _mark(row: Row) -> tuple[Any, ...] | None:
     """Return what two rows must have in common to be paired; None if a row has nothing to resample."""
     kept = row.get("replicates")
-    if not kept or row["metric"] not in METRICS:
+    if not kept or row["metric"] not in SUMMED:
         return None
     try:
         strata = None if kept["strata"] is None else tuple(int(one) for one in kept["strata"])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.evaluation.metrics import METRICS
+from tactbench.core.evaluation.metrics import EXCESS, SUMMED
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.statistics.influence import Together, together
 from tactbench.core.statistics.student import NORMAL, quantile
@@ -49,12 +49,17 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     little where cells are close: among near ties it covers as little as 77 % where 95 % are promised [2]_; see
     ``benchmarks/coverage.py``.
 
+    Errors of force are ranked by what is beyond the floor of their reference, if all of them have one: by
+    ``score² - floor²``, whose sums over replicates are exact and whose differences are free of what two cells' floors
+    share. The region of practical equivalence is that of the roots: ``b² … (b + region)²`` for the better one's b.
+
     Differences are paired over replicates where two cells have the same (:func:`together`), else their errors are taken
     as independent. Their interval is Student's, with the jackknife's standard error over replicates; of two degrees of
     freedom the smaller. A row without replicates enters with the interval that stands beside its score.
 
     Nothing is drawn at random, and the answer depends on `cell`, `score`, `ci_low`, `ci_high`, `metric`, `classes`,
-    `equivalence` and `replicates` of these rows and on nothing else: it may be kept under a digest of them.
+    `equivalence`, `replicates` and the three keys of the error beyond the floor of these rows and on nothing else: it
+    may be kept under a digest of them.
 
     References
     ----------
@@ -65,7 +70,9 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     entered = [row for row in rows if row["status"] == "done" and not row["is_baseline"]]
     if not entered:
         return {}
-    sign = -1.0 if METRICS[entered[0]["metric"]].higher_is_better else 1.0
+    if beyond_floor(entered):
+        entered = [_excess(row) for row in entered]
+    sign = -1.0 if SUMMED[entered[0]["metric"]].higher_is_better else 1.0
     entered.sort(key=lambda row: (sign * row["score"], row["cell"]))
     error = sign * np.array([row["score"] for row in entered], dtype=np.float64)  # the lower, the better
     better, worse = _clearly(entered, error)
@@ -77,6 +84,19 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
         row["cell"]: Rank(place, first, last, bool(many[place] > 1))
         for row, place, first, last in zip(entered, places.tolist(), low.tolist(), high.tolist(), strict=True)
     }
+
+
+def beyond_floor(rows: Sequence[Row]) -> bool:
+    """Return whether rows are ranked by their errors beyond the floor: all have one."""
+    return all(row["metric"] == "rmse" and row.get("reference_floor") is not None for row in rows)
+
+
+def _excess(row: Row) -> Row:
+    """Return a row of a RMSE as that of its mean square beyond the floor, which may be below zero."""
+    ends = {"ci_low": row["beyond_floor_ci_low"], "ci_high": row["beyond_floor_ci_high"]}
+    squares = {key: None if value is None else value * value for key, value in ends.items()}
+    excess = row["score"] * row["score"] - row["reference_floor"] * row["reference_floor"]
+    return {**row, **squares, "score": excess, "metric": EXCESS.name}
 
 
 def _places(low: IntArray, error: FloatArray) -> IntArray:
@@ -93,6 +113,9 @@ def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray
     distinct, which = np.unique(freedom, return_inverse=True)
     wide = quantile(distinct) ** 2
     same = float(rows[0].get("equivalence") or 0.0)
+    near_to = np.full(n, same)
+    if rows[0]["metric"] == EXCESS.name:
+        near_to = (np.sqrt(np.maximum(error, 0.0)) + same) ** 2 - np.maximum(error, 0.0)
     better, worse = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     for start in range(0, n, _STRIP):
         stop = min(start + _STRIP, n)
@@ -106,8 +129,9 @@ def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray
         clear = ahead > 0
         clear &= np.square(ahead) > bound
         if same > 0:
-            near = np.nonzero(clear & (ahead <= same))
-            clear[near] = ahead[near] + np.sqrt(bound[near]) > same
+            region = np.broadcast_to(near_to[columns], ahead.shape)
+            near = np.nonzero(clear & (ahead <= region))
+            clear[near] = ahead[near] + np.sqrt(bound[near]) > region[near]
         better[lines] = clear.sum(axis=1)
         worse[columns] += clear.sum(axis=0)
     return better, worse

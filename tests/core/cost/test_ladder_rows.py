@@ -8,9 +8,11 @@ from tactbench.core.errors import NotApplicable
 from tests.core.cost.test_rounds import Hours, contestant
 
 
-def row(name, score, fit_s, latency, *, baseline=False, status="done"):
-    return {"estimator": name, "score": score, "fit_s": fit_s, "latency_ms_p50": latency, "is_baseline": baseline,
-            "status": status, "front_fit": False, "front_latency": False}  # fmt: skip
+def row(name, score, fit_s, latency, *, baseline=False, status="done", looks_at="features"):
+    return {
+        "estimator": name, "looks_at": looks_at, "score": score, "fit_s": fit_s, "latency_ms_p50": latency,
+        "is_baseline": baseline, "status": status, "front_fit": False, "front_latency": False,
+    }  # fmt: skip
 
 
 def test_a_front_for_each_time_and_baselines_and_failures_on_none():
@@ -18,7 +20,7 @@ def test_a_front_for_each_time_and_baselines_and_failures_on_none():
         row("quick", 0.5, 1.0, 3.0),
         row("good", 0.9, 5.0, 1.0),
         row("poor", 0.4, 2.0, 4.0),
-        row("trivial", 1.0, 0.1, 0.1, baseline=True),
+        row("time", 1.0, 0.1, 0.1, baseline=True, looks_at="time"),
         row("gone", 1.0, 0.1, 0.1, status="failed"),
     ]
     mark_fronts(rows, higher_is_better=True)
@@ -27,6 +29,20 @@ def test_a_front_for_each_time_and_baselines_and_failures_on_none():
     errors = [{**one, "front_fit": False, "front_latency": False} for one in rows]
     mark_fronts(errors, higher_is_better=False)
     assert [one["estimator"] for one in errors if one["front_fit"]] == ["quick", "poor"]
+
+
+@pytest.mark.parametrize(("higher", "sign"), [(True, 1.0), (False, -1.0)])
+def test_nobody_who_is_no_better_than_the_best_answer_from_nothing_is_on_a_front(higher, sign):
+    rows = [
+        row("good", sign * 0.9, 5.0, 5.0),
+        row("same", sign * 0.5, 1.0, 1.0),
+        row("below", sign * 0.4, 0.5, 0.5),
+        row("poorer trivial", sign * 0.1, 0.1, 0.1, baseline=True, looks_at="nothing"),
+        row("trivial", sign * 0.5, 0.1, 0.1, baseline=True, looks_at="nothing"),
+        row("time", sign * 0.95, 0.1, 0.1, baseline=True, looks_at="time"),
+    ]
+    mark_fronts(rows, higher_is_better=higher)
+    assert [one["estimator"] for one in rows if one["front_fit"] or one["front_latency"]] == ["good"]
 
 
 def test_the_best_score_comes_first_and_no_score_last():

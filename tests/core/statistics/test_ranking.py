@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tactbench.core.evaluation.metrics import EXCESS, METRICS
 from tactbench.core.statistics.ranking import ranks
 
 from .made import mae_row, row
@@ -150,3 +151,73 @@ def test_blocks_of_time_that_depend_on_each_other_say_less():
     runs = [one | {"replicates": one["replicates"] | block | {"run": 8}} for one in rows]
     assert ranks(runs)["b"].low <= ranks(apart)["b"].low
     assert ranks(runs)["b"].place == 1
+
+
+def force_row(cell, errors, holds, **more):
+    """A row of RMSE with (sessions,) mean squares of its errors, and of its reference while unloaded."""
+    n, held = 500.0, 300.0
+    sums = np.column_stack([np.multiply(errors, n), np.full(len(errors), n)])
+    made = row(cell, sums, **more)
+    made["replicates"]["floor"] = [[one * held, held] for one in holds]
+    floor = float(np.sqrt(np.mean(holds)))
+    excess = made["score"] ** 2 - floor**2
+    beyond = float(np.sqrt(max(0.0, excess)))
+    return made | {
+        "reference_floor": floor, "score_beyond_floor": beyond, "beyond_floor_ci_low": 0.0,
+        "beyond_floor_ci_high": 2 * beyond + 0.1,
+    }  # fmt: skip
+
+
+def noisy(rng, own, sessions=8, sigma=0.6875, scatter=0.002):
+    """Mean squares of errors and of holds by session; `own` is the answer's own error."""
+    holds = sigma**2 + scatter * rng.standard_normal(sessions)
+    return own**2 + sigma**2 + scatter * rng.standard_normal(sessions), holds
+
+
+def test_errors_of_force_are_ranked_by_what_is_beyond_the_floor():
+    """Of a noisier reference the better sensor has the larger RMSE."""
+    rng = np.random.default_rng(1)
+    better, worse = noisy(rng, 0.1, sigma=0.75), noisy(rng, 0.4, sigma=0.5)
+    rows = [force_row("worse", *worse), force_row("better", *better)]
+    assert rows[1]["score"] > rows[0]["score"]
+    assert [ranks(rows)[name].place for name in ("better", "worse")] == [1, 2]
+    for one in rows:
+        one["reference_floor"] = None
+    assert [ranks(rows)[name].place for name in ("better", "worse")] == [2, 1], "without floors, by RMSE"
+
+
+def test_where_one_answer_has_no_floor_all_are_ranked_by_rmse():
+    rng = np.random.default_rng(1)
+    rows = [force_row("a", *noisy(rng, 0.1, sigma=0.75)), force_row("b", *noisy(rng, 0.4, sigma=0.5))]
+    rows[0]["reference_floor"] = None
+    assert [ranks(rows)[name].place for name in "ab"] == [2, 1]
+
+
+def test_a_floor_that_two_answers_share_does_not_blur_their_difference():
+    """Both were tested on the same recordings: what their one floor is uncertain by cancels."""
+    rng = np.random.default_rng(2)
+    errors, holds = noisy(rng, 0.2, scatter=0.1)
+    rows = [force_row("a", errors, holds), force_row("b", errors + 0.005 + 1e-4 * rng.standard_normal(8), holds)]
+    assert [one.place for one in ranks(rows).values()] == [1, 2]
+    other = noisy(rng, 0.2, scatter=0.1)
+    apart = [rows[0], force_row("c", other[0] + 0.005, other[1])]
+    apart[1]["replicates"]["names"] = [f"other {place}" for place in range(8)]
+    assert {one.place for one in ranks(apart).values()} == {1}, "of two references it does not"
+
+
+@pytest.mark.parametrize(("same", "places"), [(0.0, [1, 2]), (0.03, [1, 2]), (0.08, [1, 1])])
+def test_practically_the_same_is_said_of_the_error_and_not_of_its_square(same, places):
+    """0.20 and 0.25 N differ by 0.05 N, and their squares by 0.0225 N²."""
+    rng = np.random.default_rng(3)
+    holds = np.full(8, 0.5)
+    pair = [
+        force_row(name, own**2 + holds + 1e-5 * rng.standard_normal(8), holds, equivalence=same)
+        for name, own in (("a", 0.2), ("b", 0.25))
+    ]
+    assert [one.place for one in ranks(pair).values()] == places
+
+
+def test_the_square_beyond_the_floor_is_no_metric_that_a_task_may_ask_for():
+    assert EXCESS.name not in METRICS
+    found = EXCESS.score(np.array([[2.0, 4.0, 3.0, 10.0], [2.0, 4.0, 30.0, 10.0]]), 0)
+    np.testing.assert_allclose(found, [0.2, -2.5])

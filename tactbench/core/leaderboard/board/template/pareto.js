@@ -8,23 +8,24 @@ const timeText = (seconds) => {
 const UNKNOWN = "a host that is not known";
 const pointsOf = (place, axis) => {
   const { order, starts, shown } = board;
-  const score = board.role("score"), times = axis.column.values(), scores = score.column.values();
+  const score = board.role("score"), rank = board.role("rank"), times = axis.column.values(), scores = score.column.values();
   const points = [];
   let untimed = 0;
   for (let at = starts[place]; at < starts[place + 1]; at += 1) {
     const row = order[at];
     if (!shown[row] || Number.isNaN(scores[row])) continue;
     if (!(times[row] > 0)) untimed += 1;
-    else points.push({ row, time: times[row], score: scores[row], kind: board.kinds.text(row),
+    else points.push({ row, time: times[row], score: scores[row], kind: board.kinds.text(row), placed: !rank || rank.column.text(row) !== ABSENT,
       host: board.field("host", row) || UNKNOWN });
   }
   return { points, untimed };
 };
 
-// In the order of time, each of the front scores better than all before it.
+// In the order of time, each of the front scores better than all before it; without a place (no better than the trivial
+// answer) nobody is on it.
 const frontOf = (points, lower) => {
   const better = (one, other) => (lower ? one < other : one > other);
-  const inOrder = points.filter((one) => one.kind === "result")
+  const inOrder = points.filter((one) => one.kind === "result" && one.placed)
     .sort((one, other) => one.time - other.time || (lower ? one.score - other.score : other.score - one.score));
   const front = [];
   for (const one of inOrder) if (!front.length || better(one.score, front.at(-1).score)) front.push(one);
@@ -101,7 +102,7 @@ const drawTime = () => {
   const elsewhere = all.length - points.length;
   const atOnce = [...new Set(points.map((one) => board.field("concurrency", one.row)).filter((text) => text))].sort(words.compare);
   const told = [
-    `${block.lower ? "Lower" : "Higher"} and further left is better. Filled: answers; joined: the front, which no other answer beats in both; its intervals are the upright bands. Hollow: trivial answers, which are not part of it.`,
+    `${block.lower ? "Lower" : "Higher"} and further left is better. Filled: answers; joined: the front, which no other answer beats in both; its intervals are the upright bands. Hollow: trivial answers, which are not part of it, nor is what is no better than the best of them.`,
     `All times of this figure were taken on ${host === UNKNOWN ? UNKNOWN : `host ${host}`}${atOnce.length ? `, with ${
       atOnce.length > 1 ? `${atOnce[0]} to ${atOnce.at(-1)} cells` : atOnce[0] === "1" ? "one cell" : `${atOnce[0]} cells`} at once` : ""}.`,
   ];

@@ -1,0 +1,233 @@
+"""The floor of the reference, the error beyond it, and on a simulated rig the error against the true force.
+
+A reference that errs by noise of deviation f puts f under every RMSE against it: of an estimator that errs by e on its
+own, the mean squares add up to ``e² + f²``. The floor is measured where the true force is known not to change: in the
+recording's unloaded hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.interval import (
+    RESAMPLES,
+    block_length,
+    circular_blocks,
+    enough,
+    generator,
+    integrated_correlation,
+    strata_of,
+    student_reach,
+)
+from tactbench.core.evaluation.jackknife import influences
+from tactbench.core.evaluation.metrics import Metric
+from tactbench.core.evaluation.replication import Units
+from tactbench.core.evaluation.unloaded import hold_s, unloaded
+from tactbench.core.samples import Answers, FloatArray, IntArray
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.task import ChannelTarget, TaskSpec
+
+FEWEST = 30
+"""Independent unloaded samples below which no floor is told (assumed): a deviation from 30 is known to 13 %."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """What one recording's reference says while nothing presses."""
+
+    squares: FloatArray
+    """(n,) squared differences from the hold's mean, in time order"""
+    freedom: float
+    """how many independent differences they are worth: n less one, or less than that where noise is correlated"""
+
+    @property
+    def shares(self) -> FloatArray:
+        """(n, 2) each sample's square, and its part of the degrees of freedom: what a block of time adds up."""
+        return np.column_stack([self.squares, np.full(len(self.squares), self.freedom / max(len(self.squares), 1))])
+
+
+@dataclass(frozen=True)
+class BeyondFloor:
+    """The floor under a RMSE, and what is left of it; all in the unit of the RMSE."""
+
+    floor: float
+    score: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What is known of the reference of the recordings that were tested."""
+
+    holds: dict[int, Hold]
+    """By number of the recording."""
+
+    @property
+    def value(self) -> float:
+        """The deviation of the reference, pooled over the recordings."""
+        return float(np.sqrt(_per_freedom(self.sums(list(self.holds)).sum(axis=0))))
+
+    def sums(self, recordings: Sequence[int]) -> FloatArray:
+        """Return (recordings, 2) sums of squares and degrees of freedom."""
+        return np.array([[self.holds[one].squares.sum(), self.holds[one].freedom] for one in recordings])
+
+
+def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answers) -> tuple[Floor | None, str]:
+    """Return what the tested recordings' unloaded holds say of their reference, or None and why.
+
+    Notes
+    -----
+    Sums of squares about each hold's own mean and their degrees of freedom are pooled, so that offsets between
+    recordings are no noise and the variance is unbiased. The mean of n samples whose correlations add up to tau
+    (1 for white noise) takes ``tau`` degrees of freedom, not one: ``E sum (y - mean)² = n sigma² - n var(mean) =
+    (n - tau) sigma²``, so that a reference behind a low-pass is measured right too.
+    """
+    if metric.name != "rmse" or not isinstance(task.target, ChannelTarget) or task.target.kind != "force":
+        return None, ""
+    holds: dict[int, Hold] = {}
+    for place in np.unique(tested.recording).tolist():
+        table = data.tables[place]
+        why = _no_hold(table)
+        if why:
+            return None, f"no floor of the reference: recording {table.meta.name!r} {why}"
+        holds[place] = hold_of(table.y[unloaded(table) & table.labelled])
+    if sum(one.freedom for one in holds.values()) < FEWEST:
+        return None, f"no floor of the reference: fewer than {FEWEST} independent samples of it are unloaded"
+    return Floor(holds), ""
+
+
+def _no_hold(table: Table) -> str:
+    if hold_s(table.meta) == 0:
+        return "states no unloaded hold"
+    if table.meta.scene is not None and table.meta.scene.drive is not None:
+        return "was pressed by a force loop, whose motion during the hold is no noise of the reference"
+    if (unloaded(table) & table.labelled).sum() < 2:
+        return "has fewer than two samples of the reference in its unloaded hold"
+    return ""
+
+
+def hold_of(y: npt.NDArray[Any]) -> Hold:
+    """Return what (n,) samples of an unloaded reference say, n at least 2, in time order."""
+    centred = np.asarray(y, dtype=np.float64) - np.mean(y)
+    return Hold(centred**2, len(centred) - min(integrated_correlation(centred), len(centred) / 2))
+
+
+def beyond_floor(floor: Floor, tested: Answers, unit: Units, seed: int) -> BeyondFloor:
+    """Return what a RMSE is beyond the floor, with its 95 % interval.
+
+    Notes
+    -----
+    The interval is of the mean square beyond the floor, ``mean (p - y)² - floor²``, which may be below zero and is a
+    sum of two independent means; only its ends are put through ``sqrt(max(0, .))``. Where there are units enough each
+    is left out in turn, its hold with it; else both are resampled in circular blocks of time, the errors in the same
+    blocks as for the RMSE, the holds in their own, and the degrees of freedom are those of Welch and Satterthwaite.
+    """
+    loss = (tested.y_pred - tested.y_true) ** 2
+    held = floor.sums(list(floor.holds))
+    excess = float(loss.mean() - _per_freedom(held.sum(axis=0)))
+    if enough(tested.y_true, unit.codes, 0):
+        low, high = _over_units(floor, loss, tested, unit, excess)
+    else:
+        low, high = _over_time(floor, loss, tested.recording, seed, excess)
+    ends = [float(np.sqrt(max(0.0, value))) for value in (excess, low, high)]
+    return BeyondFloor(floor.value, *ends)
+
+
+def floor_sums(floor: Floor, recording: IntArray, code: IntArray, replicates: int, rows: IntArray) -> FloatArray:
+    """Return (replicates, 2) the floor's sums of squares and degrees of freedom by replicate.
+
+    Parameters
+    ----------
+    recording, code, rows
+        (n,) of each test row: its recording, its replicate, and its row in the recording. Where a recording's test rows
+        are in several replicates, its hold is dealt to them in order of time, in proportion to their rows: noise of one
+        hold is as good as of another.
+    """
+    out = np.zeros((replicates, 2))
+    for place, hold in floor.holds.items():
+        mine = np.flatnonzero(recording == place)
+        codes = code[mine[np.argsort(rows[mine], kind="stable")]]
+        share = codes[np.arange(len(hold.squares)) * len(codes) // len(hold.squares)]
+        np.add.at(out, share, hold.shares)
+    return out
+
+
+def _over_units(floor: Floor, loss: FloatArray, tested: Answers, unit: Units, excess: float) -> tuple[float, float]:
+    n = len(unit.labels)
+    sums = np.zeros((n, 2))
+    np.add.at(sums, unit.codes, np.column_stack([loss, np.ones(len(loss))]))
+    held = floor_sums(floor, tested.recording, unit.codes, n, tested.row)
+    strata = strata_of(tested.y_true, unit.codes, 0)
+    without = _per_freedom(sums.sum(axis=0) - sums) - _per_freedom(held.sum(axis=0) - held)
+    carried = influences(without, np.zeros(n, dtype=np.int64))
+    reach = student_reach(float(n - len(strata))) * float(np.sqrt(carried @ carried))
+    return excess - reach, excess + reach
+
+
+def _over_time(
+    floor: Floor, loss: FloatArray, recording: IntArray, seed: int, excess: float
+) -> tuple[float, float]:  # fmt: skip
+    rng = generator(seed)
+    places = np.unique(recording).tolist()
+    errors = [np.column_stack([loss[recording == one], np.ones((recording == one).sum())]) for one in places]
+    deviations, freedoms = [], []
+    for parts in (errors, [floor.holds[one].shares for one in places]):
+        total, blocks = np.zeros((RESAMPLES, 2)), 0.0
+        for part in parts:
+            length = block_length(part[:, 0])
+            blocks += len(part) / length
+            total += circular_blocks(part, length, rng)
+        freedom = max(blocks - len(parts), 1.0)
+        freedoms.append(freedom)
+        deviations.append(float(_per_freedom(total).std()) * np.sqrt(blocks / freedom))
+    squares = np.array(deviations) ** 2
+    if not squares.any():
+        return excess, excess
+    together = float(squares.sum() ** 2 / (squares**2 / np.array(freedoms)).sum())
+    reach = student_reach(together) * float(np.sqrt(squares.sum()))
+    return excess - reach, excess + reach
+
+
+def _per_freedom(sums: FloatArray) -> FloatArray:
+    return np.asarray(sums[..., 0] / sums[..., 1])
+
+
+def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | None:
+    """Return (n,) the force [N] that was exerted at each test row; None where nobody knows it.
+
+    A simulated rig without a force loop follows its scene's profile exactly; there the profile is the truth, noise and
+    filters of the reference are not in it. A real rig's truth is not known, nor that of a simulated loop, which is not
+    recorded.
+    """
+    target = task.target
+    if not isinstance(target, ChannelTarget) or target.kind != "force" or target.name not in (None, "normal"):
+        return None
+    if target.unit != "N":
+        return None
+    out = np.zeros(len(tested))
+    for place in np.unique(tested.recording).tolist():
+        mine = tested.recording == place
+        found = _commanded(data.metas[place], tested.time_s[mine])
+        if found is None:
+            return None
+        out[mine] = found
+    return out
+
+
+def _commanded(meta: RecordingMeta, time_s: FloatArray) -> FloatArray | None:
+    scene = meta.scene
+    if scene is None or not meta.simulated or meta.clock == "none" or scene.drive is not None:
+        return None
+    profile = scene.profile
+    duration, start = profile.duration.to("s"), profile.start.to("N")
+    hold = min(profile.hold.to("s"), duration)
+    if hold >= duration:
+        return np.full(len(time_s), start)
+    return np.asarray(np.interp(time_s, [0.0, hold, duration], [start, start, profile.end.to("N")]))

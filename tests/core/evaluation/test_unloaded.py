@@ -1,0 +1,123 @@
+"""Taring on the unloaded hold: offsets of a recording do not matter, and nothing after the hold changes a reading."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import NotApplicable
+from tactbench.core.evaluation.cell import NOT_TARED, evaluate
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.preparation import prepared
+from tactbench.core.evaluation.protocols import DEPLOYABLE, DEPLOYABLE_UNTARED
+from tactbench.core.evaluation.splits import make_splits
+from tactbench.core.evaluation.unloaded import hold_s, tare_s, tared, unloaded
+from tactbench.core.plugins.registry import installed
+from tactbench.core.spec.quantity import assumed
+from tactbench.core.spec.scene import ForceRamp, Scene
+
+from .made import force_task, record
+
+TASK = force_task(protocols=("deployable", "deployable-untared"), splits=("roles",))
+HOLD, ROWS = 40, 200
+
+
+def scene(name, hold=0.4, start=0.0, duration=2.0):
+    profile = ForceRamp(
+        hold=assumed(hold, "s", "a test"), start=assumed(start, "N", "a test"),
+        duration=assumed(duration, "s", "a test"), samples=ROWS,
+    )  # fmt: skip
+    return Scene(name=name, profile=profile)
+
+
+def three(folder, offsets=(0.0, 0.0, 0.0), **how):
+    """A ramp after a hold, in three roles, each with an offset of its own."""
+    folder.mkdir()
+    rng = np.random.default_rng(3)
+    paths = []
+    for role, offset in zip(("train", "validation", "test"), offsets, strict=True):
+        force = np.concatenate([np.zeros(HOLD), np.linspace(0, 5, ROWS - HOLD)])
+        X = force[:, None] * [1.0, 2.0, -1.0] + 0.1 * rng.standard_normal((ROWS, 3)) + np.multiply(offset, [1, -2, 3])
+        paths.append(record(folder / f"{role}.h5", X, force, role=role, session=role, scene=scene(role, **how)))
+    return paths
+
+
+def answered(paths, protocol, estimator="ols"):
+    return evaluate(TASK, installed().estimators[estimator], {}, protocol, "roles", paths, seed=1, clock=lambda: 0.0)
+
+
+def test_constant_offsets_of_recordings_change_nothing_where_they_are_tared(tmp_path):
+    plain, shifted = three(tmp_path / "a"), three(tmp_path / "b", (100.0, -50.0, 7.0))
+    same = [answered(paths, "deployable") for paths in (plain, shifted)]
+    np.testing.assert_allclose(same[1].sets["test"].y_pred, same[0].sets["test"].y_pred, atol=1e-9)
+    untared = [answered(paths, "deployable-untared").score for paths in (plain, shifted)]
+    assert untared[1] > 10 * untared[0], "what is not tared feels them"
+    assert [one.tare_s for one in same] == [0.4, 0.4]
+    assert answered(plain, "deployable-untared").tare_s is None
+
+
+def test_a_tared_recording_is_zero_on_average_while_unloaded(tmp_path):
+    data = load_dataset(TASK, three(tmp_path / "a", (1.0, 20.0, -3.0)))
+    for table in data.tables:
+        before = unloaded(table)
+        assert before.sum() == HOLD
+        np.testing.assert_allclose(tared(table)[before].mean(axis=0), 0.0, atol=1e-9)
+        np.testing.assert_allclose(np.diff(tared(table), axis=0), np.diff(table.X, axis=0), atol=1e-9)
+
+
+@pytest.mark.parametrize("first_changed", [HOLD, 120, ROWS - 1])
+def test_later_rows_change_no_earlier_reading(tmp_path, first_changed):
+    """The last fold's readings under `deployable`, its window included, before the first row that was altered."""
+    paths = three(tmp_path / "a")
+    (altered,) = [path for path in paths if path.stem == "test"]
+    data = load_dataset(TASK, paths)
+    table = data.tables[paths.index(altered)]
+    X = table.X.copy()
+    X[first_changed:] += 1000.0
+    other = record(tmp_path / "test.h5", X, table.y, role="test", session="test", scene=scene("test"))
+    changed = load_dataset(TASK, [*(path for path in paths if path != altered), other])
+
+    def readings(source):
+        (roles,) = make_splits(source, "roles", 1)
+        fold = prepared(roles, source, DEPLOYABLE, 7, Counter())
+        return fold.test.X[fold.test.row < first_changed]
+
+    # The filter sums up about the set's mean, so that rounding knows of later rows; what was altered is 1000.
+    np.testing.assert_allclose(readings(changed), readings(data), rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(tared(changed.tables[-1])[:first_changed], tared(table)[:first_changed])
+
+
+def test_recordings_without_a_hold_are_as_they_are_and_the_row_says_so(tmp_path):
+    for name, how in {"no hold": {"hold": 0.0}, "loaded from the start": {"start": 1.0}}.items():
+        paths = three(tmp_path / name, (5.0, 5.0, 5.0), **how)
+        data = load_dataset(TASK, paths)
+        assert {hold_s(meta) for meta in data.metas} == {0.0}
+        assert tare_s(data) == 0.0
+        for table in data.tables:
+            np.testing.assert_array_equal(tared(table), table.X)
+        result = answered(paths, "deployable")
+        assert result.tare_s is None
+        assert NOT_TARED in result.remarks
+        assert result.score == answered(paths, "deployable-untared").score
+    assert not answered(paths, "deployable-untared").remarks[1:], "who does not tare need not say why not"
+
+
+def test_a_hold_of_rows_without_a_clock_is_not_known(tmp_path):
+    path = record(tmp_path / "a.h5", np.ones((ROWS, 3)), np.ones(ROWS), t_ns=None, scene=scene("a"), role="train")
+    (table,) = load_dataset(TASK, [path]).tables
+    assert not unloaded(table).any()
+
+
+def test_recordings_of_which_some_cannot_be_tared_are_refused(tmp_path):
+    paths = three(tmp_path / "a")
+    bare = record(tmp_path / "bare.h5", np.ones((ROWS, 3)), np.ones(ROWS), role="train", session="bare")
+    with pytest.raises(NotApplicable, match=r"3 of 4 recordings .* 'bare'"):
+        answered([*paths, bare], "deployable")
+    assert answered([*paths, bare], "deployable-untared").score > 0
+
+
+def test_the_two_differ_in_the_tare_alone():
+    told = DEPLOYABLE.model_dump(exclude={"name", "title", "tare"})
+    assert told == DEPLOYABLE_UNTARED.model_dump(exclude={"name", "title", "tare"})
+    assert DEPLOYABLE.tare
+    assert not DEPLOYABLE_UNTARED.tare
