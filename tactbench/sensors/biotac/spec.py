@@ -48,7 +48,9 @@ SKIN = FluidBackedShell(
     poisson=assumed(0.48, "1", "nearly incompressible silicone"),
     thickness=derived(_SKIN_MM, "mm", f"{_MESH}: inner 6.47-6.69, outer 8.08-8.31 mm"),
     mid_radius=derived(
-        6.31, "mm", f"outer surface, a circle of 7.11 mm about 1.1 mm below the core's axis, less half of the thickness; {_MESH}"
+        6.31,
+        "mm",
+        f"outer surface, a circle of 7.11 mm about 1.1 mm below the core's axis, less half of the thickness; {_MESH}",
     ),
     tension=assumed(0.02, "N/mm", "no source"),
     contact_stiffness=assumed(1.299, "MPa/mm", "2 E / ((1 - nu^2) t); the factor 2 has no source"),

@@ -43,7 +43,9 @@ SKIN = FoamPad(
     densification=assumed(0.75, "1", "strain at which the foam is solid; no source"),
     cover_tension=assumed(0.015, "N/mm", "no source"),
     cover_bending=assumed(0.006, "N*mm", "no source"),
-    contact_stiffness=assumed(10.8, "MPa/mm", "180 E/h: a stiff penalty, whose penetration is taken back; not a material value"),
+    contact_stiffness=assumed(
+        10.8, "MPa/mm", "180 E/h: a stiff penalty, whose penetration is taken back; not a material value"
+    ),
 )
 
 PARAMETERS: dict[str, Quantity] = {

@@ -70,9 +70,7 @@ def test_a_curved_film_conducts_as_its_middle_is_long():
 def test_a_stretched_disc_is_the_disc_on_the_stretched_grid():
     x, film = (np.arange(40) + 0.5) * 0.2, np.full((40, 40), 0.5)
     plain = RimmedDiscs(x, x, [Disc(2.0, 3.1, 0.6)], [Disc(6.0, 5.0, 0.8)])
-    squeezed = RimmedDiscs(
-        x / 2, 4 * x, [Disc(1.0, 12.4, 0.6, (2.0, 0.25))], [Disc(3.0, 20.0, 0.8, (2.0, 0.25))]
-    )
+    squeezed = RimmedDiscs(x / 2, 4 * x, [Disc(1.0, 12.4, 0.6, (2.0, 0.25))], [Disc(3.0, 20.0, 0.8, (2.0, 0.25))])
     sheets = [FilmSheet(flat_faces((40, 40), (0.2, 0.2)), discs) for discs in (plain, squeezed)]
     one, other = (sheet.resistances(film)[0, 0] for sheet in sheets)
     assert one == pytest.approx(other, rel=1e-12)

@@ -28,9 +28,7 @@ def test_a_uniform_strip_has_the_resistance_of_a_strip(width, length, film, aspe
     ends = np.zeros((2, length, width))
     ends[0, 0] = ends[1, -1] = 1.0
     thickness = np.full((length, width), film)
-    sheet = FilmSheet(
-        flat_faces(thickness.shape, (aspect, 1.0)), Discs(ends[1:], ends[0], TINY, TINY, PERFECT)
-    )
+    sheet = FilmSheet(flat_faces(thickness.shape, (aspect, 1.0)), Discs(ends[1:], ends[0], TINY, TINY, PERFECT))
     expected = (length - 1) * aspect / (film * width)  # L / (h W) between the centres of the end cells
     assert resistance(sheet, thickness) == pytest.approx(expected, rel=1e-5)
 
@@ -120,9 +118,7 @@ def test_the_elimination_agrees_with_a_dense_inverse(seed, shape):
     rng = np.random.default_rng(seed)
     x, s = (-3.0 + (np.arange(n) + 0.5) * 6.0 / n for n in shape)
     discs = [disc_overlap(x, s, tuple(rng.uniform(-2.4, 2.4, 2)), 0.5) for _ in range(5)]
-    sheet = FilmSheet(
-        flat_faces(shape, (6 / shape[0], 6 / shape[1])), Discs(np.stack(discs[1:]), discs[0], 0.5, 0.5)
-    )
+    sheet = FilmSheet(flat_faces(shape, (6 / shape[0], 6 / shape[1])), Discs(np.stack(discs[1:]), discs[0], 0.5, 0.5))
     film = np.exp(rng.uniform(np.log(0.06), np.log(2.4), shape))
     # Conductances over four decades: rounding of 1e-16, multiplied by as much.
     np.testing.assert_allclose(sheet.resistances(film), in_full(sheet, film), rtol=1e-9)

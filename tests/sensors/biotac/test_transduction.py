@@ -103,9 +103,7 @@ def test_the_conduction_grid_converges(grid, make_state, make_dent):
     change = {}
     for refinement in (1, 2, 4):
         made = prepared(SPEC, grid, refinement)
-        change[refinement] = 4095 * np.subtract(
-            *(made.shares(state) for state in (pressed, rest))
-        )
+        change[refinement] = 4095 * np.subtract(*(made.shares(state) for state in (pressed, rest)))
     scale = np.sqrt(np.mean(change[4] ** 2))
     coarse, default = (np.sqrt(np.mean((change[r] - change[4]) ** 2)) / scale for r in (1, 2))
     # The default grid keeps 1.5 % of the signal, and halving the cell at least halves the error (order 1 or better).

@@ -58,4 +58,6 @@ class Bench:
         self, radius_mm: float, x_mm: float, s_mm: float, forces_n: Sequence[float]
     ) -> tuple[FloatArray, FloatArray]:
         """Return the same for a cap, or a flat surface of infinite radius, at a place of the sheet."""
-        return self.press(gap_mm(self.grid, Contact(radius_mm, x_mm, s_mm), self._outer, self.sheet.dome, self.sheet.relief), forces_n)
+        return self.press(
+            gap_mm(self.grid, Contact(radius_mm, x_mm, s_mm), self._outer, self.sheet.dome, self.sheet.relief), forces_n
+        )

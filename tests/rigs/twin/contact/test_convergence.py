@@ -25,7 +25,12 @@ def _changes(spec, fidelity, radius, *, table=False):
     medium = medium_of(skin, grid)
     contact = Contact(radius, spec.parameters["contact_x"].to("mm") + 0.07, 0.11)
     core = (lambda below: with_core(below, skin)) if medium.has_core else None
-    press = Press(medium, gap_mm(grid, contact, skin.sheet.outer_radius.to("mm"), skin.sheet.dome, skin.sheet.relief), contact, core=core)
+    press = Press(
+        medium,
+        gap_mm(grid, contact, skin.sheet.outer_radius.to("mm"), skin.sheet.dome, skin.sheet.relief),
+        contact,
+        core=core,
+    )
     factory = load_object(f"tactbench.sensors.{spec.name}.transduction:build")
     names = [channel.name for channel in spec.channels("taxel")]
     read = factory(spec, grid, names, **fidelity.options(factory))
