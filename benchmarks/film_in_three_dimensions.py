@@ -1,4 +1,4 @@
-"""What conducting in a thin film leaves out under the BioTac's tip, where the film is as thick as its electrodes are wide.
+"""What conducting in a thin film leaves out under the BioTac's tip, where the film is twice as thick as a disc is wide.
 
 The twin conducts in two dimensions, each disc joined by ``A (3/h + 4/(pi a))``. Here one disc on the core, of the
 electrodes' radius, is fed through a film of the tip's thickness in three dimensions: axisymmetric finite elements

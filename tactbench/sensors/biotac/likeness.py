@@ -19,8 +19,8 @@ _PLATE = f"{RF}: plate tilted by 29 deg [10, 51], mostly towards the tip"
 
 _SOFT = (
     "the model's skin gives way several times too far under a plate, and its flanks, where the film is thin, with it: "
-    "its modulus and how it is held at seam and seal are assumed. Held only where the mesh's film ends, it would be half "
-    "as stiff, as finite elements of its cross-section say"
+    "its modulus and how it is held at seam and seal are assumed. Held only where the mesh's film ends, it would be "
+    "half as stiff, as finite elements of its cross-section say"
 )
 _NARROW = (
     "in the model electrodes turn from falling to rising 31 deg from the contact, in reality 35-40 deg, so that fewer "
