@@ -157,8 +157,10 @@ def _named(prefix: str, model: object) -> Iterable[tuple[str, Quantity]]:
             yield f"{prefix}: {name.replace('_', ' ')}", value
         elif isinstance(value, SheetTable):
             for end, length in (("least", value.least_mm), ("most", value.most_mm)):
-                place = f"{prefix}: {name.replace('_', ' ')}, {end}"
-                yield place, Quantity(value=length, unit="mm", source=value.source)
+                yield (
+                    f"{prefix}: {name.replace('_', ' ')}, {end}",
+                    Quantity(value=length, unit="mm", source=value.source),
+                )
         elif hasattr(type(value), "model_fields"):
             yield from _named(f"{prefix} {name.replace('_', ' ')}", value)
         elif isinstance(value, tuple):
