@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tactbench.core.spec.quantity import Quantity, Source
 from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, SensorSpec
+from tactbench.core.spec.skin import SheetTable
 
 ABSENT = "-"
 
@@ -162,6 +163,12 @@ def _named(prefix: str, model: object) -> Iterable[tuple[str, Quantity]]:
         value = getattr(model, name)
         if isinstance(value, Quantity):
             yield f"{prefix}: {name.replace('_', ' ')}", value
+        elif isinstance(value, SheetTable):
+            for end, length in (("least", value.least_mm), ("most", value.most_mm)):
+                yield (
+                    f"{prefix}: {name.replace('_', ' ')}, {end}",
+                    Quantity(value=length, unit="mm", source=value.source),
+                )
         elif hasattr(type(value), "model_fields"):
             yield from _named(f"{prefix} {name.replace('_', ' ')}", value)
         elif isinstance(value, tuple):

@@ -138,16 +138,16 @@ def discs_on(sensor: SensorSpec, grid: SkinGrid) -> RimmedDiscs:
             raise RigError(f"{channel.name} of {sensor.name} has no position.", hint="Give ChannelSpec.position_m.")
         x, y, z = (1e3 * component for component in channel.position_m)
         place = sheet_x(x, float(np.hypot(y, z)), outer, dome)
-        electrodes.append(_disc(sensor, place, float(np.arctan2(y, -z)), electrode_radius))
+        electrodes.append(disc_at(sensor, place, float(np.arctan2(y, -z)), electrode_radius))
     excitation = []
     for pair in ("front", "back"):
         x = par[f"excitation_x_{pair}"].to("mm")
         angle = par[f"excitation_arc_{pair}"].to("mm") / par["core_radius"].to("mm")
-        excitation += [_disc(sensor, x, side, excitation_radius) for side in (-angle, angle)]
+        excitation += [disc_at(sensor, x, side, excitation_radius) for side in (-angle, angle)]
     return RimmedDiscs(grid.x_mm, grid.s_mm, electrodes, excitation)
 
 
-def _disc(sensor: SensorSpec, x_mm: float, angle_rad: float, radius_mm: float) -> Disc:
+def disc_at(sensor: SensorSpec, x_mm: float, angle_rad: float, radius_mm: float) -> Disc:
     """Return a disc at a place of the sheet, with the stretch of the film's middle there."""
     outer = outer_radius_mm(sensor)
     x, angle = x_mm + _STEP_MM * np.array([-1.0, 1.0]), angle_rad + _STEP_MM / outer * np.array([-1.0, 1.0])

@@ -18,9 +18,9 @@ _BETWEEN = "one value, the range is that of the neighbouring bands"
 _PLATE = f"{RF}: plate tilted by 29 deg [10, 51], mostly towards the tip"
 
 _SOFT = (
-    "the model's skin gives way several times too far under a plate, and the flanks, where the film is thin, rise by as "
-    "much too far: its modulus and how it is held at seam and seal are assumed. A skin held as the mesh's film ends "
-    "would be half as stiff again, as finite elements of its cross-section say"
+    "the model's skin gives way several times too far under a plate, and its flanks, where the film is thin, with it: "
+    "its modulus and how it is held at seam and seal are assumed. Held only where the mesh's film ends, it would be "
+    "half as stiff, as finite elements of its cross-section say"
 )
 _NARROW = (
     "in the model electrodes turn from falling to rising 31 deg from the contact, in reality 35-40 deg, so that fewer "
@@ -43,8 +43,8 @@ _RIDGES = (
     "touches at asperities; above 100 Hz the moving arm itself vibrates, which no scene has"
 )
 _FLANKS = (
-    "the flank electrodes lie under .2-.3 mm of film in the meshes, which are good to .03 mm, and rest lowest; that the "
-    "meshes equal a filled sensor is assumed"
+    "the flank electrodes lie under .2-.3 mm of film in the meshes, which are good to .03 mm, and rest lowest; that "
+    "the meshes equal a filled sensor is assumed"
 )
 _ASPERITIES = (
     "the film over electrode 1 is a quarter of a millimetre: a point meets the core at once and raises the fluid's "

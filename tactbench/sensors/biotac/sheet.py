@@ -118,8 +118,8 @@ class FilmSheet:
             gathered += passed[::-1] if reverse else passed
         try:
             lower = np.linalg.cholesky(separator)
-            gathered = np.linalg.solve(lower, gathered)
-            found: FloatArray = np.linalg.inv(np.diag(sums) - coupled - gathered.T @ gathered)
+            crossed = np.linalg.solve(lower, gathered)
+            found: FloatArray = np.asarray(np.linalg.inv(np.diag(sums) - coupled - crossed.T @ crossed), np.float64)
         except np.linalg.LinAlgError as error:
             raise _unsolved() from error
         return found
@@ -138,13 +138,14 @@ class FilmSheet:
         along_s = self._faces.along_s * _logarithmic_mean(film_mm[:, :-1], film_mm[:, 1:], log[:, 1:] - log[:, :-1])
         self._contacts.narrow(film_mm, along_x, along_s)
         joints, drive = self._contacts.joints(film_mm)
-        diagonal = drive + np.bincount(self._contacts.under, weights=joints, minlength=film_mm.size)
-        diagonal = diagonal.reshape(self.shape)
+        joined = np.bincount(self._contacts.under, weights=joints, minlength=film_mm.size)
+        diagonal: FloatArray = np.asarray(drive + joined, np.float64).reshape(self.shape)
         diagonal[1:] += along_x
         diagonal[:-1] += along_x
         diagonal[:, 1:] += along_s
         diagonal[:, :-1] += along_s
-        sums = np.bincount(self._contacts.owner, weights=joints, minlength=self._contacts.count)
+        owned = np.bincount(self._contacts.owner, weights=joints, minlength=self._contacts.count)
+        sums: FloatArray = np.asarray(owned, np.float64)
         if self._turned:
             return diagonal.T, along_s.T, along_x.T, joints, sums
         return diagonal, along_x, along_s, joints, sums

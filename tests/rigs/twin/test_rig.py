@@ -203,12 +203,13 @@ def test_only_observed_kinds_are_recorded_and_planned(rig, sensors):
 
 
 def test_a_flat_surface_leaves_the_core_out_with_a_number(rig, sensors):
-    scene = Scene(name="flat", profile=ForceRamp(samples=100))
+    scene = Scene(name="flat", profile=ForceRamp(end=assumed(2.0, "N", "test"), samples=100))
     acquisition, _ = _record(rig, sensors["biotac"], scene)
     (core,) = [entry for entry in acquisition.plan if entry.effect == "core"]
     assert not core.included
-    assert "never touches the core below 5 N: depth 0." in core.reason
-    assert "mm < 1.21 mm" in core.reason
+    # Of the thinnest film, at the seal, a few hundredths of a millimetre are above the asperities.
+    assert "never touches the core below 2 N: 0.0" in core.reason
+    assert "mm of film are left above the asperities" in core.reason
 
 
 def test_what_the_twin_does_not_model_is_not_applicable(rig, sensors):

@@ -134,7 +134,7 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
     )
     medium = press.medium
     closing = press.closing_at(largest) if medium.has_core else 0.0
-    film = float(medium.rest_thickness_mm.max()) - medium.least_thickness_mm
+    film = float(medium.rest_thickness_mm.min()) - medium.least_thickness_mm
     skin = run.sensor.spec.skin
     sheet = None if skin is None else skin.sheet
     outer_mm = math.inf if sheet is None else outer_radius_mm(sheet)

@@ -52,7 +52,9 @@ def press_of(skin: AnySkin, contact: Contact, cells: tuple[int, int] | None = No
         def core(medium: Medium) -> Medium:
             return with_core(medium, skin)
 
-    return Press(medium_of(skin, grid), gap_mm(grid, contact, outer_radius_mm(skin.sheet)), contact, core=core)
+    sheet = skin.sheet
+    gap = gap_mm(grid, contact, outer_radius_mm(sheet), sheet.dome, sheet.relief)
+    return Press(medium_of(skin, grid), gap, contact, core=core)
 
 
 def draw_contact(case: Case, skin: AnySkin, radius: float, *, margin: float = 0.25, tilt: float = 0.0) -> Contact:

@@ -20,7 +20,7 @@ _STIFFNESSES = (
     "clamp_stiffness",
 )  # fmt: skip
 """Everything in a skin that is measured in newtons."""
-_ABOVE_ZERO = ("young", "thickness", "mid_radius", "contact_stiffness", "gap", "densification")
+_ABOVE_ZERO = ("young", "thickness", "mid_radius", "contact_stiffness", "densification")
 
 
 def _changed(skin: AnySkin, **values: float) -> AnySkin:
