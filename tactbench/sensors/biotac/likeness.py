@@ -18,12 +18,11 @@ _BETWEEN = "one value, the range is that of the neighbouring bands"
 _PLATE = f"{RF}: plate tilted by 29 deg [10, 51], mostly towards the tip"
 
 _SOFT = (
-    "the model's skin gives way several times too far under a plate, and its flanks, where the film is thin, with it: "
-    "its modulus and how it is held at seam and seal are assumed. Held only where the mesh's film ends, it would be "
-    "half as stiff, as finite elements of its cross-section say"
+    "how the real skin is held and stretched is in no source: its modulus is assumed, and the clamp at seam and seal is "
+    "set by one figure, the largest rise under a plate, for all electrodes and plates"
 )
 _NARROW = (
-    "in the model electrodes turn from falling to rising 31 deg from the contact, in reality 35-40 deg, so that fewer "
+    "in the model electrodes turn from falling to rising 27 deg from the contact, in reality 35-40 deg, so that fewer "
     "fall under a plate"
 )
 _DRIFT = (

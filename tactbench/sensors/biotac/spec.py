@@ -17,10 +17,9 @@ from tactbench.plugin import (
     sourced,
 )
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
-from tactbench.sensors.biotac.film import film_table, relief_table
 from tactbench.sensors.biotac.likeness import LIKENESS
+from tactbench.sensors.biotac.meshes import MESHES, film_table, relief_table
 from tactbench.sensors.biotac.nuisances import HARD_HANDLED, NUISANCES
-from tactbench.sensors.biotac.surface import MESHES
 from tactbench.sensors.biotac.thermal import THERMAL
 
 _MESH = MESHES
@@ -57,7 +56,12 @@ SKIN = FluidBackedShell(
     core_stiffness=assumed(6.0, "MPa/mm", "penalty, stiff beside the skin"),
     film=film_table(_OUTER_MM, _DOME_MM),
     residual_film=assumed(0.06, "mm", "asperities of the inner skin keep a film open at touch-down"),
-    clamp_stiffness=assumed(0.5, "MPa/mm", "soft clamp instead of the real seal, seam and nail"),
+    clamp_stiffness=assumed(
+        3.0,
+        "MPa/mm",
+        "clamp instead of the real seal, seam and nail; the value at which the largest rise under a plate is 0.45 per "
+        "count of pressure (200-350 counts), as measured. It stands for what holds and stretches the real skin, too",
+    ),
     clamp_length=assumed(1.0, "mm", "soft clamp instead of the real seal, seam and nail"),
 )
 

@@ -30,7 +30,7 @@ SKIN = FoamPad(
         x_max=derived(9.25, "mm", f"pad of 14.5 mm ({_SCHMITZ}) and 2 mm of soft margin"),
         arc=derived(_ARC_MM, "mm", "half of the circumference"),
         outer_radius=derived(OUTER_RADIUS_MM, "mm", f"half of the width of 13 mm; {_SCHMITZ}"),
-        cells=(44, 48),
+        cells=(46, 50),
         pad=(
             derived(-7.25, "mm", f"half of the length of 14.5 mm; {_SCHMITZ}"),
             derived(7.25, "mm", f"half of the length of 14.5 mm; {_SCHMITZ}"),

@@ -67,9 +67,9 @@ def prototype() -> Callable[..., tuple[Medium, Any]]:
 
     def make(name: str, *, core: bool = True) -> tuple[Medium, Any]:
         skin = SPECS[name].skin
-        given = {"contact_stiffness": 3.6} if name == "icub" else {"mid_radius": 7.4}
+        given = {"contact_stiffness": 3.6} if name == "icub" else {"mid_radius": 7.4, "clamp_stiffness": 0.5}
         change = {key: assumed(value, getattr(skin, key).unit, "test") for key, value in given.items()}
-        sheet = skin.sheet
+        sheet = skin.sheet.model_copy(update={"cells": (44, 48)})
         if name == "biotac":
             angle = np.arange(0.0, 90.1, 0.25)
             side = np.clip(np.radians(angle) - 0.6, 0.0, 1.0)

@@ -16,8 +16,8 @@ SCENE = Scene(name="cap", indenter=Indenter(radius=assumed(10.0, "mm", "test")),
 def test_the_default_leaves_the_sheets_own_cells(specs):
     assert DEFAULT.cells(specs["biotac"].skin.sheet) == (64, 64)
     assert FINE.cells(specs["biotac"].skin.sheet) == (192, 192)
-    # 44 and 48 times 1.3 are 57.2 and 62.4: the nearest even numbers.
-    assert Fidelity(cells_factor=1.3).cells(specs["icub"].skin.sheet) == (58, 62)
+    # 46 and 50 times 1.3 are 59.8 and 65: the nearest even numbers.
+    assert Fidelity(cells_factor=1.3).cells(specs["icub"].skin.sheet) == (60, 64)
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_a_rig_resolves_as_finely_as_it_is_told_and_keeps_tables_apart(specs):
     GRIDS.clear()
     coarse = dataclasses.replace(DEFAULT, cells_factor=0.5)
     depths = [_deepest(sensor, fidelity) for fidelity in (DEFAULT, coarse, DEFAULT)]
-    assert GRIDS == [(44, 48), (22, 24)]  # the third recording found its table
+    assert GRIDS == [(46, 50), (24, 24)]  # the third recording found its table
     assert depths[0] == depths[2]
     # Half as many cells change the depth, but not by more than a cell's sag, 0.84² / (2 R).
     assert 0 < abs(depths[1] - depths[0]) < 0.84**2 / 20

@@ -21,7 +21,7 @@ FOAM_MM = 2.0
 
 def test_nothing_touching_reads_the_rest_level(make_grid, make_state):
     grid = make_grid(SPEC)
-    reading = build(SPEC, grid, NAMES)(make_state(SPEC, grid, np.zeros((44, 48))))
+    reading = build(SPEC, grid, NAMES)(make_state(SPEC, grid, np.zeros((len(grid.x_mm), len(grid.s_mm)))))
     # Weights add to 1 up to rounding of 2000 terms.
     assert reading == pytest.approx(REST, abs=1e-9)
 

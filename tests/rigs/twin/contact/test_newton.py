@@ -194,7 +194,7 @@ def test_what_is_no_load_is_refused(solver, force):
 
 
 def test_what_did_not_converge_is_an_error_and_not_a_result(solver, monkeypatch):
-    monkeypatch.setattr(newton, "MAX_STEPS", 3)
+    monkeypatch.setattr(newton, "MAX_STEPS", 2)
     with pytest.raises(RigError, match="residual"):
         solver("biotac", 5.0, -5.0).solve(1.0)
 
