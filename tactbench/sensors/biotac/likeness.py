@@ -18,8 +18,8 @@ _BETWEEN = "one value, the range is that of the neighbouring bands"
 _PLATE = f"{RF}: plate tilted by 29 deg [10, 51], mostly towards the tip"
 
 _SOFT = (
-    "how the real skin is held and stretched is in no source: its modulus is assumed, and the clamp at seam and seal is "
-    "set by one figure, the largest rise under a plate, for all electrodes and plates"
+    "how the real skin is held and stretched is in no source: its modulus is assumed, and the clamp at seam and seal "
+    "is set by one figure, the largest rise under a plate, for all electrodes and plates"
 )
 _NARROW = (
     "in the model electrodes turn from falling to rising 27 deg from the contact, in reality 35-40 deg, so that fewer "
