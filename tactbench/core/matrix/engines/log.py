@@ -17,6 +17,9 @@ LOG_BYTES = 64 * 2**10
 OVERFLOW_BYTES = 2**20
 """A log is cut back once it is longer: whoever prints without end must not fill memory."""
 
+_KEEP_SIZE_AND_PUNCH_HOLE = 0x01 | 0x02
+_Offset = ctypes.c_longlong
+
 _open_logs: list[int] = []
 """Descriptors of the logs being written in this process, innermost last."""
 
@@ -43,11 +46,21 @@ def tail(log: int) -> str:
 
 
 def cut_back(log: int) -> None:
-    """Drop all but the end of a log that has grown too long."""
-    if os.fstat(log).st_size > OVERFLOW_BYTES:
-        kept = os.pread(log, LOG_BYTES, os.fstat(log).st_size - LOG_BYTES)
-        os.ftruncate(log, 0)
-        os.write(log, kept)
+    """Give back the memory of all but the end of a log that has grown too long.
+
+    Its process may write and read it meanwhile: the end stays where it is, and a hole takes the place of what was
+    before (fallocate(2)). Where there are no holes the log is written anew, and for a moment it is empty.
+    """
+    status = os.fstat(log)
+    if 512 * status.st_blocks <= OVERFLOW_BYTES:
+        return
+    before = status.st_size - LOG_BYTES
+    with suppress(AttributeError):
+        if before > 0 and not _c_library().fallocate(log, _KEEP_SIZE_AND_PUNCH_HOLE, _Offset(0), _Offset(before)):
+            return
+    kept = os.pread(log, LOG_BYTES, max(0, before))
+    os.ftruncate(log, 0)
+    os.write(log, kept)
 
 
 def flush() -> None:

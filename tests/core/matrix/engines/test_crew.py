@@ -187,13 +187,19 @@ def test_an_iteration_given_up_leaves_nobody(engine, heard):
 @pytest.mark.filterwarnings("ignore:Exception ignored in. <_io.FileIO")  # one just opened closes itself
 @pytest.mark.parametrize("after_s", [n / 200 for n in range(1, 13)])
 def test_ctrl_c_leaves_nobody_whenever_it_comes(engine, after_s):
+    def rings():
+        # Set in here: on a busy machine the alarm may ring before the next line, and an interrupt out there would end
+        # the whole test process.
+        signal.setitimer(signal.ITIMER_REAL, after_s)
+        for _ in engine.each(work, ["fine"] * 1000):
+            pass
+
     before = signal.signal(signal.SIGALRM, lambda number, frame: signal.raise_signal(signal.SIGINT))
-    signal.setitimer(signal.ITIMER_REAL, after_s)
     try:
         with pytest.raises(KeyboardInterrupt):
-            for _ in engine.each(work, ["fine"] * 1000):
-                pass
+            rings()
     finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)  # one that rings later would end it as well
         signal.signal(signal.SIGALRM, before)
 
 
