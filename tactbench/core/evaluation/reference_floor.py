@@ -225,9 +225,4 @@ def _commanded(meta: RecordingMeta, time_s: FloatArray) -> FloatArray | None:
     scene = meta.scene
     if scene is None or not meta.simulated or meta.clock == "none" or scene.drive is not None:
         return None
-    profile = scene.profile
-    duration, start = profile.duration.to("s"), profile.start.to("N")
-    hold = min(profile.hold.to("s"), duration)
-    if hold >= duration:
-        return np.full(len(time_s), start)
-    return np.asarray(np.interp(time_s, [0.0, hold, duration], [start, start, profile.end.to("N")]))
+    return np.asarray(np.interp(time_s, *scene.profile.corners))

@@ -23,7 +23,7 @@ def hold_s(meta: RecordingMeta) -> float:
     """Return how many seconds a recording is commanded to be unloaded before its press; 0 where it states none."""
     if meta.scene is None or meta.clock == "none" or meta.scene.profile.start.to("N") != 0:
         return 0.0
-    return min(meta.scene.profile.hold.to("s"), meta.scene.profile.duration.to("s"))
+    return meta.scene.profile.hold_s
 
 
 def unloaded(table: Table) -> npt.NDArray[np.bool_]:

@@ -59,6 +59,19 @@ class ForceRamp(Frozen):
         """The largest force of the profile [N]."""
         return max(self.start.to("N"), self.end.to("N"))
 
+    @property
+    def hold_s(self) -> float:
+        """How long the force stays at its start [s]: at most the whole recording."""
+        return min(self.hold.to("s"), self.duration.to("s"))
+
+    @property
+    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Times [s] and forces [N] between which the force runs straight."""
+        start, end, duration = self.start.to("N"), self.end.to("N"), self.duration.to("s")
+        if self.hold_s >= duration:
+            return (0.0, duration), (start, start)
+        return (0.0, self.hold_s, duration), (start, start, end)
+
 
 class Environment(Frozen):
     """What surrounds the contact, and how far the assumed nuisances are scaled."""

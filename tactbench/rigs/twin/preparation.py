@@ -85,9 +85,7 @@ def _load(scene: Scene) -> tuple[FloatArray, Load]:
             hint="Duration must be positive, hold and forces at least zero.",
         )
     t_s: FloatArray = np.arange(profile.samples, dtype=np.float64) * (duration / profile.samples)
-    if hold >= duration:
-        return t_s, Load(np.array([0.0, duration]), np.array([start, start]))
-    return t_s, Load(np.array([0.0, hold, duration]), np.array([start, start, end]))
+    return t_s, Load(*(np.array(corner) for corner in profile.corners))
 
 
 def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: Load) -> Iterator[Track]:

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, FluidBackedShell, RigError, SensorSpec, SkinGrid
+from tactbench.sensors.biotac.film import mid_film_mm
 from tactbench.sensors.biotac.meshes import sheet_x
 from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
-from tactbench.sensors.biotac.surface import mid_film_mm
 
 _STEP_MM = 0.1
 """Over which the film's stretch under a disc is taken: an eighth of the disc or less."""

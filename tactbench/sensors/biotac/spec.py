@@ -18,7 +18,7 @@ from tactbench.plugin import (
 )
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.likeness import LIKENESS
-from tactbench.sensors.biotac.meshes import MESHES, film_table, relief_table
+from tactbench.sensors.biotac.meshes import ELECTRODES_MM, MESHES, film_table, relief_table
 from tactbench.sensors.biotac.nuisances import HARD_HANDLED, NUISANCES
 from tactbench.sensors.biotac.thermal import THERMAL
 
@@ -73,7 +73,9 @@ _EXCITATION = (
 PARAMETERS: dict[str, Quantity] = {
     "contact_x": assumed(-5.0, "mm", "middle of the pad; the paper does not state where its caps touch"),
     "contact_s": assumed(0.0, "mm", "on the midline"),
-    "core_radius": sourced(5.08, "mm", "radius on which the electrode table lies, e.g. sqrt(3.513^2 + 3.670^2)"),
+    "core_radius": sourced(
+        ELECTRODES_MM, "mm", "radius on which the electrode table lies, e.g. sqrt(3.513^2 + 3.670^2)"
+    ),
     "conductivity": assumed(
         0.391, "S/m", "NaBr solution; the value at which the median electrode rests at 3237 counts, as measured"
     ),

@@ -13,9 +13,8 @@ import numpy as np
 from tactbench.plugin import FloatArray, RigError, SensorSpec, SkinGrid, SkinState
 from tactbench.sensors.biotac.discs import discs_on, dome_mm, outer_radius_mm, shell_of
 from tactbench.sensors.biotac.electrodes import NAMES
-from tactbench.sensors.biotac.film import REFINEMENT, edges, refined, spectral_interpolation
+from tactbench.sensors.biotac.film import REFINEMENT, edges, mid_film_mm, refined, spectral_interpolation
 from tactbench.sensors.biotac.sheet import FilmSheet, faces_between
-from tactbench.sensors.biotac.surface import mid_film_mm
 
 
 class Preparation:

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import SkinGrid
 from tactbench.sensors.biotac.electrodes import ELECTRODES
-from tactbench.sensors.biotac.film import refined, spectral_interpolation
+from tactbench.sensors.biotac.film import core_mm, mid_film_mm, refined, spectral_interpolation
 from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM, ray_on_sheet, sheet_x
 from tactbench.sensors.biotac.rims import Disc, RimmedDiscs
 from tactbench.sensors.biotac.sheet import FilmSheet, faces_between, flat_faces
 from tactbench.sensors.biotac.spec import SKIN
-from tactbench.sensors.biotac.surface import core_mm, mid_film_mm
 
 OUTER, DOME = SKIN.sheet.outer_radius.to("mm"), SKIN.sheet.dome.start.to("mm")
 

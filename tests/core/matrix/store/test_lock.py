@@ -83,6 +83,7 @@ def test_a_process_that_was_being_forked_when_its_run_was_killed_lets_go_before_
                 kept(store, "a")
         finally:
             wakes.join()
+    assert [row["cell"] for row in Store(tmp_path).rows()] == ["a"]
 
 
 def test_who_holds_it_may_enter_again_and_lets_go_at_the_end(tmp_path):
