@@ -7,14 +7,25 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, TextIO
+from typing import Any, Protocol, TextIO
 
 from tactbench.core.cli.screen import remark
 from tactbench.core.matrix.progress import Progress
 
 
+class Display(Progress, Protocol):
+    """Progress, and what is known so far."""
+
+    def show(self, text: str) -> None:
+        """Show `text` while the rest is under way, in place of what was shown before; not in a log."""
+
+
+_QUIET_S = 5.0
+"""A log gets no further line of a stage sooner."""
+
+
 @contextmanager
-def progress() -> Iterator[Progress]:
+def progress() -> Iterator[Display]:
     """Show progress on stderr."""
     if not sys.stderr.isatty():
         yield Lines(time.monotonic)
@@ -47,20 +58,22 @@ class Lines:
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        self._began_s = 0.0
+        self._began_s = self._said_s = 0.0
         self._stage, self._total, self._done, self._stopped = "", 0, 0, 0
 
     def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
         """Say what begins."""
         self._stage, self._total, self._done, self._stopped = stage, total, 0, 0
-        self._began_s = self._clock()
+        self._began_s = self._said_s = self._clock()
         remark(f"{stage}: {total} to do")
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
-        """Say how far it is, once a tenth."""
+        """Say how far it is: at the end, and after every tenth that took its time."""
         self._done += 1
         self._stopped += stopped
-        if self._done == self._total or self._done * 10 // self._total > (self._done - 1) * 10 // self._total:
+        tenth = self._done * 10 // self._total > (self._done - 1) * 10 // self._total
+        if self._done == self._total or (tenth and self._clock() - self._said_s >= _QUIET_S):
+            self._said_s = self._clock()
             remark(f"{self._stage}: {self._done}/{self._total} {what}{self._beside()}")
 
     def _beside(self) -> str:
@@ -73,6 +86,9 @@ class Lines:
     def working(self, what: str) -> None:
         """Say nothing: what is under way is no line."""
 
+    def show(self, text: str) -> None:
+        """Show nothing: only the last table is for a log."""
+
 
 class _Bar:
     """A bar a stage; its clock ticks by a thread where a thread is allowed, else with each step."""
@@ -82,11 +98,21 @@ class _Bar:
         self._shown: Any = None
         self._task: Any = None
         self._stopped = 0
+        self._text = ""
 
     def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
         from rich.progress import Progress as RichProgress
+        from rich.text import Text
+
+        above = [Text.from_ansi(self._text, no_wrap=True)] if self._text else []
+
+        class Shown(RichProgress):
+            """Bars below what is known so far."""
+
+            def get_renderables(self) -> Iterator[Any]:
+                yield from (*above, *super().get_renderables())
 
         self.end()
         columns = (
@@ -99,12 +125,12 @@ class _Bar:
             TextColumn("{task.fields[now]}", markup=False),
         )
         # The terminal is handed over as it is: rich must not take over streams that cells print to.
-        self._shown = RichProgress(
+        self._shown = Shown(
             *columns, console=Console(file=self._terminal), auto_refresh=alone, redirect_stdout=False,
-            redirect_stderr=False,
+            redirect_stderr=False, transient=True,
         )  # fmt: skip
         self._stopped = 0
-        self._task = self._shown.add_task(f"{stage:<10}", total=total, now="", stopped="")
+        self._task = self._shown.add_task(f"{stage}", total=total, now="", stopped="")
         self._shown.start()
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
@@ -114,6 +140,10 @@ class _Bar:
 
     def working(self, what: str) -> None:
         self._shown.update(self._task, now=what, refresh=True)
+
+    def show(self, text: str) -> None:
+        """Show `text` above the bars that follow."""
+        self._text = text
 
     def end(self) -> None:
         if self._shown is not None:

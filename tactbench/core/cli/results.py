@@ -29,7 +29,7 @@ def opened(folder: Path) -> Store:
 
 
 def shown_rows(store: Store) -> list[dict[str, Any]]:
-    """Return the rows of a folder that a table can be made of, baselines beside each; tell of the others.
+    """Return a row for each cell of a folder that a table can be made of, baselines beside each; tell of the others.
 
     Raises
     ------
@@ -39,8 +39,8 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.checked import checked
+    from tactbench.core.leaderboard.replicates import over_replicates
     from tactbench.core.leaderboard.text import cut, visible
-    from tactbench.core.matrix.leaving import fill_baselines
 
     rows, wrong = checked(store.rows())
     told = [cut(visible(one), 300) for one in (*store.troubles, *wrong)]
@@ -53,8 +53,7 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
         remark(f"Left out: {one}")
     if len(told) > _MOST_TOLD:
         remark(f"Left out: {len(told) - _MOST_TOLD} more rows.")
-    fill_baselines(rows)
-    return rows
+    return over_replicates(rows)
 
 
 def provenance_of(store: Store, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +47,7 @@ def command(
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.files import table_of, write_tables
+    from tactbench.core.leaderboard.replicates import over_replicates
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
@@ -55,39 +56,54 @@ def command(
     choice = choice_of(matrix, engine=engine, jobs=jobs, timeout=timeout, memory=memory, scheduler=scheduler)
     store = Store(out)
     with progress() as told:
-        outcome = run_matrix(matrix, store, choice=choice, recordings=folder, progress=told)
+        outcome = run_matrix(
+            matrix, store, choice=choice, recordings=folder, progress=told,
+            shown=lambda rows: told.show(_so_far(rows)),
+        )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
-    table = table_of(outcome.rows, store.folder, provenance)
+    rows = over_replicates(outcome.rows)
+    table = table_of(rows, store.folder, provenance)
     print_table(table, shape)
     if shape == "table":
-        _side_by_side(outcome)
-    write_tables(outcome.rows, store.folder, provenance, table)
-    _farewell(outcome, store.folder, shape)
+        _side_by_side(rows)
+    write_tables(rows, store.folder, provenance, table)
+    _farewell(outcome, rows, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
 
 
-def _side_by_side(outcome: Outcome) -> None:
+def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the replicates that are finished, as wide as the terminal."""
+    from tactbench.core.cli.screen import console
+    from tactbench.core.leaderboard.replicates import over_replicates
+    from tactbench.core.leaderboard.table import build_table
+    from tactbench.core.leaderboard.terminal import blocks_text
+
+    return blocks_text(build_table(over_replicates(rows)), console().width)
+
+
+def _side_by_side(rows: Sequence[Mapping[str, Any]]) -> None:
     """Print what was asked under several protocols or splits once more, side by side."""
     from tactbench.core.cli.comparisons import print_comparisons
     from tactbench.core.leaderboard.comparison import compare
 
     for by in ("protocol", "split"):
-        if compare(outcome.rows, by):
-            print_comparisons(outcome.rows, by, "table")
+        if compare(rows, by):
+            print_comparisons(rows, by, "table")
 
 
-def _farewell(outcome: Outcome, folder: Path, shape: str) -> None:
+def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path, shape: str) -> None:
     """Say what there is now, where it lies and what to try next."""
     from tactbench.core.cli.screen import remark
     from tactbench.core.cli.stopped import tell_stopped
 
-    cells = len(outcome.rows)
-    remark(f"\n{cells - outcome.computed} of {cells} cells were found finished, {outcome.computed} computed now; "
-           f"{outcome.recorded} recordings made now.")  # fmt: skip
+    answers = len(outcome.rows)
+    of = f"{len(rows)} cells" if answers == len(rows) else f"{len(rows)} cells over their replicates"
+    remark(f"\n{of}: {answers - outcome.computed} of {answers} answers were found finished, {outcome.computed} "
+           f"computed now; {outcome.recorded} recordings made now.")  # fmt: skip
     remark(f"Files: {folder}/leaderboard.html, .md, .csv, .json; scores.json; recordings/; cells/; run.json")
     tell_stopped(outcome.failures, folder)
     if shape == "table":
-        _suggest(outcome.rows[0])
+        _suggest(rows[0])
 
 
 def _suggest(row: Mapping[str, Any]) -> None:

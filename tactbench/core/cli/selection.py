@@ -26,8 +26,10 @@ _OPTIONS = (
     click.option("--estimator", "estimators", multiple=True, metavar="NAME",
                  help="What answers; may be repeated. all: every one for this kind of question."),
     click.option("--config", metavar="FILE", help="A matrix like benchmarks.yaml, or the name of a packaged one."),
-    click.option("--repeats", type=click.IntRange(min=1), metavar="N", help="Repeat everything with N seeds."),
-    click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first repeat."),
+    click.option("--repeats", type=click.IntRange(min=1), metavar="N",
+                 help="Replicates: record and answer everything N times, each with another seed. Default: 8 simulated "
+                 "ones; of recordings 1, whose sessions are the replicates."),
+    click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of the first replicate."),
     click.option("--probe", is_flag=True,
                  help="Also ask what the recordings give away: first frame alone, shuffled rows."),
     click.option("--latency/--no-latency", default=None,

@@ -1,6 +1,6 @@
 """Rows that may be compared stand in one block; no rank spans two.
 
-Rows under different tasks, protocols, splits or repeats, and rows from the twin and from hardware, are not comparable.
+Rows under different tasks, protocols or splits, and rows from the twin and from hardware, are not comparable.
 The order of blocks and lines depends on the rows alone, never on the order they come in.
 """
 
@@ -18,10 +18,11 @@ from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, met
 from tactbench.core.leaderboard.placing import Placing, errors, places
 from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
+from tactbench.core.leaderboard.verdict import verdict_of
 
 Row = Mapping[str, Any]
-_Key = tuple[str, str, str, str, int]
-_ORIGIN = ("task", "protocol", "rig", "simulated", "status", "repeat", "split")
+_Key = tuple[str, str, str, str]
+_ORIGIN = ("task", "protocol", "rig", "simulated", "status", "split")
 """All that says in which block a row stands."""
 
 
@@ -36,6 +37,8 @@ class Block:
     """Those of this block, in order."""
     unranked: str = ""
     """Why there are no rank intervals; empty where there are."""
+    verdict: tuple[str, ...] = ()
+    """What its rows come to, in sentences."""
 
     @cached_property
     def lines(self) -> tuple[Line, ...]:
@@ -65,15 +68,28 @@ def blocks_of(sheet: Sheet, letters: Mapping[str, str], times: bool) -> tuple[Sh
     arranged = [(key, *_arranged(sheet, groups[key], placings)) for key in sorted(groups, key=_order)]
     shown = shown_of(sheet, placings, letters, times)
     blocks = [
-        Block(_title(key, [sheet.rows[place] for place in groups[key]]), shown, members, unranked)
+        Block(
+            _title(key, [sheet.rows[place] for place in groups[key]]),
+            shown,
+            members,
+            unranked,
+            _verdict(sheet, members, placings),
+        )
         for key, members, unranked in arranged
     ]
     return shown, tuple(blocks)
 
 
+def _verdict(sheet: Sheet, members: Sequence[int], placings: Sequence[Placing | None]) -> tuple[str, ...]:
+    ranked = [(sheet.rows[place], placing) for place in members if (placing := placings[place]) is not None]
+    status, trivial = sheet["status"], sheet["is_baseline"]
+    below = sum(status[place] == "done" and not trivial[place] and placings[place] is None for place in members)
+    return tuple(map(visible, verdict_of(ranked, below)))
+
+
 def _order(key: _Key) -> tuple[Any, ...]:
     """Return what blocks are sorted by: within a task, what probes or is not kept apart comes after what is."""
-    task, protocol, split, _, _ = key
+    task, protocol, split, _ = key
     return task, split in ("shuffled", "in-session"), is_probe(protocol), key
 
 
@@ -101,16 +117,16 @@ def _grouped(sheet: Sheet) -> dict[_Key, list[int]]:
 
 
 def _key(row: Row, kinds: Mapping[str, set[str]], splits: Mapping[tuple[Any, ...], set[str]]) -> _Key:
-    task, protocol, kind, repeat = _without_split(row, kinds)
-    known = splits.get((task, protocol, kind, repeat), set())
+    task, protocol, kind = _without_split(row, kinds)
+    known = splits.get((task, protocol, kind), set())
     split = row["split"] if row["split"] is not None else next(iter(known)) if len(known) == 1 else ""
-    return task, protocol, split, kind, repeat
+    return task, protocol, split, kind
 
 
-def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, str, int]:
+def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, str]:
     known = kinds.get(row["rig"], set())
     kind = next(iter(known)) if row["status"] != "done" and len(known) == 1 else hardware_name(row)
-    return row["task"], row["protocol"], kind, row["repeat"] or 0
+    return row["task"], row["protocol"], kind
 
 
 def _arranged(
@@ -154,7 +170,7 @@ def no_better(error: float, sign: float, baseline: float | None) -> bool:
 
 
 def _title(key: _Key, members: Sequence[Row]) -> str:
-    _, protocol, split, kind, _ = key
+    _, protocol, split, kind = key
     first = members[0]
     direction = "lower" if first["metric"] in LOWER_IS_BETTER else "higher"
     dagger = " †" if any(row["dagger"] for row in members) else ""
@@ -162,6 +178,4 @@ def _title(key: _Key, members: Sequence[Row]) -> str:
     if split:
         parts.append(f"split {split}")
     parts.append(kind)
-    if first["repeats"] > 1:
-        parts.append(f"repeat {first['repeat']} of {first['repeats']}, seed {first['seed']}")
     return visible(" · ".join(parts))

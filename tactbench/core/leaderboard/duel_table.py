@@ -45,8 +45,6 @@ def _title(duel: Duel) -> str:
     if row["split"]:
         parts.append(f"split {row['split']}")
     parts.append(hardware_name(row))
-    if row["repeats"] > 1:
-        parts.append(f"repeat {row['repeat']} of {row['repeats']}")
     return " · ".join(parts)
 
 
@@ -137,9 +135,9 @@ def _averages(found: Sequence[Duel]) -> list[str]:
     groups: dict[tuple[Any, ...], list[Duel]] = {}
     for duel in found:
         row = duel.row
-        groups.setdefault((row["simulated"], row["protocol"], row["repeat"]), []).append(duel)
+        groups.setdefault((row["simulated"], row["protocol"]), []).append(duel)
     notes = []
-    for (_, protocol, _), members in groups.items():
+    for (_, protocol), members in groups.items():
         pairs = [(duel.first_row, duel.second_row) for duel in members]
         sides = [aggregate([row for row in side if row is not None]) for side in zip(*pairs, strict=True)]
         if len({duel.row["task"] for duel in members}) < 2 or sides[0] is None or sides[1] is None:

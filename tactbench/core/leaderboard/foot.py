@@ -28,7 +28,8 @@ def foot_of(sheet: Sheet, provenance: Sequence[Row], times: bool) -> tuple[str, 
     times
         False: nothing is said of machines.
     """
-    seeds = _seeds(sheet["seed"])
+    own = zip(sheet.known("seeds"), sheet["seed"], strict=True)
+    seeds = _seeds([seed for several, first in own for seed in several or [first]])
     if not times:
         return (f"{_WITHOUT} {seeds}",)
     runs = len(set(filter(None, sheet.known("made_by"))))

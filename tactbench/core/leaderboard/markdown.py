@@ -17,7 +17,9 @@ def markdown(table: Table) -> str:
     """Return the table as Markdown, a heading a block."""
     parts: list[str] = []
     for block in table.blocks:
-        parts += [*markdown_grid(block.title, table.columns, NUMERIC, [line.cells for line in block.lines]), ""]
+        heading, *grid = markdown_grid(block.title, table.columns, NUMERIC, [line.cells for line in block.lines])
+        told = [f"{' '.join(map(markdown_note, block.verdict))}\n"] if block.verdict else []
+        parts += [heading, *told, *grid, ""]
     parts += [f"- {markdown_note(note)}" for note in table.notes]
     for section in table.sections:
         parts += ["", *markdown_grid(section.title, section.columns, section.numeric, section.lines)]

@@ -132,16 +132,15 @@ def _told(value: object) -> str:
 
 
 def _no_better_notes(sheet: Sheet) -> list[str]:
-    """Return one sentence a sensor and task on the answers that are no better than the trivial one."""
+    """Return one sentence a sensor and task on the answers that are not clearly better than the trivial one."""
     names: dict[tuple[str, str], dict[str, None]] = {}
     for row in compress(sheet.rows, _no_better(sheet)):
         if not is_probe(row["protocol"]):  # no better than trivial is what a probe should be
             names.setdefault((question_name(row), _probing(row)), {})[f"{answer_name(row)} ({row['protocol']})"] = None
     return [
         visible(
-            f"{where}/{', '.join(who)} {'is' if len(who) == 1 else 'are'} no better than the trivial baseline, and "
-            "where the score itself is none has no place: see how the recordings differ before blaming the sensor, "
-            f"`{command}`."
+            f"{where}/{', '.join(who)} cannot be told from the trivial baseline; who scores no better has no place. "
+            f"See how the recordings differ before blaming the sensor: `{command}`."
         )
         for (where, command), who in names.items()
     ]

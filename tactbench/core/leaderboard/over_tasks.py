@@ -17,8 +17,8 @@ from tactbench.core.leaderboard.text import visible
 Row = Mapping[str, Any]
 
 TITLE = "Over tasks · interquartile mean between the trivial baseline, 0, and the reference of each task, 1"
-COLUMNS = ("sensor", "estimator", "protocol", "repeat", "mean", "95 % interval", "tasks")
-NUMERIC = frozenset({"repeat", "mean", "95 % interval"})
+COLUMNS = ("sensor", "estimator", "protocol", "mean", "95 % interval", "tasks")
+NUMERIC = frozenset({"mean", "95 % interval"})
 NOTE = (
     "Over tasks: compare means of the same tasks only. The interval is over replicates; the tasks are those given, not "
     "a sample of all (docs/statistics.md)."
@@ -38,7 +38,7 @@ def over_tasks(sheet: Sheet) -> Section | None:
     A task that was asked under several splits is left out: none of them stands for it.
     """
     groups: dict[tuple[Any, ...], dict[str, list[Row]]] = {}
-    keys = (sheet.sensors, sheet.answers, map(visible, sheet["protocol"]), sheet["rig"], sheet["repeat"])
+    keys = (sheet.sensors, sheet.answers, map(visible, sheet["protocol"]), sheet["rig"])
     given = zip(zip(*keys, strict=True), sheet["task"], sheet.rows, strict=True)
     for key, task, row in compress(given, _counts(sheet)):
         groups.setdefault(key, {}).setdefault(task, []).append(row)
@@ -50,7 +50,7 @@ def over_tasks(sheet: Sheet) -> Section | None:
         return None
     lines = []
     notes: dict[str, None] = {NOTE: None}
-    for (sensor, answer, protocol, _, repeat), members in several.items():
+    for (sensor, answer, protocol, _), members in several.items():
         found = _mean(members)
         if found is None:
             continue
@@ -58,7 +58,7 @@ def over_tasks(sheet: Sheet) -> Section | None:
         absent = {told.partition(":")[0] for told in left_out}
         names = ", ".join(visible(row["task"]) for row in members if row["task"] not in absent)
         texts = (score(value, "1"), interval(low, high, "1"), names)
-        lines.append((sensor, answer, protocol, str(repeat) if members[0]["repeats"] > 1 else "", *texts))
+        lines.append((sensor, answer, protocol, *texts))
         notes |= dict.fromkeys(visible(f"Not in the mean of {sensor}/{answer}: {told}.") for told in left_out)
     return Section(TITLE, COLUMNS, NUMERIC, tuple(lines), tuple(notes)) if lines else None
 

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 from tactbench.core.leaderboard import memo
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER
 from tactbench.core.leaderboard.sheet import Sheet, alike
+from tactbench.core.statistics.excess import beyond_floor, excess_of
+from tactbench.core.statistics.median import FEWEST
 
 _DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
 """Packages whose code ranks."""
@@ -35,6 +37,10 @@ class Placing(NamedTuple):
     """Worst place that the 95 % interval holds."""
     tied: bool
     """Whether others share the place."""
+    apart: bool = False
+    """Whether it is clearly worse than the answer next before it."""
+    behind: bool = False
+    """Whether it is clearly worse than the best one."""
 
 
 def places(results: Sheet) -> tuple[dict[str, Placing], str]:
@@ -45,6 +51,10 @@ def places(results: Sheet) -> tuple[dict[str, Placing], str]:
     results
         The finished answers of one block, no baselines, the best score first.
     """
+    few = [n for n in results.known("n_replicates") if n is not None and n < FEWEST]
+    if few:
+        shared = Placing(1, None, None, len(results.rows) > 1)
+        return dict.fromkeys(results["cell"], shared), f"fewer than {FEWEST} replicates carry them"
     reason = _unrankable(results)
     if not results.rows or reason:
         return _by_score(results), reason
@@ -56,7 +66,7 @@ def places(results: Sheet) -> tuple[dict[str, Placing], str]:
             from tactbench.core.statistics.ranking import ranks
 
             ranked = ranks(results.rows)
-            found = {cell: Placing(rank.place, rank.low, rank.high, rank.tied) for cell, rank in ranked.items()}
+            found = {cell: Placing(**vars(rank)) for cell, rank in ranked.items()}
             memo.remember(digest, [[cell, *placing] for cell, placing in found.items()])
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         # Rows of a stranger's folder: their replicates may be anything.
@@ -70,10 +80,8 @@ def errors(results: Sheet) -> list[float]:
     The score; of errors of force the mean square beyond the floor of the reference, if all of them have one. It may be
     below zero, where the error beyond the floor is 0: two answers of one sensor differ by more than its floor tells.
     """
-    floors = results.known("reference_floor")
-    if all(metric == "rmse" for metric in results["metric"]) and None not in floors:
-        found = [score * score - floor * floor for score, floor in zip(results["score"], floors, strict=True)]
-        return [one if math.isfinite(one) else math.inf for one in found]
+    if beyond_floor(results.rows):
+        return [one if math.isfinite(one) else math.inf for one in map(excess_of, results.rows)]
     signs = [1.0 if metric in LOWER_IS_BETTER else -1.0 for metric in results["metric"]]
     return [
         sign * score if math.isfinite(score) else math.inf
@@ -118,7 +126,7 @@ def _believed(told: Any, cells: Sequence[str]) -> dict[str, Placing] | None:
     columns = list(zip(*told, strict=True))
     if any(set(map(type, column)) != {kind} for column, kind in zip(columns, _ENTRY, strict=True)):
         return None
-    if not all(1 <= low <= place <= high <= len(cells) for _, place, low, high, _ in told):
+    if not all(1 <= low <= place <= high <= len(cells) for _, place, low, high, *_ in told):
         return None
     found = {cell: Placing(*placing) for cell, *placing in told}
     if found.keys() != set(cells):
@@ -127,5 +135,5 @@ def _believed(told: Any, cells: Sequence[str]) -> dict[str, Placing] | None:
     return found if places == sorted(places) else None
 
 
-_ENTRY = (str, int, int, int, bool)
+_ENTRY = (str, int, int, int, bool, bool, bool)
 """What is remembered of an answer: the name of its cell, and its placing."""

@@ -24,10 +24,10 @@ leaderboard's 95 % intervals."""
 FEWEST = 5
 """Recordings from which on an error of first frames has an interval."""
 COLUMNS = (
-    "sensor", "task", "estimator", "split", "repeat", "score", "95 % interval", "shuffled", "first frame alone",
+    "sensor", "task", "estimator", "split", "score", "95 % interval", "shuffled", "first frame alone",
     "trivial", "verdict",
 )  # fmt: skip
-NUMERIC = frozenset({"repeat", "score", "95 % interval", "shuffled", "first frame alone", "trivial"})
+NUMERIC = frozenset({"score", "95 % interval", "shuffled", "first frame alone", "trivial"})
 
 
 def build_probe(rows: Sequence[Row]) -> Section | None:
@@ -87,7 +87,7 @@ class _Probes:
 
     @staticmethod
     def _key(row: Row, protocol: str) -> tuple[Any, ...]:
-        same = (row[key] for key in ("sensor", "task", "rig", "estimator", "repeat"))
+        same = (row[key] for key in ("sensor", "task", "rig", "estimator"))
         return (protocol, *same, json.dumps(row["params"], sort_keys=True))
 
 
@@ -98,7 +98,6 @@ def _line(row: Row, shuffled: Row | None, first: Row | None) -> tuple[str, ...]:
         row["task"],
         answer_name(row),
         row["split"],
-        str(row["repeat"]) if row["repeats"] > 1 else "",
         score(row["score"], unit),
         interval(row["ci_low"], row["ci_high"], unit),
         _shown(shuffled),

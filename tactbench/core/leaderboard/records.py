@@ -26,10 +26,22 @@ JSON_KEYS = (
 )  # fmt: skip
 """Keys of a JSON row, in order."""
 
+OF_REPLICATES = (
+    "n_replicates",
+    "replicate_unit",
+    "replicate_scores",
+    "seeds",
+    "score_min",
+    "score_max",
+    "recordings_right",
+    "recordings_asked",
+)
+"""Keys of a row that stands for all replicates of its cell; they follow."""
+
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
-NESTED = frozenset(key for key in JSON_KEYS if not FORMAT[key].types.isdisjoint({list, dict}))
+NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key].types.isdisjoint({list, dict}))
 """Keys whose values are lists or tables: JSON inside a cell of CSV and Parquet."""
 
 OF_THE_MACHINE = frozenset({
@@ -44,7 +56,8 @@ _ACTS = re.compile("[\x7f-\x9f\xad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\
 
 def keys(table: Table) -> tuple[str, ...]:
     """Return the keys that a table's records have, before their ranks."""
-    return JSON_KEYS if table.times else tuple(key for key in JSON_KEYS if key not in OF_THE_MACHINE)
+    every = (*JSON_KEYS, *OF_REPLICATES)
+    return every if table.times else tuple(key for key in every if key not in OF_THE_MACHINE)
 
 
 def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:

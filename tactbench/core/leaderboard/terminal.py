@@ -40,6 +40,11 @@ def show(table: Table, console: Console) -> None:
     say(_below(table, console.width))
 
 
+def blocks_text(table: Table, width: int) -> str:
+    """Return the blocks of a table alone, without notes, as a terminal without colours shows them."""
+    return "\n".join(text for block in table.blocks for text, _ in _block_lines(table.columns, block, width)[0])
+
+
 def plain_text(table: Table, width: int = 240) -> str:
     """Return what a terminal without colours shows; the width is enough for names of ordinary length."""
     lines = [text for text, _ in _above(table, width)]
@@ -88,6 +93,7 @@ def _block_lines(columns: Sequence[str], block: Block, width: int) -> tuple[list
     body = [(_padded(columns, columns, widths), "bold"), (rule[:width], "")]
     body += [(_padded(line.cells, columns, widths), _STYLE[line.kind]) for line in block.lines]
     title = [(line, "bold") for line in _folded(block.title, width)]
+    title += [(line, "") for said in block.verdict for line in _folded(said, width)]
     return [*title, ("", ""), *((_cut(text, width), how) for text, how in body), ("", "")], gone
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.explanation import Book
 from tactbench.core.matrix.installed import built
-from tactbench.core.matrix.material import Order
+from tactbench.core.matrix.material import Order, need_of
+from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.interfaces import Rig
@@ -22,9 +23,14 @@ GRACE_S = 5.0
 
 
 def acquire_missing(
-    material: Material, book: Book, choice: EngineChoice, told: Progress, meanwhile: Callable[[], None] | None = None
+    material: Material,
+    cells: Sequence[Cell],
+    book: Book,
+    choice: EngineChoice,
+    told: Progress,
+    meanwhile: Callable[[], None] | None = None,
 ) -> None:
-    """Make the recordings that are missing, and note in `material` which were made and what went wrong.
+    """Make the recordings that `cells` lack, and note in `material` which were made and what went wrong.
 
     Simulations do not disturb each other and are not timed by the wall: they use all cores. A real rig does one scene
     at a time, and is asked to end before it is ended. A scene that its process does not survive costs its recording.
@@ -39,7 +45,8 @@ def acquire_missing(
     UnwritableError
         If the disk refuses them.
     """
-    unique = {order.path: order for orders in material.orders.values() for order in orders}
+    needs = dict.fromkeys(map(need_of, cells))
+    unique = {order.path: order for need in needs for order in material.orders.get(need, ())}
     missing = [order for path, order in unique.items() if not path.exists()]
     if not missing:
         return

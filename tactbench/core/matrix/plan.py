@@ -12,7 +12,7 @@ from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.matrix import REPLICATES, EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import TaskSpec
 
@@ -24,7 +24,7 @@ _AS_PLANNED = Simulation()
 
 @dataclass(frozen=True)
 class Cell:
-    """One (sensor, task, rig, protocol, estimator, repeat)."""
+    """One (sensor, task, rig, protocol, estimator), answered on one of its replicates."""
 
     sensor: str
     task: str
@@ -37,7 +37,7 @@ class Cell:
     repeat: int
     repeats: int
     seed: int
-    """Seed of this repeat: of the scenes it records and of its estimators."""
+    """Seed of this replicate: of the scenes it records and of its estimators."""
     latency: bool = True
     """Whether the latency of single rows is measured."""
     simulation: Simulation = _AS_PLANNED
@@ -71,7 +71,8 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
         question, or a parameter is not one of the estimator's.
     """
     cells: dict[Cell, None] = {}
-    for repeat in range(1, matrix.repeats + 1):
+    repeats = matrix.repeats or (REPLICATES if registry.rigs[matrix.rig].simulated else 1)
+    for repeat in range(1, repeats + 1):
         for choice in matrix.tasks:
             task = registry.tasks[choice.name].spec
             ways = _ways(task, choice)
@@ -88,7 +89,7 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                         params=tuple(sorted(answer.params.items())),
                         baseline=registry.estimators[answer.name].baseline,
                         repeat=repeat,
-                        repeats=matrix.repeats,
+                        repeats=repeats,
                         seed=matrix.seed + repeat - 1,
                         latency=matrix.latency,
                         simulation=matrix.simulation,

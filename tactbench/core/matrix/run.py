@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tactbench.core.matrix.acquiring import acquire_missing
 from tactbench.core.matrix.engines.choice import EngineChoice
-from tactbench.core.matrix.evaluating import evaluate_all
+from tactbench.core.matrix.evaluating import Evaluated, evaluate_all
 from tactbench.core.matrix.explanation import Book
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import keys_of
@@ -19,7 +20,7 @@ from tactbench.core.matrix.leaving import fill_baselines, scores_text
 from tactbench.core.matrix.personal import sources_of_this_user
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material, plan
-from tactbench.core.matrix.progress import Progress, Silence
+from tactbench.core.matrix.progress import Prefixed, Progress, Silence
 from tactbench.core.matrix.provenance import gather
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
@@ -54,13 +55,14 @@ def run_matrix(
     choice: EngineChoice | None = None,
     recordings: Path | None = None,
     progress: Progress | None = None,
+    shown: Callable[[Sequence[Row]], None] | None = None,
 ) -> Outcome:
     """Carry out `matrix` and write the files of a run: ``run.json`` and ``scores.json``.
 
     The parameters are those of `carry_out`.
     """
     with store.hold():
-        outcome = carry_out(matrix, store, choice=choice, recordings=recordings, progress=progress)
+        outcome = carry_out(matrix, store, choice=choice, recordings=recordings, progress=progress, shown=shown)
         store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
         store.write("scores.json", scores_text(outcome.rows))
     return outcome
@@ -73,6 +75,7 @@ def carry_out(
     choice: EngineChoice | None = None,
     recordings: Path | None = None,
     progress: Progress | None = None,
+    shown: Callable[[Sequence[Row]], None] | None = None,
 ) -> Outcome:
     """Acquire and answer `matrix`, reusing what `store` already has; the files of the last run stay as they are.
 
@@ -88,6 +91,8 @@ def carry_out(
         Folder for rigs that replay.
     progress
         Told what happens.
+    shown
+        Called with all rows so far after each replicate but the last.
 
     Raises
     ------
@@ -99,11 +104,16 @@ def carry_out(
     chosen = (choice or EngineChoice()).checked()
     chosen.ready()
     with store.hold():
-        return _carry_out(matrix, store, chosen, recordings, progress or Silence())
+        return _carry_out(matrix, store, chosen, recordings, progress or Silence(), shown or (lambda _: None))
 
 
 def _carry_out(
-    matrix: MatrixSpec, store: Store, choice: EngineChoice, recordings: Path | None, told: Progress
+    matrix: MatrixSpec,
+    store: Store,
+    choice: EngineChoice,
+    recordings: Path | None,
+    told: Progress,
+    shown: Callable[[Sequence[Row]], None],
 ) -> Outcome:
     registry = installed()
     sources = sources_of_this_user()
@@ -113,17 +123,40 @@ def _carry_out(
     provenance = gather(sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.named(len(cells)))
     made_by = store.begin(provenance)
     inherited = choice.named(len(cells)) != "dask"
-    acquire_missing(material, book, choice, told, (lambda: _import_estimators(cells, choice)) if inherited else None)
-    # A reader that nobody hears while libraries are imported would seem to take too long.
-    fresh = store.blank and choice.forks(len(cells)) and choice.limits.timeout_s is None
-    with _read_ahead(cells, material, choice) if fresh else nullcontext():
-        found = evaluate_all(cells, material, book, choice, store, made_by, told)
+    found = Evaluated()
+    rows: list[Row] = []
+    rounds = _rounds(cells, choice, material)
+    for number, some in enumerate(rounds, 1):
+        ready = partial(_import_estimators, some, choice) if inherited else None
+        during = told if len(rounds) == 1 else Prefixed(told, f"replicate {number} of {len(rounds)}: ")
+        acquire_missing(material, some, book, choice, during, ready)
+        # A reader that nobody hears while libraries are imported would seem to take too long.
+        fresh = store.blank and choice.forks(len(some)) and choice.limits.timeout_s is None
+        with _read_ahead(some, material, choice) if fresh else nullcontext():
+            evaluated = evaluate_all(some, material, book, choice, store, made_by, during)
+        found.rows |= evaluated.rows
+        found.computed += evaluated.computed
+        rows += [found.rows[cell.name] for cell in some]
+        fill_baselines(rows)
+        if number < len(rounds) and evaluated.computed:
+            shown(tuple(rows))
     sources.save()
     recorded.save()
-    rows = [found.rows[cell.name] for cell in cells]
-    fill_baselines(rows)
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, found.computed, recorded.number_made, used)
+
+
+def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: Material) -> list[list[Cell]]:
+    """Return the cells of each replicate that has to be recorded; all at once where recordings exist already.
+
+    Between rounds nothing is under way, so that a table can be shown. On a cluster, which takes seconds to start, all
+    replicates after the first are one round.
+    """
+    rounds: dict[int, list[Cell]] = {}
+    for cell in cells:
+        number = cell.repeat if material.orders else 1
+        rounds.setdefault(min(number, 2) if choice.named(len(cells)) == "dask" else number, []).append(cell)
+    return list(rounds.values())
 
 
 def _read_ahead(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> AbstractContextManager[None]:

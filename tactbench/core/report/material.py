@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
-from tactbench.core.matrix.leaving import fill_baselines
+from tactbench.core.leaderboard.replicates import over_replicates
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.samples import Answers
 
@@ -60,6 +60,4 @@ class Material:
 
 def open_material(store: Store, registry: Registry) -> Material:
     """Return what `store` holds, baselines beside every row."""
-    rows = store.rows()
-    fill_baselines(rows)
-    return Material(store, registry, tuple(rows))
+    return Material(store, registry, tuple(over_replicates(store.rows())))

@@ -22,6 +22,9 @@ def _names(given: Any) -> Any:
     return (given,) if isinstance(given, str) else given
 
 
+REPLICATES = 8
+"""Replicates of a simulated cell: with eight, one outlying replicate moves no end of the 95 % interval by much."""
+
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
 """A name, or a list of names."""
 
@@ -69,8 +72,9 @@ class MatrixSpec(Frozen):
 
     version: Literal[1] = 1
     seed: int = Field(default=1, ge=0)
-    repeats: int = Field(default=1, ge=1)
-    """How often everything is repeated, each time with another seed."""
+    repeats: int | None = Field(default=None, ge=1)
+    """Replicates: how often everything is recorded and answered anew, each time with another seed. None: eight on a
+    simulated rig; on recordings one, whose sessions are the replicates."""
     rig: str = "twin"
     recordings: str | None = None
     """Folder of recordings for rigs that replay; relative to where tactbench is run."""

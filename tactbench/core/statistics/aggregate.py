@@ -15,7 +15,7 @@ from tactbench.core.evaluation.interval import LEVEL
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray
-from tactbench.core.statistics.influence import together
+from tactbench.core.statistics.influence import scores_of, together
 
 Row = Mapping[str, Any]
 RESAMPLES = 2000
@@ -111,6 +111,9 @@ def _entries(row: Row) -> tuple[FloatArray, FloatArray, int]:
     """Return (k,) scores of a task, (RESAMPLES, k) what they might have been, and of how many replicates."""
     metric, n_classes, kept = METRICS[row["metric"]], len(row["classes"]), row["replicates"]
     group = together([row])[0]
+    if "scores" in kept:
+        own = scores_of(kept, row["metric"])
+        return own, own[_drawn(group.names, len(own), 1)], len(own)
     sums = tables_of([kept], row["metric"], n_classes)[0]
     run = int(group.runs[0])
     sizes = np.unique(group.strata, return_counts=True)[1]

@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.jackknife import influences
-from tactbench.core.evaluation.metrics import SUMMED, Metric
+from tactbench.core.evaluation.metrics import EXCESS, SUMMED, Metric
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.statistics.median import FEWEST
 
 Row = Mapping[str, Any]
 _Carried = tuple[npt.NDArray[np.bool_], FloatArray, FloatArray, FloatArray]
@@ -75,6 +76,8 @@ def _mark(row: Row) -> tuple[Any, ...] | None:
     if not kept or row["metric"] not in SUMMED:
         return None
     try:
+        if "scores" in kept and len(kept["names"]) < FEWEST:
+            return None
         strata = None if kept["strata"] is None else tuple(int(one) for one in kept["strata"])
         names = tuple(str(one) for one in kept["names"])
         return names, strata, str(kept["unit"]).startswith("block"), len(row["classes"]), row["metric"]
@@ -85,6 +88,8 @@ def _mark(row: Row) -> tuple[Any, ...] | None:
 def _group(
     kept: list[dict[str, Any]], metric: Metric, n_classes: int, strata: tuple[int, ...] | None, replicates: int
 ) -> _Carried | None:
+    if any("scores" in one for one in kept):
+        return _of_scores(kept, metric, replicates)
     codes = np.zeros(replicates, dtype=np.int64) if strata is None else np.array(strata, dtype=np.int64)
     sizes = np.unique(codes, return_counts=True)[1] if len(codes) == replicates else np.zeros(1)
     if not replicates or sizes.min() < 2:
@@ -105,6 +110,24 @@ def _group(
         influence[:, codes == one] = _smoothed(influence[:, codes == one], runs)
     freedom = np.maximum(replicates / runs - len(sizes), 1.0)
     return np.isfinite(influence).all(axis=1) & np.isfinite(runs), influence, freedom, runs
+
+
+def _of_scores(kept: list[dict[str, Any]], metric: Metric, replicates: int) -> _Carried | None:
+    """Return what replicates with a score of their own carry of the mean over replicates."""
+    try:
+        scores = np.array([scores_of(one, metric.name) for one in kept], dtype=np.float64)
+    except (KeyError, TypeError, ValueError):
+        return None
+    if scores.shape != (len(kept), replicates):
+        return None
+    influence = (scores - scores.mean(axis=1, keepdims=True)) / np.sqrt(replicates * (replicates - 1))
+    alike = np.ones(len(kept))
+    return np.isfinite(influence).all(axis=1), influence, alike * (replicates - 1), alike
+
+
+def scores_of(kept: Mapping[str, Any], metric: str) -> FloatArray:
+    """Return (replicates,) scores that a row keeps of its replicates: of `metric`, or of what is beyond the floor."""
+    return np.asarray(kept["excess" if metric == EXCESS.name else "scores"], dtype=np.float64)
 
 
 def _one_by_one(

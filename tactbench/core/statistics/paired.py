@@ -10,8 +10,8 @@ import numpy as np
 
 from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.replicate_sums import tables_of
-from tactbench.core.samples import FloatArray
-from tactbench.core.statistics.influence import Together, together
+from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.statistics.influence import Together, scores_of, together
 from tactbench.core.statistics.student import NORMAL, quantile, two_sided
 
 Row = Mapping[str, Any]
@@ -63,6 +63,9 @@ def difference(first: Row, second: Row) -> Difference:
     2^n ways up to 12 replicates, else 9,999 drawn (Phipson and Smyth 2010 on counting the observed one). With n
     replicates it cannot be below 2 / 2^n.
 
+    Where each replicate has a score of its own, the difference is that of the means over replicates; of errors of force
+    that have a floor, of what is beyond it.
+
     Where the replicates differ, errors are taken as independent, and of two degrees of freedom the smaller.
 
     The verdict is *better* or *worse* if the interval neither contains 0 nor lies within the task's region of practical
@@ -70,11 +73,28 @@ def difference(first: Row, second: Row) -> Difference:
     """
     metric = METRICS[first["metric"]]
     sign = 1.0 if metric.higher_is_better else -1.0
+    first, second = _means(first, second)
     value = float(first["score"] - second["score"])
     groups = together([first, second])
     if len(groups) == 1 and len(groups[0].places) == 2:
         return _paired(first, second, value, sign, groups[0], metric)
     return _unpaired(first, second, value, sign, groups)
+
+
+def _means(first: Row, second: Row) -> tuple[Row, Row]:
+    """Return rows whose replicates have scores of their own with the mean in place of the median.
+
+    Errors of force are those beyond the floor of the reference, if both rows have them.
+    """
+    kept = [row.get("replicates") or {} for row in (first, second)]
+    if not all("scores" in one for one in kept):
+        return first, second
+    key = "beyond" if all("beyond" in one for one in kept) else "scores"
+    one, other = (
+        {**row, "score": float(np.mean(mine[key])), "replicates": {**mine, "scores": mine[key], "of": key}}
+        for row, mine in zip((first, second), kept, strict=True)
+    )
+    return one, other
 
 
 def _paired(first: Row, second: Row, value: float, sign: float, group: Together, metric: Metric) -> Difference:
@@ -86,6 +106,8 @@ def _paired(first: Row, second: Row, value: float, sign: float, group: Together,
     p, smallest = exchanged(first, second, run)
     unit = str(first["replicates"]["unit"])
     over = f"paired over {len(group.names)} {_several(unit, len(group.names))}"
+    if first["replicates"].get("of") == "beyond":
+        over += ", of the errors beyond the floor"
     own = value + carried * _to_own(group)
     return _told(
         value, deviation, freedom, sign, _region(first),
@@ -182,26 +204,37 @@ def exchanged(first: Row, second: Row, run: int = 1) -> tuple[float, float]:
     run
         Neighbouring blocks of time that are exchanged together.
     """
-    n_classes = len(first["classes"])
     metric = METRICS[first["metric"]]
+    if "scores" in first["replicates"]:
+        apart_each = scores_of(first["replicates"], metric.name) - scores_of(second["replicates"], metric.name)
+        ways, smallest = _ways(len(apart_each))
+        return _share((1.0 - 2.0 * ways) @ apart_each), smallest
+    n_classes = len(first["classes"])
     sums = tables_of([first["replicates"], second["replicates"]], metric.name, n_classes)
     strata = first["replicates"]["strata"] or [0] * sums.shape[1]
     sums = np.add.reduceat(sums, _starts(strata, run), axis=1)
-    n = sums.shape[1]
-    if n <= EXACT:
-        ways = (np.arange(2**n)[:, None] >> np.arange(n)) & 1
-        smallest = 2.0 / 2**n
-    else:
-        drawn = np.random.default_rng(SEED).integers(0, 2, size=(EXCHANGES, n))
-        ways = np.concatenate([np.zeros((1, n), dtype=np.int64), drawn])  # as it was is one of the ways
-        smallest = 1.0 / len(ways)
+    ways, smallest = _ways(sums.shape[1])
     moved = ways.astype(np.float64) @ (sums[1] - sums[0])
     with np.errstate(divide="ignore", invalid="ignore"):
         apart = metric.score(sums[0].sum(axis=0) + moved, n_classes) - metric.score(
             sums[1].sum(axis=0) - moved, n_classes
         )
+    return _share(apart), smallest
+
+
+def _ways(n: int) -> tuple[IntArray, float]:
+    """Return (ways, n) which of n replicates are exchanged, at first none, and the least p that so many ways give."""
+    if n <= EXACT:
+        return (np.arange(2**n)[:, None] >> np.arange(n)) & 1, 2.0 / 2**n
+    drawn = np.random.default_rng(SEED).integers(0, 2, size=(EXCHANGES, n))
+    ways = np.concatenate([np.zeros((1, n), dtype=np.int64), drawn])  # as it was is one of the ways
+    return ways, 1.0 / len(ways)
+
+
+def _share(apart: FloatArray) -> float:
+    """Return the share of ways whose difference is at least that of the first."""
     apart = np.abs(apart[np.isfinite(apart)])
-    return float(np.mean(apart >= apart[0] * (1 - 1e-9) - 1e-15)), smallest
+    return float(np.mean(apart >= apart[0] * (1 - 1e-9) - 1e-15))
 
 
 def _starts(strata: list[int], run: int) -> list[int]:

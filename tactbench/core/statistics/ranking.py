@@ -10,7 +10,8 @@ import numpy as np
 
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.statistics.influence import Together, together
+from tactbench.core.statistics.excess import beyond_floor, excess_of
+from tactbench.core.statistics.influence import Together, scores_of, together
 from tactbench.core.statistics.student import NORMAL, quantile
 
 Row = Mapping[str, Any]
@@ -27,6 +28,10 @@ class Rank:
     high: int
     tied: bool
     """another cell has the same place"""
+    apart: bool
+    """clearly worse than the cell next before it"""
+    behind: bool
+    """clearly worse than the cell with the best score"""
 
 
 def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
@@ -40,12 +45,14 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     Notes
     -----
     A cell is *clearly better* than another if its score is, and the interval of their paired difference neither
-    contains 0 nor lies within the task's region of practical equivalence. A place is 1 + the number of cells that are
-    clearly better, and never better than that of a cell with a better score. So the best score always has place 1, a
-    better score never has a worse place, and what comes in far behind changes no place before it.
+    contains 0 nor lies within the task's region of practical equivalence. Cells in order of their scores share a place
+    until one comes that is clearly worse than the one before it and than the best of that place: it takes the place of
+    its number in that order. So two neighbours have different places only if the data separate them, and a better score
+    never has a worse place.
 
-    `low` and `high` are the ranks that no comparison of two excludes: 1 + the number of cells that are clearly better,
-    and the number of cells that are not clearly worse, itself among them [1]_. Resampling the ranks themselves says too
+    `low` and `high` are the ranks that no comparison of two excludes, the shared place among them: 1 + the number of
+    cells that are clearly better, and the number of cells that are not clearly worse, itself among them [1]_.
+    Resampling the ranks themselves says too
     little where cells are close: among near ties it covers as little as 77 % where 95 % are promised [2]_; see
     ``benchmarks/coverage.py``.
 
@@ -55,7 +62,9 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
 
     Differences are paired over replicates where two cells have the same (:func:`together`), else their errors are taken
     as independent. Their interval is Student's, with the jackknife's standard error over replicates; of two degrees of
-    freedom the smaller. A row without replicates enters with the interval that stands beside its score.
+    freedom the smaller. Where each replicate has a score of its own, the interval is that of the mean difference, and
+    the better median must agree with it. A row without replicates enters with the interval that stands beside its
+    score.
 
     Nothing is drawn at random, and the answer depends on `cell`, `score`, `ci_low`, `ci_high`, `metric`, `classes`,
     `equivalence`, `replicates` and the three keys of the error beyond the floor of these rows and on nothing else: it
@@ -75,40 +84,33 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     sign = -1.0 if SUMMED[entered[0]["metric"]].higher_is_better else 1.0
     entered.sort(key=lambda row: (sign * row["score"], row["cell"]))
     error = sign * np.array([row["score"] for row in entered], dtype=np.float64)  # the lower, the better
-    better, worse = _clearly(entered, error)
-    low = 1 + better
-    places = _places(low, error)
+    better, worse, places, apart, behind = _clearly(entered, error)
+    low = np.minimum(1 + better, places)
     high = np.maximum(len(entered) - worse, places)
     many = np.bincount(places)
     return {
-        row["cell"]: Rank(place, first, last, bool(many[place] > 1))
-        for row, place, first, last in zip(entered, places.tolist(), low.tolist(), high.tolist(), strict=True)
-    }
-
-
-def beyond_floor(rows: Sequence[Row]) -> bool:
-    """Return whether rows are ranked by their errors beyond the floor: all have one."""
-    return all(row["metric"] == "rmse" and row.get("reference_floor") is not None for row in rows)
+        row["cell"]: Rank(int(places[i]), int(low[i]), int(high[i]), bool(many[places[i]] > 1), bool(apart[i]),
+                          bool(behind[i]))
+        for i, row in enumerate(entered)
+    }  # fmt: skip
 
 
 def _excess(row: Row) -> Row:
     """Return a row of a RMSE as that of its mean square beyond the floor, which may be below zero."""
     ends = {"ci_low": row["beyond_floor_ci_low"], "ci_high": row["beyond_floor_ci_high"]}
     squares = {key: None if value is None else value * value for key, value in ends.items()}
-    excess = row["score"] * row["score"] - row["reference_floor"] * row["reference_floor"]
-    return {**row, **squares, "score": excess, "metric": EXCESS.name}
+    return {**row, **squares, "score": excess_of(row), "metric": EXCESS.name}
 
 
-def _places(low: IntArray, error: FloatArray) -> IntArray:
-    """Return (n,) places of cells in order of their errors: equal scores have the same."""
-    behind = np.maximum.accumulate(low)
-    return np.asarray(behind[np.searchsorted(error, error, side="right") - 1])
+def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
+    """Return (n,) of cells in order of their errors what their ranks are made of.
 
-
-def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return (n,) how many cells are clearly better and how many clearly worse than each; rows in order of errors."""
+    How many are clearly better and how many clearly worse, the place, and whether it is clearly worse than the cell
+    before and than the first.
+    """
     n = len(rows)
     groups = together(rows)
+    mean = _means(rows, groups, error)
     deviation, freedom = _own_errors(rows, groups)
     distinct, which = np.unique(freedom, return_inverse=True)
     wide = quantile(distinct) ** 2
@@ -116,7 +118,8 @@ def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray
     near_to = np.full(n, same)
     if rows[0]["metric"] == EXCESS.name:
         near_to = (np.sqrt(np.maximum(error, 0.0)) + same) ** 2 - np.maximum(error, 0.0)
-    better, worse = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    better, worse, places, apart, behind = (np.zeros(n, dtype=np.int64) for _ in range(5))
+    first = 0  # of those that share the place of the cell before
     for start in range(0, n, _STRIP):
         stop = min(start + _STRIP, n)
         lines, columns = slice(start, stop), slice(0, stop)  # only what stands before a cell can be better
@@ -125,8 +128,9 @@ def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray
             _less_covariance(bound, group, start, stop)
         np.maximum(bound, 0.0, out=bound)
         bound *= wide[0] if len(wide) == 1 else wide[np.minimum.outer(which[lines], which[columns])]
-        ahead = np.subtract.outer(error[lines], error[columns])
-        clear = ahead > 0
+        clear = np.subtract.outer(error[lines], error[columns]) > 0
+        ahead = np.subtract.outer(mean[lines], mean[columns])
+        clear &= ahead > 0
         clear &= np.square(ahead) > bound
         if same > 0:
             region = np.broadcast_to(near_to[columns], ahead.shape)
@@ -134,7 +138,26 @@ def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray
             clear[near] = ahead[near] + np.sqrt(bound[near]) > region[near]
         better[lines] = clear.sum(axis=1)
         worse[columns] += clear.sum(axis=0)
-    return better, worse
+        for place in range(start, stop):
+            apart[place] = place > 0 and clear[place - start, place - 1]
+            behind[place] = clear[place - start, 0]
+            if apart[place] and clear[place - start, first]:
+                first = place
+            places[place] = first + 1
+    return better, worse, places, apart, behind
+
+
+def _means(rows: Sequence[Row], groups: Sequence[Together], error: FloatArray) -> FloatArray:
+    """Return (n,) what differences are taken of: `error`, or the mean over replicates with scores of their own."""
+    found = error.copy()
+    metric = rows[0]["metric"]
+    sign = -1.0 if SUMMED[metric].higher_is_better else 1.0
+    for group in groups:
+        for place in group.places.tolist():
+            kept = rows[place]["replicates"]
+            if "scores" in kept:
+                found[place] = sign * scores_of(kept, metric).mean()
+    return found
 
 
 def _less_covariance(bound: FloatArray, group: Together, start: int, stop: int) -> None:

@@ -104,8 +104,9 @@ def _head(pack: Pack, table: Table, remarks: Sequence[str]) -> dict[str, Any]:
         "order": pack.planes([place for block in table.blocks for place in block.places]),
         "kinds": write_words(pack, shown.kinds) or NOTHING,
         "blocks": [
-            {"title": block.title, "size": len(block.places), "lower": first["metric"] in LOWER_IS_BETTER}
-            | {"metric": first["metric"], "unit": first["unit"], "simulated": _is_simulated(block)}
+            {"title": block.title, "verdict": list(block.verdict), "size": len(block.places)}
+            | {"lower": first["metric"] in LOWER_IS_BETTER, "metric": first["metric"], "unit": first["unit"]}
+            | {"simulated": _is_simulated(block)}
             for block, first in zip(table.blocks, firsts, strict=True)
         ],
         "columns": [

@@ -25,8 +25,9 @@ def still(table: Table, remarks: Sequence[str]) -> str:
             )
             lines.append(f'<tr class="{line.kind}">{cells}<td>{_text(why)}</td></tr>')
         body = "\n".join(lines)
+        said = "".join(f"<p>{_text(one)}</p>" for one in block.verdict)
         parts.append(
-            f'<div class="box"><table><caption>{_text(block.title)}</caption>\n'
+            f'<div class="box"><table><caption>{_text(block.title)}{said}</caption>\n'
             f"<thead><tr>{heads}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
         )
     notes = "\n".join(f"<li>{prose(note)}</li>" for note in (*remarks, *table.notes, *table.foot))

@@ -91,7 +91,8 @@ const drawTables = () => {
         ? ` · ${whole(some.length)} of ${whole(block.size)} cells` : "";
       table.append(make("tbody", {},
         make("tr", { class: "block" }, make("th", { scope: "rowgroup", colspan: board.visibleColumns.length },
-          make("span", {}, block.title, make("small", {}, part)))),
+          make("span", {}, block.title, make("small", {}, part)),
+          ...block.verdict.map((said) => make("p", { class: "verdict" }, said)))),
         ...some.map(drawLine)));
     }
     at += rows.length;

@@ -1,0 +1,225 @@
+"""One row a cell: what its replicates came to, in place of a row for each."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from statistics import median, median_low
+from typing import Any
+
+from tactbench.core.matrix.leaving import fill_baselines
+from tactbench.core.statistics.median import FEWEST, median_interval
+
+Row = Mapping[str, Any]
+
+_MEDIANS = (
+    "score", "reference_floor", "score_beyond_floor", "true_score", "sim_s", "search_s", "fit_s", "predict_s",
+    "latency_ms_p50", "latency_ms_p95", "answer_delay_ms", "peak_rss_mb", "wall_s",
+)  # fmt: skip
+"""Numbers of a row whose median over replicates stands in the table."""
+_INTERVALS = {
+    "score": ("ci_low", "ci_high"),
+    "score_beyond_floor": ("beyond_floor_ci_low", "beyond_floor_ci_high"),
+    "true_score": ("true_ci_low", "true_ci_high"),
+}
+"""Where the interval of a number stands."""
+_IN_ONE_SESSION = ("recording", "block")
+"""How units of replication begin that lie within one session: no interval of ours is over them."""
+
+
+def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return one row for each cell, without the number of the replicate in its name.
+
+    Parameters
+    ----------
+    rows
+        One a cell and replicate, as a result folder holds them; rows that are of all replicates already stay as they
+        are.
+
+    Returns
+    -------
+    list of dict
+        In the order in which the cells come first. On a simulated rig `score` is the median over replicates, and the
+        interval is that of the median (:func:`median_interval`), None of fewer than five. On recordings the replicates
+        are the sessions (or coarser groups) within the row, whose own interval stays if there are five or more; of
+        several seeds asked of the same recordings the one with the median score stands for all. Times are medians.
+        Recordings, answers and key are those of the first replicate.
+
+    Notes
+    -----
+    Keys that are added: `n_replicates`, `replicate_unit`, `replicate_scores`, `seeds`, `score_min` and `score_max` (the
+    range of the replicates' scores), `recordings_right` and `recordings_asked` (of a classification: test recordings
+    most of whose samples were classified rightly, the mean over replicates).
+    """
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(_name(row), []).append(row)
+    found = [_of_all(name, members) for name, members in groups.items()]
+    fill_baselines(found)
+    return found
+
+
+def _name(row: Row) -> str:
+    """Return the name of a row's cell without the number of the replicate."""
+    cell = str(row["cell"])
+    return cell if row.get("n_replicates") else cell.removesuffix(f"/{row.get('repeat')}")
+
+
+def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:
+    first = members[0]
+    if first.get("n_replicates"):
+        return dict(first)
+    done = [row for row in members if row["status"] == "done"]
+    if not done:
+        return {**_stopped(first, len(members)), "cell": name}
+    found = _of_campaigns(done) if done[0]["simulated"] else _of_sessions(done)
+    return {**found, "cell": name, "repeat": first["repeat"], "remarks": _remarks(members, done), **_right(done)}
+
+
+def _stopped(first: Row, n: int) -> dict[str, Any]:
+    return {**first, "n_replicates": n, "replicate_unit": "replicate", "replicate_scores": [],
+            "seeds": [first["seed"]], "score_min": None, "score_max": None, "recordings_right": None,
+            "recordings_asked": None, "replicates": {}}  # fmt: skip
+
+
+def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
+    """Return the row of a simulated cell: each replicate is a campaign recorded anew."""
+    first = done[0]
+    if len(done) == 1 and _sessions(first) >= FEWEST:
+        return _of_sessions(done)
+    found = dict(first) | {key: _median([row.get(key) for row in done]) for key in _MEDIANS if key in first}
+    level = 0.0
+    for key, (low, high) in _INTERVALS.items():
+        if low in first:
+            values = [row.get(key) for row in done]
+            known = None if None in values else median_interval([float(value) for value in values])  # type: ignore[arg-type]
+            found[low], found[high] = (known.low, known.high) if known else (None, None)
+            level = known.level if known else level
+    scores = [row["score"] for row in done]
+    return found | {
+        **_counted(done, len(done), "replicate", scores),
+        "ci_method": f"order statistics of {len(done)} replicates, {100 * level:.3g} %" if level else "",
+        "replicates": _kept(done) if len(done) >= FEWEST else {},
+        "chosen": _chosen(done),
+        "scores": _middle([row["scores"] for row in done]),
+        "confusion": _added([row["confusion"] for row in done]),
+        "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
+    }
+
+
+def _kept(done: Sequence[Row]) -> dict[str, Any]:
+    """Return what is kept of each replicate, by which cells are compared."""
+    kept: dict[str, Any] = {
+        "unit": "replicate",
+        "names": [str(row["seed"]) for row in done],
+        "strata": None,
+        "scores": [row["score"] for row in done],
+    }
+    floors = [row.get("reference_floor") for row in done]
+    if None not in floors:
+        kept["beyond"] = [row["score_beyond_floor"] for row in done]
+        kept["excess"] = [row["score"] ** 2 - row["reference_floor"] ** 2 for row in done]
+    return kept
+
+
+def _of_sessions(done: Sequence[Row]) -> dict[str, Any]:
+    """Return the row of a cell whose replicates are the sessions in it; of several seeds the median one's."""
+    middle = median_low([row["score"] for row in done])
+    row = next(row for row in done if row["score"] == middle)
+    many = _sessions(row)
+    found = {**row, **_counted(done, max(many, 1), _unit(row) if many else "session", [one["score"] for one in done])}
+    if many < FEWEST:
+        ends = dict.fromkeys([end for both in _INTERVALS.values() for end in both if end in row])
+        found |= {**ends, "ci_method": "", "replicates": {}}
+    return found
+
+
+def _counted(done: Sequence[Row], n: int, unit: str, scores: list[float]) -> dict[str, Any]:
+    finite = [score for score in scores if math.isfinite(score)]
+    return {
+        "n_replicates": n,
+        "replicate_unit": unit,
+        "replicate_scores": scores,
+        "seeds": [row["seed"] for row in done],
+        "score_min": min(finite, default=None),
+        "score_max": max(finite, default=None),
+    }
+
+
+def _unit(row: Row) -> str:
+    return str((row.get("replicates") or {}).get("unit", ""))
+
+
+def _sessions(row: Row) -> int:
+    """Return how many sessions, or coarser groups, a row's own interval is over; 0 if it is over nothing so coarse."""
+    kept = row.get("replicates") or {}
+    names = kept.get("names")
+    return 0 if not isinstance(names, list) or _unit(row).startswith(_IN_ONE_SESSION) else len(names)
+
+
+def _median(values: Sequence[Any]) -> float | None:
+    known = [float(value) for value in values if value is not None]
+    return median(known) if known else None
+
+
+def _chosen(done: Sequence[Row]) -> dict[str, Any]:
+    """Return what was chosen on validation data: of what replicates chose, the lower median."""
+    names = dict.fromkeys(name for row in done for name in row["chosen"])
+    return {name: median_low([row["chosen"][name] for row in done if name in row["chosen"]]) for name in names}
+
+
+def _middle(several: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    names = dict.fromkeys(name for one in several for name in one)
+    return {name: _median([one.get(name) for one in several]) for name in names}
+
+
+def _added(tables: Sequence[Any]) -> Any:
+    """Return the sum of confusion matrices; that of the first where they are of different classes."""
+    if any(table is None or len(table) != len(tables[0]) for table in tables):
+        return tables[0]
+    return [[sum(counts) for counts in zip(*lines, strict=True)] for lines in zip(*tables, strict=True)]
+
+
+def _remarks(members: Sequence[Row], done: Sequence[Row]) -> list[str]:
+    """Return what rows remark, those of a part of the replicates with their number, and which were stopped."""
+    many = len(done)
+    counts = Counter(remark for row in done for remark in dict.fromkeys(row["remarks"]))
+    told = [remark if n == many else f"in {n} of {many} replicates: {remark}" for remark, n in counts.items()]
+    stopped = [row for row in members if row["status"] != "done"]
+    return [*told, *(f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped)]
+
+
+def _right(done: Sequence[Row]) -> dict[str, Any]:
+    """Return how many test recordings were classified rightly by most of their samples, the mean over replicates."""
+    each = [found for row in done if (found := recordings_right(row)) is not None]
+    if not each or len(each) < len(done):
+        return {"recordings_right": None, "recordings_asked": None}
+    return {
+        "recordings_right": sum(right for right, _ in each) / len(each),
+        "recordings_asked": sum(asked for _, asked in each) / len(each),
+    }
+
+
+def recordings_right(row: Row) -> tuple[int, int] | None:
+    """Return how many test recordings of one class each were classified rightly, and how many were tested.
+
+    None of a regression, and where the row does not keep its recordings apart.
+    """
+    kept, n = row.get("replicates") or {}, len(row["classes"])
+    unit, names, lines = str(kept.get("unit", "")), kept.get("names"), kept.get("sums")
+    if not n or not unit.startswith(_IN_ONE_SESSION) or not isinstance(names, list) or not isinstance(lines, list):
+        return None
+    recordings: dict[str, Counter[int]] = {}
+    for name, line in zip(names, lines, strict=False):
+        recording = str(name).rpartition("/")[0] if unit.startswith("block") else str(name)
+        found = recordings.setdefault(recording, Counter())
+        for column, count in zip(line[::2], line[1::2], strict=False):
+            found[column] += count
+    right = 0
+    for found in recordings.values():
+        if len({column // n for column in found}) != 1:
+            return None  # samples of several classes: no recording is right or wrong as a whole
+        column, _ = found.most_common(1)[0]
+        right += column // n == column % n
+    return right, len(recordings)

@@ -1,0 +1,135 @@
+"""What a block of rows comes to, in a sentence, and how far that may be relied on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name
+from tactbench.core.leaderboard.numbers import interval, score, suffix
+from tactbench.core.leaderboard.placing import Placing
+from tactbench.core.statistics.excess import beyond_floor
+from tactbench.core.statistics.median import FEWEST
+
+Row = Mapping[str, Any]
+
+_CHEAPER = 1.2
+"""A cost that is so many times lower is said: less is within what timings of one machine differ by."""
+_SPARED = ("answer_delay_ms", "fit_s")
+"""Costs by which equal scores are told apart, the first that all rows have."""
+_SPARES = {"answer_delay_ms": "answers {:.3g} times sooner", "fit_s": "fits {:.3g} times quicker"}
+
+
+def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int) -> tuple[str, ...]:
+    """Return sentences on the answers of one block: who is best, how well that is resolved, what it hangs on.
+
+    Parameters
+    ----------
+    ranked
+        Answers that have a place, in order.
+    below
+        How many answers are no better than the trivial one.
+
+    Returns
+    -------
+    tuple of str
+        One of three verdicts (a clear winner; a tie at the top; not enough to tell), then, where intervals allow it,
+        how many neighbouring rows are separable and whether the first place hangs on one replicate.
+    """
+    if not ranked:
+        return (f"None of {below} answers is better than the trivial one.",) if below else ()
+    rows = [row for row, _ in ranked]
+    names = _names(rows)
+    replicates = [row.get("n_replicates") for row in rows]
+    if any(n is not None and n < FEWEST for n in replicates) or ranked[0][1].low is None:
+        return (_too_few(rows, names),)
+    leaders = [place for place, (_, one) in enumerate(ranked) if not one.behind]
+    best = rows[0]
+    if _may_be_trivial(best):
+        trivial = score(best["baseline"], best["unit"]) + suffix(best["unit"])
+        said = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {trivial}."
+    elif len(rows) == 1:
+        said = f"{names[0]}: {_measured(best)}, the only answer better than the trivial one."
+    elif len(leaders) == 1:
+        said = f"{names[0]} is best: {_measured(best)}."
+    else:
+        listed = ", ".join(names[place] for place in leaders)
+        said = f"Tie at the top: of {len(rows)} answers {len(leaders)} cannot be told from the best: {listed}."
+        said += _cheapest([rows[place] for place in leaders], [names[place] for place in leaders])
+    return (said, _resolution(ranked, len(leaders), names)) if len(rows) > 1 else (said,)
+
+
+def _too_few(rows: Sequence[Row], names: Sequence[str]) -> str:
+    """Return what can be said of fewer replicates than an interval needs."""
+    n = min((row.get("n_replicates") or 1 for row in rows), default=1)
+    unit = str(rows[0].get("replicate_unit") or "replicate")
+    have = f"one {unit}" if n == 1 else f"{n} {unit}s"
+    more = " Give --repeats 8." if rows[0]["simulated"] else ""
+    return f"Not enough to tell: {have}, and an interval or a rank needs {FEWEST}. {names[0]} has the best score.{more}"
+
+
+def _names(rows: Sequence[Row]) -> list[str]:
+    """Return what tells rows apart: the estimator, with the sensor before it where there are several."""
+    several = len({row["sensor"] for row in rows}) > 1
+    return [f"{row['sensor']}/{answer_name(row)}" if several else answer_name(row) for row in rows]
+
+
+def _measured(row: Row) -> str:
+    if beyond_floor([row]):
+        value, ends, what = "score_beyond_floor", ("beyond_floor_ci_low", "beyond_floor_ci_high"), " beyond the floor"
+    else:
+        value, ends, what = "score", ("ci_low", "ci_high"), ""
+    low, high = (row.get(end) for end in ends)
+    held = "" if low is None else f" (95 % over {_replicates(row)}: {interval(low, high, row['unit'])})"
+    return f"{score(row[value], row['unit'])}{suffix(row['unit'])}{what}{held}"
+
+
+def _replicates(row: Row) -> str:
+    return f"{row.get('n_replicates')} {row.get('replicate_unit')}s" if row.get("n_replicates") else "replicates"
+
+
+def _may_be_trivial(row: Row) -> bool:
+    """Return whether the interval of a row holds its trivial answer's score."""
+    end = row["ci_high" if row["metric"] in LOWER_IS_BETTER else "ci_low"]
+    if row["baseline"] is None or end is None:
+        return False
+    return bool(end >= row["baseline"] if row["metric"] in LOWER_IS_BETTER else end <= row["baseline"])
+
+
+def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:
+    """Return which of equal answers costs least, and how much less than the best score's."""
+    for key in _SPARED:
+        costs = [row.get(key) for row in rows]
+        if any(cost is None or not math.isfinite(cost) or cost <= 0 for cost in costs):
+            continue
+        least = min(range(len(rows)), key=lambda place: costs[place])  # type: ignore[arg-type, return-value]
+        dearest = max(range(len(rows)), key=lambda place: costs[place])  # type: ignore[arg-type, return-value]
+        ratio = costs[dearest] / costs[least]  # type: ignore[operator]
+        if ratio >= _CHEAPER:
+            return f" Of these {names[least]} {_SPARES[key].format(ratio)} than {names[dearest]}."
+    return ""
+
+
+def _resolution(ranked: Sequence[tuple[Row, Placing]], leaders: int, names: Sequence[str]) -> str:
+    """Return how many neighbours can be told apart, and whether the first place hangs on one replicate."""
+    apart = sum(one.apart for _, one in ranked)
+    said = f"{apart} of {len(ranked) - 1} neighbouring rows separable; {leaders - 1} tied with the first."
+    rows = [row for row, _ in ranked]
+    without = _firsts(rows)
+    if without is None:
+        return said
+    others = [place for place in without if place != 0]
+    if not others:
+        return f"{said} Without any one {rows[0].get('replicate_unit') or 'replicate'} the first stays first."
+    instead = ", ".join(dict.fromkeys(names[place] for place in others))
+    return f"{said} Without one of them ({len(others)} of {len(without)} ways) the first would be {instead}."
+
+
+def _firsts(rows: Sequence[Row]) -> list[int] | None:
+    from tactbench.core.statistics.leaving_out import best_without
+
+    try:
+        return best_without(rows, "excess_square" if beyond_floor(rows) else str(rows[0]["metric"]))
+    except (ArithmeticError, LookupError, TypeError, ValueError):
+        return None  # rows of a stranger's folder: their replicates may be anything
