@@ -23,6 +23,9 @@ LARGEST_BYTES = 64_000_000
 MOST = 4096
 """Answers that a file remembers, the latest."""
 
+STATISTICS = ("tactbench.core.statistics", "tactbench.core.evaluation")
+"""Packages whose code decides what statistics come to."""
+
 _known: dict[str, Any] = {}
 _added: set[str] = set()
 

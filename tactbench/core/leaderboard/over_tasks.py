@@ -25,8 +25,6 @@ NOTE = (
 )
 MOST_ROWS = 2000
 """Rows beyond which resampling all of them takes too long for a table."""
-_DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
-"""Packages whose code averages."""
 _DECIDES = (
     "task", "score", "baseline", "reference_score", "ci_low", "ci_high", "metric", "classes", "replicates",
 )  # fmt: skip
@@ -82,7 +80,7 @@ def _mean(members: Sequence[Row]) -> tuple[float, float, float, tuple[str, ...]]
     """Return mean, interval and what is left out; None where fewer than two tasks are in it, or nothing can be told."""
     try:
         facts = [[memo.ordered(row.get(key)) for key in _DECIDES] for row in members]
-        digest = memo.digest_of("over tasks", *map(memo.source_digest, _DECIDING), facts)
+        digest = memo.digest_of("over tasks", *map(memo.source_digest, memo.STATISTICS), facts)
         told = memo.recall(digest)
         if not _believable(told):
             from tactbench.core.statistics.aggregate import aggregate

@@ -17,8 +17,6 @@ from tactbench.core.leaderboard.sheet import Sheet, alike
 from tactbench.core.statistics.excess import beyond_floor, excess_of
 from tactbench.core.statistics.median import FEWEST
 
-_DECIDING = ("tactbench.core.statistics", "tactbench.core.evaluation")
-"""Packages whose code ranks."""
 _DECIDES = (
     "cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes", "reference_floor",
     "beyond_floor_ci_low", "beyond_floor_ci_high",
@@ -41,6 +39,8 @@ class Placing(NamedTuple):
     """Whether it is clearly worse than the answer next before it."""
     behind: bool = False
     """Whether it is clearly worse than the best one."""
+    first_without: int = 0
+    """Without how many replicates, each left out alone, it is the best one; 0 for all where replicates differ."""
 
 
 def places(results: Sheet) -> tuple[dict[str, Placing], str]:
@@ -60,7 +60,7 @@ def places(results: Sheet) -> tuple[dict[str, Placing], str]:
         return _by_score(results), reason
     try:
         facts = [*map(results.known, _DECIDES), _plain(results["replicates"])]
-        digest = memo.digest_of(*map(memo.source_digest, _DECIDING), facts)
+        digest = memo.digest_of(*map(memo.source_digest, memo.STATISTICS), facts)
         found = _believed(memo.recall(digest), results["cell"])
         if found is None:
             from tactbench.core.statistics.ranking import ranks
@@ -135,5 +135,5 @@ def _believed(told: Any, cells: Sequence[str]) -> dict[str, Placing] | None:
     return found if places == sorted(places) else None
 
 
-_ENTRY = (str, int, int, int, bool, bool, bool)
+_ENTRY = (str, int, int, int, bool, bool, bool, int)
 """What is remembered of an answer: the name of its cell, and its placing."""

@@ -115,21 +115,11 @@ def _resolution(ranked: Sequence[tuple[Row, Placing]], leaders: int, names: Sequ
     """Return how many neighbours can be told apart, and whether the first place hangs on one replicate."""
     apart = sum(one.apart for _, one in ranked)
     said = f"{apart} of {len(ranked) - 1} neighbouring rows separable; {leaders - 1} tied with the first."
-    rows = [row for row, _ in ranked]
-    without = _firsts(rows)
-    if without is None:
+    ways = sum(one.first_without for _, one in ranked)
+    if not ways:
         return said
-    others = [place for place in without if place != 0]
+    others = {names[place]: one.first_without for place, (_, one) in enumerate(ranked) if place and one.first_without}
     if not others:
-        return f"{said} Without any one {rows[0].get('replicate_unit') or 'replicate'} the first stays first."
-    instead = ", ".join(dict.fromkeys(names[place] for place in others))
-    return f"{said} Without one of them ({len(others)} of {len(without)} ways) the first would be {instead}."
-
-
-def _firsts(rows: Sequence[Row]) -> list[int] | None:
-    from tactbench.core.statistics.leaving_out import best_without
-
-    try:
-        return best_without(rows, "excess_square" if beyond_floor(rows) else str(rows[0]["metric"]))
-    except (ArithmeticError, LookupError, TypeError, ValueError):
-        return None  # rows of a stranger's folder: their replicates may be anything
+        return f"{said} Without any one {ranked[0][0].get('replicate_unit') or 'replicate'} the first stays first."
+    instead = ", ".join(others)
+    return f"{said} Without one of them ({sum(others.values())} of {ways} ways) the first would be {instead}."

@@ -10,27 +10,27 @@ import numpy as np
 from tactbench.core.evaluation.metrics import SUMMED
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray
-from tactbench.core.statistics.influence import scores_of, together
+from tactbench.core.statistics.influence import Together, scores_of
 
 Row = Mapping[str, Any]
 
 
-def best_without(rows: Sequence[Row], metric: str) -> list[int] | None:
+def best_without(rows: Sequence[Row], groups: Sequence[Together]) -> list[int] | None:
     """Return the place in `rows` of the best one without each replicate; None if they do not share replicates.
 
     Parameters
     ----------
     rows
         Finished rows of one metric.
-    metric
-        What is compared: theirs, or the mean square beyond the floor.
+    groups
+        What :func:`together` says of them.
 
     Notes
     -----
     A first place that leaves with one replicate is no property of the sensor (Huang et al. 2025, Dropping just a
     handful of preferences can change top large language model rankings).
     """
-    groups = together([{**row, "metric": metric} for row in rows])
+    metric = str(rows[0]["metric"])
     if len(groups) != 1 or len(groups[0].places) != len(rows):
         return None
     kept = [row["replicates"] for row in rows]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from tactbench.core.evaluation.metrics import EXCESS, SUMMED
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.statistics.excess import beyond_floor, excess_of
 from tactbench.core.statistics.influence import Together, scores_of, together
+from tactbench.core.statistics.leaving_out import best_without
 from tactbench.core.statistics.student import NORMAL, quantile
 
 Row = Mapping[str, Any]
@@ -32,6 +33,9 @@ class Rank:
     """clearly worse than the cell next before it"""
     behind: bool
     """clearly worse than the cell with the best score"""
+    first_without: int = field(compare=False)
+    """without how many replicates, each left out alone, it is the best, of equal cells the one first in order; 0 for
+    all cells where replicates differ"""
 
 
 def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
@@ -84,13 +88,15 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     sign = -1.0 if SUMMED[entered[0]["metric"]].higher_is_better else 1.0
     entered.sort(key=lambda row: (sign * row["score"], row["cell"]))
     error = sign * np.array([row["score"] for row in entered], dtype=np.float64)  # the lower, the better
-    better, worse, places, apart, behind = _clearly(entered, error)
+    groups = together(entered)
+    better, worse, places, apart, behind = _clearly(entered, groups, error)
     low = np.minimum(1 + better, places)
     high = np.maximum(len(entered) - worse, places)
     many = np.bincount(places)
+    without = best_without(entered, groups) or []
     return {
         row["cell"]: Rank(int(places[i]), int(low[i]), int(high[i]), bool(many[places[i]] > 1), bool(apart[i]),
-                          bool(behind[i]))
+                          bool(behind[i]), without.count(i))
         for i, row in enumerate(entered)
     }  # fmt: skip
 
@@ -102,14 +108,15 @@ def _excess(row: Row) -> Row:
     return {**row, **squares, "score": excess_of(row), "metric": EXCESS.name}
 
 
-def _clearly(rows: Sequence[Row], error: FloatArray) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
+def _clearly(
+    rows: Sequence[Row], groups: Sequence[Together], error: FloatArray
+) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
     """Return (n,) of cells in order of their errors what their ranks are made of.
 
     How many are clearly better and how many clearly worse, the place, and whether it is clearly worse than the cell
     before and than the first.
     """
     n = len(rows)
-    groups = together(rows)
     mean = _means(rows, groups, error)
     deviation, freedom = _own_errors(rows, groups)
     distinct, which = np.unique(freedom, return_inverse=True)

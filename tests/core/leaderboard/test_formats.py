@@ -17,7 +17,7 @@ from tactbench.core.leaderboard.csv_text import csv_text, guarded, unguarded
 from tactbench.core.leaderboard.formats import to_csv, to_json, to_latex, to_markdown, to_page, to_parquet
 from tactbench.core.leaderboard.latex import latex
 from tactbench.core.leaderboard.markdown import markdown
-from tactbench.core.leaderboard.records import JSON_KEYS, OF_THE_MACHINE, RANK_KEYS
+from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, OF_THE_MACHINE, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.terminal import plain_text
 
@@ -202,7 +202,10 @@ def test_without_times_nothing_is_left_that_a_machine_decides():
         texts = [form([one], known, times=False) for one, known in zip((here, there), machine, strict=True)]
         assert texts[0] == texts[1]
         assert form([here]) != form([there])
-    assert set(json.loads(to_json([here], times=False))[0]) == {*JSON_KEYS, *RANK_KEYS, "shown"} - OF_THE_MACHINE
+    assert (
+        set(json.loads(to_json([here], times=False))[0])
+        == {*JSON_KEYS, *OF_REPLICATES, *RANK_KEYS, "shown"} - OF_THE_MACHINE
+    )
 
 
 def test_parquet_without_pyarrow_says_what_to_install(monkeypatch):

@@ -37,7 +37,7 @@ def test_each_answer_to_several_tasks_has_its_mean(rows):
     assert [line[0] for line in section.lines] == ["a SIM", "b SIM"]
     for line, members in zip(section.lines, (rows[:2], rows[2:]), strict=True):
         mean = aggregate(members)
-        assert line[4:] == (f"{mean.value:.3f}", f"{mean.low:.3f} … {mean.high:.3f}", "force, shear")
+        assert line[3:] == (f"{mean.value:.3f}", f"{mean.low:.3f} … {mean.high:.3f}", "force, shear")
     table = build_table(rows)
     for text in (to_markdown(rows), to_latex(rows), plain_text(table)):
         assert "interquartile mean" in text

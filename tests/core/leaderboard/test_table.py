@@ -8,7 +8,7 @@ from rich.console import Console
 from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.formats import JSON_KEYS, to_csv, to_json, to_latex, to_markdown
 from tactbench.core.leaderboard.numbers import duration, score
-from tactbench.core.leaderboard.records import RANK_KEYS
+from tactbench.core.leaderboard.records import OF_REPLICATES, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.terminal import show
 
@@ -59,7 +59,7 @@ def test_marks_are_explained():
 
 def test_json_and_csv_hold_every_key_of_every_row():
     rows = [row(), row("b", status="failed", score=None)]
-    keys = (*JSON_KEYS, *RANK_KEYS, "shown")
+    keys = (*JSON_KEYS, *OF_REPLICATES, *RANK_KEYS, "shown")
     assert [tuple(entry) for entry in json.loads(to_json(rows))] == [keys, keys]
     read = list(csv.DictReader(io.StringIO(to_csv(rows))))
     assert float(read[0]["score"]) == 0.5
