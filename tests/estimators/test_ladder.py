@@ -121,7 +121,7 @@ def test_all_is_every_estimator_of_the_kind_with_the_tasks_baselines_where_they_
     for task in ("force", "curvature"):
         spec = REGISTRY.tasks[task].spec
         choice = TaskChoice(name=task, estimators=(EstimatorChoice(name="all"),))
-        cells = plan_cells(MatrixSpec(tasks=(choice,)), ("biotac",), REGISTRY)
+        cells = plan_cells(MatrixSpec(repeats=1, tasks=(choice,)), ("biotac",), REGISTRY)
         assert {cell.estimator for cell in cells} == {e.name for e in ESTIMATORS if spec.kind in e.kinds}
         assert [cell.estimator for cell in cells if cell.baseline] == list(spec.baselines)
         assert len({cell.name for cell in cells}) == len(cells)
@@ -133,14 +133,14 @@ def test_all_leaves_the_first_baseline_of_the_task_first():
     spec = registry.tasks["force"].spec.model_copy(update={"name": "backwards", "baselines": ("time-index",)})
     registry.tasks.add(Owned(TaskDescriptor(spec=spec), "made", "made", "1"))
     choice = TaskChoice(name="backwards", estimators=(EstimatorChoice(name="all"),))
-    cells = plan_cells(MatrixSpec(tasks=(choice,)), ("biotac",), registry)
+    cells = plan_cells(MatrixSpec(repeats=1, tasks=(choice,)), ("biotac",), registry)
     assert [cell.estimator for cell in cells if cell.baseline] == ["time-index", "mean"]
 
 
 def test_all_beside_a_name_with_parameters_keeps_both():
     asked = (EstimatorChoice(name="forest", params={"max_depth": 3}), EstimatorChoice(name="all"))
     choice = TaskChoice(name="curvature", estimators=asked)
-    names = [cell.name for cell in plan_cells(MatrixSpec(tasks=(choice,)), ("biotac",), REGISTRY)]
+    names = [cell.name for cell in plan_cells(MatrixSpec(repeats=1, tasks=(choice,)), ("biotac",), REGISTRY)]
     assert sum("/forest/" in name or "/forest,max_depth=3/" in name for name in names) == 2
 
 

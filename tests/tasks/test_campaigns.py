@@ -40,7 +40,7 @@ def test_one_name_is_one_scene_in_all_campaigns_of_a_task(name):
 
 
 def test_campaigns_of_other_tasks_share_their_recordings(tmp_path):
-    matrix = MatrixSpec(tasks=tuple(
+    matrix = MatrixSpec(repeats=1, tasks=tuple(
         TaskChoice(name=name, protocol="deployable", split=("roles", "placement", "unit", "few-shot"))
         for name in ("force", "curvature", "inverse-radius")
     ))  # fmt: skip
@@ -141,7 +141,7 @@ def _sessions(seed):
 def test_tasks_that_share_the_caps_share_their_order(tmp_path):
     assert in_time("curvature", 5) == in_time("inverse-radius", 5)
     cells = plan_cells(
-        MatrixSpec(seed=5, tasks=(TaskChoice(name="curvature", protocol="karl2016"),)), ["icub"], REGISTRY
+        MatrixSpec(seed=5, repeats=1, tasks=(TaskChoice(name="curvature", protocol="karl2016"),)), ["icub"], REGISTRY
     )
     (orders,) = orders_for(
         cells, REGISTRY, SourceDigests(tmp_path / "s.json"), Store(tmp_path), Simulation()

@@ -64,11 +64,12 @@ class Lines:
     def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
         """Say what begins."""
         self._stage, self._total, self._done, self._stopped = stage, total, 0, 0
-        self._began_s = self._said_s = self._clock()
+        self._began_s = self._clock()
+        self._said_s = self._began_s - _QUIET_S
         remark(f"{stage}: {total} to do")
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
-        """Say how far it is: at the end, and after every tenth that took its time."""
+        """Say how far it is: at the end, and after the first tenth and further ones that took their time."""
         self._done += 1
         self._stopped += stopped
         tenth = self._done * 10 // self._total > (self._done - 1) * 10 // self._total

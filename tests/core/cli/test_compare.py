@@ -6,7 +6,8 @@ import json
 
 import pytest
 
-ASKED = ("run", "--sensor", "biotac", "--sensor", "icub", "--task", "force", "--protocol", "deployable",
+ASKED = ("run", "--repeats", "1", "--sensor", "biotac", "--sensor", "icub", "--task", "force",
+         "--protocol", "deployable",
          "--estimator", "ols", "--estimator", "lasso")  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from tests.conftest import Shell
 
 CELL = "ideal/force/twin/karl2016/ols/1"
 VERBS = {
-    "run": ("--sensor", "ideal", "--task", "force", "--estimator", "ols", "--protocol", "karl2016"),
+    "run": ("--sensor", "ideal", "--task", "force", "--estimator", "ols", "--protocol", "karl2016", "--repeats", "1"),
     "list": (),
     "plugins": (),
     "show": ("biotac", "icub", "force"),

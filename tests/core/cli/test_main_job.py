@@ -12,7 +12,7 @@ import pytest
 
 from tests.core.matrix.engines.patience import ending
 
-FORCE = ("run", "--sensor", "icub", "--task", "force")
+FORCE = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force")
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,9 @@ def test_a_cell_that_fails_is_a_row_and_stops_nobody(ran):
         damaged = path.read_bytes()[:2000]
         path.unlink()
         path.write_bytes(damaged)
-    done = shell("run", "--sensor", "icub", "--sensor", "ideal", "--task", "force", "--format", "json", code=1)
+    done = shell(
+        "run", "--repeats", "1", "--sensor", "icub", "--sensor", "ideal", "--task", "force", "--format", "json", code=1
+    )
     rows = json.loads(done.stdout)
     assert {row["status"] for row in rows if row["sensor"] == "icub"} == {"failed"}
     assert {row["status"] for row in rows if row["sensor"] == "ideal"} == {"done"}
@@ -113,7 +115,18 @@ def test_a_cell_that_fails_is_a_row_and_stops_nobody(ran):
 
 
 def test_a_strangers_sensor_runs(shell):
-    done = shell("run", "--sensor", "acme-pad", "--task", "force", "--format", "json", plugins=("good", "broken"))
+    done = shell(
+        "run",
+        "--repeats",
+        "1",
+        "--sensor",
+        "acme-pad",
+        "--task",
+        "force",
+        "--format",
+        "json",
+        plugins=("good", "broken"),
+    )
     rows = json.loads(done.stdout)
     assert {row["status"] for row in rows} == {"done"}
     (lasso,) = [row for row in rows if row["estimator"] == "lasso" and not row["params"]]
@@ -121,7 +134,7 @@ def test_a_strangers_sensor_runs(shell):
 
 
 CURVATURE = [
-    *(sys.executable, "-m", "tactbench", "run", "--sensor", "icub", "--task", "curvature"),
+    *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "icub", "--task", "curvature"),
     *("--estimator", "logistic", "--estimator", "forest"),
 ]
 
@@ -167,7 +180,9 @@ def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path,
 
 def test_a_row_over_several_places_states_all_of_them(shell):
     asked = ("--sensor", "icub", "--task", "force", "--split", "placement", "--protocol", "deployable")
-    rows = json.loads(shell("run", *asked, "--estimator", "ols", "--no-latency", "--format", "json").stdout)
+    rows = json.loads(
+        shell("run", "--repeats", "1", *asked, "--estimator", "ols", "--no-latency", "--format", "json").stdout
+    )
     (row,) = [row for row in rows if row["estimator"] == "ols"]
     # Nominal at (-0.3, 0), and 1.5 mm either way along and across.
     assert row["assumptions"]["contact_x_mm"] == "-1.8 to 1.2"

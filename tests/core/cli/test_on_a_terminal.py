@@ -14,7 +14,7 @@ import pytest
 from tests.core.matrix.engines.patience import ending
 
 COMMAND = [
-    *(sys.executable, "-m", "tactbench", "run", "--sensor", "icub", "--task", "curvature"),
+    *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "icub", "--task", "curvature"),
     *("--estimator", "logistic", "--estimator", "forest"),
 ]
 

@@ -12,7 +12,7 @@ from tests.conftest import Shell
 from tests.core.matrix.plugin_packages import write_acme
 
 RUN = (
-    "run", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator", "ols",
+    "run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator", "ols",
     "--effects", "-drift", "--seed", "3",
 )  # fmt: skip
 CELLS = [f"ideal/force/twin/karl2016/{name}/1" for name in ("acme", "ols", "mean", "time-index")]

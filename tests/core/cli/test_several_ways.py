@@ -36,7 +36,7 @@ def test_a_file_is_taken_before_a_name_and_a_missing_one_is_named(tmp_path, monk
 
 
 def test_protocols_and_splits_side_by_side(shell):
-    asked = ("run", "--sensor", "icub", "--task", "force", "--estimator", "lasso", "--out", "out")
+    asked = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force", "--estimator", "lasso", "--out", "out")
     asked += ("--protocol", "karl2016", "--protocol", "deployable", "--split", "roles", "--split", "unit")
     done = shell(*asked)
     assert "by protocol" in done.stdout

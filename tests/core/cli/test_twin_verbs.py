@@ -86,7 +86,7 @@ def test_a_scenario_is_listed_and_kept_with_the_recording(shell):
 def test_a_scenario_is_asked_for_by_a_matrix_file(shell):
     matrix = {
         "sensors": ["biotac", "icub"], "tasks": [{"name": "force", "estimators": ["ols"]}], "latency": False,
-        "simulation": {"scenario": "hard-handled"},
+        "repeats": 1, "simulation": {"scenario": "hard-handled"},
     }  # fmt: skip
     (shell.folder / "hard.yaml").write_text(json.dumps(matrix))
     rows = json.loads(shell("run", "--config", "hard.yaml", "--format", "json").stdout)

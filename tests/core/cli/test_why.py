@@ -8,7 +8,19 @@ import pytest
 from tests.conftest import Shell
 from tests.core.matrix.plugin_packages import write_acme
 
-RUN = ("run", "--sensor", "ideal", "--task", "force", "--estimator", "acme", "--estimator", "acme-raises")
+RUN = (
+    "run",
+    "--repeats",
+    "1",
+    "--sensor",
+    "ideal",
+    "--task",
+    "force",
+    "--estimator",
+    "acme",
+    "--estimator",
+    "acme-raises",
+)
 ACME = "ideal/force/twin/karl2016/acme/1"
 
 

@@ -163,6 +163,8 @@ def recorded(tmp_path, rig, *options):
     """Record the task `force` with the ideal sensor on an evil rig; return the rows and what was printed."""
     asked = (
         "run",
+        "--repeats",
+        "1",
         "--rig",
         rig,
         "--sensor",
@@ -203,7 +205,7 @@ def test_a_rig_that_cannot_record_gives_rows_that_say_so(tmp_path, rig, says):
 
 
 def test_a_misspelt_split_is_refused_before_anything_is_recorded(tmp_path):
-    asked = ("run", "--sensor", "icub", "--task", "force", "--protocol", "deployable")
+    asked = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force", "--protocol", "deployable")
     done = Shell(tmp_path)(*asked, "--split", "sesion", code=2)
     assert "Did you mean 'session'" in done.stderr
     assert not list(tmp_path.rglob("*.h5"))

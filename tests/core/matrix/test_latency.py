@@ -41,7 +41,7 @@ def test_a_row_without_latency_says_so_and_is_not_taken_for_one_with(tmp_path, t
 
 def test_only_a_cell_without_latency_has_another_key(tmp_path):
     registry, sources = load_registry(), SourceDigests(tmp_path / "sources.json")
-    matrix = MatrixSpec(tasks=(TaskChoice(name="force"),))
+    matrix = MatrixSpec(repeats=1, tasks=(TaskChoice(name="force"),))
     cell = plan_cells(matrix, ["icub"], registry)[0]
     without = plan_cells(matrix.model_copy(update={"latency": False}), ["icub"], registry)[0]
     assert without == replace(cell, latency=False)

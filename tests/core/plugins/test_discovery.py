@@ -30,7 +30,9 @@ def test_two_with_one_name_are_refused_naming_both(shell):
     (refusal,) = plugins(shell, "good", "twin_name", code=1)["refused"]
     assert "acme-tactile" in refusal
     assert "copycat-tactile" in refusal
-    done = shell("run", "--sensor", "acme-pad", "--task", "force", plugins=("good", "twin_name"), code=2)
+    done = shell(
+        "run", "--repeats", "1", "--sensor", "acme-pad", "--task", "force", plugins=("good", "twin_name"), code=2
+    )
     assert "acme-tactile" in done.stderr
     assert "copycat-tactile" in done.stderr
     assert "biotac" in shell("list", "sensors", plugins=("good", "twin_name")).stdout

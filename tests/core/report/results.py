@@ -3,6 +3,7 @@
 from tactbench.core.report.drawn import Drawn
 
 MATRIX = """\
+repeats: 1
 sensors: [icub]
 tasks:
   - name: force

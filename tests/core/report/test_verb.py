@@ -47,7 +47,7 @@ def test_a_folder_that_is_not_there_is_not_made(shell):
 
 
 def test_results_without_a_finished_cell_say_what_to_run(shell):
-    shell("run", "--sensor", "icub", "--task", "grasp-stability")
+    shell("run", "--repeats", "1", "--sensor", "icub", "--task", "grasp-stability")
     (shell.folder / "tactbench-results" / "index.jsonl").touch()
     one_clear_screen(shell("report", code=2), "No cell in tactbench-results has finished", "tactbench run")
 

@@ -13,7 +13,7 @@ from tests.conftest import Shell
 from tests.core.matrix.engines.patience import ending, until
 from tests.core.matrix.engines.started import started
 
-RUN = ("run", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--estimator", "lasso")
+RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--estimator", "lasso")
 
 
 @pytest.fixture(scope="module")

@@ -134,7 +134,9 @@ def test_a_limit_on_the_size_of_files_is_told(tmp_path):
 def test_a_disk_too_full_for_a_recording_stops_the_run_and_fails_no_cell(tmp_path):
     with small_disk(tmp_path / "disk") as disk:
         (disk / "filler").write_bytes(b"x" * 540 * 1024)
-        stopped = Shell(tmp_path)("run", "--sensor", "icub", "--task", "curvature", "--out", str(disk / "out"), code=2)
+        stopped = Shell(tmp_path)(
+            "run", "--repeats", "1", "--sensor", "icub", "--task", "curvature", "--out", str(disk / "out"), code=2
+        )
         assert "No space left on device" in stopped.stderr
         assert str(disk / "out" / "recordings") in stopped.stderr
         assert "Traceback" not in stopped.stderr

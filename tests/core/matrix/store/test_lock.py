@@ -52,10 +52,10 @@ def test_a_second_run_is_refused_at_once_and_told_who_is_there(tmp_path):
 
 def test_the_command_line_refuses_too_and_reading_needs_no_lock(shell):
     folder = shell.folder / "tactbench-results"
-    shell("run", "--sensor", "icub", "--task", "grasp-stability")
+    shell("run", "--repeats", "1", "--sensor", "icub", "--task", "grasp-stability")
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     with holder(folder):
-        refused = shell("run", "--sensor", "icub", "--task", "grasp-stability", code=2)
+        refused = shell("run", "--repeats", "1", "--sensor", "icub", "--task", "grasp-stability", code=2)
         assert "Another run is at work in tactbench-results: process" in refused.stderr
         assert "Traceback" not in refused.stderr
         assert "icub" in shell("leaderboard").stdout
