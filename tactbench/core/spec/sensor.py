@@ -211,7 +211,7 @@ class SensorSpec(Frozen):
     for one."""
     references: tuple[str, ...] = ()
     data_sheet: DataSheet = Field(default=DataSheet(), exclude=True)
-    """Size, range, interface … for whoever chooses a sensor. Left out of recordings and keys: no sample depends on it."""
+    """Size, range, interface … of the device. Left out of recordings and keys: no sample depends on it."""
     likeness: tuple[RealFigure, ...] = Field(default=(), exclude=True)
     """Figures of real units, to judge by. Left out of recordings and keys: no sample depends on them."""
 

@@ -1,0 +1,386 @@
+"""Which sensor meets a wish: scores and delays from rows, range and rate from the sensors' specs.
+
+Each wish is met, missed by so much, or unknown. What is unknown, or only assumed, never counts as met; an answer that
+is no better than a trivial one is never proposed; simulated and measured rows are never in one list.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import Any, Literal, NamedTuple
+
+from tactbench.core.leaderboard.blocks import no_better
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, hardware_name, metric_name, sensor_name
+from tactbench.core.leaderboard.numbers import ABSENT, duration, interval, score, suffix
+from tactbench.core.leaderboard.text import command_line, visible
+from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.units import conversion
+
+Row = Mapping[str, Any]
+State = Literal["met", "missed", "unknown"]
+
+
+class Wish(NamedTuple):
+    """What an integrator wants; None: no matter."""
+
+    max_delay_ms: float | None = None
+    """Largest time from a touch to the answer [ms]."""
+    range_n: float | None = None
+    """Largest normal force that must be told [N]."""
+    rate_hz: float | None = None
+    """Smallest rate of answers [Hz]."""
+    max_error: float | None = None
+    """Largest score of a metric that is an error [the metric's unit]."""
+    min_score: float | None = None
+    """Smallest score of any other metric."""
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """How one answer stands to one wish."""
+
+    wish: str
+    """``answer delay``, ``force range``, ``rate`` or ``score``."""
+    state: State
+    text: str
+    """What is known, in a few words."""
+    value: float | None = None
+    """What the wish is compared with, in its unit; None: unknown."""
+    short_by: float = 0.0
+    """By how much it is missed, in its unit; 0 where it is not."""
+    relative: float = 0.0
+    """The same over the wish [1]."""
+    missed_by: str = ""
+    """The same in words."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """The answer of a sensor that comes nearest to the wish."""
+
+    sensor: str
+    """As shown: marked SIM where it was simulated."""
+    estimator: str
+    score: float
+    low: float | None
+    high: float | None
+    criteria: tuple[Criterion, ...]
+    row: Row
+
+    def named(self, state: State) -> list[Criterion]:
+        """Return the wishes that are met, missed or unknown."""
+        return [one for one in self.criteria if one.state == state]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the rows of one kind of hardware say to a wish."""
+
+    hardware: str
+    quantity: str
+    """What the scores are, with its unit."""
+    unit: str
+    verdict: str
+    candidates: tuple[Candidate, ...]
+    """One a sensor: those that meet all by score, then those with fewest unknowns, then those that miss least."""
+    unknown: tuple[str, ...]
+    """What would have to be known, and what to do for it."""
+    left_out: tuple[str, ...]
+    """Sensors that are not proposed, and why."""
+
+    def record(self) -> dict[str, Any]:
+        """Return it as plain values, for programs."""
+        found = []
+        for one in self.candidates:
+            row, criteria = one.row, [asdict(criterion) for criterion in one.criteria]
+            known = {key: row.get(key) for key in ("cell", "sensor", "estimator", "params", "simulated", "baseline")}
+            found.append({**known, "score": one.score, "low": one.low, "high": one.high, "criteria": criteria})
+        return {
+            "hardware": self.hardware, "verdict": self.verdict, "quantity": self.quantity, "unit": self.unit,
+            "candidates": found, "unknown": self.unknown, "left_out": self.left_out,
+        }  # fmt: skip
+
+
+def choose(rows: Sequence[Row], wish: Wish, task: TaskSpec, sensors: Mapping[str, SensorSpec]) -> tuple[Choice, ...]:
+    """Hold answers against a wish.
+
+    Parameters
+    ----------
+    rows
+        Of one task, protocol and split, baselines filled in (`tactbench.core.matrix.leaving.fill_baselines`).
+    sensors
+        Specs by name; a sensor that is not installed has no known range and rate.
+
+    Returns
+    -------
+    tuple of Choice
+        Measured rows first, then simulated ones.
+    """
+    kinds: dict[tuple[bool, str], list[Row]] = {}
+    for row in rows:
+        kinds.setdefault((bool(row["simulated"]), hardware_name(row)), []).append(row)
+    return tuple(_Choosing(members, wish, task, sensors).choice(kind) for (_, kind), members in sorted(kinds.items()))
+
+
+class _Choosing:
+    """The rows of one kind of hardware."""
+
+    def __init__(self, rows: Sequence[Row], wish: Wish, task: TaskSpec, sensors: Mapping[str, SensorSpec]) -> None:
+        self.wish, self.task, self.sensors, self.rows = wish, task, sensors, rows
+        done = [row for row in rows if row["status"] == "done" and not row["is_baseline"] and isfinite(row["score"])]
+        self.lower = task.metric in LOWER_IS_BETTER
+        self.sign = 1.0 if self.lower else -1.0
+        self.beyond = bool(done) and all(row.get("score_beyond_floor") is not None for row in done)
+        self.answers = _one_each(done)
+        self.pressed_n = max((planned.scene.profile.largest_n for planned in task.scenes), default=None)
+
+    def choice(self, hardware: str) -> Choice:
+        by_sensor: dict[str, list[Candidate]] = {}
+        trivial: dict[str, None] = {}
+        for row in self.answers:
+            trivial[row["sensor"]] = None
+            if row.get("baseline") is None or not no_better(self.sign * row["score"], self.sign, row["baseline"]):
+                by_sensor.setdefault(row["sensor"], []).append(self.candidate(row))
+        chosen = sorted((min(found, key=self.order) for found in by_sensor.values()), key=self.order)
+        left_out = [
+            f"{visible(name)}: none of its answers is better than a trivial one; `{self.run(name, '--probe')}` says why."
+            for name in trivial
+            if name not in by_sensor
+        ]
+        left_out += [
+            f"{visible(name)}: there is no finished answer beside trivial ones."
+            for name in dict.fromkeys(row["sensor"] for row in self.rows)
+            if name not in trivial
+        ]
+        left_out += [
+            f"{visible(one.row['sensor'])}: it exists as a definition only."
+            for one in chosen
+            if not self.exists(one.row["sensor"])
+        ]
+        chosen = [one for one in chosen if self.exists(one.row["sensor"])]
+        unknown = dict.fromkeys(sentence for one in chosen for sentence in self.unknown(one))
+        unknown.update(dict.fromkeys(self.of_all(chosen)))
+        name = metric_name({"metric": self.task.metric, "unit": self.task.unit})
+        quantity = name.replace(" [", " beyond the reference's noise [") if self.beyond else name
+        verdict = self.verdict(chosen)
+        return Choice(hardware, quantity, self.task.unit, verdict, tuple(chosen), tuple(unknown), tuple(left_out))
+
+    def exists(self, sensor: str) -> bool:
+        return sensor not in self.sensors or self.sensors[sensor].data_sheet.exists
+
+    def candidate(self, row: Row) -> Candidate:
+        keys = ("score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high")
+        value, low, high = (row.get(key) for key in (keys if self.beyond else ("score", "ci_low", "ci_high")))
+        assert value is not None
+        checks = (self.delay(row), self.range(row), self.rate(row), self.score(value, low, high))
+        criteria = [one for one in checks if one is not None]
+        if row.get("baseline") is None:
+            criteria.append(Criterion("trivial answer", "unknown", "no trivial answer beside it"))
+        return Candidate(sensor_name(row), answer_name(row), value, low, high, tuple(criteria), row)
+
+    def order(self, one: Candidate) -> tuple[Any, ...]:
+        """Sort by: nothing missed or unknown, fewest unknown, fewest missed, nearest; then the better score."""
+        missed, unknown = one.named("missed"), one.named("unknown")
+        worst = max((criterion.relative for criterion in missed), default=0.0)
+        better = (self.sign * one.score, self.sign * one.row["score"], one.sensor, one.estimator)
+        return bool(missed), len(missed), round(worst, 9), len(unknown), *better
+
+    # The wishes, one by one.
+
+    def delay(self, row: Row) -> Criterion | None:
+        wished, name = self.wish.max_delay_ms, "answer delay"
+        if wished is None:
+            return None
+        told = row.get("answer_delay_ms")
+        if told is not None:
+            return _at_most(name, told, wished, _ms(told), _ms, "too slow")
+        parts = {part: time for part, time in (row.get("delay_parts_ms") or {}).items() if time is not None}
+        least = sum(parts.values()) if parts else row.get("latency_ms_p50")
+        if least is None:
+            return Criterion(name, "unknown", "not timed")
+        if least > wished:
+            return _at_most(name, least, wished, f"at least {_ms(least)}", lambda ms: f"at least {_ms(ms)}", "too slow")
+        what = "+".join(parts) if parts else "prediction"
+        return Criterion(name, "unknown", f"{what} alone {_ms(least)}")
+
+    def range(self, row: Row) -> Criterion | None:
+        wished, name = self.wish.range_n, "force range"
+        if wished is None:
+            return None
+        spec = self.sensors.get(row["sensor"])
+        stated = spec.data_sheet.force_range if spec else None
+        if stated is None or stated.source.tag == "assumed":
+            return Criterion(name, "unknown", "not stated" if stated is None else f"{stated}, assumed")
+        upper = stated.upper * conversion(stated.unit, "N")
+        return _at_least(name, upper, wished, str(stated), _newtons, "short of range")
+
+    def rate(self, row: Row) -> Criterion | None:
+        wished, name = self.wish.rate_hz, "rate"
+        if wished is None:
+            return None
+        spec = self.sensors.get(row["sensor"])
+        streams = [
+            stream
+            for stream in (spec.streams if spec else ())
+            if any(channel.kind in self.task.features for channel in stream.channels)
+        ]
+        rates = [stream.rate_hz for stream in streams if stream.rate_hz is not None]
+        if not streams or len(rates) < len(streams):
+            return Criterion(name, "unknown", "not stated")
+        sampled, taken = min(rates), row.get("latency_ms_p50")
+        answered = 1e3 / taken if taken else None
+        if answered is not None and answered < min(sampled, wished):
+            text = f"{_hz(answered)}: an answer takes {_ms(taken)}"
+            return _at_least(name, answered, wished, text, _hz, "too low")
+        if any(stream.rate_source is None or stream.rate_source.tag == "assumed" for stream in streams):
+            return Criterion(name, "unknown", f"{_hz(sampled)}, assumed")
+        if answered is None and sampled >= wished:
+            return Criterion(name, "unknown", f"samples at {_hz(sampled)}, answers not timed")
+        rate = sampled if answered is None else min(sampled, answered)
+        return _at_least(name, rate, wished, _hz(rate), _hz, "too low")
+
+    def score(self, value: float, low: float | None, high: float | None) -> Criterion | None:
+        wished = self.wish.max_error if self.lower else self.wish.min_score
+        if wished is None:
+            return None
+
+        def told(number: float) -> str:
+            return score(number, self.task.unit) + suffix(self.task.unit)
+
+        if self.wish.range_n is not None and (self.pressed_n is None or self.wish.range_n > self.pressed_n):
+            until = "how far pressed is not stated" if self.pressed_n is None else f"to {_newtons(self.pressed_n)} only"
+            return Criterion("score", "unknown", f"{told(value)}, {until}")
+        text, end = told(value), high if self.lower else low
+        if end is not None and self.sign * value <= self.sign * wished < self.sign * end:
+            text += f", interval to {told(end)}"
+        compare, word = (_at_most, "too large") if self.lower else (_at_least, "too small")
+        return compare("score", value, wished, text, told, word)
+
+    # What is said of them.
+
+    def verdict(self, chosen: Sequence[Candidate]) -> str:
+        if not chosen:
+            return f"Cannot say: no answer to {self.task.name} here can be proposed."
+        first, count = chosen[0], sum(one is not None for one in self.wish)
+        name = f"{first.sensor} / {first.estimator}"
+        missed, unknown = first.named("missed"), [one.wish for one in first.named("unknown")]
+        unsure = f"its {' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} unknown"
+        if missed:
+            by = " and ".join(one.missed_by for one in missed)
+            return f"None meets all: nearest is {name}, {by}" + (f"; {unsure}." if unknown else ".")
+        if unknown:
+            return f"Cannot say: {name} misses nothing that is known, but {unsure}."
+        if not count:
+            return f"{name} has the best score."
+        others = [one for one in chosen[1:] if not one.named("missed") and not one.named("unknown")]
+        met = "meets the wish" if count == 1 else f"meets all {count} wishes"
+        if not others:
+            return f"{name} {met}."
+        apart = "" if _apart(first, others[0]) else "; their scores cannot be told apart by these intervals"
+        return f"{name} {met}; {', '.join(f'{one.sensor} / {one.estimator}' for one in others)} too{apart}."
+
+    def unknown(self, one: Candidate) -> Iterable[str]:
+        """Yield what is not known of a candidate, and what to do about it."""
+        sensor, row = visible(one.row["sensor"]), one.row
+        again = self.run(row["sensor"], "--estimator", row["estimator"])
+        for criterion in one.named("unknown"):
+            if criterion.wish == "answer delay":
+                if row.get("delay_parts_ms"):
+                    yield f"how late {sensor} / {one.estimator} answers: {criterion.text}; its maker knows the rest."
+                else:
+                    yield f"how late {sensor} / {one.estimator} answers: {criterion.text}; run `{again}`."
+            elif criterion.wish == "force range":
+                yield f"the force range of {sensor}: {criterion.text}; ask its maker, or load it and measure."
+            elif criterion.wish == "rate":
+                yield f"the rate of {sensor}: {criterion.text}; ask its maker, or measure it on your set-up."
+            elif criterion.wish == "score":
+                yield f"the error of {sensor} up to {_newtons(self.wish.range_n)}: {criterion.text}."
+            else:
+                yield f"whether {sensor} / {one.estimator} beats a trivial answer; run `{again}`."
+        if one.low is None or one.high is None:
+            yield f"how sure the score of {sensor} is: it has no interval; run `{again} --repeats 8`."
+        spec = self.sensors.get(row["sensor"])
+        lacking = [name for name in ("length", "mass", "interface", "power", "availability")
+                   if spec is None or getattr(spec.data_sheet, name) is None]  # fmt: skip
+        if lacking:
+            listed = " and ".join(filter(None, (", ".join(lacking[:-1]), lacking[-1])))
+            known = f"; `{command_line('tactbench', 'show', row['sensor'])}` has what is known" if spec else ""
+            yield f"{listed} of {sensor}{known}."
+
+    def of_all(self, chosen: Sequence[Candidate]) -> Iterable[str]:
+        """Yield what no answer here can say."""
+        wished = self.wish.range_n
+        if chosen and wished is not None and self.pressed_n is not None and wished > self.pressed_n:
+            yield f"any error beyond {_newtons(self.pressed_n)}: the scenes of {self.task.name} press no harder."
+        if chosen and all(one.row["simulated"] for one in chosen):
+            replay = command_line(
+                "tactbench", "run", "--rig", "replay", "--recordings", "DIR", "--task", self.task.name
+            )
+            yield f"how a real unit scores, for these are SIM; with recordings of one run `{replay}`."
+        told = {row["sensor"] for row in self.rows}
+        for name, spec in sorted(self.sensors.items()):
+            if name not in told and spec.data_sheet.exists and spec.channels(*self.task.features):
+                yield f"how {visible(name)} scores: no result here; run `{self.run(name)}`."
+
+    def run(self, sensor: str, *more: str) -> str:
+        protocol = self.rows[0]["protocol"]
+        return command_line("tactbench", "run", "--sensor", sensor, "--task", self.task.name,
+                            "--protocol", protocol, *more)  # fmt: skip
+
+
+def _one_each(rows: Sequence[Row]) -> list[Row]:
+    """Return one row for each answer of a sensor: of several replicates the one of median score (the lower median)."""
+    found: dict[tuple[str, str, str], list[Row]] = {}
+    for row in rows:
+        found.setdefault((row["rig"], row["sensor"], answer_name(row)), []).append(row)
+    return [
+        next(row for row in same if row["score"] == statistics.median_low([one["score"] for one in same]))
+        for same in found.values()
+    ]
+
+
+def _apart(one: Candidate, other: Candidate) -> bool:
+    """Return whether the intervals of two scores do not overlap; without intervals nothing is apart."""
+    if one.low is None or one.high is None or other.low is None or other.high is None:
+        return False
+    return one.high < other.low or other.high < one.low
+
+
+_Told = Callable[[float], str]
+
+
+def _at_most(name: str, value: float, wished: float, text: str, told: _Told, word: str) -> Criterion:
+    return _compared(name, value, wished, value - wished, text, told, word)
+
+
+def _at_least(name: str, value: float, wished: float, text: str, told: _Told, word: str) -> Criterion:
+    return _compared(name, value, wished, wished - value, text, told, word)
+
+
+def _compared(name: str, value: float, wished: float, short: float, text: str, told: _Told, word: str) -> Criterion:
+    if not short > 0:
+        return Criterion(name, "met", text, value)
+    missed = f"{told(short)} {word}"
+    return Criterion(name, "missed", f"{text}, {missed}", value, short, short / wished if wished else 1.0, missed)
+
+
+def _ms(milliseconds: float) -> str:
+    return duration(milliseconds * 1e-3)
+
+
+def _hz(hertz: float) -> str:
+    return f"{hertz:.3g} Hz"
+
+
+def _newtons(newtons: float | None) -> str:
+    return ABSENT if newtons is None else f"{newtons:.3g} N"
+
+
+def interval_text(one: Candidate, unit: str) -> str:
+    """Return a candidate's interval, or that it has none."""
+    found = interval(one.low, one.high, unit)
+    return "one replicate" if found == ABSENT else found
