@@ -161,19 +161,16 @@ def _table(choice: Choice) -> Any:
     from tactbench.core.leaderboard.choosing import interval_text
     from tactbench.core.leaderboard.numbers import score
 
-    wishes = list(dict.fromkeys(one.wish for candidate in choice.candidates for one in candidate.criteria))
-    head = [
-        "sensor",
-        "estimator",
-        "score",
-        "95 % interval",
-        *(name if name != "score" else "wished score" for name in wishes),
-    ]
+    wishes = dict.fromkeys(one.wish for candidate in choice.candidates for one in candidate.criteria)
+    head = ["sensor / estimator", "score, 95 % interval", *(wish for wish in wishes if wish != "score")]
     lines = []
     for one in choice.candidates:
-        told = {criterion.wish: f"{criterion.state}: {criterion.text}" for criterion in one.criteria}
-        lines.append([one.sensor, one.estimator, score(one.score, choice.unit), interval_text(one, choice.unit),
-                      *(told.get(name, "") for name in wishes)])  # fmt: skip
+        told = {
+            criterion.wish: ": ".join(filter(None, (criterion.state, criterion.text))) for criterion in one.criteria
+        }
+        known = f"{score(one.score, choice.unit)}, {interval_text(one, choice.unit)}"
+        wished = f"; {told['score']}" if "score" in told else ""
+        lines.append([f"{one.sensor} / {one.estimator}", known + wished, *(told.get(wish, "") for wish in head[2:])])
     grid = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=Text(f"score: {choice.quantity}"), title_justify="left")
     for title, column in zip(head, zip(*lines, strict=True), strict=True):
         grid.add_column(Text(title), min_width=_longest((title, *column)))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from typing import Any, Literal, NamedTuple
 
@@ -16,12 +16,15 @@ from tactbench.core.leaderboard.blocks import no_better
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, hardware_name, metric_name, sensor_name
 from tactbench.core.leaderboard.numbers import ABSENT, duration, interval, score, suffix
 from tactbench.core.leaderboard.text import command_line, visible
-from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.spec.sensor import DataSheet, SensorSpec
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.spec.units import conversion
 
 Row = Mapping[str, Any]
 State = Literal["met", "missed", "unknown"]
+
+_OF_DEVICES = ("length", "mass", "interface", "power", "availability")
+"""Facts of a data sheet that no wish asks for and every integrator needs."""
 
 
 class Wish(NamedTuple):
@@ -147,7 +150,7 @@ class _Choosing:
                 by_sensor.setdefault(row["sensor"], []).append(self.candidate(row))
         chosen = sorted((min(found, key=self.order) for found in by_sensor.values()), key=self.order)
         left_out = [
-            f"{visible(name)}: none of its answers is better than a trivial one; `{self.run(name, '--probe')}` says why."
+            f"{visible(name)}: no answer of it is better than a trivial one; `{self.run(name, '--probe')}` says why."
             for name in trivial
             if name not in by_sensor
         ]
@@ -183,11 +186,11 @@ class _Choosing:
         return Candidate(sensor_name(row), answer_name(row), value, low, high, tuple(criteria), row)
 
     def order(self, one: Candidate) -> tuple[Any, ...]:
-        """Sort by: nothing missed or unknown, fewest unknown, fewest missed, nearest; then the better score."""
+        """Sort by: fewest missed, fewest unknown, least missed in proportion to the wish; then the better score."""
         missed, unknown = one.named("missed"), one.named("unknown")
         worst = max((criterion.relative for criterion in missed), default=0.0)
         better = (self.sign * one.score, self.sign * one.row["score"], one.sensor, one.estimator)
-        return bool(missed), len(missed), round(worst, 9), len(unknown), *better
+        return bool(missed), len(missed), len(unknown), round(worst, 9), *better
 
     # The wishes, one by one.
 
@@ -234,7 +237,7 @@ class _Choosing:
         sampled, taken = min(rates), row.get("latency_ms_p50")
         answered = 1e3 / taken if taken else None
         if answered is not None and answered < min(sampled, wished):
-            text = f"{_hz(answered)}: an answer takes {_ms(taken)}"
+            text = f"{_hz(answered)}: an answer takes {_ms(1e3 / answered)}"
             return _at_least(name, answered, wished, text, _hz, "too low")
         if any(stream.rate_source is None or stream.rate_source.tag == "assumed" for stream in streams):
             return Criterion(name, "unknown", f"{_hz(sampled)}, assumed")
@@ -251,14 +254,16 @@ class _Choosing:
         def told(number: float) -> str:
             return score(number, self.task.unit) + suffix(self.task.unit)
 
+        compare, word = (_at_most, "above the wished error") if self.lower else (_at_least, "below the wished score")
+        found = compare("score", value, wished, "", told, word)
+        if found.state == "missed":
+            return replace(found, text=found.missed_by)
         if self.wish.range_n is not None and (self.pressed_n is None or self.wish.range_n > self.pressed_n):
-            until = "how far pressed is not stated" if self.pressed_n is None else f"to {_newtons(self.pressed_n)} only"
-            return Criterion("score", "unknown", f"{told(value)}, {until}")
-        text, end = told(value), high if self.lower else low
-        if end is not None and self.sign * value <= self.sign * wished < self.sign * end:
-            text += f", interval to {told(end)}"
-        compare, word = (_at_most, "too large") if self.lower else (_at_least, "too small")
-        return compare("score", value, wished, text, told, word)
+            until = "nobody says how far" if self.pressed_n is None else f"to {_newtons(self.pressed_n)} only"
+            return Criterion("score", "unknown", until)
+        end = high if self.lower else low
+        crosses = end is not None and self.sign * end > self.sign * wished
+        return replace(found, text="but not by its whole interval" if crosses else "")
 
     # What is said of them.
 
@@ -268,7 +273,7 @@ class _Choosing:
         first, count = chosen[0], sum(one is not None for one in self.wish)
         name = f"{first.sensor} / {first.estimator}"
         missed, unknown = first.named("missed"), [one.wish for one in first.named("unknown")]
-        unsure = f"its {' and '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} unknown"
+        unsure = f"its {_listed(unknown)} {'is' if len(unknown) == 1 else 'are'} unknown"
         if missed:
             by = " and ".join(one.missed_by for one in missed)
             return f"None meets all: nearest is {name}, {by}" + (f"; {unsure}." if unknown else ".")
@@ -298,24 +303,25 @@ class _Choosing:
             elif criterion.wish == "rate":
                 yield f"the rate of {sensor}: {criterion.text}; ask its maker, or measure it on your set-up."
             elif criterion.wish == "score":
-                yield f"the error of {sensor} up to {_newtons(self.wish.range_n)}: {criterion.text}."
+                yield f"the error of {sensor} up to {_newtons(self.wish.range_n)}: it was pressed {criterion.text}."
             else:
                 yield f"whether {sensor} / {one.estimator} beats a trivial answer; run `{again}`."
         if one.low is None or one.high is None:
             yield f"how sure the score of {sensor} is: it has no interval; run `{again} --repeats 8`."
-        spec = self.sensors.get(row["sensor"])
-        lacking = [name for name in ("length", "mass", "interface", "power", "availability")
-                   if spec is None or getattr(spec.data_sheet, name) is None]  # fmt: skip
-        if lacking:
-            listed = " and ".join(filter(None, (", ".join(lacking[:-1]), lacking[-1])))
-            known = f"; `{command_line('tactbench', 'show', row['sensor'])}` has what is known" if spec else ""
-            yield f"{listed} of {sensor}{known}."
 
     def of_all(self, chosen: Sequence[Candidate]) -> Iterable[str]:
         """Yield what no answer here can say."""
         wished = self.wish.range_n
         if chosen and wished is not None and self.pressed_n is not None and wished > self.pressed_n:
             yield f"any error beyond {_newtons(self.pressed_n)}: the scenes of {self.task.name} press no harder."
+        lacking: dict[str, list[str]] = {}
+        for name in (one.row["sensor"] for one in chosen):
+            sheet = self.sensors[name].data_sheet if name in self.sensors else DataSheet()
+            facts = [visible(fact) for fact in _OF_DEVICES if getattr(sheet, fact) is None]
+            if facts:
+                lacking.setdefault(_listed(facts), []).append(name)
+        for facts_text, names in lacking.items():
+            yield f"{facts_text} of {_listed(names)}; `{command_line('tactbench', 'show', *names)}` has what is stated."
         if chosen and all(one.row["simulated"] for one in chosen):
             replay = command_line(
                 "tactbench", "run", "--rig", "replay", "--recordings", "DIR", "--task", self.task.name
@@ -330,6 +336,10 @@ class _Choosing:
         protocol = self.rows[0]["protocol"]
         return command_line("tactbench", "run", "--sensor", sensor, "--task", self.task.name,
                             "--protocol", protocol, *more)  # fmt: skip
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def _one_each(rows: Sequence[Row]) -> list[Row]:

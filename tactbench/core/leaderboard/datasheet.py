@@ -56,8 +56,9 @@ def table_one(sensors: Sequence[SensorSpec]) -> list[Comparison]:
 
 def data_sheets(sensors: Sequence[SensorSpec]) -> list[Comparison]:
     """Return the sensors as devices: range, size, mass, interface, power, availability."""
-    return [_row(name.replace("_", " "), sensors, lambda sensor, name=name: _of_device(sensor, name))
-            for name in OF_DEVICES]  # fmt: skip
+    return [
+        Comparison(name.replace("_", " "), tuple(_of_device(sensor, name) for sensor in sensors)) for name in OF_DEVICES
+    ]
 
 
 def details(sensors: Sequence[SensorSpec]) -> list[Comparison]:
