@@ -23,6 +23,8 @@ from tactbench.core.spec.units import conversion
 Row = Mapping[str, Any]
 State = Literal["met", "missed", "unknown"]
 
+_PARTS = ("sampling", "link", "window", "features", "prediction")
+"""Parts of an answer's delay, in the order in which they pass."""
 _OF_DEVICES = ("length", "mass", "interface", "power", "availability")
 """Facts of a data sheet that no wish asks for and every integrator needs."""
 
@@ -198,17 +200,22 @@ class _Choosing:
         wished, name = self.wish.max_delay_ms, "answer delay"
         if wished is None:
             return None
-        told = row.get("answer_delay_ms")
-        if told is not None:
-            return _at_most(name, told, wished, _ms(told), _ms, "too slow")
+        told, looks = row.get("answer_delay_ms"), row.get("looks_at") == "features"
         parts = {part: time for part, time in (row.get("delay_parts_ms") or {}).items() if time is not None}
-        least = sum(parts.values()) if parts else row.get("latency_ms_p50")
+        least = told if told is not None else sum(parts.values()) if parts else row.get("latency_ms_p50")
         if least is None:
             return Criterion(name, "unknown", "not timed")
-        if least > wished:
-            return _at_most(name, least, wished, f"at least {_ms(least)}", lambda ms: f"at least {_ms(ms)}", "too slow")
-        what = "+".join(parts) if parts else "prediction"
-        return Criterion(name, "unknown", f"{what} alone {_ms(least)}")
+        assumed = "sampling" in parts and not self.sampled(row)[1]
+        sure = least - parts["sampling"] if assumed else least
+        # Without the link an answer from readings is later than its row says.
+        whole = told is not None and not assumed and not (parts and looks and "link" not in parts)
+        if sure > wished or whole:
+            how = "" if whole else "at least "
+            return _at_most(name, sure, wished, how + _ms(sure), lambda ms: how + _ms(ms), "too slow")
+        lacking = [part for part in _PARTS if part not in parts]
+        without = f" without {_listed(lacking)}" if lacking else ""
+        text = f"{_ms(least)}{without}" if parts else f"prediction alone {_ms(least)}"
+        return Criterion(name, "unknown", text + (" by an assumed rate" if assumed else ""))
 
     def range(self, row: Row) -> Criterion | None:
         wished, name = self.wish.range_n, "force range"
@@ -225,6 +232,22 @@ class _Choosing:
         wished, name = self.wish.rate_hz, "rate"
         if wished is None:
             return None
+        (sampled, stated), taken = self.sampled(row), row.get("latency_ms_p50")
+        if sampled is None:
+            return Criterion(name, "unknown", "not stated")
+        answered = 1e3 / taken if taken else None
+        if answered is not None and answered < min(sampled, wished):
+            text = f"{_hz(answered)}: an answer takes {_ms(1e3 / answered)}"
+            return _at_least(name, answered, wished, text, _hz, "too low")
+        if not stated:
+            return Criterion(name, "unknown", f"{_hz(sampled)}, assumed")
+        if answered is None and sampled >= wished:
+            return Criterion(name, "unknown", f"samples at {_hz(sampled)}, answers not timed")
+        rate = sampled if answered is None else min(sampled, answered)
+        return _at_least(name, rate, wished, _hz(rate), _hz, "too low")
+
+    def sampled(self, row: Row) -> tuple[float | None, bool]:
+        """Return the rate [Hz] of the sensor's slowest stream that answers look at, and whether a source states it."""
         spec = self.sensors.get(row["sensor"])
         streams = [
             stream
@@ -233,18 +256,9 @@ class _Choosing:
         ]
         rates = [stream.rate_hz for stream in streams if stream.rate_hz is not None]
         if not streams or len(rates) < len(streams):
-            return Criterion(name, "unknown", "not stated")
-        sampled, taken = min(rates), row.get("latency_ms_p50")
-        answered = 1e3 / taken if taken else None
-        if answered is not None and answered < min(sampled, wished):
-            text = f"{_hz(answered)}: an answer takes {_ms(1e3 / answered)}"
-            return _at_least(name, answered, wished, text, _hz, "too low")
-        if any(stream.rate_source is None or stream.rate_source.tag == "assumed" for stream in streams):
-            return Criterion(name, "unknown", f"{_hz(sampled)}, assumed")
-        if answered is None and sampled >= wished:
-            return Criterion(name, "unknown", f"samples at {_hz(sampled)}, answers not timed")
-        rate = sampled if answered is None else min(sampled, answered)
-        return _at_least(name, rate, wished, _hz(rate), _hz, "too low")
+            return None, False
+        sources = [stream.rate_source for stream in streams]
+        return min(rates), all(source is not None and source.tag != "assumed" for source in sources)
 
     def score(self, value: float, low: float | None, high: float | None) -> Criterion | None:
         wished = self.wish.max_error if self.lower else self.wish.min_score
@@ -273,7 +287,7 @@ class _Choosing:
         first, count = chosen[0], sum(one is not None for one in self.wish)
         name = f"{first.sensor} / {first.estimator}"
         missed, unknown = first.named("missed"), [one.wish for one in first.named("unknown")]
-        unsure = f"its {_listed(unknown)} {'is' if len(unknown) == 1 else 'are'} unknown"
+        unsure = unknown and f"its {_listed(unknown)} {'is' if len(unknown) == 1 else 'are'} unknown"
         if missed:
             by = " and ".join(one.missed_by for one in missed)
             return f"None meets all: nearest is {name}, {by}" + (f"; {unsure}." if unknown else ".")
@@ -294,10 +308,8 @@ class _Choosing:
         again = self.run(row["sensor"], "--estimator", row["estimator"])
         for criterion in one.named("unknown"):
             if criterion.wish == "answer delay":
-                if row.get("delay_parts_ms"):
-                    yield f"how late {sensor} / {one.estimator} answers: {criterion.text}; its maker knows the rest."
-                else:
-                    yield f"how late {sensor} / {one.estimator} answers: {criterion.text}; run `{again}`."
+                step = "ask its maker, or measure it" if row.get("delay_parts_ms") else f"run `{again}`"
+                yield f"how late {sensor} / {one.estimator} answers: {criterion.text}; {step}."
             elif criterion.wish == "force range":
                 yield f"the force range of {sensor}: {criterion.text}; ask its maker, or load it and measure."
             elif criterion.wish == "rate":
