@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,14 @@ _PREFERRED = "deployable"
 
 
 def _positive(option: str, words: str) -> Callable[[Any], Any]:
-    return click.option(option, type=click.FloatRange(min=0, min_open=True, max=1e12), metavar="X", help=words)
+    kind = click.FloatRange(min=0, min_open=True)
+    return click.option(option, type=kind, metavar="X", callback=_finite, help=words)
+
+
+def _finite(context: click.Context, option: click.Parameter, value: float | None) -> float | None:
+    if value is not None and not math.isfinite(value):
+        raise click.BadParameter(f"{value} is no finite number.", context, option)
+    return value
 
 
 @click.command(name="choose")
@@ -45,6 +53,7 @@ def command(
     has none of the task.
     """
     from tactbench.core.leaderboard.choosing import Wish, choose
+    from tactbench.core.leaderboard.records import json_text
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()
@@ -57,7 +66,7 @@ def command(
     if shape == "json":
         told = {"task": task.name, "wish": wish._asdict(), "results": origin, "protocol": rows[0]["protocol"],
                 "split": rows[0]["split"], "choices": [choice.record() for choice in choices]}  # fmt: skip
-        click.echo(json.dumps(told, indent=1, ensure_ascii=False))
+        click.echo(json_text(told, indent=1))
         return
     for choice in choices:
         _print(choice, f"{heading} · {choice.hardware}")

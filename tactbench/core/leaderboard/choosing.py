@@ -299,7 +299,7 @@ class _Choosing:
         met = "meets the wish" if count == 1 else f"meets all {count} wishes"
         if not others:
             return f"{name} {met}."
-        apart = "" if _apart(first, others[0]) else "; their scores cannot be told apart by these intervals"
+        apart = "" if _apart(first, others[0]) else "; their scores are not told apart"
         return f"{name} {met}; {', '.join(f'{one.sensor} / {one.estimator}' for one in others)} too{apart}."
 
     def unknown(self, one: Candidate) -> Iterable[str]:
@@ -405,4 +405,4 @@ def _newtons(newtons: float | None) -> str:
 def interval_text(one: Candidate, unit: str) -> str:
     """Return a candidate's interval, or that it has none."""
     found = interval(one.low, one.high, unit)
-    return "one replicate" if found == ABSENT else found
+    return "no interval" if found == ABSENT else found
