@@ -104,14 +104,14 @@ def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
         return
     rows = table_one(sensors)
     _grid("Sensor comparison (Table I of Karl et al. 2016)", sensors, rows, with_source=everything)
-    sheets = data_sheets(sensors)
-    _grid("Data sheet", sensors, sheets, with_source=everything)
+    _grid("Data sheet", sensors, data_sheets(sensors), with_source=everything)
+    rows += data_sheets(sensors)
     more = details(sensors)
     if everything:
         _grid("Everything the specs state", sensors, more, with_source=True)
     else:
         _grid("Readings", sensors, more[:5], with_source=False)
-        tags = [fact.tag for row in more + rows + sheets for fact in row.facts if fact.tag]
+        tags = [fact.tag for row in more + rows for fact in row.facts if fact.tag]
         counted = ", ".join(f"{tags.count(tag)} {tag}" for tag in ("sourced", "measured", "derived", "assumed"))
         click.echo(f"Facts behind these sensors: {counted}. See them all with --all.")
 
