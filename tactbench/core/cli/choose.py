@@ -13,7 +13,8 @@ import click
 from tactbench.core.cli.results import is_results, opened, shown_rows
 
 if TYPE_CHECKING:
-    from tactbench.core.leaderboard.choosing import Choice, Wish
+    from tactbench.core.leaderboard.choosing import Choice
+    from tactbench.core.leaderboard.criteria import Wish
     from tactbench.core.spec.task import TaskSpec
 
 Row = dict[str, Any]
@@ -52,7 +53,8 @@ def command(
     FOLDER is what `run --out` wrote; default: tactbench-results, and the results that came with tactbench where that
     has none of the task.
     """
-    from tactbench.core.leaderboard.choosing import Wish, choose
+    from tactbench.core.leaderboard.choosing import choose
+    from tactbench.core.leaderboard.criteria import Wish
     from tactbench.core.leaderboard.records import json_text
     from tactbench.core.plugins.registry import load_registry
 
@@ -156,7 +158,11 @@ def _print(choice: Choice, heading: str) -> None:
     screen.print(Text(heading, style="dim"))
     if choice.candidates:
         screen.print(_table(choice))
-    for title, sentences in (("unknown", choice.unknown), ("left out", choice.left_out)):
+    for title, sentences in (
+        ("interval", choice.intervals),
+        ("unknown", choice.unknown),
+        ("left out", choice.left_out),
+    ):
         for sentence in sentences:
             screen.print(Text(f"{title}: {sentence}"))
     screen.print()
@@ -171,7 +177,7 @@ def _table(choice: Choice) -> Any:
     from tactbench.core.leaderboard.numbers import score
 
     wishes = dict.fromkeys(one.wish for candidate in choice.candidates for one in candidate.criteria)
-    head = ["sensor / estimator", "score, 95 % interval", *(wish for wish in wishes if wish != "score")]
+    head = ["sensor / estimator", "score, interval", *(wish for wish in wishes if wish != "score")]
     lines = []
     for one in choice.candidates:
         told = {

@@ -7,60 +7,31 @@ is no better than a trivial one is never proposed; simulated and measured rows a
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from math import isfinite
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 from tactbench.core.leaderboard.blocks import no_better
+from tactbench.core.leaderboard.criteria import (
+    Criterion,
+    Figure,
+    Row,
+    State,
+    Wish,
+    criteria_of,
+    listed,
+    newtons,
+    pressed_n,
+)
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, hardware_name, metric_name, sensor_name
-from tactbench.core.leaderboard.numbers import ABSENT, duration, interval, score, suffix
+from tactbench.core.leaderboard.numbers import ABSENT, interval
 from tactbench.core.leaderboard.text import command_line, visible
 from tactbench.core.spec.sensor import DataSheet, SensorSpec
 from tactbench.core.spec.task import TaskSpec
-from tactbench.core.spec.units import conversion
 
-Row = Mapping[str, Any]
-State = Literal["met", "missed", "unknown"]
-
-_PARTS = ("sampling", "link", "window", "features", "prediction")
-"""Parts of an answer's delay, in the order in which they pass."""
 _OF_DEVICES = ("length", "mass", "interface", "power", "availability")
 """Facts of a data sheet that no wish asks for and every integrator needs."""
-
-
-class Wish(NamedTuple):
-    """What an integrator wants; None: no matter."""
-
-    max_delay_ms: float | None = None
-    """Largest time from a touch to the answer [ms]."""
-    range_n: float | None = None
-    """Largest normal force that must be told [N]."""
-    rate_hz: float | None = None
-    """Smallest rate of answers [Hz]."""
-    max_error: float | None = None
-    """Largest score of a metric that is an error [the metric's unit]."""
-    min_score: float | None = None
-    """Smallest score of any other metric."""
-
-
-@dataclass(frozen=True)
-class Criterion:
-    """How one answer stands to one wish."""
-
-    wish: str
-    """``answer delay``, ``force range``, ``rate`` or ``score``."""
-    state: State
-    text: str
-    """What is known, in a few words."""
-    value: float | None = None
-    """What the wish is compared with, in its unit; None: unknown."""
-    short_by: float = 0.0
-    """By how much it is missed, in its unit; 0 where it is not."""
-    relative: float = 0.0
-    """The same over the wish [1]."""
-    missed_by: str = ""
-    """The same in words."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +63,8 @@ class Choice:
     verdict: str
     candidates: tuple[Candidate, ...]
     """One a sensor: those that meet all by score, then those with fewest unknowns, then those that miss least."""
+    intervals: tuple[str, ...]
+    """What the intervals are of."""
     unknown: tuple[str, ...]
     """What would have to be known, and what to do for it."""
     left_out: tuple[str, ...]
@@ -102,11 +75,14 @@ class Choice:
         found = []
         for one in self.candidates:
             row, criteria = one.row, [asdict(criterion) for criterion in one.criteria]
-            known = {key: row.get(key) for key in ("cell", "sensor", "estimator", "params", "simulated", "baseline")}
+            known = {
+                key: row.get(key)
+                for key in ("cell", "sensor", "estimator", "params", "simulated", "baseline", "ci_method")
+            }
             found.append({**known, "score": one.score, "low": one.low, "high": one.high, "criteria": criteria})
         return {
             "hardware": self.hardware, "verdict": self.verdict, "quantity": self.quantity, "unit": self.unit,
-            "candidates": found, "unknown": self.unknown, "left_out": self.left_out,
+            "candidates": found, "intervals": self.intervals, "unknown": self.unknown, "left_out": self.left_out,
         }  # fmt: skip
 
 
@@ -141,7 +117,6 @@ class _Choosing:
         self.sign = 1.0 if self.lower else -1.0
         self.beyond = bool(done) and all(row.get("score_beyond_floor") is not None for row in done)
         self.answers = _one_each(done)
-        self.pressed_n = max((planned.scene.profile.largest_n for planned in task.scenes), default=None)
 
     def choice(self, hardware: str) -> Choice:
         by_sensor: dict[str, list[Candidate]] = {}
@@ -171,8 +146,12 @@ class _Choosing:
         unknown.update(dict.fromkeys(self.of_all(chosen)))
         name = metric_name({"metric": self.task.metric, "unit": self.task.unit})
         quantity = name.replace(" [", " beyond the reference's noise [") if self.beyond else name
-        verdict = self.verdict(chosen)
-        return Choice(hardware, quantity, self.task.unit, verdict, tuple(chosen), tuple(unknown), tuple(left_out))
+        methods = dict.fromkeys(visible(str(one.row.get("ci_method") or "")) for one in chosen if one.low is not None)
+        intervals = tuple(method if "%" in method else f"95 %, {method}" for method in methods if method)
+        return Choice(
+            hardware, quantity, self.task.unit, self.verdict(chosen), tuple(chosen), intervals, tuple(unknown),
+            tuple(left_out),
+        )  # fmt: skip
 
     def exists(self, sensor: str) -> bool:
         return sensor not in self.sensors or self.sensors[sensor].data_sheet.exists
@@ -181,11 +160,10 @@ class _Choosing:
         keys = ("score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high")
         value, low, high = (row.get(key) for key in (keys if self.beyond else ("score", "ci_low", "ci_high")))
         assert value is not None
-        checks = (self.delay(row), self.range(row), self.rate(row), self.score(value, low, high))
-        criteria = [one for one in checks if one is not None]
-        if row.get("baseline") is None:
-            criteria.append(Criterion("trivial answer", "unknown", "no trivial answer beside it"))
-        return Candidate(sensor_name(row), answer_name(row), value, low, high, tuple(criteria), row)
+        figure, spec = Figure(value, low, high), self.sensors.get(row["sensor"])
+        return Candidate(
+            sensor_name(row), answer_name(row), *figure, criteria_of(row, figure, self.wish, self.task, spec), row
+        )
 
     def order(self, one: Candidate) -> tuple[Any, ...]:
         """Sort by: fewest missed, fewest unknown, least missed in proportion to the wish; then the better score."""
@@ -194,105 +172,18 @@ class _Choosing:
         better = (self.sign * one.score, self.sign * one.row["score"], one.sensor, one.estimator)
         return bool(missed), len(missed), len(unknown), round(worst, 9), *better
 
-    # The wishes, one by one.
-
-    def delay(self, row: Row) -> Criterion | None:
-        wished, name = self.wish.max_delay_ms, "answer delay"
-        if wished is None:
-            return None
-        told, looks = row.get("answer_delay_ms"), row.get("looks_at") == "features"
-        parts = {part: time for part, time in (row.get("delay_parts_ms") or {}).items() if time is not None}
-        least = told if told is not None else sum(parts.values()) if parts else row.get("latency_ms_p50")
-        if least is None:
-            return Criterion(name, "unknown", "not timed")
-        assumed = "sampling" in parts and not self.sampled(row)[1]
-        sure = least - parts["sampling"] if assumed else least
-        # Without the link an answer from readings is later than its row says.
-        whole = told is not None and not assumed and not (parts and looks and "link" not in parts)
-        if sure > wished or whole:
-            how = "" if whole else "at least "
-            return _at_most(name, sure, wished, how + _ms(sure), lambda ms: how + _ms(ms), "too slow")
-        lacking = [part for part in _PARTS if part not in parts]
-        without = f" without {_listed(lacking)}" if lacking else ""
-        text = f"{_ms(least)}{without}" if parts else f"prediction alone {_ms(least)}"
-        return Criterion(name, "unknown", text + (" by an assumed rate" if assumed else ""))
-
-    def range(self, row: Row) -> Criterion | None:
-        wished, name = self.wish.range_n, "force range"
-        if wished is None:
-            return None
-        spec = self.sensors.get(row["sensor"])
-        stated = spec.data_sheet.force_range if spec else None
-        if stated is None or stated.source.tag == "assumed":
-            return Criterion(name, "unknown", "not stated" if stated is None else f"{stated}, assumed")
-        upper = stated.upper * conversion(stated.unit, "N")
-        return _at_least(name, upper, wished, str(stated), _newtons, "short of range")
-
-    def rate(self, row: Row) -> Criterion | None:
-        wished, name = self.wish.rate_hz, "rate"
-        if wished is None:
-            return None
-        (sampled, stated), taken = self.sampled(row), row.get("latency_ms_p50")
-        if sampled is None:
-            return Criterion(name, "unknown", "not stated")
-        answered = 1e3 / taken if taken else None
-        if answered is not None and answered < min(sampled, wished):
-            text = f"{_hz(answered)}: an answer takes {_ms(1e3 / answered)}"
-            return _at_least(name, answered, wished, text, _hz, "too low")
-        if not stated:
-            return Criterion(name, "unknown", f"{_hz(sampled)}, assumed")
-        if answered is None and sampled >= wished:
-            return Criterion(name, "unknown", f"samples at {_hz(sampled)}, answers not timed")
-        rate = sampled if answered is None else min(sampled, answered)
-        return _at_least(name, rate, wished, _hz(rate), _hz, "too low")
-
-    def sampled(self, row: Row) -> tuple[float | None, bool]:
-        """Return the rate [Hz] of the sensor's slowest stream that answers look at, and whether a source states it."""
-        spec = self.sensors.get(row["sensor"])
-        streams = [
-            stream
-            for stream in (spec.streams if spec else ())
-            if any(channel.kind in self.task.features for channel in stream.channels)
-        ]
-        rates = [stream.rate_hz for stream in streams if stream.rate_hz is not None]
-        if not streams or len(rates) < len(streams):
-            return None, False
-        sources = [stream.rate_source for stream in streams]
-        return min(rates), all(source is not None and source.tag != "assumed" for source in sources)
-
-    def score(self, value: float, low: float | None, high: float | None) -> Criterion | None:
-        wished = self.wish.max_error if self.lower else self.wish.min_score
-        if wished is None:
-            return None
-
-        def told(number: float) -> str:
-            return score(number, self.task.unit) + suffix(self.task.unit)
-
-        compare, word = (_at_most, "above the wished error") if self.lower else (_at_least, "below the wished score")
-        found = compare("score", value, wished, "", told, word)
-        if found.state == "missed":
-            return replace(found, text=found.missed_by)
-        if self.wish.range_n is not None and (self.pressed_n is None or self.wish.range_n > self.pressed_n):
-            until = "nobody says how far" if self.pressed_n is None else f"to {_newtons(self.pressed_n)} only"
-            return Criterion("score", "unknown", until)
-        end = high if self.lower else low
-        crosses = end is not None and self.sign * end > self.sign * wished
-        return replace(found, text="but not by its whole interval" if crosses else "")
-
-    # What is said of them.
-
     def verdict(self, chosen: Sequence[Candidate]) -> str:
         if not chosen:
             return f"Cannot say: no answer to {self.task.name} here can be proposed."
-        first, count = chosen[0], sum(one is not None for one in self.wish)
+        first, count = chosen[0], len(chosen[0].criteria)
         name = f"{first.sensor} / {first.estimator}"
         missed, unknown = first.named("missed"), [one.wish for one in first.named("unknown")]
-        unsure = unknown and f"its {_listed(unknown)} {'is' if len(unknown) == 1 else 'are'} unknown"
+        unsure = unknown and f"its {listed(unknown)} {'is' if len(unknown) == 1 else 'are'} unknown"
         if missed:
             by = " and ".join(one.missed_by for one in missed)
             return f"None meets all: nearest is {name}, {by}" + (f"; {unsure}." if unknown else ".")
         if unknown:
-            return f"Cannot say: {name} misses nothing that is known, but {unsure}."
+            return f"Cannot say: none is known to meet all; {name} misses nothing that is known, but {unsure}."
         if not count:
             return f"{name} has the best score."
         others = [one for one in chosen[1:] if not one.named("missed") and not one.named("unknown")]
@@ -315,7 +206,7 @@ class _Choosing:
             elif criterion.wish == "rate":
                 yield f"the rate of {sensor}: {criterion.text}; ask its maker, or measure it on your set-up."
             elif criterion.wish == "score":
-                yield f"the error of {sensor} up to {_newtons(self.wish.range_n)}: it was pressed {criterion.text}."
+                yield f"the score of {sensor} over the wished range: {criterion.text}."
             else:
                 yield f"whether {sensor} / {one.estimator} beats a trivial answer; run `{again}`."
         if one.low is None or one.high is None:
@@ -324,16 +215,20 @@ class _Choosing:
     def of_all(self, chosen: Sequence[Candidate]) -> Iterable[str]:
         """Yield what no answer here can say."""
         wished = self.wish.range_n
-        if chosen and wished is not None and self.pressed_n is not None and wished > self.pressed_n:
-            yield f"any error beyond {_newtons(self.pressed_n)}: the scenes of {self.task.name} press no harder."
+        if chosen and wished is not None:
+            pressed = pressed_n(chosen[0].row, self.task)
+            if pressed is None:
+                yield "up to which force these scores hold: the rows do not say how hard was pressed."
+            elif wished > pressed:
+                yield f"any error beyond {newtons(pressed)}: the scenes of {self.task.name} press no harder."
         lacking: dict[str, list[str]] = {}
         for name in (one.row["sensor"] for one in chosen):
             sheet = self.sensors[name].data_sheet if name in self.sensors else DataSheet()
             facts = [visible(fact) for fact in _OF_DEVICES if getattr(sheet, fact) is None]
             if facts:
-                lacking.setdefault(_listed(facts), []).append(name)
+                lacking.setdefault(listed(facts), []).append(name)
         for facts_text, names in lacking.items():
-            yield f"{facts_text} of {_listed(names)}; `{command_line('tactbench', 'show', *names)}` has what is stated."
+            yield f"{facts_text} of {listed(names)}; `{command_line('tactbench', 'show', *names)}` has what is stated."
         if chosen and all(one.row["simulated"] for one in chosen):
             replay = command_line(
                 "tactbench", "run", "--rig", "replay", "--recordings", "DIR", "--task", self.task.name
@@ -348,10 +243,6 @@ class _Choosing:
         protocol = self.rows[0]["protocol"]
         return command_line("tactbench", "run", "--sensor", sensor, "--task", self.task.name,
                             "--protocol", protocol, *more)  # fmt: skip
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def _one_each(rows: Sequence[Row]) -> list[Row]:
@@ -370,36 +261,6 @@ def _apart(one: Candidate, other: Candidate) -> bool:
     if one.low is None or one.high is None or other.low is None or other.high is None:
         return False
     return one.high < other.low or other.high < one.low
-
-
-_Told = Callable[[float], str]
-
-
-def _at_most(name: str, value: float, wished: float, text: str, told: _Told, word: str) -> Criterion:
-    return _compared(name, value, wished, value - wished, text, told, word)
-
-
-def _at_least(name: str, value: float, wished: float, text: str, told: _Told, word: str) -> Criterion:
-    return _compared(name, value, wished, wished - value, text, told, word)
-
-
-def _compared(name: str, value: float, wished: float, short: float, text: str, told: _Told, word: str) -> Criterion:
-    if not short > 0:
-        return Criterion(name, "met", text, value)
-    missed = f"{told(short)} {word}"
-    return Criterion(name, "missed", f"{text}, {missed}", value, short, short / wished if wished else 1.0, missed)
-
-
-def _ms(milliseconds: float) -> str:
-    return duration(milliseconds * 1e-3)
-
-
-def _hz(hertz: float) -> str:
-    return f"{hertz:.3g} Hz"
-
-
-def _newtons(newtons: float | None) -> str:
-    return ABSENT if newtons is None else f"{newtons:.3g} N"
 
 
 def interval_text(one: Candidate, unit: str) -> str:

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.choosing import Wish, choose
+from tactbench.core.leaderboard.choosing import choose
+from tactbench.core.leaderboard.criteria import Wish
 from tactbench.core.spec.task import PlannedScene
 from tactbench.plugin import ChannelSpec, DataSheet, PhysicalRange, Scene, SensorSpec, Source, StreamSpec
 from tests.core.leaderboard.rows import TASK, row
@@ -205,6 +206,13 @@ def test_a_definition_is_never_proposed():
 
 maybe = st.none() | st.floats(0.1, 100)
 sources = st.sampled_from([STATED, ASSUMED, None])
+
+
+def test_measured_rows_do_not_say_how_hard_was_pressed():
+    measured = answer(simulated=False)
+    assert states(only([measured], Wish(range_n=1, max_error=0.6)))["score"] == "unknown"
+    assert states(only([measured], Wish(max_error=0.6)))["score"] == "met"
+    assert any("do not say how hard" in one for one in only([measured], Wish(range_n=1)).unknown)
 
 
 @given(delay=maybe, link=st.booleans(), rate=maybe, rate_source=sources, upper=maybe,
