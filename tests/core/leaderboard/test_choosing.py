@@ -165,6 +165,17 @@ def test_order_all_met_then_fewest_unknown_then_least_missed():
     )
 
 
+def test_order_of_those_that_miss_fewest_misses_then_fewest_unknowns_then_the_least_miss():
+    rows = [
+        answer("two", score=0.1, delay=2.1), answer("one-unsure", score=0.2), answer("far", score=0.3),
+        answer("near", score=0.4),
+    ]  # fmt: skip
+    sensors = (sensor("two", upper=4.9), sensor("one-unsure", upper=4.9, rate_source=ASSUMED),
+               sensor("far", upper=3.0), sensor("near", upper=4.0))  # fmt: skip
+    choice = only(rows, Wish(max_delay_ms=2, range_n=5, rate_hz=10), *sensors)
+    assert [one.row["sensor"] for one in choice.candidates] == ["near", "far", "one-unsure", "two"]
+
+
 def test_a_sensor_stands_with_the_estimator_that_comes_nearest():
     rows = [answer(estimator="forest", score=0.1, delay=20.0), answer(score=0.3), answer(estimator="ols", score=0.4)]
     choice = only(rows, Wish(max_delay_ms=2))
