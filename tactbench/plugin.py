@@ -58,10 +58,12 @@ from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
     Creep,
+    DataSheet,
     Nuisances,
     PhysicalRange,
     Scenario,
     SensorSpec,
+    Statement,
     StreamSpec,
 )
 from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPad, SheetTable, Skin, SkinSheet
@@ -85,6 +87,7 @@ __all__ = [
     "CostStudy",
     "Creep",
     "DataError",
+    "DataSheet",
     "Dome",
     "EffectDescriptor",
     "Environment",
@@ -131,6 +134,7 @@ __all__ = [
     "SkinState",
     "Slide",
     "Source",
+    "Statement",
     "StreamSpec",
     "Surface",
     "TactbenchError",

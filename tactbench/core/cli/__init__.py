@@ -17,6 +17,7 @@ VERBS = {
     "list": ("listing", "List sensors, rigs, tasks, estimators and effects."),
     "plugins": ("plugins", "List plugins, and why one could not be used."),
     "show": ("show", "Show sensors side by side, or a task, rig or estimator."),
+    "choose": ("choose", "Say which sensor meets a wish, which misses it by how much, and what is unknown."),
     "record": ("record", "Carry out one scene into one recording."),
     "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
     "import": ("import_", "Turn foreign tables into recordings, as a mapping file says."),

@@ -52,6 +52,17 @@ def packaged_matrices() -> dict[str, Path]:
     return {}
 
 
+def shipped_results() -> Path:
+    """Return the file of results that came with tactbench; raises ConfigError if the installation has lost it."""
+    package = Path(tactbench.__file__).parent
+    places = (package / "results" / "default.json", package.parent / "examples" / "results" / "default.json")
+    for place in places:
+        if place.is_file():
+            return place
+    raise ConfigError(places[0].name, None, "tactbench was installed without its results.",
+                      hint="Make some with `tactbench run --protocol deployable`.")  # fmt: skip
+
+
 def matrix_called(given: str) -> MatrixSpec:
     """Return the matrix in the file `given`, or the packaged one of that name.
 

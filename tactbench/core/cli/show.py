@@ -9,7 +9,7 @@ import click
 
 if TYPE_CHECKING:
     from tactbench.core.leaderboard.datasheet import Comparison
-    from tactbench.core.plugins.registry import Registry
+    from tactbench.core.plugins.registry import Owned, Registry
     from tactbench.core.spec.sensor import SensorSpec
 
 
@@ -18,48 +18,94 @@ if TYPE_CHECKING:
 @click.option("--all", "everything", is_flag=True, help="Every parameter, and who states it.")
 @click.option("--format", "shape", type=click.Choice(("table", "json", "md")), default="table", show_default=True)
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
-    """Show sensors side by side (the paper's Table I), or a task, rig or estimator."""
+    """Show sensors side by side (the paper's Table I and their data sheets), or a task, rig, estimator or effect."""
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()
-    if shape == "md" and not all(name in registry.sensors for name in names):
-        raise UsageError("Only sensors can be shown as Markdown.", hint="Leave --format out, or take --format json.")
-    if all(name in registry.sensors for name in names):
-        _sensors([registry.sensors[name].spec for name in names], everything, shape)
-        return
-    shelves = [shelf for shelf in registry.shelves().values() for name in names if name in shelf]
+    shelves = registry.shelves()
     for name in names:
-        if not any(name in shelf for shelf in shelves):
-            known = [known for shelf in registry.shelves().values() for known in shelf.names()]
+        if not any(name in shelf for shelf in shelves.values()):
+            known = [known for shelf in shelves.values() for known in shelf.names()]
             raise UnknownNameError("sensor, rig, task, estimator or effect", name, known)
-    found = [shown for name in names for shown in _described(name, registry)]
-    click.echo(json.dumps(found[0] if len(found) == 1 else found, indent=1, ensure_ascii=False))
+    only_sensors = all(name in registry.sensors for name in names)
+    if shape == "md" and not only_sensors:
+        raise UsageError("Only sensors can be shown as Markdown.", hint="Leave --format out, or take --format json.")
+    if shape == "json" and not only_sensors:
+        found = [shown for name in names for shown in _described(name, registry)]
+        click.echo(json.dumps(found[0] if len(found) == 1 else found, indent=1, ensure_ascii=False))
+        return
+    sensors = [registry.sensors[name].spec for name in names if name in registry.sensors]
+    if sensors:
+        _sensors(sensors, everything, shape)
+    if not only_sensors:
+        _pages([shelf.owned(name) for name in names for kind, shelf in shelves.items()
+                if kind != "sensors" and name in shelf])  # fmt: skip
 
 
 def _described(name: str, registry: Registry) -> list[dict[str, Any]]:
     """Return what is installed under `name`, one description for each kind of plugin that has it."""
     owners = [shelf.owned(name) for shelf in registry.shelves().values() if name in shelf]
-    return [
-        {
-            "brought by": f"{owned.distribution} {owned.version} ({owned.module})",
-            **owned.descriptor.model_dump(mode="json"),
-        }
-        for owned in owners
-    ]
+    return [{"brought by": _owner(owned), **_dumped(owned.descriptor)} for owned in owners]
+
+
+def _dumped(descriptor: Any) -> dict[str, Any]:
+    dumped: dict[str, Any] = descriptor.model_dump(mode="json")
+    if hasattr(descriptor, "transducer"):
+        dumped["spec"] = _sensor(descriptor.spec)
+    return dumped
+
+
+def _sensor(spec: SensorSpec) -> dict[str, Any]:
+    return {**spec.model_dump(mode="json"), "data_sheet": spec.data_sheet.model_dump(mode="json")}
+
+
+def _owner(owned: Owned[Any]) -> str:
+    return f"{owned.distribution} {owned.version} ({owned.module})"
+
+
+def _pages(owners: list[Owned[Any]]) -> None:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from tactbench.core.cli.pages import page_of
+    from tactbench.core.cli.screen import console
+
+    screen = console()
+    for owned in owners:
+        page = page_of(owned.descriptor)
+        screen.print(Text(page.title, style="bold"))
+        screen.print(Text(f"brought by {_owner(owned)}", style="dim"))
+        for section in page.sections:
+            if section.title:
+                screen.print()
+                screen.print(Text(section.title, style="bold"))
+            grid = Table(box=box.SIMPLE_HEAD if section.head else None, show_header=bool(section.head),
+                         pad_edge=False, padding=(0, 1))  # fmt: skip
+            for place in range(max(map(len, section.lines))):
+                title = section.head[place] if section.head else ""
+                words = " ".join([title, *(line[place] for line in section.lines)]).split()
+                grid.add_column(Text(title), min_width=max(map(len, words), default=1) if section.head else None)
+            for line in section.lines:
+                grid.add_row(*map(Text, line))
+            screen.print(grid)
+        screen.print()
 
 
 def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
-    from tactbench.core.leaderboard.datasheet import details, parameters_markdown, table_one
+    from tactbench.core.leaderboard.datasheet import data_sheets, details, parameters_markdown, table_one
 
     if shape == "json":
-        click.echo(json.dumps([sensor.model_dump(mode="json") for sensor in sensors], indent=1, ensure_ascii=False))
+        click.echo(json.dumps([_sensor(sensor) for sensor in sensors], indent=1, ensure_ascii=False))
         return
     if shape == "md":
         click.echo(parameters_markdown(sensors), nl=False)
         return
     rows = table_one(sensors)
     _grid("Sensor comparison (Table I of Karl et al. 2016)", sensors, rows, with_source=everything)
+    _grid("Data sheet", sensors, data_sheets(sensors), with_source=everything)
+    rows += data_sheets(sensors)
     more = details(sensors)
     if everything:
         _grid("Everything the specs state", sensors, more, with_source=True)

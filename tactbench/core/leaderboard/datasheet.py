@@ -6,10 +6,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from tactbench.core.spec.quantity import Quantity, Source
-from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, SensorSpec
+from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, PhysicalRange, SensorSpec, Statement
 from tactbench.core.spec.skin import SheetTable
 
 ABSENT = "-"
+UNKNOWN = "unknown"
+"""What stands where no source states a fact that every device has."""
+OF_DEVICES = ("force_range", "length", "width", "height", "mass", "interface", "power", "availability")
+"""Fields of a data sheet, in the order in which they are shown."""
 
 # Rows of Table I of Karl et al. 2016: title, kind of channel, and whether its range or its band is meant.
 _TABLE_ONE: tuple[tuple[str, ChannelKind, str], ...] = (
@@ -48,6 +52,13 @@ def table_one(sensors: Sequence[SensorSpec]) -> list[Comparison]:
         Comparison(title, tuple(_range(sensor, kind, which) for sensor in sensors)) for title, kind, which in _TABLE_ONE
     ]
     return rows
+
+
+def data_sheets(sensors: Sequence[SensorSpec]) -> list[Comparison]:
+    """Return the sensors as devices: range, size, mass, interface, power, availability."""
+    return [
+        Comparison(name.replace("_", " "), tuple(_of_device(sensor, name) for sensor in sensors)) for name in OF_DEVICES
+    ]
 
 
 def details(sensors: Sequence[SensorSpec]) -> list[Comparison]:
@@ -98,6 +109,13 @@ def _range(sensor: SensorSpec, kind: ChannelKind, which: str) -> Fact:
         if found is not None:
             return _sourced(str(found), found.source)
     return Fact(ABSENT)
+
+
+def _of_device(sensor: SensorSpec, name: str) -> Fact:
+    stated: PhysicalRange | Quantity | Statement | None = getattr(sensor.data_sheet, name)
+    if stated is None:
+        return Fact(UNKNOWN if sensor.data_sheet.exists else ABSENT)
+    return _sourced(stated.text if isinstance(stated, Statement) else str(stated), stated.source)
 
 
 def _streams(sensor: SensorSpec) -> Fact:

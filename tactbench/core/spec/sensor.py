@@ -149,6 +149,48 @@ class Scenario(Frozen):
     """By kind of channel, in place of the spec's own; kinds that are not here keep theirs."""
 
 
+class Statement(Frozen):
+    """What a document says in words."""
+
+    text: str = Field(min_length=1)
+    source: Source
+
+
+class DataSheet(Frozen):
+    """What an integrator asks of a sensor as a device. What no source states stays None: unknown, never guessed."""
+
+    force_range: PhysicalRange | None = None
+    """Normal forces it answers to [force]."""
+    length: Quantity | None = None
+    """Of the sensing part, along the finger [length]."""
+    width: Quantity | None = None
+    """Across the finger [length]."""
+    height: Quantity | None = None
+    """From the mount to the touched surface [length]."""
+    mass: Quantity | None = None
+    """Without cable and mount [mass]."""
+    interface: Statement | None = None
+    """How readings leave it."""
+    power: Quantity | None = None
+    """Drawn from its supply [power]."""
+    availability: Statement | None = None
+    """Whether and where it can be had."""
+    exists: bool = True
+    """False: a definition, no device; `tactbench choose` leaves it out."""
+
+    @model_validator(mode="after")
+    def _has_its_units(self) -> DataSheet:
+        for name, unit in (("length", "mm"), ("width", "mm"), ("height", "mm"), ("mass", "kg"), ("power", "W")):
+            stated: Quantity | None = getattr(self, name)
+            if stated is not None and not stated.to(unit) > 0:
+                raise ValueError(f"{name} is above 0 {unit}; leave it out where nobody states it")
+        if self.force_range is not None:
+            units.conversion(self.force_range.unit, "N")
+            if not 0 <= self.force_range.lower < self.force_range.upper:
+                raise ValueError("a force range goes from 0 or more up to a larger force")
+        return self
+
+
 class SensorSpec(Frozen):
     """A tactile sensor. See ``docs/plugins.md`` for a worked example."""
 
@@ -168,6 +210,8 @@ class SensorSpec(Frozen):
     """Ways of handling the sensor that its usual nuisances do not cover, by name; used where a scene's simulation asks
     for one."""
     references: tuple[str, ...] = ()
+    data_sheet: DataSheet = Field(default=DataSheet(), exclude=True)
+    """Size, range, interface … of the device. Left out of recordings and keys: no sample depends on it."""
     likeness: tuple[RealFigure, ...] = Field(default=(), exclude=True)
     """Figures of real units, to judge by. Left out of recordings and keys: no sample depends on them."""
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 
 from tactbench.plugin import (
+    DataSheet,
     Dome,
     FluidBackedShell,
+    PhysicalRange,
     Quantity,
     SensorSpec,
     SkinSheet,
     Source,
+    Statement,
     assumed,
     derived,
     measured,
@@ -101,6 +104,27 @@ PARAMETERS: dict[str, Quantity] = {
     **THERMAL,
 }
 
+_SP_MANUAL = "SynTouch BioTac SP product manual (26 Oct 2015), which says that the BioTac speaks the same protocol"
+# Mass, supply power, height and availability: no source read so far states them.
+DATA_SHEET = DataSheet(
+    force_range=PhysicalRange(
+        lower=0.1,
+        upper=30.0,
+        unit="N",
+        source=Source(
+            tag="sourced",
+            reference="Wettels, Santos, Johansson, Loeb 2008, abstract: impedance over 0.1-30 N, on the prototype; "
+            "largest load by the BioTac SP's product manual: 250 N",
+        ),
+    ),
+    length=derived(29.0, "mm", f"core of 26.95 mm, film .45 and skin 1.6 mm at the tip; no mount; {_MESH}"),
+    width=derived(16.2, "mm", f"twice the skin's outer radius of 8.08-8.31 mm, the smaller; {_MESH}"),
+    interface=Statement(
+        text="SPI mode 0, 0.5-10 MHz, 2-byte words with parity; supply 3.3-5 V",
+        source=Source(tag="sourced", reference=f"{_SP_MANUAL}, sections 7 and 8.2; kth-ros-pkg/biotac_driver: mode 0"),
+    ),
+)
+
 SPEC = SensorSpec(
     name="biotac",
     title="SynTouch BioTac",
@@ -112,6 +136,7 @@ SPEC = SensorSpec(
     nuisances=NUISANCES,
     scenarios={"hard-handled": HARD_HANDLED},
     likeness=LIKENESS,
+    data_sheet=DATA_SHEET,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",
         "Wettels, Santos, Johansson, Loeb 2008 (impedance of the electrodes)",

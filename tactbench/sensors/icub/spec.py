@@ -6,12 +6,14 @@ import math
 
 from tactbench.plugin import (
     Creep,
+    DataSheet,
     FoamPad,
     Nuisances,
     Quantity,
     SensorSpec,
     SkinSheet,
     Source,
+    Statement,
     assumed,
     derived,
     measured,
@@ -81,6 +83,20 @@ NUISANCES = Nuisances(
     ),
 )
 
+# Force range, height, mass, supply power and availability: no source read so far states them.
+DATA_SHEET = DataSheet(
+    length=sourced(14.5, "mm", _SCHMITZ),
+    width=sourced(13.0, "mm", _SCHMITZ),
+    interface=Statement(
+        text="AD7147 chip on I2C; on the robot by a board on CAN, 1 Mbit/s",
+        source=Source(
+            tag="sourced",
+            reference="robotology/icub-firmware (chip, I2C), robotology/icub-main CanBusSkin (bit rate); Karl et al. "
+            "2016 read the chip by I2C",
+        ),
+    ),
+)
+
 SPEC = SensorSpec(
     name="icub",
     title="iCub fingertip",
@@ -91,6 +107,7 @@ SPEC = SensorSpec(
     parameters=PARAMETERS,
     nuisances={"taxel": NUISANCES},
     likeness=LIKENESS,
+    data_sheet=DATA_SHEET,
     references=(
         "Karl et al. 2016, ML-based tactile sensor calibration: A universal approach",
         "Schmitz et al. 2010 (fingertip, abstract)",

@@ -9,6 +9,7 @@ from __future__ import annotations
 from tactbench.plugin import (
     BondedLayer,
     ChannelSpec,
+    DataSheet,
     Nuisances,
     Quantity,
     SensorDescriptor,
@@ -96,6 +97,7 @@ SPEC = SensorSpec(
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances={"taxel": _NONE},
+    data_sheet=DataSheet(exists=False),
 )
 
 

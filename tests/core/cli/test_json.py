@@ -14,6 +14,7 @@ VERBS = {
     "list": (),
     "plugins": (),
     "show": ("biotac", "icub", "force"),
+    "choose": ("--task", "force"),
     "inspect": ("ideal.h5",),
     "leaderboard": (),
     "report": (),

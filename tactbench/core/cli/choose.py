@@ -1,0 +1,199 @@
+"""``tactbench choose``: which sensor meets a wish."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tactbench.core.cli.results import is_results, opened, shown_rows
+
+if TYPE_CHECKING:
+    from tactbench.core.leaderboard.choosing import Choice
+    from tactbench.core.leaderboard.criteria import Wish
+    from tactbench.core.spec.task import TaskSpec
+
+Row = dict[str, Any]
+_DEFAULT = Path("tactbench-results")
+_PREFERRED = "deployable"
+
+
+def _positive(option: str, words: str) -> Callable[[Any], Any]:
+    kind = click.FloatRange(min=0, min_open=True)
+    return click.option(option, type=kind, metavar="X", callback=_finite, help=words)
+
+
+def _finite(context: click.Context, option: click.Parameter, value: float | None) -> float | None:
+    if value is not None and not math.isfinite(value):
+        raise click.BadParameter(f"{value} is no finite number.", context, option)
+    return value
+
+
+@click.command(name="choose")
+@click.argument("folder", type=click.Path(path_type=Path), required=False)
+@click.option("--task", "task_name", required=True, metavar="NAME", help="What the sensor is to tell.")
+@_positive("--max-delay-ms", "Largest delay from the touch to the answer, in ms.")
+@_positive("--range-n", "Largest normal force to be told, in N.")
+@_positive("--rate-hz", "Smallest rate of answers, in Hz.")
+@_positive("--max-error", "Largest error, in the task's unit; of force beyond the noise of its reference.")
+@_positive("--min-score", "Smallest score, where the task has one and no error.")
+@click.option("--protocol", metavar="NAME", help="Default: deployable, what a sensor in use can do.")
+@click.option("--split", metavar="NAME", help="Default: the first of the task's splits that there are results of.")
+@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
+def command(
+    folder: Path | None, task_name: str, max_delay_ms: float | None, range_n: float | None, rate_hz: float | None,
+    max_error: float | None, min_score: float | None, protocol: str | None, split: str | None, shape: str,
+) -> None:  # fmt: skip
+    """Say which sensor meets a wish, which misses it by how much, and what is unknown.
+
+    FOLDER is what `run --out` wrote; default: tactbench-results, and the results that came with tactbench where that
+    has none of the task.
+    """
+    from tactbench.core.leaderboard.choosing import choose
+    from tactbench.core.leaderboard.criteria import Wish
+    from tactbench.core.leaderboard.records import json_text
+    from tactbench.core.plugins.registry import load_registry
+
+    registry = load_registry()
+    task = registry.tasks[task_name].spec
+    wish = Wish(max_delay_ms, range_n, rate_hz, max_error, min_score)
+    _check(wish, task)
+    rows, origin = _results(folder, task)
+    rows, heading = _selected(rows, task, protocol, split)
+    choices = choose(rows, wish, task, {one.name: one.spec for one in registry.sensors})
+    if shape == "json":
+        told = {"task": task.name, "wish": wish._asdict(), "results": origin, "protocol": rows[0]["protocol"],
+                "split": rows[0]["split"], "choices": [choice.record() for choice in choices]}  # fmt: skip
+        click.echo(json_text(told, indent=1))
+        return
+    for choice in choices:
+        _print(choice, f"{heading} · {choice.hardware}")
+    from tactbench.core.cli.screen import console
+
+    console().print(f"From {origin}.", markup=False)
+
+
+def _check(wish: Wish, task: TaskSpec) -> None:
+    from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.names import LOWER_IS_BETTER
+
+    lower = task.metric in LOWER_IS_BETTER
+    if wish.min_score is not None and lower:
+        raise UsageError(f"The {task.metric} of {task.name} is an error.", hint="Give --max-error instead.")
+    if wish.max_error is not None and not lower:
+        raise UsageError(
+            f"The {task.metric} of {task.name} is a score, and no error.", hint="Give --min-score instead."
+        )
+
+
+def _results(folder: Path | None, task: TaskSpec) -> tuple[list[Row], str]:
+    """Return the rows of a task, and where they are from."""
+    from tactbench.core.errors import UsageError
+
+    hint = f"Make some: `tactbench run --task {task.name} --protocol {_PREFERRED}`."
+    if folder is not None or is_results(_DEFAULT):
+        store = opened(folder or _DEFAULT)
+        rows = [row for row in shown_rows(store) if row["task"] == task.name]
+        if rows:
+            return rows, f"the results in {store.folder}"
+        if folder is not None:
+            raise UsageError(f"{folder} has no results for the task {task.name}.", hint=hint)
+    rows, origin = _shipped()
+    rows = [row for row in rows if row["task"] == task.name]
+    if not rows:
+        raise UsageError(f"No results of the task {task.name} came with tactbench.", hint=hint)
+    return rows, origin
+
+
+def _shipped() -> tuple[list[Row], str]:
+    """Return the rows that came with tactbench, and how they were made."""
+    from tactbench.core.cli.config import shipped_results
+    from tactbench.core.errors import ConfigError
+    from tactbench.core.matrix.leaving import fill_baselines
+
+    path = shipped_results()
+    try:
+        shipped = json.loads(path.read_text(encoding="utf-8"))
+        rows: list[Row] = shipped["rows"]
+        made = (f"the results that came with tactbench (made by {shipped['command']} of version {shipped['version']}, "
+                f"seed {shipped['seed']}, {shipped['replicates']}; times of another machine)")  # fmt: skip
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ConfigError(str(path), None, f"cannot be used ({type(error).__name__}).",
+                          hint="Install tactbench again.") from error  # fmt: skip
+    fill_baselines(rows)
+    return rows, made
+
+
+def _selected(rows: list[Row], task: TaskSpec, protocol: str | None, split: str | None) -> tuple[list[Row], str]:
+    """Return the rows of one protocol and split, and what they are called."""
+    from tactbench.core.errors import UnknownNameError
+
+    done = [row for row in rows if row["status"] == "done"] or rows
+    protocols = list(dict.fromkeys(row["protocol"] for row in done))
+    chosen = protocol or next((name for name in (_PREFERRED, *task.protocols) if name in protocols), protocols[0])
+    if chosen not in protocols:
+        raise UnknownNameError("protocol with results", chosen, protocols)
+    splits = list(dict.fromkeys(str(row["split"]) for row in done if row["protocol"] == chosen))
+    kept = split or next((name for name in task.splits if name in splits), splits[0])
+    if kept not in splits:
+        raise UnknownNameError("split with results", kept, splits)
+    found = [row for row in rows if row["protocol"] == chosen and str(row["split"]) in (kept, "None")]
+    dagger = " † (uses test-set statistics, as no sensor in use can)" if any(row["dagger"] for row in found) else ""
+    unasked = protocol is None and chosen != _PREFERRED
+    why = f", for there are no results under {_PREFERRED}" if unasked else ""
+    return found, f"{task.name} · protocol {chosen}{dagger}{why} · split {kept}"
+
+
+def _print(choice: Choice, heading: str) -> None:
+    from rich.text import Text
+
+    from tactbench.core.cli.screen import console
+
+    screen = console()
+    screen.print(Text(choice.verdict, style="bold"))
+    screen.print(Text(heading, style="dim"))
+    if choice.candidates:
+        screen.print(_table(choice))
+    for title, sentences in (
+        ("interval", choice.intervals),
+        ("unknown", choice.unknown),
+        ("left out", choice.left_out),
+    ):
+        for sentence in sentences:
+            screen.print(Text(f"{title}: {sentence}"))
+    screen.print()
+
+
+def _table(choice: Choice) -> Any:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from tactbench.core.leaderboard.choosing import interval_text
+    from tactbench.core.leaderboard.numbers import score
+
+    wishes = dict.fromkeys(one.wish for candidate in choice.candidates for one in candidate.criteria)
+    head = ["sensor / estimator", "score, interval", *(wish for wish in wishes if wish != "score")]
+    lines = []
+    for one in choice.candidates:
+        told = {
+            criterion.wish: ": ".join(filter(None, (criterion.state, criterion.text))) for criterion in one.criteria
+        }
+        known = f"{score(one.score, choice.unit)}, {interval_text(one, choice.unit)}"
+        wished = f"; {told['score']}" if "score" in told else ""
+        lines.append([f"{one.sensor} / {one.estimator}", known + wished, *(told.get(wish, "") for wish in head[2:])])
+    grid = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=Text(f"score: {choice.quantity}"), title_justify="left")
+    for title, column in zip(head, zip(*lines, strict=True), strict=True):
+        grid.add_column(Text(title), min_width=_longest((title, *column)))
+    for line in lines:
+        grid.add_row(*map(Text, line))
+    return grid
+
+
+def _longest(texts: Sequence[str]) -> int:
+    """Return the length of the longest word: a column as wide breaks none."""
+    return max(len(word) for text in texts for word in text.split())
