@@ -1,0 +1,131 @@
+"""One row a cell: what its replicates came to."""
+
+import pytest
+
+from tactbench.core.leaderboard.formats import to_json
+from tactbench.core.leaderboard.replicates import over_replicates, recordings_right
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.statistics.median import median_interval
+from tactbench.core.statistics.paired import difference
+
+from .rows import row
+
+
+def replicates(scores, sensor="a", estimator="lasso", **more):
+    """Rows of one simulated cell, one a seed."""
+    return [
+        row(sensor, estimator, score=score, seed=seed, repeat=seed, repeats=len(scores), fit_s=float(seed), key=str(seed),
+            cell=f"{sensor}/question/twin/deployable/{estimator}/{seed}", **more)
+        for seed, score in enumerate(scores, 1)
+    ]  # fmt: skip
+
+
+SCORES = [0.5, 0.3, 0.9, 0.4, 0.6, 0.2, 0.8, 0.7]
+
+
+def test_eight_replicates_are_one_row_with_their_median_and_its_interval():
+    (found,) = over_replicates(replicates(SCORES))
+    known = median_interval(SCORES)
+    assert found["cell"] == "a/question/twin/deployable/lasso"
+    assert found["score"] == pytest.approx(0.55)
+    assert (found["ci_low"], found["ci_high"]) == (known.low, known.high)
+    assert (found["n_replicates"], found["replicate_unit"], found["seeds"]) == (8, "replicate", list(range(1, 9)))
+    assert found["replicate_scores"] == SCORES
+    assert (found["score_min"], found["score_max"]) == (0.2, 0.9)
+    assert found["fit_s"] == 4.5
+    assert found["key"] == "1"
+
+
+@pytest.mark.parametrize("n", [1, 4])
+def test_fewer_than_five_have_no_interval_and_no_rank(n):
+    rows = over_replicates([*replicates(SCORES[:n]), *replicates(SCORES[1 : n + 1], "b")])
+    assert all(one["ci_low"] is None and one["ci_high"] is None for one in rows)
+    lines = build_table(rows).blocks[0].lines
+    assert [line.cells[0] for line in lines] == ["1=", "1="]
+    assert [line.placing.low for line in lines] == [None, None]
+
+
+def test_rows_are_the_same_in_any_order_and_aggregated_once():
+    rows = replicates(SCORES)
+    found = over_replicates(rows)
+    assert over_replicates(found) == found
+    turned = over_replicates(rows[::-1])[0]
+    same = ("score", "ci_low", "ci_high", "fit_s", "score_min", "score_max", "n_replicates")
+    assert {key: turned[key] for key in same} == {key: found[0][key] for key in same}
+
+
+def test_a_stopped_replicate_is_told_and_takes_no_other_down():
+    rows = replicates(SCORES)
+    rows[2] |= {"status": "timeout", "score": None, "reason": "10 s were not enough"}
+    (found,) = over_replicates(rows)
+    assert (found["status"], found["n_replicates"]) == ("done", 7)
+    assert "replicate with seed 3: timeout: 10 s were not enough" in found["remarks"]
+
+
+def test_a_cell_of_which_no_replicate_ended_is_one_row_that_says_so():
+    rows = [one | {"status": "failed", "score": None, "reason": "no"} for one in replicates(SCORES)]
+    (found,) = over_replicates(rows)
+    assert (found["status"], found["reason"], found["score"]) == ("failed", "no", None)
+
+
+def test_what_all_replicates_remark_is_told_once_and_what_some_do_with_their_number():
+    rows = [one | {"remarks": ["always", *(["at times"] if one["seed"] < 3 else [])]} for one in replicates(SCORES)]
+    (found,) = over_replicates(rows)
+    assert found["remarks"] == ["always", "in 2 of 8 replicates: at times"]
+
+
+def test_recordings_keep_the_interval_over_their_sessions_and_lose_one_that_is_not_over_sessions():
+    names = [f"s{place}" for place in range(6)]
+    for unit, kept in (("session", True), ("recording", False), ("block of 9 rows in time", False)):
+        one = row(simulated=False, replicates={"unit": unit, "names": names, "strata": None, "sums": []})
+        (found,) = over_replicates([one])
+        assert (found["ci_low"] is not None) is kept
+        assert (found["n_replicates"], found["replicate_unit"]) == ((6, "session") if kept else (1, "session"))
+
+
+def test_seeds_asked_of_the_same_recordings_are_no_replicates():
+    rows = [one | {"simulated": False} for one in replicates(SCORES)]
+    (found,) = over_replicates(rows)
+    assert found["n_replicates"] == 1
+    assert found["score"] in SCORES
+    assert found["ci_low"] is None
+
+
+def test_cells_are_paired_by_replicate():
+    one, other = over_replicates([*replicates(SCORES), *replicates([score - 0.05 for score in SCORES], "b")])
+    found = difference(one, other)
+    assert found.paired
+    assert found.value == pytest.approx(0.05)
+    assert found.low == pytest.approx(0.05)
+    assert found.p == pytest.approx(2 / 2**8)
+    assert found.replicates == 8
+
+
+def test_errors_of_force_are_compared_beyond_their_floor():
+    known = {"metric": "rmse", "unit": "N", "reference_floor": 0.3}
+    rows = [
+        one | known | {"score_beyond_floor": (one["score"] ** 2 - 0.09) ** 0.5, "sensor": sensor}
+        for sensor, shift in (("a", 0.2), ("b", 0.3))
+        for one in replicates([score + shift for score in SCORES], sensor)
+    ]
+    one, other = over_replicates(rows)
+    found = difference(one, other)
+    assert "beyond the floor" in found.method
+    assert found.value == pytest.approx(
+        sum(a - b for a, b in zip(one["replicates"]["beyond"], other["replicates"]["beyond"], strict=True)) / 8
+    )
+
+
+def test_recordings_classified_rightly_are_counted_by_most_of_their_samples():
+    # Three classes: lines of (column of the confusion matrix, count).
+    lines = [[0, 9, 1, 1], [4, 2, 5, 8], [8, 10]]
+    kept = {"unit": "recording", "names": ["x", "y", "z"], "strata": None, "sums": lines}
+    assert recordings_right(row(classes=["p", "q", "r"], replicates=kept)) == (2, 3)
+    in_time = {"unit": "block of 5 rows in time", "names": ["x/1", "x/2", "z/1"], "strata": [0, 0, 1], "sums": [
+        [0, 4, 1, 1], [1, 5], [8, 10]]}  # fmt: skip
+    assert recordings_right(row(classes=["p", "q", "r"], replicates=in_time)) == (1, 2)
+    assert recordings_right(row(replicates=kept)) is None
+
+
+def test_json_holds_what_each_replicate_scored():
+    assert "[0.5,0.3,0.9" in to_json(over_replicates(replicates(SCORES))).replace(" ", "")
