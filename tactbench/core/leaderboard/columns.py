@@ -10,6 +10,7 @@ COLUMNS = (
     "published", "baseline", "n test", "sessions", "sim", "delay", "fit", "latency p50", "p95", "batch/row",
 )  # fmt: skip
 NUMERIC = frozenset(COLUMNS) - {"sensor", "estimator"}
+INTERVALS = ("95 % interval", "95 % beyond")
 TIMED_COLUMNS = ("sim", "delay", "fit", "latency p50", "p95", "batch/row")
 TIMED = frozenset(TIMED_COLUMNS)
 """Columns that no seed decides: they belong to the host that was timed."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Sequence
 
 Measure = Callable[[str], float]
 
-_PIECE = re.compile(r"(?<=[ ,])(?=[^ ,%…†‡‖\[])")
+_PIECE = re.compile(r"(?<=[ ,])(?=[^ ,%…†‡‖])")
 """Where a text may be broken: at a space or a comma, but not before a mark, a unit or what closes an interval."""
 
 
@@ -40,6 +40,7 @@ def fit(
     gap: float,
     measure: Measure,
     first_to_go: Sequence[int] = (),
+    broken_last: Collection[int] = (),
 ) -> tuple[dict[int, float], list[int]]:
     """Return the columns that fit with their widths, and those that do not fit even with all texts broken.
 
@@ -55,6 +56,8 @@ def fit(
         Between two columns.
     first_to_go
         Columns to leave out, in this order, before a part of a text is broken.
+    broken_last
+        Columns whose texts are broken only where breaking the others is not enough.
     """
     texts = [list({line[place] for line in lines}) for place in range(len(headers))]
     bodies = [max(map(measure, column), default=0.0) for column in texts]
@@ -83,7 +86,7 @@ def fit(
         slack = [place for place in widths if widths[place] - least[place] > 1e-9]
         if not slack:
             break
-        widest = max(slack, key=lambda place: widths[place])
+        widest = max(slack, key=lambda place: (place not in broken_last, widths[place]))
         widths[widest] = max(least[widest], widths[widest] - 1.0)
     return widths, gone
 

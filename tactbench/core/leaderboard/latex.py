@@ -11,8 +11,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from tactbench.core.leaderboard import view as viewed
+from tactbench.core.leaderboard.columns import INTERVALS
 from tactbench.core.leaderboard.fitting import fit, wrapped
+from tactbench.core.leaderboard.notes import RANKS, interval_notes
 from tactbench.core.leaderboard.numbers import whole
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.view import Grid, View
@@ -35,13 +38,14 @@ _LIGATURE = re.compile(r"-(?=-)|`(?=`)|'(?=')|[!?](?=`)|,(?=,)")
 """The first of two characters that TeX draws as one."""
 
 
-COLUMN_PT = 239.0
-"""Width of one column of a two-column paper, in points: 84 mm or 3.3 in."""
+COLUMN_PT = 229.0
+"""Width of one column of a two-column paper, in points: of the class article 229.5, of others 239 (84 mm) and more."""
+PAGE_PT = 469.0
+"""Width of its text over both columns."""
 _SEP_PT = 2.5
 """``\\tabcolsep`` inside that column."""
 _IN_A_COLUMN = ("sensor", "estimator", "score", "beyond floor", "95 % interval", "95 % beyond", "published")
 _FIRST_TO_GO = ("published", "score")
-_BREAKABLE = frozenset({"sensor", "estimator", "95 % interval", "95 % beyond"})
 
 
 def latex(table: Table, view: View = View()) -> str:  # noqa: B008  (frozen)
@@ -50,36 +54,42 @@ def latex(table: Table, view: View = View()) -> str:  # noqa: B008  (frozen)
     whole_width = view.wide or bool(view.columns)
     last = len(table.blocks) - 1
     for place, (block, grid) in enumerate(zip(table.blocks, viewed.grids(table, view), strict=True)):
-        notes = (*viewed.notes(table, view), *viewed.foot(table, view)) if place == last else ()
-        if not whole_width:
-            grid = _some(grid, _IN_A_COLUMN)
+        # A paper's table shows no ranks.
+        told = [note for note in viewed.notes(table, view) if whole_width or note != RANKS]
+        notes = (*told, *viewed.foot(table, view)) if place == last else ()
+        grid = grid if whole_width else _narrow(grid)
         parts += _table(replace(grid, title=_caption(block, grid)), notes, whole_width=whole_width, number=place)
     for number, section in enumerate(viewed.sections(table, view), len(table.blocks)):
         grid = Grid(section.title, section.columns, section.columns, section.lines, (), section.numeric)
         parts += _table(grid, section.notes, whole_width=True, number=number)
+    parts += [f"% {tex(text)}" for text in viewed.commands(table, view)]
     return "\n".join(parts) + "\n"
 
 
 def _caption(block: Block, grid: Grid) -> str:
-    """Return the title of a block, its verdict, how many samples were tested and what its intervals are."""
+    """Return the title of a block, what is said of it, how many samples were tested and what its intervals are."""
     rows = [line.row for line in block.lines if line.row["status"] == "done" and not line.row["is_baseline"]]
     counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
     n = f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples" if counts else ""
-    methods = sorted({str(row["ci_method"]) for row in rows if row["ci_method"]})
-    interval = f"95 % interval by {methods[0]}" if len(methods) == 1 else ""
-    said = [text.rstrip(".") for text in (block.title, *grid.said, n, interval) if text]
-    return visible(f"{'. '.join(said)}.")
+    task = f"{visible(str(block.lines[0].row['task']))}: "
+    how = [f"95 % {text.removeprefix(task)}" for text in interval_notes(Sheet(rows))] if rows else []
+    rule = "Below the rule: trivial answers" if "#" not in grid.columns and _first_trivial(grid) else ""
+    said = [text.rstrip(".") for text in (block.title, *grid.said, n, *how, rule) if text]
+    return f"{'. '.join(said)}."
 
 
-def _some(grid: Grid, names: Collection[str]) -> Grid:
-    """Return some columns of a grid."""
-    kept = [place for place, name in enumerate(grid.columns) if name in names]
-    return replace(
-        grid,
-        columns=tuple(grid.columns[place] for place in kept),
-        headers=tuple(grid.headers[place] for place in kept),
-        lines=tuple(tuple(line[place] for place in kept) for line in grid.lines),
-    )
+def _narrow(grid: Grid) -> Grid:
+    """Return the columns of a paper's table; a † that stands in the title and behind every score is not repeated."""
+    kept = [place for place, name in enumerate(grid.columns) if name in _IN_A_COLUMN]
+    lines = [[line[place] for place in kept] for line in grid.lines]
+    names = [grid.columns[place] for place in kept]
+    if "score" in names and "†" in grid.title:
+        column = names.index("score")
+        if all("†" in line[column] for line in lines):
+            for line in lines:
+                line[column] = line[column].replace(" †", "")
+    headers = tuple(grid.headers[place] for place in kept)
+    return replace(grid, columns=tuple(names), headers=headers, lines=tuple(map(tuple, lines)))
 
 
 def _table(grid: Grid, notes: Iterable[str], *, whole_width: bool, number: int) -> list[str]:
@@ -88,17 +98,27 @@ def _table(grid: Grid, notes: Iterable[str], *, whole_width: bool, number: int) 
         return latex_grid(grid.title, grid.headers, _right(grid), grid.lines, notes, number=number, star=True)
     places = {name: place for place, name in enumerate(grid.columns)}
     gap = 2 * _SEP_PT
+    intervals = {places[name] for name in INTERVALS if name in places}
     widths, gone = fit(
-        grid.headers, grid.lines, {places[name] for name in _BREAKABLE if name in places}, room=COLUMN_PT - gap, gap=gap,
-        measure=points, first_to_go=[places[name] for name in _FIRST_TO_GO if name in places],
+        grid.headers, grid.lines, {places["sensor"], places["estimator"], *intervals}, room=COLUMN_PT - gap, gap=gap,
+        measure=points, first_to_go=[places[name] for name in _FIRST_TO_GO if name in places], broken_last=intervals,
     )  # fmt: skip
     if gone:
         notes = [*notes, f"There was no room for: {', '.join(grid.headers[place] for place in gone)}."]
-    lines = [line for cells in grid.lines for line in _broken(cells, widths)]
+    lines = [list(_broken(cells, widths)) for cells in grid.lines]
+    rules = [sum(map(len, lines[:place])) for place in _first_trivial(grid)]
     heads = list(_broken(grid.headers, widths))
     names = [grid.columns[place] for place in widths]
     right = {str(place) for place, name in enumerate(names) if name in grid.numeric}
-    return latex_grid(grid.title, map(str, range(len(names))), right, lines, notes, heads=heads, number=number)
+    return latex_grid(
+        grid.title, map(str, range(len(names))), right, [line for one in lines for line in one], notes, heads=heads,
+        number=number, rules=rules,
+    )  # fmt: skip
+
+
+def _first_trivial(grid: Grid) -> list[int]:
+    """Return the place of the first trivial answer, if a table of one column, which shows no ranks, has some."""
+    return [grid.kinds.index("baseline")] if "baseline" in grid.kinds and grid.kinds[0] != "baseline" else []
 
 
 def _right(grid: Grid) -> set[str]:
@@ -112,19 +132,29 @@ def _broken(cells: Sequence[str], widths: Mapping[int, float]) -> Iterator[list[
 
 
 def points(text: str) -> float:
-    """Return an upper estimate of the width of `text` in cmr8, in points.
-
-    Widths of the font's metrics (cmr8.tfm: digits 4.25 pt, m 7.08, w 6.14, M 7.79, W 8.73, no other letter wider than
-    6.7 or, small, than 4.73), rounded up within groups of characters; what is in none of them is taken for a wide one.
-    """
-    return sum(_POINTS.get(character, 4.8 if character.islower() else 6.8) for character in text)
+    """Return the width of `text` in cmr8 (10 pt documents' ``\\footnotesize``), in points, by the font's metrics."""
+    return sum(map(_points, text))
 
 
-_POINTS = {
-    **dict.fromkeys("0123456789-–'`\"", 4.3), **dict.fromkeys(".,:;!| ijl", 2.9), **dict.fromkeys("()[]/ftsrI", 3.7),
-    "m": 7.2, "w": 6.3, "M": 7.9, "W": 8.8, "…": 10.5, "%": 7.2, "†": 3.9, "‡": 3.9, "=": 6.7, "+": 6.7, "_": 4.7,
-    "\u202f": 1.5,
+def _points(character: str) -> float:
+    if character in _WIDTHS:
+        return _WIDTHS[character]
+    letter = unicodedata.normalize("NFD", character)[0]
+    return _WIDTHS[letter] if letter in _WIDTHS else points(f"U+{ord(character):04X}")
+
+
+_WIDTHS = {
+    character: width
+    for width, characters in (
+        (1.42, "\u202f"), (2.37, "!',.:;<[]`il|"), (2.6, "fj"), (2.84, "- "), (3.07, "_I"), (3.31, "()t"), (3.32, "r"),
+        (3.36, "s"), (3.78, "cez†‡"), (4.02, ">?"), (4.26, '"$*/0123456789^ago{}~–‖\\'), (4.37, "J"), (4.49, "kqvxy"),
+        (4.73, "Sbdhnpu"), (5.12, "µμ"), (5.2, "Z"), (5.31, "L"), (5.55, "F"), (5.79, "EP"), (6.02, "B"),
+        (6.14, "CTw"), (6.26, "R"), (6.37, "AHNUVXY"), (6.49, "D"), (6.61, "K"), (6.62, "&+=@OQ<>×±−≤≥"), (6.67, "G"),
+        (7.09, "#%m"), (7.79, "M"), (8.51, "—"), (8.73, "W"), (11.34, "…"),
+    )
+    for character in characters
 }  # fmt: skip
+"""Read off with ``\\wd`` of a box for each character in ``\\footnotesize`` of the class article, rounded up."""
 
 
 def latex_grid(
@@ -137,6 +167,7 @@ def latex_grid(
     heads: Iterable[Iterable[str]] = (),
     number: int = 0,
     star: bool = False,
+    rules: Collection[int] = (),
 ) -> list[str]:
     """Return a table as lines of LaTeX, columns of numbers to the right, notes below.
 
@@ -148,9 +179,13 @@ def latex_grid(
         Of the table among those of one file, from 0: its label ends in it, counted from 1.
     star
         Whether it goes over both columns of a two-column paper.
+    rules
+        Lines above which there is a rule.
     """
-    names = list(columns)
+    names, lines = list(columns), [list(line) for line in lines]
     table = "table*" if star else "table"
+    widths = [max(map(points, texts)) for texts in zip(names, *lines, strict=True)]
+    too_wide = star and sum(widths) + 2 * _SEP_PT * len(names) > PAGE_PT
     return [
         rf"\begin{{{table}}}[t]",
         r"\centering",
@@ -158,14 +193,20 @@ def latex_grid(
         rf"\setlength{{\tabcolsep}}{{{_SEP_PT:g}pt}}",
         rf"\caption{{{tex(title)}}}",
         rf"\label{{{_label(title, number)}}}",
+        r"\par\smallskip",
+        *([r"\resizebox{\textwidth}{!}{% of the package graphicx"] if too_wide else []),
         rf"\begin{{tabular}}{{{''.join('r' if name in numeric else 'l' for name in names)}}}",
         r"\toprule",
         *(" & ".join(map(tex, line)) + r" \\" for line in (list(heads) or [names])),
         r"\midrule",
-        *(" & ".join(map(tex, line)) + r" \\" for line in lines),
+        *(
+            "\\midrule\n" * (place in rules) + " & ".join(map(tex, line)) + r" \\"
+            for place, line in enumerate(lines)
+        ),
         r"\bottomrule",
-        r"\end{tabular}",
-        *(rf"\par\smallskip\raggedright {tex(note)}" for note in notes),
+        r"\end{tabular}" + "}" * too_wide,
+        # Text between backticks is code elsewhere.
+        *(rf"\par\smallskip\raggedright {tex(note.replace('`', ''))}" for note in notes),
         rf"\end{{{table}}}",
         "",
     ]

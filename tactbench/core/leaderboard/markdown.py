@@ -21,7 +21,7 @@ def markdown(table: Table, view: View = View()) -> str:  # noqa: B008  (frozen)
         numeric = {head for name, head in zip(grid.columns, grid.headers, strict=True) if name in grid.numeric}
         heading, *lines = markdown_grid(grid.title, grid.headers, numeric, grid.lines)
         parts += [heading, *(f"{markdown_note(text)}\n" for text in grid.said), *lines, ""]
-    parts += [f"- {markdown_note(note)}" for note in viewed.notes(table, view)]
+    parts += [f"- {markdown_note(note)}" for note in (*viewed.notes(table, view), *viewed.commands(table, view))]
     for section in viewed.sections(table, view):
         parts += ["", *markdown_grid(section.title, section.columns, section.numeric, section.lines)]
         parts += ["", *(f"- {markdown_note(note)}" for note in section.notes)] if section.notes else []

@@ -45,6 +45,7 @@ def notes_of(sheet: Sheet, blocks: Sequence[Block]) -> list[str]:
         *_no_better_notes(sheet),
         *_tare_notes(sheet),
         *_rank_notes(blocks),
+        *_true_error_notes(sheet),
         *_other_knowledge_notes(sheet),
         *stopped_notes(sheet, frozenset(STATUSES) - STOPPED),
         *interval_notes(sheet),
@@ -99,9 +100,12 @@ def _floor_notes(sheet: Sheet) -> list[str]:
             f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond "
             "floor is sqrt(max(0, RMSE² − floor²)); ranks go by it where all answers of a block have it."
         )
-    if any(one is not None for one in sheet.known("true_score")):
-        told.append("True error (SIM): against the force that the twin exerted, free of the reference's noise.")
     return told
+
+
+def _true_error_notes(sheet: Sheet) -> list[str]:
+    known = any(one is not None for one in sheet.known("true_score"))
+    return ["True error (SIM): against the force that the twin exerted, free of the reference's noise."] * known
 
 
 def _floor(found: Sequence[float], unit: str) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from tactbench.core.leaderboard import view as viewed
+from tactbench.core.leaderboard.columns import INTERVALS
 from tactbench.core.leaderboard.fitting import fit, wrapped
 from tactbench.core.leaderboard.table import Section, Table
 from tactbench.core.leaderboard.view import Grid, View
@@ -21,7 +22,6 @@ _FIRST_TO_GO = (
     "true error", "95 % interval", "published", "delay", "95 % beyond",
 )  # fmt: skip
 """Columns that a terminal does without, in this order, where it is too narrow for them even with broken texts."""
-_BREAKABLE = frozenset({"sensor", "estimator", "95 % interval", "95 % beyond"})
 _GAPS = (3, 2)
 """Spaces between columns: the first where there is room."""
 _MARGIN = 2
@@ -51,7 +51,7 @@ def _lines(table: Table, width: int, view: View) -> Iterator[Styled]:
         lines, gone = _grid_lines(grid, width)
         left_out |= dict.fromkeys(gone)
         yield from lines
-    notes = list(viewed.notes(table, view))
+    notes = [*viewed.notes(table, view), *viewed.commands(table, view)]
     if left_out:
         notes.append(f"This terminal is too narrow for: {', '.join(left_out)}. They are in the files.")
     yield from _note_lines(notes, width)
@@ -80,12 +80,16 @@ def _grid_lines(grid: Grid, width: int, styles: Sequence[str] = ()) -> tuple[lis
     """
     numeric = grid.numeric
     places = {name: place for place, name in enumerate(grid.columns)}
-    breakable = {place for name, place in places.items() if (name in _BREAKABLE or name not in numeric) and name != "cell"}
+    breakable = {
+        place for name, place in places.items() if (name in INTERVALS or name not in numeric) and name != viewed.CELL
+    }
+    intervals = {places[name] for name in INTERVALS if name in places}
     to_go = [places[name] for name in _FIRST_TO_GO if name in places]
     for gap in _GAPS:
         widths, gone = fit(
-            grid.headers, grid.lines, breakable, room=width - _MARGIN, gap=gap, measure=_width, first_to_go=to_go
-        )
+            grid.headers, grid.lines, breakable, room=width - _MARGIN, gap=gap, measure=_width, first_to_go=to_go,
+            broken_last=intervals,
+        )  # fmt: skip
         natural = fit(grid.headers, grid.lines, (), room=float("inf"), gap=gap, measure=_width)[0]
         if widths == natural:
             break

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.columns import COLUMNS, NUMERIC, SHOWN
+from tactbench.core.leaderboard.columns import COLUMNS, INTERVALS, NUMERIC, SHOWN
 from tactbench.core.leaderboard.lines import Kind, Line
 from tactbench.core.leaderboard.names import metric_name
 from tactbench.core.leaderboard.numbers import ABSENT
@@ -107,7 +107,7 @@ def header(name: str, rows: Sequence[Any]) -> str:
         return metric_name(first)
     if name in ("beyond floor", "true error"):
         return f"{name}{unit}"
-    if name in ("95 % interval", "95 % beyond"):
+    if name in INTERVALS:
         over = _over(rows, "ci_low" if name == "95 % interval" else "beyond_floor_ci_low")
         return name if not over else f"95 % {over}" if name == "95 % interval" else f"{name}, {over}"
     return name
@@ -126,34 +126,33 @@ def sections(table: Table, view: View) -> tuple[Section, ...]:
 
 
 def notes(table: Table, view: View) -> tuple[str, ...]:
-    """Return the notes to print, the most important first, and the command that shows what is not printed."""
-    shown = table.notes if view.notes else table.notes[:MOST_NOTES]
-    hidden = len(table.notes) - len(shown)
-    more = [f"{hidden} more note{'s' if hidden > 1 else ''}"] if hidden else []
-    options = ["--notes"] if hidden or (len(table.foot) > 1 and not view.notes) else []
+    """Return the notes to print, the most important first."""
+    return table.notes if view.notes else table.notes[:MOST_NOTES]
+
+
+def commands(table: Table, view: View) -> tuple[str, ...]:
+    """Return the command that shows what is not printed, and the one that tells what a row rests on."""
+    hidden = len(table.notes) - len(notes(table, view))
+    more, options = [], []
+    if hidden or len(foot(table, view)) < len(table.foot):
+        more.append(f"{hidden} more note{'s' if hidden != 1 else ''}" if hidden else "the whole provenance")
+        options.append("--notes")
     if not view.wide and not view.columns:
         more += ["all columns", *(section.title.split(" · ")[0].lower() for section in table.sections if section.detail)]
         options.append("--wide")
-    told = [f"{_listed(more)}: `{command_line('tactbench', 'leaderboard', *_folder(view), *options)}`."] if more else []
-    return (*shown, *(text[0].upper() + text[1:] for text in told), *_why(table, view))
+    where = (view.folder,) if view.folder else ()
+    told = _listed(more)
+    all_of_it = [f"{told[:1].upper()}{told[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
+    first = next((line for block in table.blocks for line in block.lines if line.kind == "result"), None)
+    if first is None:
+        return tuple(all_of_it if more else [])
+    out = ("--out", view.folder) if view.folder else ()
+    why = command_line("tactbench", "why", _by_column(table, first)[CELL], *out)
+    return (*(all_of_it if more else []), f"What a row rests on: `{why}`.")
 
 
 def _listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
-
-
-def _folder(view: View) -> tuple[str, ...]:
-    return (view.folder,) if view.folder else ()
-
-
-def _why(table: Table, view: View) -> tuple[str, ...]:
-    """Return the command that tells what a row rests on, for the first row of the table."""
-    first = next((line for block in table.blocks for line in block.lines if line.kind == "result"), None)
-    if first is None:
-        return ()
-    name = _by_column(table, first)[CELL]
-    out = ("--out", view.folder) if view.folder else ()
-    return (f"What a row rests on: `{command_line('tactbench', 'why', name, *out)}`.",)
 
 
 def foot(table: Table, view: View) -> tuple[str, ...]:
