@@ -86,5 +86,7 @@ def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> l
                 raise UnknownNameError(f"{key} among these results", name, known)
         kept = [row for row in kept if not asked or row[key] in asked]
     if not kept:
-        raise UsageError("No row is all that at once.", hint="Ask for less: see `tactbench leaderboard --columns cell`.")
+        raise UsageError(
+            "No row is all that at once.", hint="Ask for less: see `tactbench leaderboard --columns cell`."
+        )
     return kept

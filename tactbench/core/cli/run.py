@@ -10,7 +10,14 @@ import click
 
 from tactbench.core.cli.engines import choice_of, engine_options
 from tactbench.core.cli.selection import matrix_asked, selecting_options
-from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, check_destination, print_table, view_of, view_options
+from tactbench.core.cli.tables import (
+    DEFAULT_FOLDER,
+    TABLE_FORMATS,
+    check_destination,
+    print_table,
+    view_of,
+    view_options,
+)
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:

@@ -22,7 +22,9 @@ NO_TEXT = ("parquet", "xlsx")
 DEFAULT_FOLDER = Path("tactbench-results")
 
 _VIEW_OPTIONS = (
-    click.option("--wide", is_flag=True, help="All columns. Default: eight; in LaTeX what one column of a paper holds."),
+    click.option(
+        "--wide", is_flag=True, help="All columns. Default: eight; in LaTeX what one column of a paper holds."
+    ),
     click.option("--notes", is_flag=True, help="All notes and the whole provenance. Default: the first three."),
 )
 

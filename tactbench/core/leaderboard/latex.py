@@ -18,7 +18,7 @@ from tactbench.core.leaderboard.numbers import whole
 from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.text import visible
-from tactbench.core.leaderboard.view import Grid, View
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, Grid, View
 
 _TEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
@@ -48,7 +48,7 @@ _IN_A_COLUMN = ("sensor", "estimator", "score", "beyond floor", "95 % interval",
 _FIRST_TO_GO = ("published", "score")
 
 
-def latex(table: Table, view: View = View()) -> str:  # noqa: B008  (frozen)
+def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
     """Return the table as LaTeX, a table a block; notes and foot stand below the last block."""
     parts: list[str] = []
     whole_width = view.wide or bool(view.columns)
@@ -132,7 +132,7 @@ def _broken(cells: Sequence[str], widths: Mapping[int, float]) -> Iterator[list[
 
 
 def points(text: str) -> float:
-    """Return the width of `text` in cmr8 (10 pt documents' ``\\footnotesize``), in points, by the font's metrics."""
+    r"""Return the width of `text` in cmr8 (10 pt documents' ``\footnotesize``), in points, by the font's metrics."""
     return sum(map(_points, text))
 
 
@@ -199,10 +199,7 @@ def latex_grid(
         r"\toprule",
         *(" & ".join(map(tex, line)) + r" \\" for line in (list(heads) or [names])),
         r"\midrule",
-        *(
-            "\\midrule\n" * (place in rules) + " & ".join(map(tex, line)) + r" \\"
-            for place, line in enumerate(lines)
-        ),
+        *("\\midrule\n" * (place in rules) + " & ".join(map(tex, line)) + r" \\" for place, line in enumerate(lines)),
         r"\bottomrule",
         r"\end{tabular}" + "}" * too_wide,
         # Text between backticks is code elsewhere.

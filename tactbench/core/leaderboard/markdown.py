@@ -7,14 +7,14 @@ from collections.abc import Collection, Iterable, Sequence
 
 from tactbench.core.leaderboard import view as viewed
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.view import View
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, View
 
 _ACTS = re.compile(r"[\\|*\[\]~]|(?<![^\W_])_|_(?![^\W_])")
 """Begins something wherever it stands; an underscore does so only at the edge of a word."""
 _BEGINS_A_LINE = re.compile(r"[#>+=-]|[0-9]+[.)]")
 
 
-def markdown(table: Table, view: View = View()) -> str:  # noqa: B008  (frozen)
+def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
     """Return the table as Markdown, a heading a block."""
     parts: list[str] = []
     for grid in viewed.grids(table, view):

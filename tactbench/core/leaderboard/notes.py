@@ -28,7 +28,7 @@ RANKS = (
 
 
 def notes_of(sheet: Sheet, blocks: Sequence[Block]) -> list[str]:
-    """Return the notes on the lines of `blocks`, the most important first; those on whose times they are stand elsewhere.
+    """Return the notes on the lines of `blocks`, the most important first; those on times stand elsewhere.
 
     First what did not finish, what leaks and what a deployed sensor could not do, then what the scores must be read
     with, then how they came about.
@@ -132,13 +132,17 @@ def _chosen_notes(sheet: Sheet) -> list[str]:
     names: dict[str, dict[str, None]] = {}
     for chosen, row in zip(sheet["chosen"], sheet.rows, strict=True):
         if chosen:
-            picked = ", ".join(_picked(str(key), value, row) for key, value in sorted(chosen.items()))
-            names.setdefault(visible(picked), {})[f"{question_name(row)}/{answer_name(row)}"] = None
-    return [f"{', '.join(who)}: chosen on validation data: {picked}." for picked, who in names.items()]
+            names.setdefault(visible(picked(row)), {})[f"{question_name(row)}/{answer_name(row)}"] = None
+    return [f"{', '.join(who)}: chosen on validation data: {what}." for what, who in names.items()]
+
+
+def picked(row: Row) -> str:
+    """Return what an answer chose on validation data."""
+    return ", ".join(_picked(str(key), value, row) for key, value in sorted(row["chosen"].items()))
 
 
 def _picked(key: str, value: object, row: Row) -> str:
-    """Return a chosen parameter: the window's k with its meaning (`EstimatorDescriptor.window_grid`), others by name."""
+    """Return a chosen parameter: k of `window_grid` with its meaning, others by name."""
     name, _, fold = key.partition(" of fold ")
     where = f" of fold {fold}" if fold else ""
     if name == "k":

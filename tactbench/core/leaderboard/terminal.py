@@ -10,7 +10,7 @@ from tactbench.core.leaderboard import view as viewed
 from tactbench.core.leaderboard.columns import INTERVALS
 from tactbench.core.leaderboard.fitting import fit, wrapped
 from tactbench.core.leaderboard.table import Section, Table
-from tactbench.core.leaderboard.view import Grid, View
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, Grid, View
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -29,18 +29,20 @@ Styled = tuple[str, str]
 """A line, and how it looks."""
 
 
-def show(table: Table, console: Console, view: View = View()) -> None:  # noqa: B008  (frozen)
+def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
     """Print a leaderboard on `console`; text from plugins is never read as markup."""
     from rich.segment import Segment, Segments
 
     style = {name: console.get_style(name) for name in {"bold", _ALARM, *_STYLE.values()}}
     said = [
-        part for text, how in _lines(table, console.width, view) for part in (Segment(text, style.get(how)), Segment("\n"))
+        part
+        for text, how in _lines(table, console.width, view)
+        for part in (Segment(text, style.get(how)), Segment("\n"))
     ]
     console.print(Segments(said), soft_wrap=True, end="")
 
 
-def plain_text(table: Table, width: int = 240, view: View = View()) -> str:  # noqa: B008
+def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
     """Return what a terminal without colours shows; the width is enough for names of ordinary length."""
     return "".join(f"{text}\n" for text, _ in _lines(table, width, view))
 
@@ -65,8 +67,7 @@ def _lines(table: Table, width: int, view: View) -> Iterator[Styled]:
 
 
 def _section_lines(section: Section, width: int) -> Iterator[Styled]:
-    kinds = ("baseline",) * len(section.lines)
-    grid = Grid(section.title, section.columns, section.columns, section.lines, kinds, section.numeric)
+    grid = Grid(section.title, section.columns, section.columns, section.lines, (), section.numeric)
     styles = [_ALARM if place in section.alarms else "" for place in range(len(section.lines))]
     yield from _grid_lines(grid, width, styles)[0]
     yield from _note_lines(section.notes, width)
@@ -105,7 +106,7 @@ def _grid_lines(grid: Grid, width: int, styles: Sequence[str] = ()) -> tuple[lis
     body: list[Styled] = [(text, "bold") for text in padded(grid.headers)]
     body.append((rule[:width], ""))
     for place, line in enumerate(grid.lines):
-        style = styles[place] if styles else _STYLE[grid.kinds[place]]
+        style = _STYLE[grid.kinds[place]] if grid.kinds else styles[place]
         body += [(text, style) for text in padded(line)]
     title: list[Styled] = [(line, "bold") for line in _folded(grid.title, width)]
     title += [(line, "") for text in grid.said for line in _folded(text, width)]

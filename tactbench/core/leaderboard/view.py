@@ -37,6 +37,10 @@ class View:
     """The result folder, for commands that are named; empty: the default one."""
 
 
+DEFAULT_VIEW = View()
+WHOLE = View(wide=True, notes=True)
+
+
 @dataclass(frozen=True)
 class Grid:
     """A table of texts under its title."""
@@ -114,7 +118,7 @@ def header(name: str, rows: Sequence[Any]) -> str:
 
 
 def _over(rows: Sequence[Any], key: str) -> str:
-    """Return what all intervals of a block are over: ``over 8 replicates``; empty where that differs or is not known."""
+    """Return what all intervals of a block are over: ``over 8 replicates``; empty if it differs or is not known."""
     found = {(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row.get(key) is not None}
     count, unit = next(iter(found)) if len(found) == 1 else (None, None)
     return f"over {count} {visible(str(unit or 'replicate'))}{'s' if count != 1 else ''}" if count else ""
@@ -138,7 +142,10 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
         more.append(f"{hidden} more note{'s' if hidden != 1 else ''}" if hidden else "the whole provenance")
         options.append("--notes")
     if not view.wide and not view.columns:
-        more += ["all columns", *(section.title.split(" · ")[0].lower() for section in table.sections if section.detail)]
+        more += [
+            "all columns",
+            *(section.title.split(" · ")[0].lower() for section in table.sections if section.detail),
+        ]
         options.append("--wide")
     where = (view.folder,) if view.folder else ()
     told = _listed(more)
