@@ -140,7 +140,7 @@ def _points(character: str) -> float:
     if character in _WIDTHS:
         return _WIDTHS[character]
     letter = unicodedata.normalize("NFD", character)[0]
-    return _WIDTHS[letter] if letter in _WIDTHS else points(f"U+{ord(character):04X}")
+    return _WIDTHS[letter] + 0.5 if letter in _WIDTHS else points(f"U+{ord(character):04X}")
 
 
 _WIDTHS = {
@@ -150,11 +150,12 @@ _WIDTHS = {
         (3.36, "s"), (3.78, "cez†‡"), (4.02, ">?"), (4.26, '"$*/0123456789^ago{}~–‖\\'), (4.37, "J"), (4.49, "kqvxy"),
         (4.73, "Sbdhnpu"), (5.12, "µμ"), (5.2, "Z"), (5.31, "L"), (5.55, "F"), (5.79, "EP"), (6.02, "B"),
         (6.14, "CTw"), (6.26, "R"), (6.37, "AHNUVXY"), (6.49, "D"), (6.61, "K"), (6.62, "&+=@OQ<>×±−≤≥"), (6.67, "G"),
-        (7.09, "#%m"), (7.79, "M"), (8.51, "—"), (8.73, "W"), (11.34, "…"),
+        (7.09, "#%m"), (7.79, "M"), (8.51, "—"), (8.73, "W"), (12.3, "…"),
     )
     for character in characters
 }  # fmt: skip
-"""Read off with ``\\wd`` of a box for each character in ``\\footnotesize`` of the class article, rounded up."""
+"""Read off with ``\\wd`` of a box for each character in ``\\footnotesize`` of the class article, rounded up; ``…`` with
+the wider space that follows it."""
 
 
 def latex_grid(
