@@ -79,17 +79,12 @@ def _caption(block: Block, grid: Grid) -> str:
 
 
 def _narrow(grid: Grid) -> Grid:
-    """Return the columns of a paper's table; a † that stands in the title and behind every score is not repeated."""
+    """Return the columns of a paper's table."""
     kept = [place for place, name in enumerate(grid.columns) if name in _IN_A_COLUMN]
-    lines = [[line[place] for place in kept] for line in grid.lines]
+    lines = tuple(tuple(line[place] for place in kept) for line in grid.lines)
     names = [grid.columns[place] for place in kept]
-    if "score" in names and "†" in grid.title:
-        column = names.index("score")
-        if all("†" in line[column] for line in lines):
-            for line in lines:
-                line[column] = line[column].replace(" †", "")
     headers = tuple(grid.headers[place] for place in kept)
-    return replace(grid, columns=tuple(names), headers=headers, lines=tuple(map(tuple, lines)))
+    return replace(grid, columns=tuple(names), headers=headers, lines=lines)
 
 
 def _table(grid: Grid, notes: Iterable[str], *, whole_width: bool, number: int) -> list[str]:

@@ -80,6 +80,9 @@ def grids(table: Table, view: View) -> list[Grid]:
 def grid_of(table: Table, block: Block, view: View) -> Grid:
     """Return what is printed of a block."""
     texts = [_by_column(table, line) for line in block.lines]
+    if all("†" in text["score"] for text, line in zip(texts, block.lines, strict=True) if line.row["status"] == "done"):
+        # The title has it: not repeated behind every score.
+        texts = [{**text, "score": text["score"].replace(" †", "")} for text in texts]
     if view.columns:
         names = [name for name in view.columns if name in texts[0]]
     elif view.wide:
