@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from tactbench.core.leaderboard import view as viewed
@@ -21,7 +21,8 @@ _FIRST_TO_GO = (
     "cell", "batch/row", "p95", "sessions", "n test", "sim", "baseline", "latency p50", "rank 95 %", "fit",
     "true error", "95 % interval", "published", "delay", "95 % beyond",
 )  # fmt: skip
-"""Columns that a terminal does without, in this order, where it is too narrow for them even with broken texts."""
+"""Columns that a terminal does without, in this order, where it is too narrow for them even with broken texts; those
+that were asked for by name are never left out."""
 _GAPS = (3, 2)
 """Spaces between columns: the first where there is room."""
 _MARGIN = 2
@@ -50,12 +51,11 @@ def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str
 def _lines(table: Table, width: int, view: View) -> Iterator[Styled]:
     left_out: dict[str, None] = {}
     for grid in viewed.grids(table, view):
-        lines, gone = _grid_lines(grid, width)
+        lines, gone = _grid_lines(grid, width, () if view.columns else _FIRST_TO_GO)
         left_out |= dict.fromkeys(gone)
         yield from lines
     notes = [*viewed.notes(table, view), *viewed.commands(table, view)]
-    if left_out:
-        notes.append(f"This terminal is too narrow for: {', '.join(left_out)}. They are in the files.")
+    notes += _too_narrow(left_out)
     yield from _note_lines(notes, width)
     for section in viewed.sections(table, view):
         yield "", ""
@@ -66,15 +66,22 @@ def _lines(table: Table, width: int, view: View) -> Iterator[Styled]:
         yield from _note_lines(foot, width)
 
 
+def _too_narrow(names: Collection[str]) -> list[str]:
+    return [f"This terminal is too narrow for: {', '.join(names)}. They are in the files."] if names else []
+
+
 def _section_lines(section: Section, width: int) -> Iterator[Styled]:
     grid = Grid(section.title, section.columns, section.columns, section.lines, (), section.numeric)
     styles = [_ALARM if place in section.alarms else "" for place in range(len(section.lines))]
-    yield from _grid_lines(grid, width, styles)[0]
-    yield from _note_lines(section.notes, width)
+    lines, gone = _grid_lines(grid, width, section.columns[:0:-1], styles)
+    yield from lines
+    yield from _note_lines([*section.notes, *_too_narrow(gone)], width)
 
 
-def _grid_lines(grid: Grid, width: int, styles: Sequence[str] = ()) -> tuple[list[Styled], list[str]]:
-    """Return the lines of a grid with their styles, and the columns that there was no room for.
+def _grid_lines(
+    grid: Grid, width: int, first_to_go: Sequence[str], styles: Sequence[str] = ()
+) -> tuple[list[Styled], list[str]]:
+    """Return the lines of a grid with their styles, and the columns, of `first_to_go`, that there was no room for.
 
     Lines are padded here: a grid of rich takes a second for a thousand of them, and a text of its own for each of a
     thousand blocks a third of one.
@@ -85,7 +92,7 @@ def _grid_lines(grid: Grid, width: int, styles: Sequence[str] = ()) -> tuple[lis
         place for name, place in places.items() if (name in INTERVALS or name not in numeric) and name != viewed.CELL
     }
     intervals = {places[name] for name in INTERVALS if name in places}
-    to_go = [places[name] for name in _FIRST_TO_GO if name in places]
+    to_go = [places[name] for name in first_to_go if name in places]
     for gap in _GAPS:
         widths, gone = fit(
             grid.headers, grid.lines, breakable, room=width - _MARGIN, gap=gap, measure=_width, first_to_go=to_go,
