@@ -39,7 +39,7 @@ from tactbench.core.cli.threads import keep_threads
 @click.option("--budget", type=click.FloatRange(min=0), default=20.0, show_default=True, metavar="SECONDS",
               help="What took longer once is not timed again in later rounds; its row says so.")  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Result folder, as of `run`; files go into its folder cost. Default: tactbench-results. "
+              help="Result folder, as of `run`; files and cells go into its folder cost. Default: tactbench-results. "
                    "With --twin: the folder of the files themselves; default: tactbench-results/cost.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(("table", "json", "csv")), default="table", show_default=True)
 def command(

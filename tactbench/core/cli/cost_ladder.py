@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import click
 
 if TYPE_CHECKING:
     from tactbench.core.cost.ladder import Ladder
+    from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.matrix import MatrixSpec
 
@@ -38,13 +40,12 @@ def show_ladder(
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import flat_csv, write_ladder
     from tactbench.core.leaderboard.table import METRIC_NAMES
-    from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()
     rig = rig or ("twin" if recordings is None else "replay")
     matrix = _matrix(registry, sensor, task, rig, protocol, split, estimators or ("all",), seed)
-    store = Store(out)
+    store = _store(out, sensor, task)
     with progress() as told:
         ladder = climb(matrix, registry, store, rounds=rounds, budget_s=budget, threads=threads,
                        clock=time.perf_counter, progress=told, recordings=recordings)  # fmt: skip
@@ -54,8 +55,31 @@ def show_ladder(
         click.echo(flat_csv(ladder), nl=False)
     else:
         _print(ladder)
-    paths = write_ladder(ladder, store.folder, METRIC_NAMES.get(ladder.about["metric"], ""))
+    paths = write_ladder(ladder, out, METRIC_NAMES.get(ladder.about["metric"], ""))
     remark(f"Files: {', '.join(map(str, paths))}")
+
+
+def _store(out: Path, sensor: str, task: str) -> Store:
+    """Return the folder of the ladder's own cells, `out`/cost, which no leaderboard of `out` shows.
+
+    What a run has finished of the same question, and what it recorded with the sensor, is linked into it and not done
+    again; what cannot be linked is.
+    """
+    from tactbench.core.matrix.store import Store
+    from tactbench.core.matrix.store.limits import is_key
+
+    store = Store(out / "cost")
+    rows = Store(out).rows() if (out / "cells").is_dir() else []
+    asked = ("done", sensor, task)
+    finished = [row for row in rows if (row["status"], row["sensor"], row["task"]) == asked and is_key(row["key"])]
+    cells = [Path("cells", f"{row['key']}.h5") for row in finished]
+    recordings = [path.relative_to(out) for path in (out / "recordings" / sensor).glob("*.h5")]
+    for path in (*cells, *recordings):
+        link = store.folder / path
+        with suppress(OSError):
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.hardlink_to(out / path)
+    return store
 
 
 def _matrix(

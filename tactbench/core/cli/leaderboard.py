@@ -2,56 +2,91 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from tactbench.core.cli.comparisons import print_comparisons
 from tactbench.core.cli.results import opened, provenance_of, shown_rows
-from tactbench.core.cli.tables import TABLE_FORMATS, print_table
+from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, format_of, print_table, view_of, view_options
 from tactbench.core.leaderboard.axes import AXES
 
 if TYPE_CHECKING:
+    from tactbench.core.leaderboard.view import View
     from tactbench.core.matrix.store import Store
+
+_FILTERS = ("sensor", "task", "protocol", "split", "estimator")
+
+
+def _filters(command: Any) -> Any:
+    for key in reversed(_FILTERS):
+        option = click.option(f"--{key}", multiple=True, metavar="NAME", help=f"Only this {key}; may be repeated.")
+        command = option(command)
+    return command
 
 
 @click.command(name="leaderboard")
-@click.argument("folder", type=click.Path(path_type=Path), default=Path("tactbench-results"), required=False)
+@click.argument("folder", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, required=False)
+@_filters
+@click.option("--best", type=click.IntRange(min=1), is_flag=False, flag_value=1, metavar="[N]",
+              help="Only the first N answers of each sensor in each block; N is 1 where it is left out.")  # fmt: skip
+@click.option("--columns", metavar="A,B,…", help="These columns, for example sensor,score,cell.")
+@view_options
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
               help="How it is shown; default: table, or what the name of the file given with --to says.")  # fmt: skip
 @click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-              help="Write a file: .md, .csv, .json, .tex, .html, .parquet.")  # fmt: skip
+              help="Write a file: .txt, .md, .csv, .json, .tex, .html, .parquet, .xlsx.")  # fmt: skip
 @click.option("--compare", "by", type=click.Choice(AXES), help="Show these side by side instead.")
 @click.option("--no-times", "times", flag_value=False, default=True, type=bool,
               help="Only what a seed decides, no times and hosts: the same bytes on every machine.")  # fmt: skip
-def command(folder: Path, shape: str | None, to: Path | None, by: str | None, times: bool) -> None:
+def command(
+    folder: Path, shape: str | None, to: Path | None, by: str | None, times: bool, best: int | None,
+    columns: str | None, wide: bool, notes: bool, **filters: tuple[str, ...],
+) -> None:  # fmt: skip
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
     from tactbench.core.cli.tables import check_destination
     from tactbench.core.leaderboard.collector import collector_at_rest
 
-    shape = shape or _meant(to)
+    shape = format_of(shape, to)
     check_destination(shape, to, times=times)
+    view = view_of(folder, wide=wide, notes=notes, columns=columns, shape=shape)
     with collector_at_rest():
-        _show(opened(folder), shape, to, by, times)
+        _show(opened(folder), shape, to, by, times, best, view, filters)
 
 
-def _show(store: Store, shape: str, to: Path | None, by: str | None, times: bool) -> None:
+def _show(
+    store: Store, shape: str, to: Path | None, by: str | None, times: bool, count: int | None, view: View,
+    filters: Mapping[str, Sequence[str]],
+) -> None:  # fmt: skip
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.files import table_of
+    from tactbench.core.leaderboard.view import best
 
-    rows = shown_rows(store)
+    rows = _only(shown_rows(store), filters)
     if by is None:
-        print_table(table_of(rows, store.folder, provenance_of(store, rows), times=times), shape, to=to)
-    elif to is not None or not times:
-        raise UsageError("A comparison is printed, and has no times.", hint="Leave out --to and --no-times.")
+        table = table_of(rows, store.folder, provenance_of(store, rows), times=times)
+        print_table(best(table, count) if count else table, shape, view, to=to)
+    elif to is not None or not times or count:
+        raise UsageError("A comparison is printed whole, and has no times.", hint="Leave out --to, --best, --no-times.")
     else:
         print_comparisons(rows, by, shape)
 
 
-def _meant(to: Path | None) -> str:
-    if to is None:
-        return "table"
-    from tactbench.core.leaderboard.formats import SUFFIXES
+def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
+    """Return the rows that are asked for; raises UsageError for a name that none has, or where none is left."""
+    from tactbench.core.errors import UnknownNameError, UsageError
 
-    return SUFFIXES.get(to.suffix.lower(), "table")
+    kept = rows
+    for key, asked in filters.items():
+        known = {str(row[key]) for row in rows if row[key] is not None}
+        for name in asked:
+            if name not in known:
+                raise UnknownNameError(f"{key} among these results", name, known)
+        kept = [row for row in kept if not asked or row[key] in asked]
+    if not kept:
+        raise UsageError(
+            "No row is all that at once.", hint="Ask for less: see `tactbench leaderboard --columns cell`."
+        )
+    return kept

@@ -10,7 +10,14 @@ import click
 
 from tactbench.core.cli.engines import choice_of, engine_options
 from tactbench.core.cli.selection import matrix_asked, selecting_options
-from tactbench.core.cli.tables import TABLE_FORMATS, check_destination, print_table
+from tactbench.core.cli.tables import (
+    DEFAULT_FOLDER,
+    TABLE_FORMATS,
+    check_destination,
+    print_table,
+    view_of,
+    view_options,
+)
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
@@ -21,16 +28,19 @@ if TYPE_CHECKING:
 @click.command(name="run")
 @selecting_options
 @engine_options
-@click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
+@view_options
 @click.pass_context
 def command(
     ctx: click.Context,
     /,
     out: Path,
     shape: str,
+    wide: bool,
+    notes: bool,
     engine: EngineName | None,
     jobs: int,
     timeout: float | None,
@@ -63,7 +73,7 @@ def command(
     provenance = provenance_of(store, outcome.rows)
     rows = over_replicates(outcome.rows)
     table = table_of(rows, store.folder, provenance)
-    print_table(table, shape)
+    print_table(table, shape, view_of(store.folder, wide=wide, notes=notes))
     if shape == "table":
         _side_by_side(rows)
     write_tables(rows, store.folder, provenance, table)

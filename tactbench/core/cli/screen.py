@@ -11,7 +11,7 @@ import click
 if TYPE_CHECKING:
     from rich.console import Console
 
-WITHOUT_EDGE = 240
+WITHOUT_EDGE = 400
 """Wide enough for every column of names of ordinary length."""
 
 

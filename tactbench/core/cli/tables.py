@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,8 +13,76 @@ from tactbench.core.cli.screen import console, width_without_terminal
 
 if TYPE_CHECKING:
     from tactbench.core.leaderboard.table import Table
+    from tactbench.core.leaderboard.view import View
 
-TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet", "html")
+TABLE_FORMATS = ("table", "json", "md", "latex", "csv", "parquet", "xlsx", "html")
+FOR_PEOPLE = ("table", "md", "latex")
+"""Formats that print less than everything."""
+NO_TEXT = ("parquet", "xlsx")
+DEFAULT_FOLDER = Path("tactbench-results")
+
+_VIEW_OPTIONS = (
+    click.option(
+        "--wide", is_flag=True, help="All columns. Default: eight; in LaTeX what one column of a paper holds."
+    ),
+    click.option("--notes", is_flag=True, help="All notes and the whole provenance. Default: the first three."),
+)
+
+
+def view_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say how much of a table is printed."""
+    for option in reversed(_VIEW_OPTIONS):
+        command = option(command)
+    return command
+
+
+def view_of(folder: Path, *, wide: bool, notes: bool, columns: str | None = None, shape: str = "table") -> View:
+    """Return what is printed of a table.
+
+    Parameters
+    ----------
+    columns
+        Names, separated by commas.
+
+    Raises
+    ------
+    UsageError
+        If there is no such column, or `shape` always holds them all.
+    """
+    from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.view import View, known_columns
+
+    if columns is not None and shape not in FOR_PEOPLE:
+        raise UsageError(
+            f"--format {shape} always holds all columns.", hint=f"--columns is for {', '.join(FOR_PEOPLE)}."
+        )
+    asked = [name.strip() for name in columns.split(",")] if columns is not None else []
+    where = "" if folder == DEFAULT_FOLDER else str(folder)
+    return View(wide=wide, notes=notes, columns=known_columns(asked), folder=where)
+
+
+def format_of(shape: str | None, to: Path | None) -> str:
+    """Return the format that is meant: the one asked for, or what the name of the file says.
+
+    Raises
+    ------
+    UsageError
+        If the name of the file says nothing, or another format than was asked for.
+    """
+    if to is None:
+        return shape or "table"
+    from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.formats import SUFFIXES
+
+    named = SUFFIXES.get(to.suffix.lower())
+    if named is None and shape is None:
+        raise UsageError(
+            f"What format {to} is to have cannot be told from its name.",
+            hint=f"Let it end in {', '.join(SUFFIXES)}, or give --format.",
+        )
+    if named is not None and shape is not None and named not in (shape, "table"):
+        raise UsageError(f"{to} is named as {named} and --format asks for {shape}.", hint="Leave out one of them.")
+    return shape or str(named)
 
 
 def check_destination(shape: str, to: Path | None = None, *, times: bool = True) -> None:
@@ -28,18 +97,20 @@ def check_destination(shape: str, to: Path | None = None, *, times: bool = True)
 
     if shape == "html" and not times:
         raise UsageError("The page shows every cell in full, times too.", hint="Use another --format.")
-    if shape == "parquet" and to is None and sys.stdout.isatty():
+    if shape in NO_TEXT and to is None and sys.stdout.isatty():
         raise UsageError(
-            "Parquet is no text for a terminal.",
-            hint="Write it to a file: `tactbench leaderboard --to leaderboard.parquet`, or into a pipe.",
+            f"{'Parquet' if shape == 'parquet' else 'An Excel file'} is no text for a terminal.",
+            hint=f"Write it to a file: `tactbench leaderboard --to leaderboard.{shape}`, or into a pipe.",
         )
 
 
-def print_table(table: Table, shape: str, *, to: Path | None = None) -> None:
+def print_table(table: Table, shape: str, view: View, *, to: Path | None = None) -> None:
     """Print a leaderboard on stdout, or write it to a file, in one of `TABLE_FORMATS`.
 
     Parameters
     ----------
+    view
+        What is printed of it in the formats `FOR_PEOPLE`.
     to
         The file to write in place of stdout.
 
@@ -53,20 +124,24 @@ def print_table(table: Table, shape: str, *, to: Path | None = None) -> None:
     if shape == "table" and to is None and sys.stdout.isatty():
         from tactbench.core.leaderboard.terminal import show
 
-        show(table, console())
+        show(table, console(), view)
     elif shape == "parquet":
         from tactbench.core.leaderboard.parquet import parquet
 
         _put(parquet(table), to)
+    elif shape == "xlsx":
+        from tactbench.core.leaderboard.xlsx import xlsx
+
+        _put(xlsx(table), to)
     elif shape == "table":
         from tactbench.core.leaderboard.terminal import plain_text
 
-        _put(plain_text(table, width_without_terminal()).encode("utf-8", "backslashreplace"), to)
+        _put(plain_text(table, width_without_terminal(), view).encode("utf-8", "backslashreplace"), to)
     else:
-        from tactbench.core.leaderboard.formats import TEXTS
+        from tactbench.core.leaderboard.formats import TEXTS, VIEWED
 
         with collector_at_rest():
-            text = TEXTS[shape](table)
+            text = VIEWED[shape](table, view) if shape in VIEWED else TEXTS[shape](table)
         _put(text.encode("utf-8", "replace"), to)
 
 

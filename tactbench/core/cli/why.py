@@ -1,4 +1,4 @@
-"""``tactbench why``: whether a result would be reused, what changed, and how a cell ended that did not finish."""
+"""``tactbench why``: whether a result would be reused, what changed, what it is made of, how it ended otherwise."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ import click
 
 from tactbench.core.cli.selection import selecting_options
 from tactbench.core.cli.threads import one_thread
+from tactbench.core.leaderboard.text import visible
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import Subject
     from tactbench.core.matrix.explanation import Explanation
+    from tactbench.core.matrix.store import Row
 
 _TAIL = 15
 """Lines of a traceback or log that are shown; the whole of it stands in ``--format json``."""
@@ -27,10 +29,10 @@ _REASONS = 20
 @selecting_options
 @click.option("--format", "shape", type=click.Choice(("text", "json")), default="text", show_default=True)
 def command(cell: str, out: Path, shape: str, **options: Any) -> None:
-    """Say why a cell would be reused or computed, and how it ended.
+    """Say why a cell would be reused or computed, what its score rests on, and how it ended.
 
-    CELL is its name as tables show it, a part that only one cell has, or how its key begins. Without options the cell
-    is asked for as it was; with `run`'s options, as they ask for it.
+    CELL is its name as tables show it, a part that only one cell has, or how its key begins; of the replicates of a
+    cell the first is meant. Without options the cell is asked for as it was; with `run`'s options, as they ask for it.
     """
     one_thread()
     from tactbench.core.cli.cells import subject
@@ -62,9 +64,41 @@ def _facts(found: Subject, why: Explanation) -> dict[str, Any]:
         "simulation": row.get("simulation", {}),
         "score": row.get("score"),
         "made_by": row.get("made_by", ""),
+        "rests_on": _rests_on(row) if done else [],
         "provenance": _provenance(found) if done else [],
         "try": _try(found, why),
     }
+
+
+def _rests_on(row: Row) -> list[str]:
+    """Return what the score of a finished cell is made of and what it is to be held against."""
+    from tactbench.core.leaderboard.counts import told_counts
+    from tactbench.core.leaderboard.names import metric_name
+    from tactbench.core.leaderboard.notes import picked
+    from tactbench.core.leaderboard.numbers import ABSENT, interval, score, suffix
+
+    unit = str(row["unit"])
+    told = [f"{metric_name(row)} {score(row['score'], unit)}"]
+    ends = interval(row["ci_low"], row["ci_high"], unit)
+    told += [f"95 % {ends} ({row['ci_method']})"] if ends != ABSENT else []
+    if row.get("score_beyond_floor") is not None:
+        ends = interval(row["beyond_floor_ci_low"], row["beyond_floor_ci_high"], unit)
+        floor = f"floor of the reference {score(row['reference_floor'], unit)}{suffix(unit)}"
+        told += [floor, f"beyond it {score(row['score_beyond_floor'], unit)}, 95 % {ends}"]
+    if row.get("published") is not None:
+        told.append(f"published {score(row['published'], unit)} ({row['published_reference']})")
+    parts = [("score", "; ".join(told))]
+    if row.get("scores"):
+        parts.append(("other scores", ", ".join(f"{name} {value:.3g}" for name, value in row["scores"].items())))
+    if row.get("chosen"):
+        parts.append(("chosen on validation data", picked(row)))
+    parts.append(("samples", f"{row['n_train']} to train on, {row['n_test']} to test on, from {row['n_recordings']} "
+                             f"recordings of {row['n_sessions']} sessions"))  # fmt: skip
+    counted = told_counts(row.get("counts") or {})
+    if counted:
+        parts.append(("left out", "; ".join(counted)))
+    parts += [("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ()))]
+    return [visible(f"{name}: {text}") for name, text in parts]
 
 
 def _provenance(found: Subject) -> list[str]:
@@ -104,7 +138,7 @@ def _ended(facts: dict[str, Any]) -> list[str]:
         where = ", ".join(facts["recordings"][:3])
         more = len(facts["recordings"]) - 3
         recordings = f"{where}{f' and {more} more' if more > 0 else ''}"
-        return [f"done: {facts['shard']}", f"recordings: {recordings}", *facts["provenance"]]
+        return [*facts["rests_on"], f"done: {facts['shard']}", f"recordings: {recordings}", *facts["provenance"]]
     lines = [facts["status"] + (f": {facts['reason']}" if facts["reason"] else "")]
     if facts["signal"] is not None:
         lines.append(f"signal {facts['signal']}")

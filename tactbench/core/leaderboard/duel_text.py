@@ -20,6 +20,7 @@ def markdown(tables: Sequence[DuelTable], notes: Sequence[str]) -> str:
 def latex(tables: Sequence[DuelTable], notes: Sequence[str]) -> str:
     """Return the tables as LaTeX for the booktabs package, the notes below the last."""
     parts: list[str] = []
-    for table in tables:
-        parts += latex_grid(table.title, table.columns, NUMERIC, table.lines, notes if table is tables[-1] else ())
+    for number, table in enumerate(tables):
+        below = notes if table is tables[-1] else ()
+        parts += latex_grid(table.title, table.columns, NUMERIC, table.lines, below, number=number, star=True)
     return "\n".join(parts) + "\n"

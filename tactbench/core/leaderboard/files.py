@@ -11,8 +11,9 @@ from typing import Any
 import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard import memo
-from tactbench.core.leaderboard.formats import TEXTS
+from tactbench.core.leaderboard.formats import TEXTS, VIEWED
 from tactbench.core.leaderboard.table import Table, build_table
+from tactbench.core.leaderboard.view import WHOLE
 from tactbench.core.matrix.files import replace_file
 
 Row = Mapping[str, Any]
@@ -28,7 +29,7 @@ _NESTED = (dict, list, tuple)
 def write_tables(
     rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = (), table: Table | None = None
 ) -> tuple[Path, ...]:
-    """Write the leaderboard of `rows` in every format that people open; return the files.
+    """Write the leaderboard of `rows` in every format that people open, nothing left out; return the files.
 
     Parameters
     ----------
@@ -54,7 +55,8 @@ def write_tables(
     try:
         made = {}
         for ending, path in zip(ENDINGS, paths, strict=True):
-            content = TEXTS[ending](table).encode("utf-8", "replace")
+            text = VIEWED[ending](table, WHOLE) if ending in VIEWED else TEXTS[ending](table)
+            content = text.encode("utf-8", "replace")
             replace_file(path, content)
             made[path.name] = hashlib.sha256(content).hexdigest()
         if inputs is not None:

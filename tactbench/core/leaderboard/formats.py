@@ -11,12 +11,14 @@ from tactbench.core.leaderboard.markdown import markdown, markdown_grid, markdow
 from tactbench.core.leaderboard.parquet import parquet
 from tactbench.core.leaderboard.records import JSON_KEYS, json_text, records
 from tactbench.core.leaderboard.table import Table, build_table
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, View
 
 __all__ = [
     "FORMATS",
     "JSON_KEYS",
     "SUFFIXES",
     "TEXTS",
+    "VIEWED",
     "json_array",
     "markdown_grid",
     "markdown_note",
@@ -53,9 +55,15 @@ TEXTS: dict[str, Callable[[Table], str]] = {
     "latex": latex,
     "html": page,
 }
-"""How a table is written, by the name of the format on the command line; all but Parquet, which is no text."""
+"""How a table is written, by the name of the format on the command line; all but Parquet and Excel: no text."""
 
-SUFFIXES = {".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".html": "html", ".parquet": "parquet"}
+VIEWED: dict[str, Callable[[Table, View], str]] = {"md": markdown, "latex": latex}
+"""Those of them that print less than everything, as a view says."""
+
+SUFFIXES = {
+    ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".html": "html", ".parquet": "parquet",
+    ".xlsx": "xlsx", ".txt": "table",
+}  # fmt: skip
 """The format that a file is meant to have, by how its name ends."""
 
 
@@ -69,14 +77,18 @@ def to_csv(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool =
     return csv_text(build_table(rows, provenance, times=times))
 
 
-def to_markdown(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> str:
+def to_markdown(
+    rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True, view: View = DEFAULT_VIEW
+) -> str:
     """Return the table as Markdown, a heading a block."""
-    return markdown(build_table(rows, provenance, times=times))
+    return markdown(build_table(rows, provenance, times=times), view)
 
 
-def to_latex(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> str:
+def to_latex(
+    rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True, view: View = DEFAULT_VIEW
+) -> str:
     """Return the table as LaTeX for the booktabs package, a table a block."""
-    return latex(build_table(rows, provenance, times=times))
+    return latex(build_table(rows, provenance, times=times), view)
 
 
 def to_parquet(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> bytes:

@@ -5,26 +5,28 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Sequence
 
-from tactbench.core.leaderboard.columns import NUMERIC
+from tactbench.core.leaderboard import view as viewed
 from tactbench.core.leaderboard.table import Table
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, View
 
 _ACTS = re.compile(r"[\\|*\[\]~]|(?<![^\W_])_|_(?![^\W_])")
 """Begins something wherever it stands; an underscore does so only at the edge of a word."""
 _BEGINS_A_LINE = re.compile(r"[#>+=-]|[0-9]+[.)]")
 
 
-def markdown(table: Table) -> str:
+def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
     """Return the table as Markdown, a heading a block."""
     parts: list[str] = []
-    for block in table.blocks:
-        heading, *grid = markdown_grid(block.title, table.columns, NUMERIC, [line.cells for line in block.lines])
-        told = [f"{' '.join(map(markdown_note, block.verdict))}\n"] if block.verdict else []
-        parts += [heading, *told, *grid, ""]
-    parts += [f"- {markdown_note(note)}" for note in table.notes]
-    for section in table.sections:
+    for grid in viewed.grids(table, view):
+        numeric = {head for name, head in zip(grid.columns, grid.headers, strict=True) if name in grid.numeric}
+        heading, *lines = markdown_grid(grid.title, grid.headers, numeric, grid.lines)
+        parts += [heading, *(f"{markdown_note(text)}\n" for text in grid.said), *lines, ""]
+    parts += [f"- {markdown_note(note)}" for note in (*viewed.notes(table, view), *viewed.commands(table, view))]
+    for section in viewed.sections(table, view):
         parts += ["", *markdown_grid(section.title, section.columns, section.numeric, section.lines)]
         parts += ["", *(f"- {markdown_note(note)}" for note in section.notes)] if section.notes else []
-    parts += ["", *(f"- {markdown_note(sentence)}" for sentence in table.foot)] if table.foot else []
+    foot = viewed.foot(table, view)
+    parts += ["", *(f"- {markdown_note(sentence)}" for sentence in foot)] if foot else []
     return "\n".join(parts) + "\n"
 
 

@@ -23,13 +23,17 @@ def score_marks(sheet: Sheet) -> list[str]:
 
 
 def mark_notes(sheet: Sheet) -> list[str]:
-    """Return what the marks of a table mean: †, ‡ and SIM, each once."""
+    """Return what the marks behind scores mean: ‡ and †, each once."""
     dagger = [DAGGER] if any(sheet["dagger"]) else []
     stamps = dict.fromkeys(f"‡ {visible(str(stamp))}" for stamp in chain.from_iterable(filter(None, sheet["stamps"])))
+    return [*stamps, *dagger]
+
+
+def simulation_notes(sheet: Sheet) -> list[str]:
+    """Return what SIM means, and what the simulations assumed."""
     assumed = list(compress(sheet["assumptions"], sheet["simulated"]))
     told = dict.fromkeys(map(_assumptions, dict(zip(marks_of(assumed), assumed, strict=True)).values()))
-    simulated = [f"SIM: simulated by the twin, never ranked against hardware. Assumed: {one}." for one in told]
-    return [*dagger, *stamps, *simulated]
+    return [f"SIM: simulated by the twin, never ranked against hardware. Assumed: {one}." for one in told]
 
 
 def _assumptions(assumptions: Mapping[str, Any]) -> str:

@@ -11,12 +11,13 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.counts import told_counts
-from tactbench.core.leaderboard.marks import mark_notes
+from tactbench.core.leaderboard.marks import mark_notes, simulation_notes
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, question_name
 from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.leaderboard.sheet import Sheet, marks_of
 from tactbench.core.leaderboard.stopped import stopped_notes
 from tactbench.core.leaderboard.text import visible
+from tactbench.core.spec.status import STATUSES, STOPPED
 
 Row = Mapping[str, Any]
 
@@ -27,7 +28,10 @@ RANKS = (
 
 
 def notes_of(sheet: Sheet, blocks: Sequence[Block]) -> list[str]:
-    """Return the notes on the lines of `blocks`; those on whose times they are stand elsewhere.
+    """Return the notes on the lines of `blocks`, the most important first; those on times stand elsewhere.
+
+    First what did not finish, what leaks and what a deployed sensor could not do, then what the scores must be read
+    with, then how they came about.
 
     Parameters
     ----------
@@ -35,16 +39,19 @@ def notes_of(sheet: Sheet, blocks: Sequence[Block]) -> list[str]:
         The rows in the order of the lines.
     """
     return [
+        *stopped_notes(sheet, STOPPED),
         *mark_notes(sheet),
-        *_tare_notes(sheet),
         *_floor_notes(sheet),
-        *_rank_notes(blocks),
-        *_chosen_notes(sheet),
         *_no_better_notes(sheet),
+        *_tare_notes(sheet),
+        *_rank_notes(blocks),
+        *_true_error_notes(sheet),
         *_other_knowledge_notes(sheet),
-        *_left_out_notes(sheet),
+        *stopped_notes(sheet, frozenset(STATUSES) - STOPPED),
         *interval_notes(sheet),
-        *stopped_notes(sheet),
+        *_chosen_notes(sheet),
+        *_left_out_notes(sheet),
+        *simulation_notes(sheet),
     ]
 
 
@@ -93,9 +100,12 @@ def _floor_notes(sheet: Sheet) -> list[str]:
             f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond "
             "floor is sqrt(max(0, RMSE² − floor²)); ranks go by it where all answers of a block have it."
         )
-    if any(one is not None for one in sheet.known("true_score")):
-        told.append("True error (SIM): against the force that the twin exerted, free of the reference's noise.")
     return told
+
+
+def _true_error_notes(sheet: Sheet) -> list[str]:
+    known = any(one is not None for one in sheet.known("true_score"))
+    return ["True error (SIM): against the force that the twin exerted, free of the reference's noise."] * known
 
 
 def _floor(found: Sequence[float], unit: str) -> str:
@@ -122,9 +132,22 @@ def _chosen_notes(sheet: Sheet) -> list[str]:
     names: dict[str, dict[str, None]] = {}
     for chosen, row in zip(sheet["chosen"], sheet.rows, strict=True):
         if chosen:
-            picked = ", ".join(f"{key.rstrip('_')} = {_told(value)}" for key, value in sorted(chosen.items()))
-            names.setdefault(visible(picked), {})[f"{question_name(row)}/{answer_name(row)}"] = None
-    return [f"{', '.join(who)}: chosen on validation data: {picked}." for picked, who in names.items()]
+            names.setdefault(visible(picked(row)), {})[f"{question_name(row)}/{answer_name(row)}"] = None
+    return [f"{', '.join(who)}: chosen on validation data: {what}." for what, who in names.items()]
+
+
+def picked(row: Row) -> str:
+    """Return what an answer chose on validation data."""
+    return ", ".join(_picked(str(key), value, row) for key, value in sorted(row["chosen"].items()))
+
+
+def _picked(key: str, value: object, row: Row) -> str:
+    """Return a chosen parameter: k of `window_grid` with its meaning, others by name."""
+    name, _, fold = key.partition(" of fold ")
+    where = f" of fold {fold}" if fold else ""
+    if name == "k":
+        return f"k = {_told(value)} samples before the newest in the mean filter{where}"
+    return f"{name.rstrip('_')} = {_told(value)}{where} (parameter of {row['estimator']})"
 
 
 def _told(value: object) -> str:

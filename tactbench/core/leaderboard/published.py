@@ -32,7 +32,7 @@ def published_section(sheet: Sheet) -> Section | None:
     if not lines:
         return None
     ordered = sorted(lines, key=lambda line: (line[1:], line[0]))
-    return Section(TITLE, COLUMNS, NUMERIC, tuple(ordered))
+    return Section(TITLE, COLUMNS, NUMERIC, tuple(ordered), detail=True)
 
 
 def _whose(row: Row) -> tuple[str, str]:

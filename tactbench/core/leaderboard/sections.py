@@ -17,3 +17,5 @@ class Section:
     notes: tuple[str, ...] = ()
     alarms: frozenset[int] = frozenset()
     """Lines that a reader should look at first."""
+    detail: bool = False
+    """Whether it only gives details of what stands in the blocks, and is printed with them all."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from tactbench.core.leaderboard.names import asked_of, question_name
@@ -18,11 +18,11 @@ LONGEST_REASON = 600
 """Characters of a reason in a note; JSON, CSV and Parquet have all of it."""
 
 
-def stopped_notes(sheet: Sheet) -> list[str]:
-    """Return one sentence for all cells that ended alike: which, how, why, and the command to look into it."""
+def stopped_notes(sheet: Sheet, statuses: Collection[str]) -> list[str]:
+    """Return one sentence for all cells that ended alike in one of `statuses`: which, why, how to look into it."""
     alike: dict[tuple[str, int | None, str], list[Row]] = {}
     for status, row in zip(sheet["status"], sheet.rows, strict=True):
-        if status != "done":
+        if status in statuses and status != "done":
             alike.setdefault((row["status"], row["signal"], row["reason"]), []).append(row)
     return [_told(status, signal, reason, members) for (status, signal, reason), members in alike.items()]
 

@@ -3,98 +3,127 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from tactbench.core.leaderboard.columns import NUMERIC
-from tactbench.core.leaderboard.sections import Section
-from tactbench.core.leaderboard.table import ABSENT, Block, Table
+from tactbench.core.leaderboard import view as viewed
+from tactbench.core.leaderboard.columns import INTERVALS
+from tactbench.core.leaderboard.fitting import fit, wrapped
+from tactbench.core.leaderboard.table import Section, Table
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, Grid, View
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 _STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim"}
+_ALARM = "yellow"
 _FIRST_TO_GO = (
-    "batch/row", "p95", "sessions", "n test", "sim", "baseline", "fit", "published", "latency p50", "rank 95 %",
-    "95 % beyond",
+    "cell", "batch/row", "p95", "sessions", "n test", "sim", "baseline", "latency p50", "rank 95 %", "fit",
+    "true error", "95 % interval", "published", "delay", "95 % beyond",
 )  # fmt: skip
-"""Columns that a narrow terminal does without, in this order; the files have them all."""
-_AROUND_A_CELL = 3
+"""Columns that a terminal does without, in this order, where it is too narrow for them even with broken texts; those
+that were asked for by name are never left out."""
+_GAPS = (3, 2)
+"""Spaces between columns: the first where there is room."""
+_MARGIN = 2
 Styled = tuple[str, str]
 """A line, and how it looks."""
 
 
-def show(table: Table, console: Console) -> None:
+def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
     """Print a leaderboard on `console`; text from plugins is never read as markup."""
     from rich.segment import Segment, Segments
 
-    style = {name: console.get_style(name) for name in {"bold", *_STYLE.values()}}
-
-    def say(lines: Iterable[Styled]) -> None:
-        said = [part for text, how in lines for part in (Segment(text, style.get(how)), Segment("\n"))]
-        console.print(Segments(said), soft_wrap=True, end="")
-
-    say(_above(table, console.width))
-    for section in table.sections:
-        _show_section(section, console)
-    say(_below(table, console.width))
+    style = {name: console.get_style(name) for name in {"bold", _ALARM, *_STYLE.values()}}
+    said = [
+        part
+        for text, how in _lines(table, console.width, view)
+        for part in (Segment(text, style.get(how)), Segment("\n"))
+    ]
+    console.print(Segments(said), soft_wrap=True, end="")
 
 
 def blocks_text(table: Table, width: int) -> str:
     """Return the blocks of a table alone, without notes, as a terminal without colours shows them."""
-    return "\n".join(text for block in table.blocks for text, _ in _block_lines(table.columns, block, width)[0])
+    grids = viewed.grids(table, DEFAULT_VIEW)
+    return "\n".join(text for grid in grids for text, _ in _grid_lines(grid, width, _FIRST_TO_GO)[0])
 
 
-def plain_text(table: Table, width: int = 240) -> str:
+def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
     """Return what a terminal without colours shows; the width is enough for names of ordinary length."""
-    lines = [text for text, _ in _above(table, width)]
-    if table.sections:
-        import io
-
-        from rich.console import Console
-
-        out = io.StringIO()
-        for section in table.sections:
-            _show_section(section, Console(file=out, width=width, highlight=False, color_system=None))
-        lines += out.getvalue().split("\n")[:-1]
-    lines += [text for text, _ in _below(table, width)]
-    return "".join(f"{line}\n" for line in lines)
+    return "".join(f"{text}\n" for text, _ in _lines(table, width, view))
 
 
-def _above(table: Table, width: int) -> Iterator[Styled]:
-    """Yield the lines above the sections."""
-    left_out: set[str] = set()
-    for block in table.blocks:
-        lines, gone = _block_lines(table.columns, block, width)
-        left_out |= gone
+def _lines(table: Table, width: int, view: View) -> Iterator[Styled]:
+    left_out: dict[str, None] = {}
+    for grid in viewed.grids(table, view):
+        lines, gone = _grid_lines(grid, width, () if view.columns else _FIRST_TO_GO)
+        left_out |= dict.fromkeys(gone)
         yield from lines
-    notes = list(table.notes)
-    if left_out:
-        names = ", ".join(name for name in table.columns if name in left_out)
-        notes.append(f"This terminal is too narrow for: {names}. They are in the files.")
+    notes = [*viewed.notes(table, view), *viewed.commands(table, view)]
+    notes += _too_narrow(left_out)
     yield from _note_lines(notes, width)
-
-
-def _below(table: Table, width: int) -> Iterator[Styled]:
-    """Yield the lines below the sections."""
-    if table.foot:
+    for section in viewed.sections(table, view):
         yield "", ""
-        yield from _note_lines(table.foot, width)
+        yield from _section_lines(section, width)
+    foot = viewed.foot(table, view)
+    if foot:
+        yield "", ""
+        yield from _note_lines(foot, width)
 
 
-def _block_lines(columns: Sequence[str], block: Block, width: int) -> tuple[list[Styled], set[str]]:
-    """Return the lines of a block with their styles, and the columns that there was no room for.
+def _too_narrow(names: Collection[str]) -> list[str]:
+    return [f"This terminal is too narrow for: {', '.join(names)}. They are in the files."] if names else []
 
-    Lines are padded and cut here: a grid of rich takes a second for a thousand of them, and a text of its own for each
-    of a thousand blocks a third of one.
+
+def _section_lines(section: Section, width: int) -> Iterator[Styled]:
+    grid = Grid(section.title, section.columns, section.columns, section.lines, (), section.numeric)
+    styles = [_ALARM if place in section.alarms else "" for place in range(len(section.lines))]
+    lines, gone = _grid_lines(grid, width, section.columns[:0:-1], styles)
+    yield from lines
+    yield from _note_lines([*section.notes, *_too_narrow(gone)], width)
+
+
+def _grid_lines(
+    grid: Grid, width: int, first_to_go: Sequence[str], styles: Sequence[str] = ()
+) -> tuple[list[Styled], list[str]]:
+    """Return the lines of a grid with their styles, and the columns, of `first_to_go`, that there was no room for.
+
+    Lines are padded here: a grid of rich takes a second for a thousand of them, and a text of its own for each of a
+    thousand blocks a third of one.
     """
-    widths, gone = _fitting(columns, block, width)
-    rule = f" {'─' * (sum(widths.values()) + _AROUND_A_CELL * len(widths) - 1)}"
-    body = [(_padded(columns, columns, widths), "bold"), (rule[:width], "")]
-    body += [(_padded(line.cells, columns, widths), _STYLE[line.kind]) for line in block.lines]
-    title = [(line, "bold") for line in _folded(block.title, width)]
-    title += [(line, "") for said in block.verdict for line in _folded(said, width)]
-    return [*title, ("", ""), *((_cut(text, width), how) for text, how in body), ("", "")], gone
+    numeric = grid.numeric
+    places = {name: place for place, name in enumerate(grid.columns)}
+    breakable = {
+        place for name, place in places.items() if (name in INTERVALS or name not in numeric) and name != viewed.CELL
+    }
+    intervals = {places[name] for name in INTERVALS if name in places}
+    to_go = [places[name] for name in first_to_go if name in places]
+    for gap in _GAPS:
+        widths, gone = fit(
+            grid.headers, grid.lines, breakable, room=width - _MARGIN, gap=gap, measure=_width, first_to_go=to_go,
+            broken_last=intervals,
+        )  # fmt: skip
+        natural = fit(grid.headers, grid.lines, (), room=float("inf"), gap=gap, measure=_width)[0]
+        if widths == natural:
+            break
+    right = {place for name, place in places.items() if name in numeric}
+
+    def padded(cells: Sequence[str]) -> Iterator[str]:
+        parts = {place: wrapped(cells[place], room, _width) for place, room in widths.items()}
+        for number in range(max(map(len, parts.values()))):
+            texts = {place: part[number] if number < len(part) else "" for place, part in parts.items()}
+            yield _padded(texts, right, widths, gap)
+
+    rule = f" {'─' * int(sum(widths.values()) + gap * (len(widths) - 1) + 2)}"
+    body: list[Styled] = [(text, "bold") for text in padded(grid.headers)]
+    body.append((rule[:width], ""))
+    for place, line in enumerate(grid.lines):
+        style = _STYLE[grid.kinds[place]] if grid.kinds else styles[place]
+        body += [(text, style) for text in padded(line)]
+    title: list[Styled] = [(line, "bold") for line in _folded(grid.title, width)]
+    title += [(line, "") for text in grid.said for line in _folded(text, width)]
+    return [*title, ("", ""), *body, ("", "")], [grid.columns[place] for place in gone]
 
 
 def _folded(text: str, width: int) -> list[str]:
@@ -119,61 +148,16 @@ def _width(text: str) -> int:
     return cell_len(text)
 
 
-def _cut(line: str, width: int) -> str:
-    """Return `line`, or as much of it as fits."""
-    if _width(line) <= width:
-        return line
-    from rich.cells import set_cell_size
-
-    return f"{set_cell_size(line, width - 1)}…"
-
-
-def _padded(cells: Sequence[str], columns: Sequence[str], widths: Mapping[int, int]) -> str:
-    """Return one line of a block, columns of numbers to the right."""
+def _padded(cells: Mapping[int, str], right: Iterable[int], widths: Mapping[int, float], gap: int) -> str:
+    """Return one line, columns of numbers to the right."""
     parts = []
     for place, width in widths.items():
-        blank = " " * (width - _width(cells[place]))
-        parts.append(blank + cells[place] if columns[place] in NUMERIC else cells[place] + blank)
-    return f"  {(' ' * _AROUND_A_CELL).join(parts)}".rstrip()
-
-
-def _show_section(section: Section, console: Console) -> None:
-    from rich import box
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    console.print(Text(f"\n{section.title}", style="bold"))
-    grid = RichTable(box=box.SIMPLE_HEAD)
-    for name in section.columns:
-        grid.add_column(Text(name), justify="right" if name in section.numeric else "left", overflow="fold")
-    for place, line in enumerate(section.lines):
-        grid.add_row(*map(Text, line), style="yellow" if place in section.alarms else "")
-    console.print(grid)
-    for text, how in _note_lines(section.notes, console.width):
-        console.print(Text(text, style=how), soft_wrap=True)
+        blank = " " * int(width - _width(cells[place]))
+        parts.append(blank + cells[place] if place in right else cells[place] + blank)
+    return f"{' ' * _MARGIN}{(' ' * gap).join(parts)}".rstrip()
 
 
 def _note_lines(notes: Sequence[str], width: int) -> Iterator[Styled]:
     for note in notes:
         for line in _folded(note, width - 1):
             yield f" {line}", "dim"
-
-
-def _fitting(columns: Sequence[str], block: Block, width: int) -> tuple[dict[int, int], set[str]]:
-    """Return the places of the columns to show with their widths, and the names of those that there is no room for.
-
-    Empty columns are never shown.
-    """
-    widths = {
-        place: max(_width(columns[place]), *(_width(line.cells[place]) for line in block.lines))
-        for place in range(len(columns))
-        if any(line.cells[place].strip(ABSENT) for line in block.lines)
-    }
-    gone: set[str] = set()
-    for name in _FIRST_TO_GO:
-        if sum(widths.values()) + _AROUND_A_CELL * len(widths) <= width:
-            break
-        place = columns.index(name) if name in columns else -1
-        if widths.pop(place, None) is not None:
-            gone.add(name)
-    return widths, gone

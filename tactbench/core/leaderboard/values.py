@@ -33,7 +33,7 @@ def _if_known(key: str) -> Callable[[Columns], Values]:
 
 
 def _from_ms(key: str) -> Callable[[Columns], Values]:
-    return lambda known: [None if value is None else value / 1e3 for value in known[key]]
+    return lambda known: [None if value is None else value / 1e3 for value in _if_known(key)(known)]
 
 
 VALUES: dict[str, Callable[[Columns], Values]] = {
@@ -47,6 +47,7 @@ VALUES: dict[str, Callable[[Columns], Values]] = {
     "n test": _as_is("n_test"),
     "sessions": _as_is("n_sessions"),
     "sim": _as_is("sim_s"),
+    "delay": _from_ms("answer_delay_ms"),
     "fit": _as_is("fit_s"),
     "latency p50": _from_ms("latency_ms_p50"),
     "p95": _from_ms("latency_ms_p95"),

@@ -18,6 +18,9 @@ _SHOWN = 8
 def meant(given: str, names: Sequence[str], keys: Mapping[str, str]) -> str:
     """Return the name of the cell that `given` stands for: its name, a part of only one name, or how its key begins.
 
+    The replicates of a cell differ in the last part of their names alone: what names them all, with or without that
+    part, stands for the first of them.
+
     Parameters
     ----------
     names
@@ -32,11 +35,11 @@ def meant(given: str, names: Sequence[str], keys: Mapping[str, str]) -> str:
     """
     if given in names:
         return given
-    found = [name for name in names if given in name]
+    found = [name for name in names if _parts(name)[0] == given] or [name for name in names if given in name]
     if not found and re.fullmatch(r"[0-9a-f]{4,}", given):
         found = [name for name in names if keys.get(name, "").startswith(given)]
-    if len(found) == 1:
-        return found[0]
+    if len({_parts(name)[0] for name in found}) == 1:
+        return min(found, key=lambda name: _parts(name)[1])
     if not found:
         close = " or ".join(repr(name) for name in nearest(given, names))
         raise UsageError(
@@ -50,6 +53,12 @@ def meant(given: str, names: Sequence[str], keys: Mapping[str, str]) -> str:
         f"{given!r} is part of the names of {len(found)} cells.",
         hint=f"Give more of the name of one: {', '.join(found[:_SHOWN])}{more}.",
     )
+
+
+def _parts(name: str) -> tuple[str, int]:
+    """Return what the replicates of a cell have in common, and which one this is."""
+    cell, _, repeat = name.rpartition("/")
+    return (cell, int(repeat)) if repeat.isdecimal() else (name, 0)
 
 
 def cell_of(row: Mapping[str, Any]) -> Cell:

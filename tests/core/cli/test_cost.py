@@ -32,6 +32,24 @@ def test_whoever_breaks_costs_its_own_row_only(shell):
     assert all(float(row["latency_ms_p95"]) > 0 for row in listed)
 
 
+def test_what_is_timed_adds_no_row_to_a_leaderboard_and_what_a_run_has_finished_is_not_done_again(shell):
+    presses(shell.folder / "shelf")
+    asked = ("--sensor", "made", "--task", "force", "--recordings", "shelf", "--split", "session", "--out", "out")
+    shell("run", *asked, "--estimator", "ols")
+    before = shell("leaderboard", "out", "--format", "json").stdout
+    ledger = (shell.folder / "out" / "index.jsonl").read_bytes()
+    shell("cost", *asked, "--rounds", "1", "--estimator", "ols", "--estimator", "knn")
+    assert shell("leaderboard", "out", "--format", "json").stdout == before
+    assert (shell.folder / "out" / "index.jsonl").read_bytes() == ledger
+    rows = json.loads(shell("leaderboard", "out/cost", "--format", "json").stdout)
+    assert {row["estimator"] for row in rows} == {"ols", "knn", "mean", "time-index"}
+    made_by = {row["estimator"]: row["made_by"] for row in json.loads(before)}
+    wall = {row["estimator"]: row["wall_s"] for row in json.loads(before)}
+    for row in rows:
+        if row["estimator"] in made_by:
+            assert (row["made_by"], row["wall_s"]) == (made_by[row["estimator"]], wall[row["estimator"]])
+
+
 def test_the_table_states_what_its_times_mean(shell):
     presses(shell.folder / "shelf")
     done = shell(*ASKED, "--estimator", "ols", "--estimator", "knn", "--out", "there")

@@ -51,6 +51,69 @@ def test_every_format_goes_to_a_file_named_for_it(ran):
     assert "nowhere/table.md cannot be written" in refused.stderr
 
 
+def test_a_workbook_goes_to_a_file(ran):
+    from openpyxl import load_workbook
+
+    ran("leaderboard", "out", "--to", "table.xlsx")
+    sheet = load_workbook(ran.folder / "table.xlsx").worksheets[0]
+    _, names, first, *_ = sheet.iter_rows(values_only=True)
+    rows = json.loads(ran("leaderboard", "out", "--format", "json").stdout)
+    assert dict(zip(names, first, strict=True))["score: RMSE [N]"] == rows[0]["score"]
+
+
+@pytest.mark.parametrize("name", ["table.xls", "table", "table.md.bak"])
+def test_a_name_that_says_no_format_is_refused_and_not_written(ran, name):
+    refused = ran("leaderboard", "out", "--to", name, code=2)
+    assert ".xlsx" in refused.stderr
+    assert not (ran.folder / name).exists()
+    assert "asks for md" in ran("leaderboard", "out", "--to", "table.xlsx", "--format", "md", code=2).stderr
+
+
+def test_rows_are_chosen_by_name_and_unknown_names_are_refused_with_the_known(ran):
+    shown = json.loads(ran("leaderboard", "out", "--estimator", "lasso", "--format", "json").stdout)
+    assert [row["estimator"] for row in shown] == ["lasso"]
+    assert shown[0]["baseline"] is not None
+    for option, given, says in (
+        ("--sensor", "ideel", "Did you mean 'ideal'? Known: ideal."),
+        ("--task", "forse", "Did you mean 'force'"),
+        ("--protocol", "karl2015", "Did you mean 'karl2016'"),
+        ("--split", "role", "Known: roles"),
+        ("--estimator", "laso", "Known: lasso, mean, time-index"),
+        ("--columns", "sensor,scor", "Did you mean 'score'"),
+    ):
+        assert says in ran("leaderboard", "out", option, given, code=2).stderr
+    assert "always holds all columns" in ran("leaderboard", "out", "--columns", "#", "--format", "csv", code=2).stderr
+
+
+def test_the_best_and_columns_of_ones_own_choice(ran):
+    best = ran("leaderboard", "out", "--best", "--columns", "sensor,estimator,cell").stdout.splitlines()
+    assert best[2].split() == ["sensor", "estimator", "cell"]
+    assert best[4].split() == ["ideal", "SIM", "lasso", "ideal/force/twin/karl2016/lasso"]
+    assert best[5] == ""
+
+
+def test_the_cell_that_a_table_shows_is_the_one_that_why_explains(ran):
+    shown = ran("leaderboard", "out", "--columns", "cell").stdout
+    (command,) = [line.split("`")[1] for line in shown.splitlines() if "What a row rests on" in line]
+    assert f"  {command.split()[2]}\n" in shown
+    why = ran(*command.split()[1:]).stdout
+    assert why.startswith(f"{command.split()[2]}/1\nhit")
+    assert "score: RMSE [N] " in why
+
+
+def test_more_is_shown_on_request(ran):
+    few, many = (ran("leaderboard", "out", *more).stdout for more in ((), ("--wide", "--notes")))
+    assert "latency p50" not in few
+    assert "latency p50" in many
+    assert "more note" in few
+    assert "more note" not in many
+    assert "Published figures" in many
+    assert "numpy" in many
+    again = ran(*RUN, "--wide", "--notes").stdout
+    assert "latency p50" in again
+    assert "latency p50" in (ran.folder / "out" / "leaderboard.md").read_text()
+
+
 def test_parquet_goes_to_a_file_and_into_a_pipe(ran):
     import pyarrow.parquet as pq
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from tactbench.core.leaderboard.formats import to_csv, to_json, to_latex, to_markdown
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.terminal import plain_text
+from tactbench.core.leaderboard.view import WHOLE
 
 from .rows import row
 from .strategies import some_rows
@@ -99,8 +100,9 @@ def test_published_figures_stand_apart_and_are_never_ranked():
         ("another model than ours", "Author 2020", "old"), ("their lasso", "Author 2020", ""),
     ]  # fmt: skip
     assert [line.cells[0] for line in table.blocks[0].lines] == ["1", "2"]  # both are worse than what is published
-    for text in (to_markdown(rows), to_latex(rows), plain_text(table)):
+    for text in (to_markdown(rows, view=WHOLE), to_latex(rows, view=WHOLE), plain_text(table, view=WHOLE)):
         assert "Published figures" in text
+    assert "published figures: `tactbench leaderboard --wide`" in plain_text(table)
     assert build_table([row()]).sections == ()
 
 

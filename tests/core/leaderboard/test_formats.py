@@ -10,16 +10,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
+from rich.cells import cell_len
 
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
 from tactbench.core.leaderboard.csv_text import csv_text, guarded, unguarded
+from tactbench.core.leaderboard.fitting import pieces
 from tactbench.core.leaderboard.formats import to_csv, to_json, to_latex, to_markdown, to_page, to_parquet
-from tactbench.core.leaderboard.latex import latex
+from tactbench.core.leaderboard.latex import COLUMN_PT, latex, points
 from tactbench.core.leaderboard.markdown import markdown
 from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, OF_THE_MACHINE, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.terminal import plain_text
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids, notes, sections
 
 from .board.reading import planes, read_page
 from .board.reading import texts as texts_of
@@ -29,6 +32,7 @@ from .tex import as_set, untex
 
 many = settings(max_examples=60)
 either = st.booleans()
+views = st.sampled_from((DEFAULT_VIEW, WHOLE, View(columns=("estimator", "score", "cell"))))
 
 
 def lines_of(table):
@@ -82,10 +86,10 @@ def test_parquet_shows_the_cells_of_the_table_and_keeps_types(rows, times):
 
 
 @many
-@given(some_rows(), either)
-def test_markdown_shows_the_cells_of_the_table_as_text(rows, times):
+@given(some_rows(), either, views)
+def test_markdown_shows_the_cells_of_the_table_as_text(rows, times, view):
     table = build_table(rows, times=times)
-    tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(markdown(table))
+    tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(markdown(table, view))
     allowed = {"inline", "text", "code_inline"} | {
         f"{kind}_{edge}"
         for kind in ("heading", "table", "thead", "tbody", "tr", "th", "td", "bullet_list", "list_item", "paragraph")
@@ -101,46 +105,84 @@ def test_markdown_shows_the_cells_of_the_table_as_text(rows, times):
         elif token.type == "inline" and place is not None:
             assert {child.type for child in token.children} <= {"text"}
             place.append("".join(child.content for child in token.children))
-    expected = [list(one) for block in table.blocks for one in (table.columns, *(line.cells for line in block.lines))]
-    expected += [list(one) for section in table.sections for one in (section.columns, *section.lines)]
+    expected = [list(one) for grid in grids(table, view) for one in (grid.headers, *grid.lines)]
+    expected += [list(one) for section in sections(table, view) for one in (section.columns, *section.lines)]
     assert [one_spaced(line) for line in cells] == [one_spaced(line) for line in expected]
-    notes = [token.content for token in tokens if token.type == "inline"]
-    assert len(notes) >= len(table.notes)
+    told = [token.content for token in tokens if token.type == "inline"]
+    assert len(told) >= len(notes(table, view))
+
+
+def lines_set(text):
+    """Return the cells that a text of LaTeX sets, one list a table of its lines."""
+    found = []
+    for body in re.findall(r"\\toprule\n(.*?)\\bottomrule", text, re.DOTALL):
+        found.append([])
+        for line in body.splitlines():
+            if line != r"\midrule":
+                assert line.endswith(r" \\")
+                found[-1].append([untex(cell) for cell in line.removesuffix(r" \\").split(" & ")])
+    return found
 
 
 @many
 @given(some_rows(), either)
 def test_latex_sets_the_cells_of_the_table_whatever_names_are_made_of(rows, times):
     table = build_table(rows, times=times)
-    text = latex(table)
+    text = latex(table, WHOLE)
     assert text.isascii()
-    cells = []
-    for body in re.findall(r"\\toprule\n(.*?)\\bottomrule", text, re.DOTALL):
-        for line in body.splitlines():
-            if line != r"\midrule":
-                assert line.endswith(r" \\")
-                cells.append([untex(cell) for cell in line.removesuffix(r" \\").split(" & ")])
-    expected = [one for block in table.blocks for one in (table.columns, *(line.cells for line in block.lines))]
+    expected = [one for grid in grids(table, WHOLE) for one in (grid.headers, *grid.lines)]
     expected += [one for section in table.sections for one in (section.columns, *section.lines)]
+    cells = [line for lines in lines_set(text) for line in lines]
     assert [one_spaced(line) for line in cells] == [one_spaced(map(as_set, line)) for line in expected]
-    for said in re.findall(r"\\caption\{(.*)\}$|\\par\\footnotesize (.*)$", text, re.MULTILINE):
+    for said in re.findall(r"\\caption\{(.*)\}$|\\raggedright (.*)$", text, re.MULTILINE):
         untex("".join(said))
-    assert text.count(r"\begin{table}") == text.count(r"\end{table}") == len(table.blocks) + len(table.sections)
+    assert text.count(r"\begin{table*}") == text.count(r"\end{table*}") == len(table.blocks) + len(table.sections)
 
 
 @many
 @given(some_rows(), either)
-def test_a_terminal_shows_the_cells_of_the_table(rows, times):
+def test_a_column_of_a_paper_holds_the_same_texts_in_more_lines_and_is_no_wider(rows, times):
     table = build_table(rows, times=times)
-    # On a screen of any width a line may meet the edge, and columns are left out: here none is.
-    lines = [" ".join(line.split()) for line in plain_text(table, width=100_000).splitlines()]
-    for block in table.blocks:
-        used = [
-            place for place in range(len(table.columns)) if any(line.cells[place].strip("–") for line in block.lines)
-        ]
-        for line in block.lines:
-            whole = " ".join(" ".join(line.cells[place] for place in used).split())
-            assert whole in lines
+    text = latex(table)
+    labels = re.findall(r"\\label\{(.*)\}", text)
+    assert len(labels) == len(set(labels)) == len(table.blocks) + len(sections(table, DEFAULT_VIEW))
+    assert all(re.fullmatch(r"tab:tactbench-[a-z0-9-]+", label) for label in labels)
+    for grid, lines in zip(grids(table, DEFAULT_VIEW), lines_set(text), strict=False):
+        set_whole = {"".join("".join(column).split()).replace("†", "") for column in zip(*lines, strict=True)}
+        for name, *column in zip(grid.columns, grid.headers, *grid.lines, strict=True):
+            if name in ("sensor", "estimator"):
+                assert "".join("".join(map(as_set, column)).split()).replace("†", "") in set_whole
+        words = [pieces(cell) for line in grid.lines for cell in line]
+        # What is never broken may be wider than the column of a paper; nothing else is.
+        if max(points(piece) for cell in words for piece in cell) < 40:
+            assert sum(max(map(points, column)) for column in zip(*lines, strict=True)) + 5 * len(lines[0]) <= COLUMN_PT
+
+
+@many
+@given(some_rows(), either, views)
+def test_a_terminal_shows_the_cells_of_the_table(rows, times, view):
+    table = build_table(rows, times=times)
+    # On a screen of any width texts are broken and columns may be left out: here none is.
+    lines = [" ".join(line.split()) for line in plain_text(table, 100_000, view).splitlines()]
+    for grid in grids(table, view):
+        for line in grid.lines:
+            assert " ".join(" ".join(line).split()) in lines
+
+
+@many
+@given(some_rows(), st.sampled_from((80, 100, 140)), views)
+def test_nothing_is_cut_off_or_broken_within_a_word(rows, width, view):
+    table = build_table(rows)
+    text = plain_text(table, width, view)
+    _, _, gone = text.partition("too narrow for: ")
+    for grid in grids(table, view):
+        for name, *column in zip(grid.columns, grid.headers, *grid.lines, strict=True):
+            if column[0] not in gone:
+                words = [piece.strip() for cell in column for piece in (pieces(cell) if name != "cell" else [cell])]
+                assert [word for word in words if word not in text] == []
+    words = [piece for grid in grids(table, view) for line in grid.lines for cell in line for piece in pieces(cell)]
+    if max(map(cell_len, words)) < 12 and "cell" not in view.columns:
+        assert max(cell_len(line) for line in text.splitlines()) <= width
 
 
 @settings(max_examples=30)

@@ -11,6 +11,7 @@ from tactbench.core.leaderboard.numbers import duration, score
 from tactbench.core.leaderboard.records import OF_REPLICATES, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.terminal import show
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE
 
 from .rows import row
 
@@ -95,18 +96,22 @@ def test_scores_with_a_unit_have_four_decimals():
     assert (score(0.68754, "N"), score(0.60488, "1"), score(None, "1")) == ("0.6875", "0.605", "–")
 
 
-def test_a_narrow_terminal_drops_columns_and_says_so_and_never_breaks_a_word():
-    out = io.StringIO()
-    show(build_table([row("a-sensor-of-some-name", sim_s=1.0)]), Console(file=out, width=80))
-    lines = out.getvalue().splitlines()
-    (line,) = [line for line in lines if "a-sensor-of-some-name SIM" in line]
-    assert "0.5000" in line
-    assert "too narrow for" in out.getvalue()
-    assert "batch/row" in out.getvalue()
-    assert max(len(line.rstrip()) for line in lines) <= 80
-    wide = io.StringIO()
-    show(build_table([row("a-sensor-of-some-name", sim_s=1.0)]), Console(file=wide, width=200))
-    assert "too narrow" not in wide.getvalue()
+def test_a_narrow_terminal_breaks_texts_between_words_then_drops_columns_and_says_so():
+    def shown(width, view=DEFAULT_VIEW):
+        out = io.StringIO()
+        show(build_table([row("a-sensor-of-some-name", sim_s=1.0)]), Console(file=out, width=width), view)
+        assert max(len(line.rstrip()) for line in out.getvalue().splitlines()) <= width
+        return out.getvalue()
+
+    place = next(n for n, line in enumerate(shown(90).splitlines()) if "a-sensor-of-some-name" in line)
+    first, second = shown(90).splitlines()[place : place + 2]
+    assert "0.5000" in first
+    assert second.strip() == "SIM"
+    assert "too narrow" not in shown(90)
+    assert "too narrow for: fit. They are in the files" in shown(80)
+    assert "too narrow for: cell, batch/row" in shown(80, WHOLE).replace("\n ", " ")
+    assert "a-sensor-of-some-name SIM" in shown(240, WHOLE)
+    assert "too narrow" not in shown(240, WHOLE)
 
 
 def test_counts_are_summed_over_sets_and_the_busiest_channels_come_first():

@@ -1,0 +1,188 @@
+"""What of a table is printed for people: eight columns and three notes, or all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from tactbench.core.errors import UnknownNameError
+from tactbench.core.leaderboard.columns import COLUMNS, INTERVALS, NUMERIC, SHOWN
+from tactbench.core.leaderboard.lines import Kind, Line
+from tactbench.core.leaderboard.names import metric_name
+from tactbench.core.leaderboard.numbers import ABSENT
+from tactbench.core.leaderboard.sections import Section
+from tactbench.core.leaderboard.table import Block, Table
+from tactbench.core.leaderboard.text import command_line, visible
+
+CELL = "cell"
+"""The column of cells' names, as `why` and `rerun` take them."""
+DEFAULT = ("#", "sensor", "estimator", "score", "95 % interval", "published", "delay", "fit")
+OF_FLOOR = ("#", "sensor", "estimator", "score", "beyond floor", "95 % beyond", "published", "delay")
+"""Where a block has errors beyond the floor of the reference: what its ranks go by, with its interval."""
+MOST_NOTES = 3
+
+
+@dataclass(frozen=True)
+class View:
+    """What is printed of a table."""
+
+    wide: bool = False
+    """All columns, and the tables that only give details."""
+    notes: bool = False
+    """All notes and the whole provenance."""
+    columns: tuple[str, ...] = ()
+    """These columns instead; see `known_columns`."""
+    folder: str = ""
+    """The result folder, for commands that are named; empty: the default one."""
+
+
+DEFAULT_VIEW = View()
+WHOLE = View(wide=True, notes=True)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table of texts under its title."""
+
+    title: str
+    columns: tuple[str, ...]
+    """Names of the columns."""
+    headers: tuple[str, ...]
+    """What stands above them."""
+    lines: tuple[tuple[str, ...], ...]
+    kinds: tuple[Kind, ...]
+    numeric: frozenset[str] = NUMERIC
+    said: tuple[str, ...] = ()
+    """Sentences below the title."""
+
+
+def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of columns that a person asks for by these or by their names for programs (``rank``).
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such column.
+    """
+    known = {**{name: name for name in (*COLUMNS, CELL)}, **{told: name for name, told in SHOWN.items()}}
+    for name in asked:
+        if name not in known:
+            raise UnknownNameError("column", name, (*COLUMNS, CELL))
+    return tuple(dict.fromkeys(known[name] for name in asked))
+
+
+def grids(table: Table, view: View) -> list[Grid]:
+    """Return what is printed of a table's blocks."""
+    return [grid_of(table, block, view) for block in table.blocks]
+
+
+def grid_of(table: Table, block: Block, view: View) -> Grid:
+    """Return what is printed of a block."""
+    texts = [_by_column(table, line) for line in block.lines]
+    if all("†" in text["score"] for text, line in zip(texts, block.lines, strict=True) if line.row["status"] == "done"):
+        # The title has it: not repeated behind every score.
+        texts = [{**text, "score": text["score"].replace(" †", "")} for text in texts]
+    if view.columns:
+        names = [name for name in view.columns if name in texts[0]]
+    elif view.wide:
+        names = [name for name in texts[0] if any(text[name].strip(ABSENT) for text in texts)]
+    else:
+        floor = any(text.get("beyond floor", ABSENT) != ABSENT for text in texts)
+        names = [name for name in (OF_FLOOR if floor else DEFAULT) if name in texts[0]]
+    rows = [line.row for line in block.lines]
+    return Grid(
+        block.title,
+        tuple(names),
+        tuple(header(name, rows) for name in names),
+        tuple(tuple(text[name] for name in names) for text in texts),
+        tuple(line.kind for line in block.lines),
+        said=block.verdict,
+    )
+
+
+def _by_column(table: Table, line: Line) -> dict[str, str]:
+    name = line.cell.removesuffix(f"/{line.row.get('repeat')}") if line.row.get("repeats") == 1 else line.cell
+    return {**dict(zip(table.columns, line.cells, strict=True)), CELL: visible(name)}
+
+
+def header(name: str, rows: Sequence[Any]) -> str:
+    """Return what stands above a column of a block: a score by its metric and unit, an interval by what it is over."""
+    first = rows[0]
+    unit = f" [{visible(str(first['unit']))}]" if first["unit"] != "1" else ""
+    if name == "score":
+        return metric_name(first)
+    if name in ("beyond floor", "true error"):
+        return f"{name}{unit}"
+    if name in INTERVALS:
+        over = _over(rows, "ci_low" if name == "95 % interval" else "beyond_floor_ci_low")
+        return name if not over else f"95 % {over}" if name == "95 % interval" else f"{name}, {over}"
+    return name
+
+
+def _over(rows: Sequence[Any], key: str) -> str:
+    """Return what all intervals of a block are over: ``over 8 replicates``; empty if it differs or is not known."""
+    found = {(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row.get(key) is not None}
+    count, unit = next(iter(found)) if len(found) == 1 else (None, None)
+    return f"over {count} {visible(str(unit or 'replicate'))}{'s' if count != 1 else ''}" if count else ""
+
+
+def sections(table: Table, view: View) -> tuple[Section, ...]:
+    """Return the tables to print below the blocks."""
+    return tuple(section for section in table.sections if view.wide or not section.detail)
+
+
+def notes(table: Table, view: View) -> tuple[str, ...]:
+    """Return the notes to print, the most important first."""
+    return table.notes if view.notes else table.notes[:MOST_NOTES]
+
+
+def commands(table: Table, view: View) -> tuple[str, ...]:
+    """Return the command that shows what is not printed, and the one that tells what a row rests on."""
+    hidden = len(table.notes) - len(notes(table, view))
+    more, options = [], []
+    if hidden or len(foot(table, view)) < len(table.foot):
+        more.append(f"{hidden} more note{'s' if hidden != 1 else ''}" if hidden else "the whole provenance")
+        options.append("--notes")
+    if not view.wide and not view.columns:
+        more += [
+            "all columns",
+            *(section.title.split(" · ")[0].lower() for section in table.sections if section.detail),
+        ]
+        options.append("--wide")
+    where = (view.folder,) if view.folder else ()
+    told = _listed(more)
+    all_of_it = [f"{told[:1].upper()}{told[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
+    first = next((line for block in table.blocks for line in block.lines if line.kind == "result"), None)
+    if first is None:
+        return tuple(all_of_it if more else [])
+    out = ("--out", view.folder) if view.folder else ()
+    why = command_line("tactbench", "why", _by_column(table, first)[CELL], *out)
+    return (*(all_of_it if more else []), f"What a row rests on: `{why}`.")
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
+
+
+def foot(table: Table, view: View) -> tuple[str, ...]:
+    """Return the provenance to print."""
+    return table.foot if view.notes else table.foot[:1]
+
+
+def best(table: Table, count: int) -> Table:
+    """Return the table with the first `count` answers of each sensor in each block; places stay those among all."""
+    blocks = []
+    for block in table.blocks:
+        seen: dict[str, int] = {}
+        kept = []
+        for place, line in zip(block.places, block.lines, strict=True):
+            sensor = str(line.row["sensor"])
+            if line.kind == "result" and seen.setdefault(sensor, 0) < count:
+                seen[sensor] += 1
+                kept.append(place)
+        if kept:
+            blocks.append(replace(block, places=tuple(kept)))
+    which = "the first answer" if count == 1 else f"the first {count} answers"
+    note = f"Of each block only {which} of each sensor; places are those among all answers."
+    return replace(table, blocks=tuple(blocks), notes=(note, *table.notes))
