@@ -1,7 +1,8 @@
 """What the main job costs over a plain script, and what a second run costs.
 
 ``tactbench run --sensor biotac --task curvature`` in an empty folder, against ``plain_forest.py`` on the very arrays
-that the job makes for the forest of each of its replicates, turn and turn about. Prints medians over rounds and their ratio.
+that the job makes for the forest of each of its replicates, turn and turn about. Prints medians over rounds and their
+ratio.
 
 Usage: python benchmarks/main_job.py [ROUNDS]
 """

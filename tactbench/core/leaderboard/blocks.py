@@ -84,7 +84,8 @@ def _verdict(sheet: Sheet, members: Sequence[int], placings: Sequence[Placing | 
     ranked = [(sheet.rows[place], placing) for place in members if (placing := placings[place]) is not None]
     status, trivial = sheet["status"], sheet["is_baseline"]
     below = sum(status[place] == "done" and not trivial[place] and placings[place] is None for place in members)
-    return tuple(map(visible, verdict_of(ranked, below)))
+    baselines = [sheet.rows[place] for place in members if status[place] == "done" and trivial[place]]
+    return tuple(map(visible, verdict_of(ranked, below, baselines)))
 
 
 def _order(key: _Key) -> tuple[Any, ...]:

@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name
 from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.leaderboard.placing import Placing
+from tactbench.core.leaderboard.text import visible
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST
 
@@ -21,7 +22,7 @@ _SPARED = ("answer_delay_ms", "fit_s")
 _SPARES = {"answer_delay_ms": "answers {:.3g} times sooner", "fit_s": "fits {:.3g} times quicker"}
 
 
-def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int) -> tuple[str, ...]:
+def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Sequence[Row] = ()) -> tuple[str, ...]:
     """Return sentences on the answers of one block: who is best, how well that is resolved, what it hangs on.
 
     Parameters
@@ -30,6 +31,8 @@ def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int) -> tuple[str, 
         Answers that have a place, in order.
     below
         How many answers are no better than the trivial one.
+    trivial
+        The trivial answers of the block.
 
     Returns
     -------
@@ -47,8 +50,8 @@ def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int) -> tuple[str, 
     leaders = [place for place, (_, one) in enumerate(ranked) if not one.behind]
     best = rows[0]
     if _may_be_trivial(best):
-        trivial = score(best["baseline"], best["unit"]) + suffix(best["unit"])
-        said = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {trivial}."
+        bar = score(best["baseline"], best["unit"]) + suffix(best["unit"])
+        said = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {bar}."
     elif len(rows) == 1:
         said = f"{names[0]}: {_measured(best)}, the only answer better than the trivial one."
     elif len(leaders) == 1:
@@ -57,7 +60,26 @@ def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int) -> tuple[str, 
         listed = ", ".join(names[place] for place in leaders)
         said = f"Tie at the top: of {len(rows)} answers {len(leaders)} cannot be told from the best: {listed}."
         said += _cheapest([rows[place] for place in leaders], [names[place] for place in leaders])
-    return (said, _resolution(ranked, len(leaders), names)) if len(rows) > 1 else (said,)
+    more = [_resolution(ranked, len(leaders), names)] if len(rows) > 1 else []
+    return (said, *more, *_without_touch(rows, trivial))
+
+
+def _without_touch(rows: Sequence[Row], trivial: Sequence[Row]) -> list[str]:
+    """Return a sentence where an answer that reads no sensor is as good as the best one that does."""
+    best = rows[0]
+    if best.get("looks_at") == "time":
+        return []
+    sign = 1.0 if best["metric"] in LOWER_IS_BETTER else -1.0
+    found = [row for row in trivial if row.get("looks_at") == "time" and sign * (row["score"] - best["score"]) <= 0]
+    if not found:
+        return []
+    one = min(found, key=lambda row: sign * row["score"])
+    known = f"{answer_name(one)} reads no sensor, only the time since the press began, and scores {_score(one)}"
+    return [f"{known}: every recording is pressed alike, so these scores need no touch."]
+
+
+def _score(row: Row) -> str:
+    return score(row["score"], row["unit"]) + suffix(row["unit"])
 
 
 def _too_few(rows: Sequence[Row], names: Sequence[str]) -> str:
@@ -82,7 +104,8 @@ def _measured(row: Row) -> str:
         value, ends, what = "score", ("ci_low", "ci_high"), ""
     low, high = (row.get(end) for end in ends)
     held = "" if low is None else f" (95 % over {_replicates(row)}: {interval(low, high, row['unit'])})"
-    return f"{score(row[value], row['unit'])}{suffix(row['unit'])}{what}{held}"
+    name = METRIC_NAMES.get(row["metric"], visible(str(row["metric"])))
+    return f"{name} {score(row[value], row['unit'])}{suffix(row['unit'])}{what}{held}"
 
 
 def _replicates(row: Row) -> str:

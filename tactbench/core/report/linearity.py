@@ -26,8 +26,6 @@ class Contrast:
         """What was asked of which sensor, and how."""
         row = self.linear
         parts = [sensor_name(row), row["task"], row["protocol"], row["split"] or ""]
-        if row["repeats"] > 1:
-            parts.append(f"repeat {row['repeat']}")
         return ", ".join(part for part in parts if part)
 
     @property
@@ -39,6 +37,8 @@ class Contrast:
             return "they score the same"
         better = "non-linear" if (by < 0) == (self.linear["metric"] in LOWER_IS_BETTER) else "linear"
         low, high = sorted((self.linear, self.other), key=lambda row: float(row["score"]))
+        if low["ci_high"] is None or high["ci_low"] is None:
+            return f"{better} is better by {score(abs(by), unit)}{suffix(unit)}; too few replicates for intervals"
         apart = "are apart" if low["ci_high"] < high["ci_low"] else "overlap"
         return f"{better} is better by {score(abs(by), unit)}{suffix(unit)}; the intervals {apart}"
 

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-ASKED = ("run", "--repeats", "1", "--sensor", "biotac", "--sensor", "icub", "--task", "force",
+ASKED = ("run", "--repeats", "5", "--sensor", "biotac", "--sensor", "icub", "--task", "force",
          "--protocol", "deployable",
          "--estimator", "ols", "--estimator", "lasso")  # fmt: skip
 
@@ -24,10 +24,10 @@ def test_two_sensors_in_every_format(shell):
     asked = ("compare", "biotac", "icub", "--out", "here")
     shown = shell(*asked)
     assert "A = biotac, B = icub · force · RMSE [N] · deployable" in shown.stdout
-    assert "paired over 40 blocks" in shown.stderr
+    assert "paired over 5 replicates" in shown.stderr
     records = json.loads(shell(*asked, "--format", "json").stdout)
     assert {record["of"] for record in records} == {"ols", "lasso"}
-    assert all(record["low"] < record["difference"] < record["high"] for record in records)
+    assert all(record["low"] <= record["difference"] <= record["high"] for record in records)
     lines = list(csv.DictReader(io.StringIO(shell(*asked, "--format", "csv").stdout)))
     assert [float(line["difference"]) for line in lines] == [record["difference"] for record in records]
     first = f"{abs(records[0]['difference']):.4f}"

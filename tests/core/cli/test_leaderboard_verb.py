@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "lasso", "--out", "out")
+RUN = ("run", "--repeats", "5", "--sensor", "ideal", "--task", "force", "--estimator", "lasso", "--out", "out")
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,7 @@
 """The sentence above a table: one of three outcomes, and how far it may be relied on."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -58,6 +60,12 @@ def test_nobody_better_than_trivial_is_said():
     assert build_table(rows).blocks[0].verdict == ("None of 1 answers is better than the trivial one.",)
 
 
+def test_an_answer_without_touch_that_is_as_good_is_named():
+    timed = [one | {"looks_at": "time"} for one in replicates([0.3] * 8, estimator="mean")]
+    rows = over_replicates([*replicates([0.4] * 8), *timed])
+    assert build_table(rows).blocks[0].verdict[-1].startswith("mean reads no sensor, only the time since the press")
+
+
 def test_a_first_place_that_hangs_on_one_replicate_is_said():
     one = [0.50, 0.50, 0.50, 0.50, 0.60, 0.60, 0.60, 0.60]
     other = [0.549, 0.549, 0.549, 0.549, 0.549, 0.549, 0.549, 0.549]
@@ -75,7 +83,7 @@ def test_neighbours_have_different_places_only_if_the_replicates_separate_them(s
         scores = 0.5 + 0.01 * place + rng.normal(0, rng.choice([0.005, 0.05]), 8)
         rows += replicates(scores.tolist(), estimator=f"e{place}")
     lines = build_table(over_replicates(rows)).blocks[0].lines
-    for before, after in zip(lines, lines[1:], strict=False):
+    for before, after in itertools.pairwise(lines):
         if before.placing.place != after.placing.place:
             assert difference(before.row, after.row).verdict == "better"
 

@@ -25,7 +25,7 @@ def trivial(monkeypatch):
 
 def test_a_row_without_latency_says_so_and_is_not_taken_for_one_with(tmp_path, trivial, monkeypatch):
     shelf = trivial.install(tmp_path / "plugin")
-    asked = ("run", "--task", "nothing-asked", "--estimator", "nothing", "--recordings", str(shelf))
+    asked = ("run", "--repeats", "1", "--task", "nothing-asked", "--estimator", "nothing", "--recordings", str(shelf))
     shell = Shell(tmp_path)
     plugin = (str(tmp_path / "plugin"),)
     shell(*asked, "--no-latency", plugins=plugin)
