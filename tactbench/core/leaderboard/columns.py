@@ -7,10 +7,10 @@ from typing import Any
 
 COLUMNS = (
     "#", "sensor", "estimator", "score", "95 % interval", "beyond floor", "95 % beyond", "true error", "rank 95 %",
-    "published", "baseline", "n test", "sessions", "sim", "fit", "latency p50", "p95", "batch/row",
+    "published", "baseline", "n test", "sessions", "sim", "fit", "delay", "latency p50", "p95", "batch/row",
 )  # fmt: skip
 NUMERIC = frozenset(COLUMNS) - {"sensor", "estimator"}
-TIMED_COLUMNS = ("sim", "fit", "latency p50", "p95", "batch/row")
+TIMED_COLUMNS = ("sim", "fit", "delay", "latency p50", "p95", "batch/row")
 TIMED = frozenset(TIMED_COLUMNS)
 """Columns that no seed decides: they belong to the host that was timed."""
 OF_FORCE = {
@@ -22,8 +22,8 @@ SHOWN = {
     "#": "rank", "sensor": "sensor", "estimator": "estimator", "score": "score", "95 % interval": "interval",
     "beyond floor": "beyond_floor", "95 % beyond": "beyond_floor_interval", "true error": "true_error",
     "rank 95 %": "rank_interval", "published": "published", "baseline": "baseline", "n test": "n_test",
-    "sessions": "sessions", "sim": "sim", "fit": "fit", "latency p50": "latency_p50", "p95": "latency_p95",
-    "batch/row": "batch_row",
+    "sessions": "sessions", "sim": "sim", "fit": "fit", "delay": "answer_delay", "latency p50": "latency_p50",
+    "p95": "latency_p95", "batch/row": "batch_row",
 }  # fmt: skip
 """What each column is called where programs read its text: ``shown`` in JSON, ``shown_…`` in CSV and Parquet."""
 

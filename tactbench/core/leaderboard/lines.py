@@ -82,7 +82,10 @@ def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[
     texts = {name: texts[name] for name in columns(sheet, times=False)}
     if times:
         marks = timing_marks(sheet, letters)
-        texts |= {name: _times(VALUES[name](sheet), marks) for name in TIMED_COLUMNS}
+        told = {name: list(map(duration, VALUES[name](sheet))) for name in TIMED_COLUMNS}
+        told["delay"] = _delays(told["delay"], sheet)
+        told["p95"] = _tails(told["p95"], sheet)
+        texts |= {name: _marked(column, marks) for name, column in told.items()}
     status = sheet["status"]
     for place in [place for place, ended in enumerate(status) if ended != "done"]:
         for name, column in texts.items():
@@ -117,6 +120,20 @@ def _ranges(placings: Sequence[Placing | None]) -> list[str]:
     ]  # fmt: skip
 
 
-def _times(seconds: Sequence[float | None], marks: Sequence[str]) -> list[str]:
-    told = list(map(duration, seconds))
+def _delays(told: Sequence[str], sheet: Sheet) -> list[str]:
+    """Return delays, with a sign before those of readings whose link is not known: they are no shorter than that."""
+    parts = sheet.known("delay_parts_ms")
+    return [
+        f"≥ {text}" if text != ABSENT and known and "window" in known and "link" not in known else text
+        for text, known in zip(told, parts, strict=True)
+    ]
+
+
+def _tails(told: Sequence[str], sheet: Sheet) -> list[str]:
+    """Return 95th percentiles; what is the largest of fewer calls says so."""
+    known = zip(told, sheet.known("latency_ms_p95"), sheet.known("latency_n"), strict=True)
+    return [f"{text} (largest of {n})" if p95 is None and n and text != ABSENT else text for text, p95, n in known]
+
+
+def _marked(told: list[str], marks: Sequence[str]) -> list[str]:
     return [text if text == ABSENT else text + mark for text, mark in zip(told, marks, strict=True)] if marks else told

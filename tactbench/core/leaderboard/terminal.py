@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 _STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim"}
 _FIRST_TO_GO = (
-    "batch/row", "p95", "sessions", "n test", "sim", "baseline", "fit", "published", "latency p50", "rank 95 %",
-    "95 % beyond",
+    "batch/row", "p95", "sessions", "n test", "sim", "baseline", "latency p50", "fit", "published", "rank 95 %",
+    "95 % beyond", "delay",
 )  # fmt: skip
 """Columns that a narrow terminal does without, in this order; the files have them all."""
 _AROUND_A_CELL = 3
