@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
-from tactbench.core.evaluation.delay import answer_delay_ms, reading_delay_ms
+from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, reading_delay_ms
 from tactbench.core.evaluation.fitting import answers as answers_of
 from tactbench.core.evaluation.fitting import fit
 from tactbench.core.evaluation.interval import LEVEL, score_interval
@@ -220,6 +220,8 @@ def _delay(
             parts["features"] = float(1e3 * np.median(ready_s))
     if latency:
         parts["prediction"] = latency["latency_ms_p50"]
+    else:
+        remarks = tuple(one for one in remarks if one not in (NO_LINK, NO_RATE))  # there is no delay to speak of
     return _Delay(parts, answer_delay_ms(parts, estimator.looks_at), remarks)
 
 

@@ -179,10 +179,12 @@ def test_cost_files_are_shown_whatever_their_keys(material, tmp_path):
 
 def ladder_row(estimator, **more):
     times = {"fit_s": 0.25, "fit_s_q1": 0.2, "fit_s_q3": 0.3, "latency_ms_p50": 2.0, "latency_ms_p95": 4.0,
+             "answer_delay_ms": 254.0,
+             "delay_parts_ms": {"sampling": 10.0, "link": 1.0, "window": 240.0, "features": 1.0, "prediction": 2.0},
              "batch_s_per_row": 1e-6, "data_s": 0.5, "loop_100_hz": True, "loop_1000_hz": False}  # fmt: skip
     return {
         "estimator": estimator, "is_baseline": False, "status": "done", "reason": "", "score": 0.7, "ci_low": 0.6,
-        "ci_high": 0.8, "front_fit": True, "front_latency": False, "notes": [], **times, **more,
+        "ci_high": 0.8, "front_fit": True, "front_delay": False, "notes": [], **times, **more,
     }  # fmt: skip
 
 
@@ -190,7 +192,8 @@ def test_a_ladder_is_shown_as_the_terminal_shows_it_and_sorts_by_the_numbers_beh
     subject, path = Subject(material), tmp_path / "icub-force.json"
     lasso = next(row for row in material.rows if row["task"] == "force" and row["estimator"] == "lasso")
     about = {name: lasso[name] for name in ("sensor", "task", "rig", "protocol", "split", "metric", "unit")}
-    about |= {"version": 1, "higher_is_better": False, "simulated": True, "dagger": True, "rounds": 5, "threads": 1,
+    about |= {"version": 2, "remarks": [], "higher_is_better": False, "simulated": True, "dagger": True,
+              "rounds": 5, "threads": 1,
               "definitions": {"fit_s": "one fit"}}  # fmt: skip
     gone = dict.fromkeys(("score", "ci_low", "ci_high", "fit_s"), None)
     skipped = ladder_row("forest", **gone, status="skipped", reason="needs <it>", front_fit=False)
