@@ -28,11 +28,14 @@ def single_row_latency_s(model: Estimator, X: FloatArray, clock: Callable[[], fl
     return _timed(len(X), lambda place: X[place : place + 1], model.predict, clock)
 
 
-def single_row_preparation_s(X: FloatArray, k: int, clock: Callable[[], float], *, tared: bool = False) -> FloatArray:
+def single_row_preparation_s(
+    X: FloatArray, k: int, clock: Callable[[], float], *, tared: bool = False, at_most: int = AT_MOST
+) -> FloatArray:
     """Return (calls,) seconds of making one row of features ready from the `k` + 1 readings that it is made of.
 
-    As often as :func:`single_row_latency_s`, with the code that prepares whole sets: taring if `tared`, scaling, the
-    mean over the window. Whose numbers these are changes no time: rows of `X` stand for raw readings.
+    At most `at_most` calls, else as :func:`single_row_latency_s`, with the code that prepares whole
+    sets: taring if `tared`, scaling, the mean over the window. Rows of `X` stand for raw readings:
+    values change no time.
     """
     rest, scale = np.zeros(X.shape[1]), Scale(np.zeros(X.shape[1]), np.ones(X.shape[1]))
     segment = np.zeros(k + 1, dtype=np.int64)
@@ -40,7 +43,7 @@ def single_row_preparation_s(X: FloatArray, k: int, clock: Callable[[], float], 
     def ready(readings: FloatArray) -> FloatArray:
         return causal_mean(scale(readings - rest if tared else readings), k, segment[: len(readings)])[-1:]
 
-    return _timed(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock)
+    return _timed(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock, at_most)
 
 
 def tail_ms(spent_s: FloatArray) -> tuple[float | None, float]:
@@ -50,9 +53,13 @@ def tail_ms(spent_s: FloatArray) -> tuple[float | None, float]:
 
 
 def _timed(
-    rows: int, given: Callable[[int], FloatArray], work: Callable[[FloatArray], object], clock: Callable[[], float]
+    rows: int,
+    given: Callable[[int], FloatArray],
+    work: Callable[[FloatArray], object],
+    clock: Callable[[], float],
+    at_most: int = AT_MOST,
 ) -> FloatArray:
-    wanted = np.linspace(0, rows - 1, AT_MOST).astype(int)
+    wanted = np.linspace(0, rows - 1, at_most).astype(int)
     for place in wanted[:WARM_UP]:
         work(given(place))
     spent: list[float] = []

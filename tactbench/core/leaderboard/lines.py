@@ -10,7 +10,7 @@ from typing import Any, Literal
 from tactbench.core.leaderboard.columns import TIMED_COLUMNS, columns
 from tactbench.core.leaderboard.hosts import timing_marks
 from tactbench.core.leaderboard.marks import score_marks
-from tactbench.core.leaderboard.numbers import ABSENT, duration, intervals, scores, whole
+from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, intervals, scores, tail, whole
 from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.values import VALUES
@@ -83,8 +83,8 @@ def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[
     if times:
         marks = timing_marks(sheet, letters)
         told = {name: list(map(duration, VALUES[name](sheet))) for name in TIMED_COLUMNS}
-        told["delay"] = _delays(told["delay"], sheet)
-        told["p95"] = _tails(told["p95"], sheet)
+        told["delay"] = list(map(delay, sheet.known("answer_delay_ms"), sheet.known("delay_parts_ms")))
+        told["p95"] = list(map(tail, *map(sheet.known, ("latency_ms_p95", "latency_ms_max", "latency_n"))))
         texts |= {name: _marked(column, marks) for name, column in told.items()}
     status = sheet["status"]
     for place in [place for place, ended in enumerate(status) if ended != "done"]:
@@ -118,21 +118,6 @@ def _ranges(placings: Sequence[Placing | None]) -> list[str]:
         else f"{one.low}–{one.high}"
         for one in placings
     ]  # fmt: skip
-
-
-def _delays(told: Sequence[str], sheet: Sheet) -> list[str]:
-    """Return delays, with a sign before those of readings whose link is not known: they are no shorter than that."""
-    parts = sheet.known("delay_parts_ms")
-    return [
-        f"≥ {text}" if text != ABSENT and known and "window" in known and "link" not in known else text
-        for text, known in zip(told, parts, strict=True)
-    ]
-
-
-def _tails(told: Sequence[str], sheet: Sheet) -> list[str]:
-    """Return 95th percentiles; what is the largest of fewer calls says so."""
-    known = zip(told, sheet.known("latency_ms_p95"), sheet.known("latency_n"), strict=True)
-    return [f"{text} (largest of {n})" if p95 is None and n and text != ABSENT else text for text, p95, n in known]
 
 
 def _marked(told: list[str], marks: Sequence[str]) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tactbench.core.leaderboard.numbers import duration, interval, score
+from tactbench.core.leaderboard.numbers import delay, duration, interval, score, tail
 from tactbench.core.leaderboard.table import METRIC_NAMES
 
 COLUMNS = (
@@ -51,28 +51,15 @@ def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
     return texts | {
         "fit": duration(row["fit_s"]),
         "quartiles": f"{duration(row['fit_s_q1'])} … {duration(row['fit_s_q3'])}",
-        "delay": _delay(row),
+        "delay": delay(row["answer_delay_ms"], row["delay_parts_ms"]),
         "latency p50": duration(row["latency_ms_p50"] / 1e3),
-        "p95": _tail(row),
+        "p95": tail(row["latency_ms_p95"], row["latency_ms_max"], row["latency_n"]),
         "batch/row": duration(row["batch_s_per_row"]),
         "data": duration(row["data_s"]),
         "front": ", ".join(fronts),
         "100 Hz loop": _verdict(row, "loop_100_hz"),
         "1 kHz loop": _verdict(row, "loop_1000_hz"),
     }
-
-
-def _delay(row: Mapping[str, Any]) -> str:
-    delay, parts = row["answer_delay_ms"], row["delay_parts_ms"]
-    least = "≥ " if "window" in parts and "link" not in parts else ""
-    return "" if delay is None else f"{least}{duration(delay / 1e3)}"
-
-
-def _tail(row: Mapping[str, Any]) -> str:
-    """Return the 95th percentile; of fewer calls than it needs, the largest."""
-    if row["latency_ms_p95"] is not None:
-        return duration(row["latency_ms_p95"] / 1e3)
-    return f"{duration(row['latency_ms_max'] / 1e3)} (largest of {row['latency_n']})"
 
 
 def _verdict(row: Mapping[str, Any], loop: str) -> str:

@@ -180,6 +180,7 @@ def test_cost_files_are_shown_whatever_their_keys(material, tmp_path):
 
 def ladder_row(estimator, **more):
     times = {"fit_s": 0.25, "fit_s_q1": 0.2, "fit_s_q3": 0.3, "latency_ms_p50": 2.0, "latency_ms_p95": 4.0,
+             "latency_ms_max": 5.0, "latency_n": 1000,
              "answer_delay_ms": 8.5,
              "delay_parts_ms": {"sampling": 4.0, "link": 0.5, "window": 1.0, "features": 1.0, "prediction": 2.0},
              "batch_s_per_row": 1e-6, "data_s": 0.5, "loop_100_hz": True, "loop_1000_hz": False}  # fmt: skip
