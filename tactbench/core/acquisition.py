@@ -83,9 +83,12 @@ def _meta(
     role: Role | None,
     seed: int,
 ) -> RecordingMeta:
+    recorded_hz = {stream.name: stream.rate_hz for stream in acquisition.streams}
+    own_hz = {stream.name: stream.rate_hz for stream in sensor.spec.streams if stream.rate_hz is not None}
     return RecordingMeta(
         name=scene.name,
         sensor=sensor.spec.model_copy(update={"streams": tuple(acquisition.streams)}),
+        own_rates_hz={name: rate for name, rate in own_hz.items() if recorded_hz.get(name, rate) != rate},
         reference=tuple(acquisition.reference),
         rig=descriptor.name,
         simulated=descriptor.simulated,

@@ -48,8 +48,8 @@ def command(
 ) -> None:  # fmt: skip
     """Measure what accuracy costs in time, and draw it.
 
-    Of estimators: score against fit time and latency, for one sensor and task. Of the simulated rig: --twin, error in
-    counts against seconds, and what its rungs do to the score.
+    Of estimators: score against fit time and answer delay, for one sensor and task. Of the simulated rig: --twin, error
+    in counts against seconds, and what its rungs do to the score.
     """
     keep_threads(1 if twin else threads)
     from tactbench.core.errors import UsageError

@@ -1,4 +1,4 @@
-"""``tactbench cost --sensor S --task T``: score against fit time and latency, estimator by estimator."""
+"""``tactbench cost --sensor S --task T``: score against fit time and answer delay, estimator by estimator."""
 
 from __future__ import annotations
 
@@ -110,12 +110,14 @@ def _print(ladder: Ladder) -> None:
 
     about = ladder.about
     lines = [line(row, about["unit"]) for row in ladder.rows]
-    styles = ["bold" if row["front_fit"] or row["front_latency"] else "" for row in ladder.rows]
+    styles = ["bold" if row["front_fit"] or row["front_delay"] else "" for row in ladder.rows]
     print_grid(title(about), COLUMNS, lines, numeric=RIGHT, styles=styles)
     if about["load"] is not None and about["load"] > about["cores"]:
         remark(
             f"The machine was busy: {about['load']:.1f} processes wanted its {about['cores']} cores. Others' work is "
             "in these times, most of all in the 95th percentiles; time on an idle machine before you quote them."
         )
+    for text in about["remarks"]:
+        remark(f"{text[0].upper()}{text[1:]}.")
     for key, text in DEFINITIONS.items():
         remark(f"{key}: {text}.")

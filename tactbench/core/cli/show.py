@@ -110,7 +110,7 @@ def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
     if everything:
         _grid("Everything the specs state", sensors, more, with_source=True)
     else:
-        _grid("Readings", sensors, more[:5], with_source=False)
+        _grid("Readings", sensors, more[:6], with_source=False)
         tags = [fact.tag for row in more + rows for fact in row.facts if fact.tag]
         counted = ", ".join(f"{tags.count(tag)} {tag}" for tag in ("sourced", "measured", "derived", "assumed"))
         click.echo(f"Facts behind these sensors: {counted}. See them all with --all.")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.delay import reading_delay_ms
 from tactbench.core.evaluation.metrics import Metric, metric_called
 from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import protocol_called
@@ -38,6 +39,14 @@ class Contestant:
     metric: Metric
     trained_on: tuple[RecordingMeta, ...]
     """The recordings that the training rows are from."""
+    looks_at: str = "features"
+    k: int = 0
+    """Rows that the mean filter looks back."""
+    tared: bool = False
+    delay_parts_ms: Mapping[str, float] = field(default_factory=dict)
+    """Parts of the answer delay that no machine decides; see `tactbench.core.evaluation.delay`."""
+    remarks: tuple[str, ...] = ()
+    """on these parts"""
 
 
 def contestant(
@@ -51,7 +60,7 @@ def contestant(
     seed: int,
     threads: int,
 ) -> Contestant:
-    """Prepare `descriptor` as a cell does, for the last fold: the one whose model a cell's latency is taken from.
+    """Prepare `descriptor` as a cell does, for the last fold: the one whose model a cell's times are taken from.
 
     Parameters
     ----------
@@ -70,6 +79,7 @@ def contestant(
     k = choice.k if choice else descriptor.window_grid[0]
     fold = prepared(assignment, data, rules, k, Counter())
     chosen = choice.params if choice else {}
+    parts, remarks = reading_delay_ms(data, rules, k) if descriptor.looks_at == "features" else ({}, ())
     return Contestant(
         name=descriptor.name,
         build=lambda: build(chosen),
@@ -81,4 +91,9 @@ def contestant(
         n_classes=len(data.classes),
         metric=metric,
         trained_on=tuple(data.metas[place] for place in np.unique(fold.train.recording)),
+        looks_at=descriptor.looks_at,
+        k=k,
+        tared=rules.tare,
+        delay_parts_ms=parts,
+        remarks=remarks,
     )

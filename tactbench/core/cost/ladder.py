@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -95,8 +95,19 @@ def climb(
     found = by_score(list(rows.values()), higher_is_better=better)
     mark_fronts(found, higher_is_better=better)
     fold = next((one.fold for one in contestants.values()), "")
-    measured = {"higher_is_better": better, "fold": fold, "rounds": rounds, "budget_s": budget_s, "threads": threads}
+    measured = {
+        "higher_is_better": better,
+        "fold": fold,
+        "remarks": _remarks(contestants.values()),
+        "rounds": rounds,
+        "budget_s": budget_s,
+        "threads": threads,
+    }
     return Ladder({**_about(outcome), **measured, "load": load, "cores": os.cpu_count()}, found)
+
+
+def _remarks(contestants: Iterable[Contestant]) -> list[str]:
+    return list(dict.fromkeys(remark for one in contestants for remark in one.remarks))
 
 
 def _about(outcome: Outcome) -> dict[str, Any]:

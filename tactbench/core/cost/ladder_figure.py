@@ -1,4 +1,4 @@
-"""The ladder as a figure: score against fit time, and score against latency."""
+"""The ladder as a figure: score against fit time, and score against answer delay."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactbench.core.cost.ladder_rows import LOOPS_HZ, Record
 _MARKS = (("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "^"), ("#CC79A7", "D"), ("#E69F00", "v"), ("#56B4E9", "P"),
           ("#000000", "X"), ("#F0E442", "h"))  # fmt: skip
 _TRIVIAL = ("#888888", ".")
-_QUARTILES = {"fit_s": ("fit_s_q1", "fit_s_q3"), "latency_ms_p50": ("latency_ms_q1", "latency_ms_q3")}
+_QUARTILES = {"fit_s": ("fit_s_q1", "fit_s_q3"), "answer_delay_ms": ("answer_delay_ms_q1", "answer_delay_ms_q3")}
 
 
 def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
@@ -37,10 +37,12 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
     FigureCanvasAgg(figure)
     panels = figure.subplots(1, 2, sharey=True)
     for axis, (time, (low, high)), mark, across in zip(
-        panels, _QUARTILES.items(), ("front_fit", "front_latency"),
-        ("one fit, median and quartiles [s]", "latency of one row, median and quartiles [ms]"), strict=True,
+        panels, _QUARTILES.items(), ("front_fit", "front_delay"),
+        ("one fit, median and quartiles [s]", "answer delay, median and quartiles [ms]"), strict=True,
     ):  # fmt: skip
         for row in rows:
+            if row[time] is None:
+                continue
             colour, shape = marks[row["estimator"]]
             axis.errorbar(
                 row[time], row["score"],
@@ -73,8 +75,9 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axis, time in zip(panels, _QUARTILES, strict=True):
-        points = [(row[time], row["score"]) for row in rows]
-        label(axis, points, [row["estimator"] for row in rows], _bars(axis, rows, time))
+        drawn = [row for row in rows if row[time] is not None]
+        points = [(row[time], row["score"]) for row in drawn]
+        label(axis, points, [row["estimator"] for row in drawn], _bars(axis, drawn, time))
     for path in paths:
         figure.savefig(path)
     return figure

@@ -4,16 +4,17 @@
 
     OUT/cost/SENSOR-TASK.json     the whole table, as below
     OUT/cost/SENSOR-TASK.csv      its rows alone
-    OUT/cost/SENSOR-TASK.png, .pdf    score against fit time and against latency
+    OUT/cost/SENSOR-TASK.png, .pdf    score against fit time and against answer delay
 
 Keys of the JSON file; those that nobody could measure are null:
 
-``version``           1
+``version``           2
 ``sensor, task, rig, protocol, split, seed``      what was asked, as in a leaderboard's row
 ``metric, unit, higher_is_better``                of the score
 ``simulated, dagger``     as in a leaderboard's row: recordings of the twin; test-set statistics were used
 ``fold``              the fold that was timed: the last one
 ``rounds, budget_s, threads``      how it was timed
+``remarks``           on the delay: a link or a rate that is not known, a sensor sampled at another rate than its own
 ``load, cores``       mean number of processes that wanted to run, in the last minute of it, and cores to run on
 ``definitions``       one sentence for each time and verdict
 ``provenance``        versions, machine, commit; times of different ``host`` are never compared
@@ -28,9 +29,13 @@ Keys of the JSON file; those that nobody could measure are null:
     ``fit_s, fit_s_q1, fit_s_q3, fits``        median and quartiles of so many fits
     ``batch_s_per_row, …_q1, …_q3, batches``   all test rows in one call, by row: median and quartiles
     ``latency_ms_p50, latency_ms_p95, latency_ms_q1, latency_ms_q3, latency_n``    single rows, quantiles of all calls
+    ``latency_ms_max``          the largest of them; fewer than 200 calls have no p95
+    ``answer_delay_ms, …_q1, …_q3``            from a change at the skin to the answer: median and quartiles
+    ``delay_parts_ms``          what it is the sum of: ``sampling, link, window, features, prediction``
     ``data_s, data_kind``       seconds that the training recordings took, ``simulated`` or ``acquired``
-    ``loop_100_hz, loop_1000_hz``      whether p95 is below the period
-    ``front_fit, front_latency``       whether nobody is both better and quicker; baselines do not compete, nor
+    ``loop_100_hz, loop_1000_hz``      whether the answer delay is below the period, features and prediction
+                                taken at their p95 (of fewer than 200 calls the largest)
+    ``front_fit, front_delay``  whether nobody is both better and quicker; baselines do not compete, nor
                                 who is no better than the best of them that looks at nothing
     ``notes``                   what a reader of the row must know
 """
@@ -46,7 +51,7 @@ from tactbench.core.cost.ladder import Ladder
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.files import replace_file
 
-VERSION = 1
+VERSION = 2
 
 DEFINITIONS = {
     "fit_s": "seconds of one fit on the training rows of one fold, with parameters chosen and features ready; median "
@@ -57,8 +62,11 @@ DEFINITIONS = {
     "calls of all rounds",
     "data_s": "seconds that it took to record the training recordings: the processor's for simulated ones, else the "
     "wall's",
-    "loop": "an estimator keeps up with a loop on this machine if latency p95 at batch 1 is below the loop's period "
-    "(10 ms at 100 Hz, 1 ms at 1 kHz); reading the sensor and making features come on top",
+    "answer_delay_ms": "milliseconds from a change at the skin to the answer that knows of it: one sampling interval "
+    "of the sensor, its link, the group delay of the window, features and prediction of one row (medians)",
+    "loop": "an answer keeps up with a loop on this machine if its delay is below the loop's period (10 ms at 100 Hz, "
+    "1 ms at 1 kHz), features and prediction taken at their p95 or, of fewer than 200 calls, the largest; the part in "
+    "brackets is the longest",
     "front": "nobody else is both better by the score itself and quicker; trivial answers do not compete, nor what is "
     "no better than the best of them that looks at nothing; scores whose "
     "intervals overlap may be told apart by luck",

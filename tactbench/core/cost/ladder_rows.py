@@ -14,6 +14,8 @@ from tactbench.core.cost.contestants import Contestant
 from tactbench.core.cost.front import front
 from tactbench.core.cost.rounds import Timing
 from tactbench.core.errors import NotApplicable, TactbenchError
+from tactbench.core.evaluation.delay import answer_delay_ms
+from tactbench.core.evaluation.timing import tail_ms
 from tactbench.core.matrix.store import Row
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
@@ -29,8 +31,9 @@ SAME_SCORE = 1e-9
 
 _MEASURED = (
     "n_train", "n_test", "n_features", "fit_s", "fit_s_q1", "fit_s_q3", "fits", "batch_s_per_row",
-    "batch_s_per_row_q1", "batch_s_per_row_q3", "batches", "latency_ms_p50", "latency_ms_p95", "latency_ms_q1",
-    "latency_ms_q3", "latency_n", "data_s", "data_kind",
+    "batch_s_per_row_q1", "batch_s_per_row_q3", "batches", "latency_ms_p50", "latency_ms_p95", "latency_ms_max",
+    "latency_ms_q1", "latency_ms_q3", "latency_n", "answer_delay_ms", "answer_delay_ms_q1", "answer_delay_ms_q3",
+    "data_s", "data_kind",
 )  # fmt: skip
 
 
@@ -46,9 +49,10 @@ def opening(row: Row, descriptor: EstimatorDescriptor) -> Record:
         "chosen": row["chosen"],
         **{key: row[key] for key in ("status", "reason", "score", "ci_low", "ci_high", "ci_method", "search_s")},
         **dict.fromkeys(_MEASURED),
+        "delay_parts_ms": {},
         **{f"loop_{rate}_hz": None for rate in LOOPS_HZ},
         "front_fit": False,
-        "front_latency": False,
+        "front_delay": False,
         "notes": [],
     }
 
@@ -65,8 +69,17 @@ def timed(one: Contestant, timing: Timing, scores: Mapping[str, float], rounds: 
         return stopped(timing.trouble)
     fit_q1, fit, fit_q3 = _quartiles(timing.fit_s)
     batch_q1, batch, batch_q3 = (value / len(one.X_test) for value in _quartiles(timing.batch_s))
-    latency = 1e3 * np.array(timing.latency_s)
-    p95 = float(np.quantile(latency, 0.95))
+    latency_q1, latency, latency_q3 = _quartiles([1e3 * spent for spent in timing.latency_s])
+    p95, largest = tail_ms(np.array(timing.latency_s))
+    parts = {**one.delay_parts_ms, "prediction": latency}
+    spread = latency_q1 - latency, latency_q3 - latency
+    later = (largest if p95 is None else p95) - latency
+    if timing.features_s:
+        features_q1, parts["features"], features_q3 = _quartiles([1e3 * spent for spent in timing.features_s])
+        spread = spread[0] + features_q1 - parts["features"], spread[1] + features_q3 - parts["features"]
+        p95_features, largest = tail_ms(np.array(timing.features_s))
+        later += (largest if p95_features is None else p95_features) - parts["features"]
+    delay = answer_delay_ms(parts, one.looks_at)
     kind, spent = _acquisition(one.trained_on)
     return {
         "n_train": len(one.X_train),
@@ -80,14 +93,19 @@ def timed(one: Contestant, timing: Timing, scores: Mapping[str, float], rounds: 
         "batch_s_per_row_q1": batch_q1,
         "batch_s_per_row_q3": batch_q3,
         "batches": len(timing.batch_s),
-        "latency_ms_p50": float(np.quantile(latency, 0.5)),
+        "latency_ms_p50": latency,
         "latency_ms_p95": p95,
-        "latency_ms_q1": float(np.quantile(latency, 0.25)),
-        "latency_ms_q3": float(np.quantile(latency, 0.75)),
-        "latency_n": len(latency),
+        "latency_ms_max": 1e3 * max(timing.latency_s),
+        "latency_ms_q1": latency_q1,
+        "latency_ms_q3": latency_q3,
+        "latency_n": len(timing.latency_s),
+        "answer_delay_ms": delay,
+        "answer_delay_ms_q1": None if delay is None else delay + spread[0],
+        "answer_delay_ms_q3": None if delay is None else delay + spread[1],
+        "delay_parts_ms": parts,
         "data_s": spent,
         "data_kind": kind,
-        **{f"loop_{rate}_hz": p95 < 1e3 / rate for rate in LOOPS_HZ},
+        **{f"loop_{rate}_hz": None if delay is None else delay + later < 1e3 / rate for rate in LOOPS_HZ},
         "notes": [*_cut_short(timing, rounds, budget_s), *_other_answers(one, timing, scores)],
     }
 
@@ -136,8 +154,9 @@ def mark_fronts(rows: Sequence[Record], *, higher_is_better: bool) -> None:
     trivial = (row for row in done if row["is_baseline"] and row.get("looks_at") != "time")
     bar = min((sign * row["score"] for row in trivial), default=float("inf"))
     able = [row for row in done if not row["is_baseline"] and sign * row["score"] < bar]
-    for mark, time in (("front_fit", "fit_s"), ("front_latency", "latency_ms_p50")):
-        for row in front(able, seconds=lambda row, key=time: row[key], error=lambda row: sign * row["score"]):  # type: ignore[misc]
+    for mark, time in (("front_fit", "fit_s"), ("front_delay", "answer_delay_ms")):
+        told = [row for row in able if row[time] is not None]
+        for row in front(told, seconds=lambda row, key=time: row[key], error=lambda row: sign * row["score"]):  # type: ignore[misc]
             row[mark] = True
 
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from tactbench.core.cost.contestants import Contestant
 from tactbench.core.evaluation.fitting import answers, fit
-from tactbench.core.evaluation.timing import single_row_latency_s
+from tactbench.core.evaluation.timing import single_row_latency_s, single_row_preparation_s
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.plugins.interfaces import Estimator
 
@@ -38,6 +38,8 @@ class Timing:
     """of one ``predict`` over all test rows"""
     latency_s: list[float] = field(default_factory=list)
     """of ``predict`` on one row, all calls of all rounds"""
+    features_s: list[float] = field(default_factory=list)
+    """of making one row of features ready, all calls of all rounds; none for answers that look at no reading"""
     answers: npt.NDArray[Any] | None = None
     """to the test rows, by the last fit"""
     trouble: Exception | None = None
@@ -103,6 +105,8 @@ def _turn(one: Contestant, timing: Timing, budget_s: float, clock: Callable[[], 
             timing.batch_s.append(_median_s(lambda: _answer(one, timing), clock))
         assert timing._model is not None
         timing.latency_s.extend(single_row_latency_s(timing._model, one.X_test, clock))
+        if one.looks_at == "features":
+            timing.features_s.extend(single_row_preparation_s(one.X_test, one.k, clock, tared=one.tared))
 
 
 def _fit(one: Contestant, timing: Timing) -> None:

@@ -6,13 +6,14 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
+from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, reading_delay_ms
 from tactbench.core.evaluation.fitting import answers as answers_of
 from tactbench.core.evaluation.fitting import fit
 from tactbench.core.evaluation.interval import LEVEL, score_interval
@@ -30,7 +31,13 @@ from tactbench.core.evaluation.splits import (
     choose_split,
 )
 from tactbench.core.evaluation.thread_limit import thread_limit
-from tactbench.core.evaluation.timing import peak_rss_mb, single_row_latency_s
+from tactbench.core.evaluation.timing import (
+    AT_LEAST,
+    peak_rss_mb,
+    single_row_latency_s,
+    single_row_preparation_s,
+    tail_ms,
+)
 from tactbench.core.evaluation.unloaded import tare_s
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import Answers, FloatArray, Fold, Part
@@ -71,9 +78,15 @@ class CellResult:
     predict_s: float
     batch_rows: int
     latency_ms_p50: float | None
-    """None where latency was not measured; `latency_ms_p95` and `latency_n` alike"""
+    """None where latency was not measured; `latency_ms_max`, `latency_n` and `answer_delay_ms` alike"""
     latency_ms_p95: float | None
+    """None also where fewer than 200 calls were measured"""
+    latency_ms_max: float | None
     latency_n: int | None
+    answer_delay_ms: float | None
+    """None where a part other than the link is not known; see delay"""
+    delay_parts_ms: Mapping[str, float]
+    """sampling, link, window, features, prediction: those that are known"""
     threads: int
     peak_rss_mb: float | None
     search: tuple[Mapping[str, Any], ...]
@@ -108,6 +121,7 @@ class _Sum:
     n_train: int = 0
     model: Estimator | None = None
     test: Any = None
+    k: int = 0
 
 
 def evaluate(
@@ -175,13 +189,47 @@ def evaluate(
         if total.model is None:
             raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
         waits = _latency_ms(total.model, features_of(total.test, estimator), clock) if latency else {}
-    return _result(task, rules, metric, chosen_split, data, total, counts, waits, seed, threads)
+        late = _delay(total, estimator, data, rules, waits, clock)
+    return _result(task, rules, metric, chosen_split, data, total, counts, waits, late, seed, threads)
 
 
 def _latency_ms(model: Estimator, X: FloatArray, clock: Callable[[], float]) -> dict[str, Any]:
-    waits = 1e3 * single_row_latency_s(model, X, clock)
-    p50, p95 = (float(np.quantile(waits, share)) for share in (0.5, 0.95))
-    return {"latency_ms_p50": p50, "latency_ms_p95": p95, "latency_n": len(waits)}
+    waits = single_row_latency_s(model, X, clock)
+    p95, largest = tail_ms(waits)
+    return {
+        "latency_ms_p50": float(1e3 * np.median(waits)), "latency_ms_p95": p95, "latency_ms_max": largest,
+        "latency_n": len(waits),
+    }  # fmt: skip
+
+
+class _Delay(NamedTuple):
+    parts_ms: dict[str, float]
+    total_ms: float | None
+    remarks: tuple[str, ...]
+
+
+def _delay(
+    total: _Sum,
+    estimator: EstimatorDescriptor,
+    data: Dataset,
+    rules: ProtocolSpec,
+    latency: Mapping[str, Any],
+    clock: Callable[[], float],
+) -> _Delay:
+    """Return how late answers of the last fold's model are: the one whose latency was measured, if it was."""
+    parts: dict[str, float] = {}
+    remarks: tuple[str, ...] = ()
+    if estimator.looks_at == "features":
+        parts, remarks = reading_delay_ms(data, rules, total.k)
+        if latency:
+            # A median needs no more calls, and a row keeps nothing else of them.
+            ready_s = single_row_preparation_s(total.test.X, total.k, clock, tared=rules.tare, at_most=AT_LEAST)
+            parts["features"] = float(1e3 * np.median(ready_s))
+    if latency:
+        parts["prediction"] = latency["latency_ms_p50"]
+    else:
+        remarks = tuple(one for one in remarks if one not in (NO_LINK, NO_RATE))  # there is no delay to speak of
+    return _Delay(parts, answer_delay_ms(parts, estimator.looks_at), remarks)
 
 
 def _fold(
@@ -201,7 +249,8 @@ def _fold(
     began = clock()
     choice = select(estimator, params, build, data, rules, assignment, metric, counts)
     total.search_s += clock() - began
-    fold = prepared(assignment, data, rules, choice.k if choice else estimator.window_grid[0], counts)
+    k = choice.k if choice else estimator.window_grid[0]
+    fold = prepared(assignment, data, rules, k, counts)
     _worth_answering(fold, data)
     X_train, X_test = features_of(fold.train, estimator), features_of(fold.test, estimator)
     model = build(choice.params if choice else {})
@@ -230,7 +279,7 @@ def _fold(
         total.scores["validation"] = choice.score
     total.n_train += len(fold.train)
     total.folds += 1
-    total.model, total.test = model, fold.test
+    total.model, total.test, total.k = model, fold.test, k
 
 
 def _add(total: _Sum, role: Role, asked: Part, given: npt.NDArray[Any], number: int, data: Dataset) -> None:
@@ -275,6 +324,7 @@ def _result(
     total: _Sum,
     counts: Counter[str],
     latency: Mapping[str, Any],
+    late: _Delay,
     seed: int,
     threads: int,
 ) -> CellResult:
@@ -332,7 +382,10 @@ def _result(
         batch_rows=len(y),
         latency_ms_p50=latency.get("latency_ms_p50"),
         latency_ms_p95=latency.get("latency_ms_p95"),
+        latency_ms_max=latency.get("latency_ms_max"),
         latency_n=latency.get("latency_n"),
+        answer_delay_ms=late.total_ms,
+        delay_parts_ms=late.parts_ms,
         threads=threads,
         peak_rss_mb=peak_rss_mb(),
         search=_search(total.chosen, total.names),
@@ -341,7 +394,7 @@ def _result(
         beyond=None if floor is None else beyond_floor(floor, tested, unit, seed),
         true=None if truth is None else _against(truth, metric, tested, unit, seed),
         tare_s=held or None,
-        remarks=tuple(one for one in (no_floor, NOT_TARED if rules.tare and not held else "") if one),
+        remarks=tuple(one for one in (no_floor, NOT_TARED if rules.tare and not held else "", *late.remarks) if one),
     )
 
 

@@ -65,6 +65,7 @@ def details(sensors: Sequence[SensorSpec]) -> list[Comparison]:
     """Return what else the specs say: clocks, converters, rest levels, skin, parameters, noise."""
     rows = [
         _row("streams", sensors, _streams),
+        _row("delay of a reading", sensors, _delay),
         _row("taxel reading", sensors, _reading),
         _row("taxel at rest", sensors, _rest),
         _row("under load", sensors, _sign),
@@ -126,6 +127,15 @@ def _streams(sensor: SensorSpec) -> Fact:
     return _sourced("; ".join(parts), sensor.streams[0].rate_source)
 
 
+def _delay(sensor: SensorSpec) -> Fact:
+    """Return the parts of an answer's delay that are the sensor's own: an interval of each stream, and the link."""
+    parts = [f"{stream.name} {1e3 / stream.rate_hz:.3g} ms" for stream in sensor.streams if stream.rate_hz]
+    sampling = f"sampling interval {', '.join(parts) or 'not stated'}"
+    if sensor.link_delay is None:
+        return Fact(f"{sampling}; link not stated")
+    return _sourced(f"{sampling}; link {sensor.link_delay}", sensor.link_delay.source)
+
+
 def _reading(sensor: SensorSpec) -> Fact:
     taxels = sensor.channels("taxel")
     if not taxels:
@@ -160,6 +170,8 @@ def _positions(sensor: SensorSpec) -> Fact:
 
 def _quantities(sensor: SensorSpec) -> dict[str, Quantity]:
     found: dict[str, Quantity] = {}
+    if sensor.link_delay is not None:
+        found["link delay"] = sensor.link_delay
     if sensor.skin is not None:
         found.update(_named("skin", sensor.skin))
     found.update({f"{name.replace('_', ' ')}": quantity for name, quantity in sensor.parameters.items()})

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from tactbench.core.leaderboard.columns import TIMED_COLUMNS, columns
 from tactbench.core.leaderboard.hosts import timing_marks
 from tactbench.core.leaderboard.marks import score_marks
-from tactbench.core.leaderboard.numbers import ABSENT, duration, intervals, scores, whole
+from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, intervals, scores, tail, whole
 from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.values import VALUES
@@ -82,7 +82,10 @@ def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[
     texts = {name: texts[name] for name in columns(sheet, times=False)}
     if times:
         marks = timing_marks(sheet, letters)
-        texts |= {name: _times(VALUES[name](sheet), marks) for name in TIMED_COLUMNS}
+        told = {name: list(map(duration, VALUES[name](sheet))) for name in TIMED_COLUMNS}
+        told["delay"] = list(map(delay, sheet.known("answer_delay_ms"), sheet.known("delay_parts_ms")))
+        told["p95"] = list(map(tail, *map(sheet.known, ("latency_ms_p95", "latency_ms_max", "latency_n"))))
+        texts |= {name: _marked(column, marks) for name, column in told.items()}
     status = sheet["status"]
     for place in [place for place, ended in enumerate(status) if ended != "done"]:
         for name, column in texts.items():
@@ -133,6 +136,5 @@ def _ranges(placings: Sequence[Placing | None]) -> list[str]:
     ]  # fmt: skip
 
 
-def _times(seconds: Sequence[float | None], marks: Sequence[str]) -> list[str]:
-    told = list(map(duration, seconds))
+def _marked(told: list[str], marks: Sequence[str]) -> list[str]:
     return [text if text == ABSENT else text + mark for text, mark in zip(told, marks, strict=True)] if marks else told

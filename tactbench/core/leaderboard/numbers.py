@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 ABSENT = "–"
@@ -55,6 +55,21 @@ def duration(seconds: float | None) -> str:
     if value >= 99.95:
         return f"{value:.0f} {unit}"
     return f"{value:.1f} {unit}" if value >= 9.995 else f"{value:.2f} {unit}"
+
+
+def delay(known_ms: float | None, parts_ms: Mapping[str, float] | None) -> str:
+    """Return an answer delay; of readings whose link is not known, as the least that it can be."""
+    if known_ms is None:
+        return ABSENT
+    least = "≥ " if parts_ms and "window" in parts_ms and "link" not in parts_ms else ""
+    return f"{least}{duration(known_ms / 1e3)}"
+
+
+def tail(p95_ms: float | None, largest_ms: float | None, calls: int | None) -> str:
+    """Return the 95th percentile of times; where there are too few calls for one, the largest of them, and says so."""
+    if p95_ms is not None:
+        return duration(p95_ms / 1e3)
+    return ABSENT if largest_ms is None else f"{duration(largest_ms / 1e3)} (largest of {calls})"
 
 
 @lru_cache(maxsize=4096, typed=True)  # rows of one data set have the same counts

@@ -15,7 +15,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "n_sessions", "n_train", "n_test",
     ),
     "Times and memory": (
-        "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95", "latency_n",
+        "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95",
+        "latency_ms_max", "latency_n", "answer_delay_ms",
         "wall_s", "peak_rss_mb", "host", "concurrency", "made_by",
     ),
 }  # fmt: skip
@@ -26,6 +27,7 @@ TITLES = {
     "chosen": "Chosen on validation data",
     "search": "Every candidate that was compared",
     "scores": "Other scores: by class, by fold, by other metrics",
+    "delay_parts_ms": "Parts of the answer delay [ms]",
     "counts": "What was counted",
     "assumptions": "Assumed by the simulation",
     "plan": "Effects of the first recording: included and left out, with reasons",

@@ -20,7 +20,8 @@ JSON_KEYS = (
     "true_score", "true_ci_low", "true_ci_high", "tare_s", "baseline", "published",
     "published_reference", "published_remark", "n_recordings",
     "n_sessions", "n_train", "n_test", "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50",
-    "latency_ms_p95", "latency_n", "threads", "peak_rss_mb", "wall_s", "concurrency", "host", "made_by", "simulated",
+    "latency_ms_p95", "latency_ms_max", "latency_n", "answer_delay_ms", "delay_parts_ms", "threads", "peak_rss_mb",
+    "wall_s", "concurrency", "host", "made_by", "simulated",
     "dagger", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "fold_sizes", "confusion",
     "classes", "recordings", "key", "replicates",
 )  # fmt: skip
@@ -45,8 +46,9 @@ NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key
 """Keys whose values are lists or tables: JSON inside a cell of CSV and Parquet."""
 
 OF_THE_MACHINE = frozenset({
-    "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95", "latency_n", "threads",
-    "peak_rss_mb", "wall_s", "concurrency", "host", "made_by", "search", "recordings", "key",
+    "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95",
+    "latency_ms_max", "latency_n", "answer_delay_ms", "delay_parts_ms", "threads", "peak_rss_mb", "wall_s",
+    "concurrency", "host", "made_by", "search", "recordings", "key",
 })  # fmt: skip
 """Keys that machine, place or hour decide, not the seed alone."""
 

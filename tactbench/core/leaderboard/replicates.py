@@ -15,7 +15,7 @@ Row = Mapping[str, Any]
 
 _MEDIANS = (
     "score", "reference_floor", "score_beyond_floor", "true_score", "sim_s", "search_s", "fit_s", "predict_s",
-    "latency_ms_p50", "latency_ms_p95", "answer_delay_ms", "peak_rss_mb", "wall_s",
+    "latency_ms_p50", "latency_ms_p95", "latency_ms_max", "answer_delay_ms", "peak_rss_mb", "wall_s",
 )  # fmt: skip
 """Numbers of a row whose median over replicates stands in the table."""
 _INTERVALS = {
@@ -103,6 +103,7 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
+        "delay_parts_ms": _middle([row.get("delay_parts_ms") or {} for row in done]),
         "confusion": _added([row["confusion"] for row in done]),
         "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
     }

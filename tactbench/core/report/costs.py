@@ -105,7 +105,8 @@ def _ladder(about: Mapping[str, Any], subject: Subject) -> PlainTable:
         lines.append(entries)
     kinds = ["baseline" if row["is_baseline"] else "result" if row["status"] == "done" else "failed"
              for row in about["rows"]]  # fmt: skip
-    words = [f"{name}: {text}." for name, text in about["definitions"].items()]
+    words = [f"{text}." for text in about["remarks"]]
+    words += [f"{name}: {text}." for name, text in about["definitions"].items()]
     return plain(f"Cost: {title(about)}", COLUMNS, lines, numeric=tuple(SORTED_BY), notes=words, kinds=kinds)
 
 

@@ -8,18 +8,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tactbench.core.leaderboard.numbers import duration, interval, score
+from tactbench.core.leaderboard.numbers import delay, duration, interval, score, tail
 from tactbench.core.leaderboard.table import METRIC_NAMES
 
 COLUMNS = (
-    "estimator", "score", "95 % interval", "fit", "quartiles", "latency p50", "p95", "batch/row", "data", "front",
-    "100 Hz loop", "1 kHz loop", "remark",
+    "estimator", "score", "95 % interval", "fit", "quartiles", "delay", "latency p50", "p95", "batch/row", "data",
+    "front", "100 Hz loop", "1 kHz loop", "remark",
 )  # fmt: skip
-RIGHT = ("score", "fit", "latency p50", "p95", "batch/row", "data")
+RIGHT = ("score", "fit", "delay", "latency p50", "p95", "batch/row", "data")
 
 SORTED_BY = {
     "score": "score", "95 % interval": "ci_low", "fit": "fit_s", "quartiles": "fit_s_q1",
-    "latency p50": "latency_ms_p50", "p95": "latency_ms_p95", "batch/row": "batch_s_per_row", "data": "data_s",
+    "delay": "answer_delay_ms", "latency p50": "latency_ms_p50", "p95": "latency_ms_p95",
+    "batch/row": "batch_s_per_row", "data": "data_s",
 }  # fmt: skip
 """Column -> key of the number behind it."""
 
@@ -46,15 +47,24 @@ def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
         texts |= {"score": score(row["score"], unit), "95 % interval": interval(row["ci_low"], row["ci_high"], unit)}
     if row["fit_s"] is None:
         return texts
-    fronts = [what for what, on in (("fit", row["front_fit"]), ("latency", row["front_latency"])) if on]
+    fronts = [what for what, on in (("fit", row["front_fit"]), ("delay", row["front_delay"])) if on]
     return texts | {
         "fit": duration(row["fit_s"]),
         "quartiles": f"{duration(row['fit_s_q1'])} … {duration(row['fit_s_q3'])}",
+        "delay": delay(row["answer_delay_ms"], row["delay_parts_ms"]),
         "latency p50": duration(row["latency_ms_p50"] / 1e3),
-        "p95": duration(row["latency_ms_p95"] / 1e3),
+        "p95": tail(row["latency_ms_p95"], row["latency_ms_max"], row["latency_n"]),
         "batch/row": duration(row["batch_s_per_row"]),
         "data": duration(row["data_s"]),
         "front": ", ".join(fronts),
-        "100 Hz loop": "yes" if row["loop_100_hz"] else "no",
-        "1 kHz loop": "yes" if row["loop_1000_hz"] else "no",
+        "100 Hz loop": _verdict(row, "loop_100_hz"),
+        "1 kHz loop": _verdict(row, "loop_1000_hz"),
     }
+
+
+def _verdict(row: Mapping[str, Any], loop: str) -> str:
+    """Return whether the answer keeps up with a loop; if not, which part of its delay is the longest."""
+    if row[loop] is None:
+        return ""
+    parts = row["delay_parts_ms"]
+    return "yes" if row[loop] else f"no ({max(parts, key=parts.__getitem__)})"

@@ -39,6 +39,8 @@ class RecordingMeta(Frozen):
     """Streams that are not the sensor's own: the force-torque sensor, for example."""
     rig: str
     simulated: bool = False
+    own_rates_hz: dict[str, float] = Field(default_factory=dict)
+    """By stream: the rate at which the sensor itself samples it, where the recording has it at another [Hz]."""
     clock: Literal["device", "host", "nominal", "none"] = "device"
     """Who made the time stamps: the device, the host that read it, `row / rate`, or nobody (row order only)."""
     session: str = "1"

@@ -48,6 +48,7 @@ FORMAT: Mapping[str, Held] = {
     **_each("reference_floor score_beyond_floor beyond_floor_ci_low beyond_floor_ci_high", [*_NUMBERS, _NOTHING]),
     **_each("true_score true_ci_low true_ci_high tare_s", [*_NUMBERS, _NOTHING]),
     **_each("sim_s search_s fit_s predict_s latency_ms_p50 latency_ms_p95 peak_rss_mb wall_s", [*_NUMBERS, _NOTHING]),
+    **_each("latency_ms_max answer_delay_ms", [*_NUMBERS, _NOTHING]),
     **_each("is_baseline simulated dagger", [bool]),
     **_each("stamps remarks recordings digests", [list], [str]),
     **_each("n_replicates", [int, _NOTHING]),
@@ -57,7 +58,7 @@ FORMAT: Mapping[str, Held] = {
     **_each("plan search", [list], [dict]),
     **_each("classes", [list], [str, bool, *_NUMBERS]),
     **_each("confusion", [list, _NOTHING], [list]),
-    **_each("counts chosen scores", [dict], _NUMBERS),
+    **_each("counts chosen scores delay_parts_ms", [dict], _NUMBERS),
     **_each("params simulation assumptions replicates fold_sizes", [dict]),
 }
 """By key. A row may have other keys, of which nothing is asked."""

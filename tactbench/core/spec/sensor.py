@@ -200,6 +200,8 @@ class SensorSpec(Frozen):
     """How a taxel measures: resistive, capacitive, magnetic …"""
     principle_source: Source
     streams: tuple[StreamSpec, ...] = Field(min_length=1)
+    link_delay: Quantity | None = None
+    """From a sample taken to the sample in the host: frame and bus [time]. None: nobody states it."""
     skin: Skin | None = None
     """None: the sensor cannot be simulated, only recorded or replayed."""
     parameters: dict[str, Quantity] = Field(default_factory=dict)

@@ -131,6 +131,12 @@ SPEC = SensorSpec(
     principle="resistive",
     principle_source=Source(tag="sourced", reference="Karl et al. 2016, table I"),
     streams=STREAMS,
+    link_delay=sourced(
+        10.0,
+        "ms",
+        "kth-ros-pkg/biotac_driver: the host collects batches of whole frames of 44 samples at 4400 samples/s; its ROS "
+        "node one frame at a time, its default is five, 50 ms. The last word's own time on SPI is 0.07 ms of it",
+    ),
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances=NUISANCES,

@@ -103,6 +103,13 @@ SPEC = SensorSpec(
     principle="capacitive",
     principle_source=Source(tag="sourced", reference="Karl et al. 2016, table I"),
     streams=STREAMS,
+    link_delay=derived(
+        0.27,
+        "ms",
+        "robotology/icub-main CanBusSkin.cpp: 12 taxels are two frames of 8 bytes at 1 Mbit/s; 135 bits each with all "
+        "stuff bits (CAN 2.0A: 44 + 64 bits, 24 stuffed, 3 between frames). On a bus that carries nothing else; a full "
+        "board sends 32 frames, 4.3 ms",
+    ),
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances={"taxel": NUISANCES},

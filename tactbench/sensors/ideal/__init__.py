@@ -94,6 +94,7 @@ SPEC = SensorSpec(
     principle="contact pressure under a Gaussian influence",
     principle_source=_SOURCE,
     streams=(STREAM,),
+    link_delay=_by_definition(0.0, "ms"),
     skin=SKIN,
     parameters=PARAMETERS,
     nuisances={"taxel": _NONE},

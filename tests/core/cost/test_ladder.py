@@ -55,7 +55,9 @@ def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data
         assert row["notes"] == [], row["estimator"]
         assert row["ci_low"] <= row["score"] <= row["ci_high"]
         assert row["fit_s_q1"] <= row["fit_s"] <= row["fit_s_q3"]
-        assert 0 < row["latency_ms_q1"] <= row["latency_ms_p50"] <= row["latency_ms_q3"] <= row["latency_ms_p95"]
+        assert 0 < row["latency_ms_q1"] <= row["latency_ms_p50"] <= row["latency_ms_q3"] <= row["latency_ms_max"]
+        assert row["answer_delay_ms"] == pytest.approx(sum(row["delay_parts_ms"].values()))
+        assert row["answer_delay_ms_q1"] <= row["answer_delay_ms"] <= row["answer_delay_ms_q3"]
         assert (row["fits"], row["batches"]) == (2, 2)
         assert (row["n_train"], row["n_test"]) == (240, 120)
         assert row["latency_n"] >= 40
@@ -64,6 +66,11 @@ def test_what_is_timed_is_what_was_scored_whatever_was_chosen_on_validation_data
     by_name = {row["estimator"]: row for row in ladder.rows}
     assert max(value for key, value in by_name["ridge"]["chosen"].items() if key.startswith("k")) > 0
     assert by_name["mean"]["is_baseline"]
+    assert set(by_name["mean"]["delay_parts_ms"]) == {"prediction"}
+    # 100 Hz recordings of a sensor that states neither rate nor link.
+    assert set(by_name["ridge"]["delay_parts_ms"]) == {"sampling", "window", "features", "prediction"}
+    assert by_name["ridge"]["delay_parts_ms"]["sampling"] == pytest.approx(10.0)
+    assert ladder.about["remarks"] == ["link delay unknown: the answer delay is without it"]
     assert by_name["knn"]["n_features"] == 3
     assert by_name["time-index"]["n_features"] == 1
 
@@ -101,8 +108,8 @@ def test_what_is_no_ladder_is_left_out_and_what_cannot_be_written_is_said(ladder
     assert list(read_ladders(tmp_path)) == []
     (tmp_path / "cost").mkdir()
     (tmp_path / "cost" / "twin.json").write_text("[]")
-    (tmp_path / "cost" / "torn.json").write_text('{"version": 1, "rows"')
-    (tmp_path / "cost" / "later.json").write_text('{"version": 2, "rows": []}')
+    (tmp_path / "cost" / "torn.json").write_text('{"version": 2, "rows"')
+    (tmp_path / "cost" / "later.json").write_text('{"version": 3, "rows": []}')
     write_ladder(ladder, tmp_path)
     assert [found["task"] for found in read_ladders(tmp_path)] == ["force"]
     (tmp_path / "file").write_text("")

@@ -1,18 +1,26 @@
 """Verdicts, fronts and order of the ladder's rows."""
 
+from dataclasses import replace
+
 import pytest
 
 from tactbench.core.cost.ladder_rows import by_score, mark_fronts, stopped, timed
 from tactbench.core.cost.rounds import Timing
 from tactbench.core.errors import NotApplicable
+from tactbench.core.report.ladder_table import line
 from tests.core.cost.test_rounds import Hours, contestant
 
 
-def row(name, score, fit_s, latency, *, baseline=False, status="done", looks_at="features"):
+def row(name, score, fit_s, delay, *, baseline=False, status="done", looks_at="features"):
     return {
-        "estimator": name, "looks_at": looks_at, "score": score, "fit_s": fit_s, "latency_ms_p50": latency,
-        "is_baseline": baseline, "status": status, "front_fit": False, "front_latency": False,
+        "estimator": name, "looks_at": looks_at, "score": score, "fit_s": fit_s, "answer_delay_ms": delay,
+        "is_baseline": baseline, "status": status, "front_fit": False, "front_delay": False,
     }  # fmt: skip
+
+
+def at_once(name, **parts_ms):
+    """A contestant of whose delay all that no machine decides is known."""
+    return replace(contestant(Hours(), name), delay_parts_ms={"sampling": 0.0, "link": 0.0, "window": 0.0, **parts_ms})
 
 
 def test_a_front_for_each_time_and_baselines_and_failures_on_none():
@@ -25,8 +33,8 @@ def test_a_front_for_each_time_and_baselines_and_failures_on_none():
     ]
     mark_fronts(rows, higher_is_better=True)
     assert [one["estimator"] for one in rows if one["front_fit"]] == ["quick", "good"]
-    assert [one["estimator"] for one in rows if one["front_latency"]] == ["good"]
-    errors = [{**one, "front_fit": False, "front_latency": False} for one in rows]
+    assert [one["estimator"] for one in rows if one["front_delay"]] == ["good"]
+    errors = [{**one, "front_fit": False, "front_delay": False} for one in rows]
     mark_fronts(errors, higher_is_better=False)
     assert [one["estimator"] for one in errors if one["front_fit"]] == ["quick", "poor"]
 
@@ -42,7 +50,7 @@ def test_nobody_who_is_no_better_than_the_best_answer_from_nothing_is_on_a_front
         row("time", sign * 0.95, 0.1, 0.1, baseline=True, looks_at="time"),
     ]
     mark_fronts(rows, higher_is_better=higher)
-    assert [one["estimator"] for one in rows if one["front_fit"] or one["front_latency"]] == ["good"]
+    assert [one["estimator"] for one in rows if one["front_fit"] or one["front_delay"]] == ["good"]
 
 
 def test_the_best_score_comes_first_and_no_score_last():
@@ -58,14 +66,40 @@ def test_the_best_score_comes_first_and_no_score_last():
         (1.1, 1.1, 0, True, False),
         (11.0, 11.0, 0, False, False),
         (1.0, 1.0, 0, True, False),  # the period itself is too late
-        (0.1, 50.0, 10, False, False),  # one call in ten misses the beat
-        (0.1, 50.0, 4, True, True),  # one in twenty-five: the definition lets it
+        (0.1, 50.0, 20, False, False),  # one call in ten misses the beat
+        (0.1, 50.0, 8, True, True),  # one in twenty-five: the definition lets it
     ],
 )
 def test_a_loop_is_kept_by_its_95th_percentile(usual_ms, rare_ms, rare, hundred, thousand):
-    latency = [usual_ms / 1e3] * (100 - rare) + [rare_ms / 1e3] * rare
-    found = timed(contestant(Hours(), "a"), Timing([1.0], [1.0], latency), {}, 1, 20.0)
+    latency = [usual_ms / 1e3] * (200 - rare) + [rare_ms / 1e3] * rare
+    found = timed(at_once("a"), Timing([1.0], [1.0], latency, [0.0] * 200), {}, 1, 20.0)
     assert (found["loop_100_hz"], found["loop_1000_hz"]) == (hundred, thousand)
+
+
+def test_too_few_calls_for_a_95th_percentile_are_judged_by_the_largest():
+    found = timed(at_once("a"), Timing([1.0], [1.0], [0.0001] * 198 + [0.05], [0.0] * 199), {}, 1, 20.0)
+    assert (found["latency_ms_p95"], found["latency_ms_max"]) == (None, 50.0)
+    assert not found["loop_100_hz"]
+
+
+def test_a_loop_waits_for_every_part_of_the_delay_and_is_told_of_the_longest():
+    parts = {"sampling": 4.0, "link": 0.5, "window": 5.0}
+    times = Timing([1.0], [1.0], [0.0001] * 200, [0.0003] * 200)
+    found = timed(at_once("a", **parts), times, {}, 1, 20.0)
+    assert found["answer_delay_ms"] == pytest.approx(4.0 + 0.5 + 5.0 + 0.3 + 0.1)
+    assert found["loop_100_hz"]
+    later = timed(at_once("a", **parts | {"window": 5.2}), times, {}, 1, 20.0)
+    assert not later["loop_100_hz"]
+    shown = line({**row("a", None, None, None), "reason": "", **later}, "N")
+    assert shown["100 Hz loop"] == "no (window)"
+
+
+def test_a_delay_that_is_not_known_is_no_verdict_and_on_no_front():
+    found = timed(contestant(Hours(), "a"), Timing([1.0], [1.0], [0.001] * 200, [0.0] * 200), {}, 1, 20.0)
+    assert (found["answer_delay_ms"], found["loop_100_hz"], found["loop_1000_hz"]) == (None, None, None)
+    rows = [row("a", 0.9, 1.0, None), row("b", 0.5, 2.0, 3.0)]
+    mark_fronts(rows, higher_is_better=True)
+    assert [one["estimator"] for one in rows if one["front_delay"]] == ["b"]
 
 
 def test_quartiles_and_rows_are_those_of_the_times():

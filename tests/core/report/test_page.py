@@ -22,7 +22,7 @@ from tactbench.core.report.section import Subject
 from .html import Reader
 from .results import draw_one
 
-TOLD_BY_TITLE = ("scores", "counts", "chosen", "assumptions", "recordings", "replicates")
+TOLD_BY_TITLE = ("scores", "counts", "chosen", "assumptions", "recordings", "replicates", "delay_parts_ms")
 HOSTILE = "<script>alert('`x`')</script><img src=x onerror=alert(1)> & \"quoted\""
 
 
@@ -84,6 +84,7 @@ def test_everything_that_a_row_knows_is_on_the_page(subject):
             if name not in ("params", "stamps", "remarks", "search", "confusion", "classes", "plan", "traceback"):
                 assert name in text or not row[name] or name in TOLD_BY_TITLE
         told = [*row["scores"], *row["counts"], *row["chosen"], *row["assumptions"], *row["recordings"], *row["params"]]
+        told += row["delay_parts_ms"]
         told += [reason for one in row["plan"] for reason in (one["effect"], one["reason"])]
         assert [what for what in told if " ".join(what.split()) not in text] == []
 
@@ -179,10 +180,13 @@ def test_cost_files_are_shown_whatever_their_keys(material, tmp_path):
 
 def ladder_row(estimator, **more):
     times = {"fit_s": 0.25, "fit_s_q1": 0.2, "fit_s_q3": 0.3, "latency_ms_p50": 2.0, "latency_ms_p95": 4.0,
+             "latency_ms_max": 5.0, "latency_n": 1000,
+             "answer_delay_ms": 8.5,
+             "delay_parts_ms": {"sampling": 4.0, "link": 0.5, "window": 1.0, "features": 1.0, "prediction": 2.0},
              "batch_s_per_row": 1e-6, "data_s": 0.5, "loop_100_hz": True, "loop_1000_hz": False}  # fmt: skip
     return {
         "estimator": estimator, "is_baseline": False, "status": "done", "reason": "", "score": 0.7, "ci_low": 0.6,
-        "ci_high": 0.8, "front_fit": True, "front_latency": False, "notes": [], **times, **more,
+        "ci_high": 0.8, "front_fit": True, "front_delay": False, "notes": [], **times, **more,
     }  # fmt: skip
 
 
@@ -190,7 +194,8 @@ def test_a_ladder_is_shown_as_the_terminal_shows_it_and_sorts_by_the_numbers_beh
     subject, path = Subject(material), tmp_path / "icub-force.json"
     lasso = next(row for row in material.rows if row["task"] == "force" and row["estimator"] == "lasso")
     about = {name: lasso[name] for name in ("sensor", "task", "rig", "protocol", "split", "metric", "unit")}
-    about |= {"version": 1, "higher_is_better": False, "simulated": True, "dagger": True, "rounds": 5, "threads": 1,
+    about |= {"version": 2, "remarks": [], "higher_is_better": False, "simulated": True, "dagger": True,
+              "rounds": 5, "threads": 1,
               "definitions": {"fit_s": "one fit"}}  # fmt: skip
     gone = dict.fromkeys(("score", "ci_low", "ci_high", "fit_s"), None)
     skipped = ladder_row("forest", **gone, status="skipped", reason="needs <it>", front_fit=False)
@@ -199,7 +204,8 @@ def test_a_ladder_is_shown_as_the_terminal_shows_it_and_sorts_by_the_numbers_beh
     assert table.title.startswith("Cost: icub, force: RMSE, lower is better · karl2016 † · split roles · SIM")
     first, second = (dict(zip(table.columns, line, strict=True)) for line in table.lines)
     assert (first["fit"].text, first["fit"].value) == ("250 ms", 0.25)
-    assert (first["100 Hz loop"].text, first["1 kHz loop"].text, first["front"].text) == ("yes", "no", "fit")
+    assert (first["100 Hz loop"].text, first["1 kHz loop"].text, first["front"].text) == ("yes", "no (sampling)", "fit")
+    assert (first["delay"].text, first["delay"].value) == ("8.50 ms", 8.5)
     assert first["score"].anchor == subject.anchors[lasso["cell"]]
     assert second["remark"].text == "skipped: needs <it>"
     assert table.kinds == ("result", "failed")

@@ -24,11 +24,12 @@ _ALWAYS = (
 )  # fmt: skip
 _OFTEN = (
     "traceback", "remarks", "assumptions", "plan", "chosen", "counts", "published_reference", "published_remark",
-    "batch_rows", "latency_n", "search_s", "wall_s", "peak_rss_mb", "classes", "log", "fold_sizes", "recordings",
+    "batch_rows", "latency_n", "delay_parts_ms", "search_s", "wall_s", "peak_rss_mb", "classes", "log", "fold_sizes",
+    "recordings",
 )  # fmt: skip
 _IN_THE_LINE = (
     "score", "ci_low", "ci_high", "baseline", "published", "n_sessions", "n_test", "sim_s", "fit_s", "predict_s",
-    "latency_ms_p50", "latency_ms_p95",
+    "answer_delay_ms", "latency_ms_p50", "latency_ms_p95",
 )  # fmt: skip
 """Where there are many cells, these are told as the line shows them."""
 _OWN = ("scores", "confusion", "search", "replicates")

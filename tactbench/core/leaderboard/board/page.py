@@ -39,7 +39,7 @@ MOST_NOTES = 2_000
 MOST_LINES = 500
 """Lines of a table below the blocks."""
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
-DURATIONS = ("latency p50", "p95", "fit", "sim", "batch/row")
+DURATIONS = ("delay", "latency p50", "p95", "fit", "sim", "batch/row")
 """Columns that a score can be drawn against."""
 _HOME = "tactbench.core.leaderboard.board"
 

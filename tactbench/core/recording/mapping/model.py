@@ -9,7 +9,7 @@ from pydantic import Field, field_validator, model_validator
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
-from tactbench.core.spec.quantity import Frozen, Source
+from tactbench.core.spec.quantity import Frozen, Quantity, Source
 from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import ChannelKind, Vector
 
@@ -227,6 +227,8 @@ class SensorDeclaration(Frozen):
     title: str
     principle: str
     principle_source: Source
+    link_delay: Quantity | None = None
+    """From a sample taken to the sample in the host [time]."""
     references: tuple[str, ...] = ()
 
 

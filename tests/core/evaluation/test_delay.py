@@ -1,0 +1,198 @@
+"""The answer delay: its parts against the filter that is used, the sum, and what the row says of it."""
+
+import itertools
+from contextlib import nullcontext
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactbench.core.acquisition import acquire
+from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, reading_delay_ms
+from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
+from tactbench.core.evaluation.windows import causal_mean
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.plugins.registry import load_registry
+from tactbench.plugin import Block, ForceRamp, RigDescriptor, Scene, StreamSpec, assumed
+from tests.core.evaluation.made import force_task, record
+from tests.core.leaderboard.rows import row
+
+TASK = force_task(protocols=tuple(PROTOCOLS))
+STEP_NS = 12_000_000  # 12 ms, as the paper's 5000 samples in 60 s
+K = 40
+
+
+def pressed(folder, *, t_ns="12 ms", own_hz=None, n=400):
+    """Three recordings, one a role, of a sensor without a rate or a link of its own."""
+    rng = np.random.default_rng(7)
+    folder.mkdir(exist_ok=True)
+    paths = []
+    for role in ("train", "validation", "test"):
+        force = np.linspace(0.0, 5.0, n + 600)
+        clock = np.arange(len(force), dtype=np.int64) * STEP_NS if t_ns == "12 ms" else t_ns
+        X = force[:, None] * [3.0, -1.0] + 0.1 * rng.standard_normal((len(force), 2))
+        paths.append(record(folder / f"{role}.h5", X, force, t_ns=clock, role=role, session=role,
+                            own_rates_hz=own_hz or {}))  # fmt: skip
+    return paths
+
+
+def with_link(data, link):
+    """The data of a sensor that states its link."""
+
+    def linked(table):
+        sensor = table.meta.sensor.model_copy(update={"link_delay": link})
+        return replace(table, meta=table.meta.model_copy(update={"sensor": sensor}))
+
+    return replace(data, tables=tuple(map(linked, data.tables)))
+
+
+def estimator():
+    """Least squares behind one window."""
+    return load_registry().estimators["ols"].model_copy(update={"window_grid": (K,)})
+
+
+def slope_s(k, interval_s):
+    """Group delay of the filter that the protocols run, near zero frequency: minus the slope of its phase."""
+    impulse = np.zeros((4096, 1))
+    impulse[2 * k] = 1.0
+    response = causal_mean(impulse, k, np.zeros(4096, dtype=np.int64))[2 * k :, 0]
+    omega = 2 * np.pi * np.array([1e-4, 2e-4]) / interval_s  # well below the first zero, 1 / (k + 1) of the rate
+    t_s = np.arange(len(response)) * interval_s
+    phase = np.unwrap([np.angle(np.sum(response * np.exp(-1j * one * t_s))) for one in omega])
+    return -float(np.diff(phase)[0] / np.diff(omega)[0])
+
+
+@pytest.mark.parametrize("name", [name for name in PROTOCOLS if name != "first-frame"])
+@pytest.mark.parametrize("k", [0, 1, 5, K])
+def test_the_window_of_every_protocol_is_the_group_delay_of_the_filter_it_runs(tmp_path, name, k):
+    data = load_dataset(TASK, pressed(tmp_path / "a"))
+    parts, _ = reading_delay_ms(data, protocol_called(name), k)
+    # A mean of n = k + 1 samples is late by (n - 1) / 2 of them. Clocks are whole nanoseconds: 1e-9 of a second.
+    assert parts["window"] == pytest.approx(k / 2 * 12.0, abs=1e-6)
+    assert parts["window"] == pytest.approx(1e3 * slope_s(k, 0.012), rel=1e-6, abs=1e-6)
+
+
+def test_one_row_alone_is_filtered_over_nothing(tmp_path):
+    data = load_dataset(TASK, pressed(tmp_path / "a"))
+    assert reading_delay_ms(data, protocol_called("first-frame"), K)[0]["window"] == 0.0
+
+
+def test_a_ramp_is_answered_by_as_much_too_late_as_the_window_says():
+    # The definition that a person can check: a filtered ramp is the ramp of that long ago.
+    t_s = np.arange(500) * 0.012
+    late = t_s - causal_mean(t_s[:, None], K, np.zeros(500, dtype=np.int64))[:, 0]
+    np.testing.assert_allclose(late[K:], K / 2 * 0.012, rtol=1e-9)
+
+
+def test_a_quicker_sensor_waits_less_for_its_next_sample_and_the_scene_says_what_it_did(tmp_path):
+    found = []
+    for own_hz in (50.0, 1 / 0.012, 100.0):
+        data = load_dataset(TASK, pressed(tmp_path / f"{own_hz:.0f}", own_hz={"taxels": own_hz}))
+        parts, remarks = reading_delay_ms(
+            with_link(data, assumed(0.5, "ms", "a test")), protocol_called("deployable"), K
+        )
+        assert parts["sampling"] == pytest.approx(1e3 / own_hz)
+        assert parts["window"] == pytest.approx(240.0), "at the rate of the recordings"
+        assert parts["link"] == 0.5
+        found.append((parts["sampling"], remarks))
+    assert all(slower[0] > quicker[0] for slower, quicker in itertools.pairwise(found))
+    assert [remarks for _, remarks in found] == [
+        ("taxels sampled at 83.33 Hz; its own rate is 50 Hz",), (),
+        ("taxels sampled at 83.33 Hz; its own rate is 100 Hz",),
+    ]  # fmt: skip
+
+
+def test_what_is_not_known_is_absent_and_said(tmp_path):
+    data = load_dataset(TASK, pressed(tmp_path / "a"))
+    parts, remarks = reading_delay_ms(data, protocol_called("deployable"), K)
+    assert set(parts) == {"sampling", "window"}
+    assert remarks == (NO_LINK,)
+    timeless = load_dataset(TASK, pressed(tmp_path / "b", t_ns=None))
+    parts, remarks = reading_delay_ms(timeless, protocol_called("deployable"), K)
+    assert (parts, remarks) == ({}, (NO_RATE,))
+    assert answer_delay_ms({**parts, "features": 0.1, "prediction": 0.1}, "features") is None
+
+
+def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_readings(tmp_path):
+    ticks = itertools.count()
+    result = evaluate(
+        TASK, estimator(), {}, "deployable-untared", "roles", pressed(tmp_path / "a"), seed=1,
+        clock=lambda: next(ticks) * 2.0**-10,
+    )  # fmt: skip
+    # One tick passes between the two looks at the clock around each call.
+    tick_ms = 1e3 * 2.0**-10
+    assert result.delay_parts_ms == pytest.approx(
+        {"sampling": 12.0, "window": 240.0, "features": tick_ms, "prediction": tick_ms}
+    )
+    assert result.answer_delay_ms == pytest.approx(252.0 + 2 * tick_ms)
+    assert result.latency_n == 200
+    assert result.latency_ms_p95 is not None
+    assert NO_LINK in result.remarks
+
+
+def test_an_answer_that_looks_at_no_reading_waits_for_none(tmp_path):
+    mean = load_registry().estimators["mean"]
+    result = evaluate(TASK, mean, {}, "deployable-untared", "roles", pressed(tmp_path / "a"), seed=1,
+                      clock=itertools.count().__next__)  # fmt: skip
+    assert set(result.delay_parts_ms) == {"prediction"}
+    assert result.answer_delay_ms == result.latency_ms_p50
+    assert NO_LINK not in result.remarks
+
+
+def test_without_the_times_of_a_machine_there_is_no_sum(tmp_path):
+    result = evaluate(TASK, estimator(), {}, "deployable-untared", "roles", pressed(tmp_path / "a"), seed=1,
+                      clock=itertools.count().__next__, latency=False)  # fmt: skip
+    assert set(result.delay_parts_ms) == {"sampling", "window"}
+    assert result.answer_delay_ms is None
+    assert NO_LINK not in result.remarks
+
+
+class SlowRig:
+    """Samples whatever sensor it is given at 25 Hz."""
+
+    def __init__(self, streams):
+        self.streams, self.reference, self.plan = streams, (), ()
+        self.assumptions, self.drawn = {}, {}
+
+    def open(self, sensor, scene, *, seed):
+        return nullcontext(self)
+
+    def __iter__(self):
+        t_ns = np.arange(10, dtype=np.int64) * 40_000_000
+        yield from (Block(one.name, t_ns, np.zeros((10, len(one.channels)))) for one in self.streams)
+
+
+def test_a_recording_keeps_the_rate_of_the_sensor_that_it_was_not_sampled_at(tmp_path):
+    sensor = load_registry().sensors["ideal"]
+    (own,) = sensor.spec.streams
+    rig = RigDescriptor(name="slow", title="slow", where="nowhere:none")
+    for rate, kept in ((25.0, {"taxels": 100.0}), (100.0, {})):
+        stream = StreamSpec.model_validate({**own.model_dump(), "rate_hz": rate})
+        done = acquire(SlowRig((stream,)), sensor, rig, Scene(name="s", profile=ForceRamp()), role=None, seed=1,
+                       path=tmp_path / f"{rate:.0f}.h5", clock=lambda: 0.0, provenance={})  # fmt: skip
+        assert done.meta.own_rates_hz == kept
+        assert done.meta.sensor.link_delay == sensor.spec.link_delay
+
+
+def test_the_table_shows_a_delay_without_its_link_as_the_least_it_can_be():
+    parts = {"sampling": 20.0, "window": 240.0, "features": 0.03, "prediction": 0.05}
+    rows = [
+        row("a", score=0.5, answer_delay_ms=260.08, delay_parts_ms=parts),
+        row("b", score=0.6, answer_delay_ms=260.35, delay_parts_ms={**parts, "link": 0.27}),
+        row("c", score=0.7, answer_delay_ms=None, delay_parts_ms={}),
+    ]
+    table = build_table(rows)
+    shown = {line.cells[1]: line.cells[table.columns.index("delay")] for block in table.blocks for line in block.lines}
+    assert [shown[f"{name} SIM"] for name in "abc"] == ["≥ 260 ms", "260 ms", "–"]
+
+
+def test_a_95th_percentile_needs_200_calls():
+    rows = [
+        row("a", score=0.5, latency_ms_p95=None, latency_ms_max=3.0, latency_n=20),
+        row("b", score=0.6, latency_ms_p95=2.0, latency_ms_max=3.0, latency_n=200),
+    ]
+    table = build_table(rows)
+    shown = [line.cells[table.columns.index("p95")] for block in table.blocks for line in block.lines]
+    assert shown == ["3.00 ms (largest of 20)", "2.00 ms"]
