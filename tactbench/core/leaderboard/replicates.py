@@ -97,13 +97,15 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
             found[low], found[high] = (known.low, known.high) if known else (None, None)
             level = known.level if known else level
     scores = [row["score"] for row in done]
+    parts = _middle([row.get("delay_parts_ms") or {} for row in done])
     return found | {
         **_counted(done, len(done), "replicate", scores),
         "ci_method": f"order statistics of {len(done)} replicates, {100 * level:.3g} %" if level else "",
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
-        "delay_parts_ms": _middle([row.get("delay_parts_ms") or {} for row in done]),
+        "delay_parts_ms": parts,
+        "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
         "confusion": _added([row["confusion"] for row in done]),
         "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
     }

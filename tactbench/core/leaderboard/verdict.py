@@ -65,12 +65,14 @@ def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Seque
 
 
 def _without_touch(rows: Sequence[Row], trivial: Sequence[Row]) -> list[str]:
-    """Return a sentence where an answer that reads no sensor is as good as the best one that does."""
+    """Return a sentence where an answer that reads no sensor scores within the interval of the best one that does."""
     best = rows[0]
     if best.get("looks_at") == "time":
         return []
     sign = 1.0 if best["metric"] in LOWER_IS_BETTER else -1.0
-    found = [row for row in trivial if row.get("looks_at") == "time" and sign * (row["score"] - best["score"]) <= 0]
+    end = best["ci_high" if sign > 0 else "ci_low"]
+    bar = best["score"] if end is None else end
+    found = [row for row in trivial if row.get("looks_at") == "time" and sign * (row["score"] - bar) <= 0]
     if not found:
         return []
     one = min(found, key=lambda row: sign * row["score"])

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.evaluation.metrics import EXCESS, METRICS
+from tactbench.core.statistics.paired import difference
 from tactbench.core.statistics.ranking import ranks
 
 from .made import mae_row, row
@@ -221,3 +222,21 @@ def test_the_square_beyond_the_floor_is_no_metric_that_a_task_may_ask_for():
     assert EXCESS.name not in METRICS
     found = EXCESS.score(np.array([[2.0, 4.0, 3.0, 10.0], [2.0, 4.0, 30.0, 10.0]]), 0)
     np.testing.assert_allclose(found, [0.2, -2.5])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_two_cells_with_different_places_are_separated(seed):
+    rng = np.random.default_rng(seed)
+    rows = []
+    for place in range(10):
+        scores = 0.5 + 0.02 * place + rng.normal(0, rng.choice([0.002, 0.03]), 8)
+        rows.append(board(1)[0] | {
+            "cell": f"c{place}", "score": float(np.median(scores)),
+            "replicates": {"unit": "replicate", "names": [str(one) for one in range(8)], "strata": None,
+                           "scores": scores.tolist()},
+        })  # fmt: skip
+    found = ranks(rows)
+    for one in rows:
+        for other in rows:
+            if found[one["cell"]].place < found[other["cell"]].place:
+                assert difference(one, other).verdict == "better"
