@@ -57,8 +57,8 @@ def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Seque
     elif len(leaders) == 1:
         said = f"{names[0]} is best: {_measured(best)}."
     else:
-        listed = ", ".join(names[place] for place in leaders)
-        said = f"Tie at the top: of {len(rows)} answers {len(leaders)} cannot be told from the best: {listed}."
+        others = ", ".join(names[place] for place in leaders[1:])
+        said = f"Tie at the top: {names[0]} has the best score, and {others} cannot be told from it."
         said += _cheapest([rows[place] for place in leaders], [names[place] for place in leaders])
     more = [_resolution(ranked, len(leaders), names)] if len(rows) > 1 else []
     return (said, *more, *_without_touch(rows, trivial))

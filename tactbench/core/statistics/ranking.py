@@ -50,9 +50,9 @@ def ranks(rows: Iterable[Row]) -> dict[str, Rank]:
     -----
     A cell is *clearly better* than another if its score is, and the interval of their paired difference neither
     contains 0 nor lies within the task's region of practical equivalence. Cells in order of their scores share a place
-    until one comes that is, with all that follow, clearly worse than all before: it takes the place of its number in
-    that order. So any two cells with different places are separated by the data, and a better score never has a worse
-    place. A cell without an interval shares the place of the one before it, and ties no others together.
+    until one comes that all of those sharing it are clearly better than: it takes the place of its number in that
+    order. So two neighbours have different places only if the data separate them, a better score never has a worse
+    place, and what comes in behind changes no place before it.
 
     `low` and `high` are the ranks that no comparison of two excludes, the shared place among them: 1 + the number of
     cells that are clearly better, and the number of cells that are not clearly worse, itself among them [1]_.
@@ -125,9 +125,8 @@ def _clearly(
     near_to = np.full(n, same)
     if rows[0]["metric"] == EXCESS.name:
         near_to = (np.sqrt(np.maximum(error, 0.0)) + same) ** 2 - np.maximum(error, 0.0)
-    better, worse, apart, behind = (np.zeros(n, dtype=np.int64) for _ in range(4))
-    known = np.isfinite(deviation)
-    reaches = np.arange(n)  # the first cell that is not clearly better than each, itself if there is none before it
+    better, worse, places, apart, behind = (np.zeros(n, dtype=np.int64) for _ in range(5))
+    first = 0  # of those that share the place of the cell before
     for start in range(0, n, _STRIP):
         stop = min(start + _STRIP, n)
         lines, columns = slice(start, stop), slice(0, stop)  # only what stands before a cell can be better
@@ -149,11 +148,9 @@ def _clearly(
         for place in range(start, stop):
             apart[place] = place > 0 and clear[place - start, place - 1]
             behind[place] = clear[place - start, 0]
-            same_place = ~clear[place - start, :place] & known[:place]
-            if known[place] and same_place.any():
-                reaches[place] = int(np.argmax(same_place))
-    behind_all = np.minimum.accumulate(reaches[::-1])[::-1] >= np.arange(n)
-    places = np.maximum.accumulate(np.where(behind_all, np.arange(1, n + 1), 1))
+            if clear[place - start, first:place].all():
+                first = place
+            places[place] = first + 1
     return better, worse, places, apart, behind
 
 

@@ -38,7 +38,8 @@ def test_in_a_tie_all_co_leaders_are_named_and_cost_decides():
     rows = [one | {"fit_s": cost} for name, cost in (("ols", 0.1), ("lasso", 1.0), ("forest", 0.2))
             for one in replicates(same[::-1] if name == "lasso" else same, estimator=name)]  # fmt: skip
     said = build_table(over_replicates(rows)).blocks[0].verdict[0]
-    assert said.startswith("Tie at the top: of 3 answers 3 cannot be told from the best: ")
+    assert said.startswith("Tie at the top: ")
+    assert "cannot be told from it." in said
     assert all(name in said for name in ("ols", "lasso", "forest"))
     assert said.endswith("Of these ols fits 10 times quicker than lasso.")
 
