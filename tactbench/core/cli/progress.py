@@ -72,16 +72,18 @@ class Lines:
         """Say how far it is: at the end, and after the first tenth and further ones that took their time."""
         self._done += 1
         self._stopped += stopped
-        tenth = self._done * 10 // self._total > (self._done - 1) * 10 // self._total
-        if self._done == self._total or (tenth and self._clock() - self._said_s >= _QUIET_S):
-            self._said_s = self._clock()
-            remark(f"{self._stage}: {self._done}/{self._total} {what}{self._beside()}")
+        if self._done * 10 // self._total == (self._done - 1) * 10 // self._total:
+            return
+        now_s = self._clock()
+        if self._done == self._total or now_s - self._said_s >= _QUIET_S:
+            self._said_s = now_s
+            remark(f"{self._stage}: {self._done}/{self._total} {what}{self._beside(now_s)}")
 
-    def _beside(self) -> str:
+    def _beside(self, now_s: float) -> str:
         said = [f"{self._stopped} stopped"] if self._stopped else []
         left = self._total - self._done
         if left:
-            said.append(f"about {duration((self._clock() - self._began_s) / self._done * left)} to go")
+            said.append(f"about {duration((now_s - self._began_s) / self._done * left)} to go")
         return f" ({', '.join(said)})" if said else ""
 
     def working(self, what: str) -> None:

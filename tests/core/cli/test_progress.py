@@ -27,7 +27,7 @@ def test_a_line_a_tenth_says_how_far_how_many_stopped_and_how_long_still(capsys)
     shown = said.err.splitlines()
     assert len(shown) == 1 + 10
     assert shown[0] == "evaluating: 40 to do"
-    assert shown[1] == "evaluating: 4/40 cell 3 (2 stopped, about XX s to go)"
+    assert shown[1] == "evaluating: 4/40 cell 3 (2 stopped, about 54 s to go)"
     assert shown[-1] == "evaluating: 40/40 cell 39 (2 stopped)"
 
 
