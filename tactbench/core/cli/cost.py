@@ -32,6 +32,8 @@ from tactbench.core.cli.threads import keep_threads
 @click.option("--protocol", metavar="NAME", help="How recordings become X and y; default: the task's first.")
 @click.option("--split", metavar="NAME", help="What is kept apart; default: the task's first that fits.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")
+@click.option("--repeats", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
+              help="Replicates that scores are over, five or more for intervals; times are of the first.")  # fmt: skip
 @click.option("--rounds", type=click.IntRange(min=1), default=5, show_default=True, metavar="N",
               help="How often everything is timed, turn and turn about.")  # fmt: skip
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",

@@ -26,6 +26,7 @@ def show_ladder(
     split: str | None,
     estimators: tuple[str, ...],
     seed: int,
+    repeats: int,
     rounds: int,
     budget: float,
     threads: int,
@@ -44,7 +45,7 @@ def show_ladder(
 
     registry = load_registry()
     rig = rig or ("twin" if recordings is None else "replay")
-    matrix = _matrix(registry, sensor, task, rig, protocol, split, estimators or ("all",), seed)
+    matrix = _matrix(registry, sensor, task, rig, protocol, split, estimators or ("all",), seed, repeats)
     store = _store(out, sensor, task)
     with progress() as told:
         ladder = climb(matrix, registry, store, rounds=rounds, budget_s=budget, threads=threads,
@@ -91,6 +92,7 @@ def _matrix(
     split: str | None,
     estimators: tuple[str, ...],
     seed: int,
+    repeats: int,
 ) -> MatrixSpec:
     from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 
@@ -99,7 +101,7 @@ def _matrix(
     choice = TaskChoice(
         name=task, protocol=protocol, split=split, estimators=tuple(EstimatorChoice(name=name) for name in estimators)
     )
-    return MatrixSpec(rig=rig, seed=seed, sensors=(sensor,), tasks=(choice,))
+    return MatrixSpec(rig=rig, seed=seed, repeats=repeats, sensors=(sensor,), tasks=(choice,))
 
 
 def _print(ladder: Ladder) -> None:

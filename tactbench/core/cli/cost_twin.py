@@ -147,7 +147,7 @@ def _show(
     remark(study.reference)
     if scores:
         remark("Scores are of recordings made at that rung, with the same draws of noise and place (SIM); behind a "
-               "score its 95 % interval, beside it how far it is from the finest rung's here.")  # fmt: skip
+               "score how far it is from the finest rung's here; all of one replicate.")  # fmt: skip
 
 
 def _lines_of(skipped: Sequence[Skipped], subject: str) -> list[dict[str, str]]:

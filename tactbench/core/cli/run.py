@@ -57,10 +57,10 @@ def command(
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.files import table_of, write_tables
-    from tactbench.core.leaderboard.replicates import over_replicates
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
+    from tactbench.core.statistics.replicates import over_replicates
 
     matrix, folder = matrix_asked(installed(), **asked)
     choice = choice_of(matrix, engine=engine, jobs=jobs, timeout=timeout, memory=memory, scheduler=scheduler)
@@ -84,9 +84,9 @@ def command(
 def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the replicates that are finished, as wide as the terminal."""
     from tactbench.core.cli.screen import console
-    from tactbench.core.leaderboard.replicates import over_replicates
     from tactbench.core.leaderboard.table import build_table
     from tactbench.core.leaderboard.terminal import blocks_text
+    from tactbench.core.statistics.replicates import over_replicates
 
     return blocks_text(build_table(over_replicates(rows)), console().width)
 

@@ -19,6 +19,7 @@ from tactbench.core.matrix.run import Outcome, carry_out
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.statistics.replicates import over_replicates
 
 
 class Ladder(NamedTuple):
@@ -45,7 +46,7 @@ def climb(
     Parameters
     ----------
     matrix
-        One sensor, one task, one repeat.
+        One sensor, one task. Scores are over its replicates, times of the first.
     store
         Cells that are in it are not scored again; timing is always done anew.
     rounds, budget_s, threads, clock
@@ -69,11 +70,12 @@ def climb(
         raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
     outcome = carry_out(matrix, store, recordings=recordings, progress=progress)
     task = registry.tasks[matrix.tasks[0].name].spec
-    done = [row for row in outcome.rows if row["status"] == "done"]
+    done = [row for row in outcome.rows if row["status"] == "done" and row["seed"] == matrix.seed]
     data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None
+    answers = over_replicates(outcome.rows)
     rows: dict[str, Record] = {}
     contestants: dict[str, Contestant] = {}
-    for row in outcome.rows:
+    for row in answers:
         descriptor = registry.estimators[row["estimator"]]
         rows[row["cell"]] = opening(row, descriptor)
         if row["status"] != "done" or data is None:
@@ -88,7 +90,7 @@ def climb(
         contestants, rounds=rounds, budget_s=budget_s, threads=threads, seed=matrix.seed, clock=clock, progress=progress
     )
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    scores = {row["cell"]: row["scores"] for row in outcome.rows}
+    scores = {row["cell"].removesuffix(f"/{row['repeat']}"): row["scores"] for row in done}
     for cell, one in contestants.items():
         rows[cell] |= timed(one, times[cell], scores[cell], rounds, budget_s)
     better = metric_called(task.metric).higher_is_better

@@ -47,7 +47,7 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
             axis.errorbar(
                 row[time], row["score"],
                 xerr=[[row[time] - row[low]], [row[high] - row[time]]],
-                yerr=[[max(0.0, row["score"] - row["ci_low"])], [max(0.0, row["ci_high"] - row["score"])]],
+                yerr=[[max(0.0, row["score"] - _ends(row)[0])], [max(0.0, _ends(row)[1] - row["score"])]],
                 fmt=shape, color=colour, ms=6, lw=0.8, alpha=0.9,
             )  # fmt: skip
         best = sorted((row for row in rows if row[mark]), key=lambda row: float(row[time]))
@@ -67,7 +67,9 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
                            color="#555555")  # fmt: skip
     unit = "" if about["unit"] == "1" else f" [{about['unit']}]"
     better = "higher" if about["higher_is_better"] else "lower"
-    panels[0].set_ylabel(f"{metric or about['metric']}{unit}, 95 % interval; {better} is better")
+    known = any(row["ci_low"] is not None for row in rows)
+    spread = "95 % interval over replicates" if known else "one replicate"
+    panels[0].set_ylabel(f"{metric or about['metric']}{unit}, {spread}; {better} is better")
     simulated = " · SIM" if about["simulated"] else ""
     figure.suptitle(f"{about['sensor']}, {about['task']} · {about['protocol']} · split {about['split']}{simulated}")
     for axis in panels:
@@ -98,6 +100,12 @@ def _near(rows: Sequence[Record], higher_is_better: bool) -> tuple[list[Record],
     return [row for row in rows if row not in off], off
 
 
+def _ends(row: Record) -> tuple[float, float]:
+    """Return the ends of a score's interval; the score itself where too few replicates carry one."""
+    low, high = row["ci_low"], row["ci_high"]
+    return (row["score"], row["score"]) if low is None or high is None else (low, high)
+
+
 def _marks(rows: Sequence[Record]) -> dict[str, tuple[str, str]]:
     families = list(dict.fromkeys(sorted(row["family"] for row in rows if not row["is_baseline"])))
     own = {family: _MARKS[place % len(_MARKS)] for place, family in enumerate(families)}
@@ -110,7 +118,7 @@ def _bars(axis: Any, rows: Sequence[Record], time: str) -> list[Box]:
     boxes = []
     for row in rows:
         x, y = axis.transData.transform((row[time], row["score"]))
-        left, bottom = axis.transData.transform((row[low], row["ci_low"]))
-        right, top = axis.transData.transform((row[high], row["ci_high"]))
+        left, bottom = axis.transData.transform((row[low], _ends(row)[0]))
+        right, top = axis.transData.transform((row[high], _ends(row)[1]))
         boxes += [Box(x - 1, bottom, x + 1, top), Box(left, y - 1, right, y + 1)]
     return boxes

@@ -14,6 +14,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.scene import Simulation
+from tactbench.core.statistics.replicates import over_replicates
 
 
 @dataclass(frozen=True)
@@ -78,10 +79,12 @@ def task_score(
         If a name is unknown or the estimator cannot answer the task.
     """
     choice = TaskChoice(name=task, estimators=(EstimatorChoice(name=estimator),))
-    matrix = MatrixSpec(rig=rig, seed=seed, sensors=(sensor,), tasks=(choice,), simulation=simulation, latency=False)
+    matrix = MatrixSpec(
+        rig=rig, seed=seed, repeats=1, sensors=(sensor,), tasks=(choice,), simulation=simulation, latency=False
+    )
     with tempfile.TemporaryDirectory(prefix="tactbench-score-") as folder:
         outcome = carry_out(matrix, Store(Path(folder)), progress=progress)
-    row = next(row for row in outcome.rows if row["estimator"] == estimator)
+    row = next(row for row in over_replicates(outcome.rows) if row["estimator"] == estimator)
     return TaskScore(
         task=task,
         estimator=estimator,

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
-from tactbench.core.leaderboard.replicates import over_replicates
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.samples import Answers
+from tactbench.core.statistics.replicates import over_replicates
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry

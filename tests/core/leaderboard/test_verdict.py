@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from tactbench.core.leaderboard.formats import to_markdown
-from tactbench.core.leaderboard.replicates import over_replicates
 from tactbench.core.leaderboard.table import build_table
-
-from .test_replicates import replicates
+from tactbench.core.statistics.replicates import over_replicates
+from tests.core.statistics.test_replicates import replicates
 
 RNG = np.random.default_rng(7)
 COMMON = 0.02 * RNG.standard_normal(8)
