@@ -189,9 +189,8 @@ def _score_line(one: TaskScore, finest: float | None) -> dict[str, str]:
     name = f"{one.task}: {METRIC_NAMES.get(one.metric, one.metric)} by {one.estimator}"
     if one.score is None:
         return {name: one.reason}
-    interval = "" if one.ci_low is None or one.ci_high is None else f" [{one.ci_low:.4g}, {one.ci_high:.4g}]"
     apart = "" if finest is None else f"{one.score - finest:+.2g}"
-    return {name: f"{in_unit(one.score, one.unit)}{interval}", f"{one.task}: against the finest": apart}
+    return {name: f"{in_unit(one.score, one.unit)}", f"{one.task}: against the finest": apart}
 
 
 def _line(point: CostPoint, on_front: bool) -> dict[str, str]:

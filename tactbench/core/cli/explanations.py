@@ -29,7 +29,7 @@ _LONGEST_S = 60.0
 """Seconds that recordings may take for a score that nobody asked for by name."""
 _TOLD_APART = 0.1
 """Share by which two times of one run each differ on a machine that does other things as well."""
-_SCORE_COLUMNS = ("effects", "score", "95 %", "simulated in")
+_SCORE_COLUMNS = ("effects", "score", "simulated in")
 
 
 def print_explanations(
@@ -107,13 +107,12 @@ def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
         {
             "effects": name,
             "score": one.reason if one.score is None else in_unit(one.score, one.unit),
-            "95 %": "" if one.ci_low is None or one.ci_high is None else f"{one.ci_low:.4g}–{one.ci_high:.4g}",
             "simulated in": "" if one.sim_s is None else f"{one.sim_s:.2f} s",
         }
         for name, one in (("chosen", chosen), ("all", every))
     ]
     title = f"{sensor}, {chosen.task}: {METRIC_NAMES.get(chosen.metric, chosen.metric)} by {chosen.estimator} (SIM)"
-    print_grid(title, _SCORE_COLUMNS, lines, numeric=("score", "95 %", "simulated in"))
+    print_grid(title, _SCORE_COLUMNS, lines, numeric=("score", "simulated in"))
     if chosen.score is None or every.score is None:
         return
     moved = every.score - chosen.score

@@ -14,7 +14,6 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.scene import Simulation
-from tactbench.core.statistics.replicates import over_replicates
 
 
 @dataclass(frozen=True)
@@ -28,9 +27,6 @@ class TaskScore:
     higher_is_better: bool
     score: float | None
     """None: there is none, and `reason` says why."""
-    ci_low: float | None
-    ci_high: float | None
-    """95 % interval."""
     sim_s: float | None
     """The processor's seconds for all recordings, files not counted."""
     recordings: int
@@ -84,7 +80,7 @@ def task_score(
     )
     with tempfile.TemporaryDirectory(prefix="tactbench-score-") as folder:
         outcome = carry_out(matrix, Store(Path(folder)), progress=progress)
-    row = next(row for row in over_replicates(outcome.rows) if row["estimator"] == estimator)
+    row = next(row for row in outcome.rows if row["estimator"] == estimator)
     return TaskScore(
         task=task,
         estimator=estimator,
@@ -92,8 +88,6 @@ def task_score(
         unit=row["unit"],
         higher_is_better=metric_called(row["metric"]).higher_is_better,
         score=row["score"],
-        ci_low=row["ci_low"],
-        ci_high=row["ci_high"],
         sim_s=row["sim_s"],
         recordings=len(row["recordings"]),
         reason=row["reason"],
