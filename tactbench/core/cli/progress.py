@@ -22,6 +22,8 @@ class Display(Progress, Protocol):
 
 _QUIET_S = 5.0
 """A log gets no further line of a stage sooner."""
+_FEW = 10
+"""Stages of so few steps have a line for each."""
 
 
 @contextmanager
@@ -69,13 +71,13 @@ class Lines:
         remark(f"{stage}: {total} to do")
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
-        """Say how far it is: at the end, and after the first tenth and further ones that took their time."""
+        """Say how far it is: at the end, after the first tenth, and after further ones that took their time."""
         self._done += 1
         self._stopped += stopped
         if self._done * 10 // self._total == (self._done - 1) * 10 // self._total:
             return
         now_s = self._clock()
-        if self._done == self._total or now_s - self._said_s >= _QUIET_S:
+        if self._done == self._total or self._total <= _FEW or now_s - self._said_s >= _QUIET_S:
             self._said_s = now_s
             remark(f"{self._stage}: {self._done}/{self._total} {what}{self._beside(now_s)}")
 
