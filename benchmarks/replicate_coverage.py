@@ -1,9 +1,9 @@
 """How often the interval over eight replicates holds the long-run median, on the twin's own scores.
 
-Records and answers 40 replicates of both sensors and both tasks, then draws groups of eight of them. The long-run median
-is known from 40 replicates only: that of all, a fifth of which are the group's own (coverage too high), and that of the
-32 others, which are no truth either (too low). Both are printed; what is true lies between. Beside them, how often the
-interval of a single campaign, over recordings or blocks of time within it, held another replicate's score.
+Records and answers 40 replicates of both sensors and both tasks, then draws groups of eight of them. The long-run
+median is known from 40 replicates only: that of all, a fifth of which are the group's own (coverage too high), and that
+of the 32 others, which are no truth either (too low). Both are printed; what is true lies between. Beside them, how
+often the interval of a single campaign, over recordings or blocks of time within it, held another replicate's score.
 
 Usage: python benchmarks/replicate_coverage.py [--replicates 40] [--groups 4000] [--out DIR]
 """

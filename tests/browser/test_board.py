@@ -122,7 +122,7 @@ def test_names_are_text_wherever_they_stand(board):
 def test_the_lines_are_those_of_the_table_digit_by_digit(board, rows):
     table = build_table(rows)
     shown = board.execute_script(LINES)
-    assert [body[0][1][0] for body in shown] == [block.title for block in table.blocks]
+    assert [body[0][1][0] for body in shown] == ["".join([block.title, *block.verdict]) for block in table.blocks]
     empty = {place for place, name in enumerate(table.columns)
              if all(line.cells[place] in ("", "–") for block in table.blocks for line in block.lines)}  # fmt: skip
     for body, block in zip(shown, table.blocks, strict=True):

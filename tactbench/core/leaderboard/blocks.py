@@ -73,19 +73,19 @@ def blocks_of(sheet: Sheet, letters: Mapping[str, str], times: bool) -> tuple[Sh
             shown,
             members,
             unranked,
-            _verdict(sheet, members, placings),
+            _verdict(sheet, members, placings, times),
         )
         for key, members, unranked in arranged
     ]
     return shown, tuple(blocks)
 
 
-def _verdict(sheet: Sheet, members: Sequence[int], placings: Sequence[Placing | None]) -> tuple[str, ...]:
+def _verdict(sheet: Sheet, members: Sequence[int], placings: Sequence[Placing | None], times: bool) -> tuple[str, ...]:
     ranked = [(sheet.rows[place], placing) for place in members if (placing := placings[place]) is not None]
     status, trivial = sheet["status"], sheet["is_baseline"]
     below = sum(status[place] == "done" and not trivial[place] and placings[place] is None for place in members)
     baselines = [sheet.rows[place] for place in members if status[place] == "done" and trivial[place]]
-    return tuple(map(visible, verdict_of(ranked, below, baselines)))
+    return tuple(map(visible, verdict_of(ranked, below, baselines, times=times)))
 
 
 def _order(key: _Key) -> tuple[Any, ...]:

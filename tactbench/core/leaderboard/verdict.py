@@ -22,7 +22,9 @@ _SPARED = ("answer_delay_ms", "fit_s")
 _SPARES = {"answer_delay_ms": "answers {:.3g} times sooner", "fit_s": "fits {:.3g} times quicker"}
 
 
-def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Sequence[Row] = ()) -> tuple[str, ...]:
+def verdict_of(
+    ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Sequence[Row] = (), *, times: bool = True
+) -> tuple[str, ...]:
     """Return sentences on the answers of one block: who is best, how well that is resolved, what it hangs on.
 
     Parameters
@@ -33,6 +35,8 @@ def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Seque
         How many answers are no better than the trivial one.
     trivial
         The trivial answers of the block.
+    times
+        Whether costs may be named: no seed decides them.
 
     Returns
     -------
@@ -59,7 +63,8 @@ def verdict_of(ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Seque
     else:
         others = ", ".join(names[place] for place in leaders[1:])
         said = f"Tie at the top: {names[0]} has the best score, and {others} cannot be told from it."
-        said += _cheapest([rows[place] for place in leaders], [names[place] for place in leaders])
+        if times:
+            said += _cheapest([rows[place] for place in leaders], [names[place] for place in leaders])
     more = [_resolution(ranked, len(leaders), names)] if len(rows) > 1 else []
     return (said, *more, *_without_touch(rows, trivial))
 
@@ -86,7 +91,9 @@ def _score(row: Row) -> str:
 
 def _too_few(rows: Sequence[Row], names: Sequence[str]) -> str:
     """Return what can be said of fewer replicates than an interval needs."""
-    n = min((row.get("n_replicates") or 1 for row in rows), default=1)
+    n = min((row.get("n_replicates") or 0 for row in rows), default=0)
+    if not n:
+        return f"Not enough to tell: these rows keep no replicates. {names[0]} has the best score."
     unit = str(rows[0].get("replicate_unit") or "replicate")
     have = f"one {unit}" if n == 1 else f"{n} {unit}s"
     more = " Give --repeats 8." if rows[0]["simulated"] else ""

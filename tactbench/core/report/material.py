@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
+from tactbench.core.leaderboard.checked import checked
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.samples import Answers
 from tactbench.core.statistics.replicates import over_replicates
@@ -59,5 +60,8 @@ class Material:
 
 
 def open_material(store: Store, registry: Registry) -> Material:
-    """Return what `store` holds, baselines beside every row."""
-    return Material(store, registry, tuple(over_replicates(store.rows())))
+    """Return what `store` holds: a row a cell, baselines beside it, and rows of other versions as they are."""
+    rows = store.rows()
+    good = checked(rows)[0]
+    known = {id(row) for row in good}
+    return Material(store, registry, (*over_replicates(good), *(row for row in rows if id(row) not in known)))

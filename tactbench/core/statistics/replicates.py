@@ -55,7 +55,7 @@ def over_replicates(rows: Sequence[Row]) -> list[dict[str, Any]]:
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(_name(row), []).append(row)
-    found = [_of_all(name, members) for name, members in groups.items()]
+    found = [_of_all(name, sorted(members, key=_number)) for name, members in groups.items()]
     fill_baselines(found)
     return found
 
@@ -64,6 +64,10 @@ def _name(row: Row) -> str:
     """Return the name of a row's cell without the number of the replicate."""
     cell = str(row["cell"])
     return cell if row.get("n_replicates") else cell.removesuffix(f"/{row.get('repeat')}")
+
+
+def _number(row: Row) -> tuple[int, int]:
+    return row.get("repeat") or 0, row.get("seed") or 0
 
 
 def _of_all(name: str, members: Sequence[Row]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ def registry():
 
 
 def plan(registry, probe=True, **choice):
-    matrix = MatrixSpec.model_validate({"tasks": [{"name": "curvature", **choice}], "probe": probe})
+    matrix = MatrixSpec.model_validate({"tasks": [{"name": "curvature", **choice}], "probe": probe, "repeats": 1})
     return plan_cells(matrix, ["icub"], registry)
 
 
