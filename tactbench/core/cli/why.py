@@ -64,10 +64,42 @@ def _facts(found: Subject, why: Explanation) -> dict[str, Any]:
         "simulation": row.get("simulation", {}),
         "score": row.get("score"),
         "made_by": row.get("made_by", ""),
+        "replicates": _replicates(found) if done else [],
         "rests_on": _rests_on(row) if done else [],
         "provenance": _provenance(found) if done else [],
         "try": _try(found, why),
     }
+
+
+def _replicates(found: Subject) -> list[str]:
+    """Return what the cell came to over its replicates, and what each of them scored."""
+    from tactbench.core.leaderboard.names import metric_name
+    from tactbench.core.leaderboard.numbers import ABSENT, interval, score
+    from tactbench.core.statistics.median import percent
+    from tactbench.core.statistics.replicates import over_replicates
+
+    name = found.cell.name.removesuffix(f"/{found.cell.repeat}")
+    (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
+    unit, many = str(row["unit"]), row["n_replicates"]
+    ends = interval(row["ci_low"], row["ci_high"], unit)
+    over = f"{many} {row['replicate_unit']}{'s' if many != 1 else ''}"
+    told = f"{metric_name(row)} {score(row['score'], unit)}"
+    told += (
+        f", {percent(many, row['replicate_unit'])} over {over}: {ends}" if ends != ABSENT else f" ({over}: no interval)"
+    )
+    if row["score_beyond_floor"] is not None:
+        ends = interval(row["beyond_floor_ci_low"], row["beyond_floor_ci_high"], unit)
+        told += f"; beyond the floor {score(row['score_beyond_floor'], unit)}" + (f", {ends}" if ends != ABSENT else "")
+    parts = [told]
+    if len(row["replicate_scores"]) > 1:
+        each = zip(row["seeds"], row["replicate_scores"], strict=True)
+        parts.append("each (seed: score): " + ", ".join(f"{seed}: {score(value, unit)}" for seed, value in each))
+    if row["recordings_right"] is not None:
+        parts.append(f"recordings right: {row['recordings_right']:.3g} of {row['recordings_asked']:.3g} a replicate")
+    if row["delay_parts_ms"] and row["answer_delay_ms"] is not None:
+        listed = ", ".join(f"{part} {value:.3g}" for part, value in row["delay_parts_ms"].items())
+        parts.append(f"answer delay {row['answer_delay_ms']:.3g} ms: {listed}")
+    return [visible(part) for part in parts]
 
 
 def _rests_on(row: Row) -> list[str]:
@@ -75,16 +107,13 @@ def _rests_on(row: Row) -> list[str]:
     from tactbench.core.leaderboard.counts import told_counts
     from tactbench.core.leaderboard.names import metric_name
     from tactbench.core.leaderboard.notes import picked
-    from tactbench.core.leaderboard.numbers import ABSENT, interval, score, suffix
+    from tactbench.core.leaderboard.numbers import score, suffix
 
     unit = str(row["unit"])
     told = [f"{metric_name(row)} {score(row['score'], unit)}"]
-    ends = interval(row["ci_low"], row["ci_high"], unit)
-    told += [f"95 % {ends} ({row['ci_method']})"] if ends != ABSENT else []
     if row.get("score_beyond_floor") is not None:
-        ends = interval(row["beyond_floor_ci_low"], row["beyond_floor_ci_high"], unit)
         floor = f"floor of the reference {score(row['reference_floor'], unit)}{suffix(unit)}"
-        told += [floor, f"beyond it {score(row['score_beyond_floor'], unit)}, 95 % {ends}"]
+        told += [floor, f"beyond it {score(row['score_beyond_floor'], unit)}"]
     if row.get("published") is not None:
         told.append(f"published {score(row['published'], unit)} ({row['published_reference']})")
     parts = [("score", "; ".join(told))]
@@ -138,7 +167,9 @@ def _ended(facts: dict[str, Any]) -> list[str]:
         where = ", ".join(facts["recordings"][:3])
         more = len(facts["recordings"]) - 3
         recordings = f"{where}{f' and {more} more' if more > 0 else ''}"
-        return [*facts["rests_on"], f"done: {facts['shard']}", f"recordings: {recordings}", *facts["provenance"]]
+        over = [f"over replicates: {facts['replicates'][0]}", *(f"  {part}" for part in facts["replicates"][1:])]
+        one = ["this replicate:", *(f"  {part}" for part in facts["rests_on"])]
+        return [*over, *one, f"done: {facts['shard']}", f"recordings: {recordings}", *facts["provenance"]]
     lines = [facts["status"] + (f": {facts['reason']}" if facts["reason"] else "")]
     if facts["signal"] is not None:
         lines.append(f"signal {facts['signal']}")

@@ -74,6 +74,7 @@ def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[
         "95 % beyond": intervals(sheet.known("beyond_floor_ci_low"), sheet.known("beyond_floor_ci_high"), units),
         "true error": scores(sheet.known("true_score"), units),
         "rank 95 %": _ranges(placings),
+        "recordings right": _right(sheet),
         "published": scores(sheet["published"], units),
         "baseline": scores(sheet["baseline"], units),
         "n test": list(map(whole, sheet["n_test"])),
@@ -93,6 +94,12 @@ def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[
                 column[place] = ABSENT
         texts["#"][place], texts["score"][place] = "", status[place].upper()
     return Shown(sheet, texts, list(map(_kind, status, sheet["is_baseline"])), placings)
+
+
+def _right(sheet: Sheet) -> list[str]:
+    """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
+    told = zip(sheet.known("recordings_right"), sheet.known("recordings_asked"), strict=True)
+    return [ABSENT if right is None or of is None else f"{right:.3g} of {of:.3g}" for right, of in told]
 
 
 def _intervals(sheet: Sheet, units: Sequence[str]) -> list[str]:

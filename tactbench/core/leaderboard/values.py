@@ -48,6 +48,7 @@ VALUES: dict[str, Callable[[Columns], Values]] = {
     "beyond floor": _if_known("score_beyond_floor"),
     "95 % beyond": lambda known: _between(known, "beyond_floor_ci_low", "beyond_floor_ci_high"),
     "true error": _if_known("true_score"),
+    "recordings right": _if_known("recordings_right"),
     "published": _as_is("published"),
     "baseline": _as_is("baseline"),
     "n test": _as_is("n_test"),

@@ -11,7 +11,7 @@ from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.statistics.excess import beyond_floor
-from tactbench.core.statistics.median import FEWEST
+from tactbench.core.statistics.median import FEWEST, percent
 
 Row = Mapping[str, Any]
 
@@ -112,9 +112,13 @@ def _measured(row: Row) -> str:
     else:
         value, ends, what = "score", ("ci_low", "ci_high"), ""
     low, high = (row.get(end) for end in ends)
-    held = "" if low is None else f" (95 % over {_replicates(row)}: {interval(low, high, row['unit'])})"
+    held = "" if low is None else f" ({_level(row)} over {_replicates(row)}: {interval(low, high, row['unit'])})"
     name = METRIC_NAMES.get(row["metric"], visible(str(row["metric"])))
     return f"{name} {score(row[value], row['unit'])}{suffix(row['unit'])}{what}{held}"
+
+
+def _level(row: Row) -> str:
+    return percent(row.get("n_replicates"), row.get("replicate_unit"))
 
 
 def _replicates(row: Row) -> str:

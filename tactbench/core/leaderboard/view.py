@@ -14,6 +14,7 @@ from tactbench.core.leaderboard.numbers import ABSENT
 from tactbench.core.leaderboard.sections import Section
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.text import command_line, visible
+from tactbench.core.statistics.median import percent
 
 CELL = "cell"
 """The column of cells' names, as `why` and `rerun` take them."""
@@ -116,7 +117,10 @@ def header(name: str, rows: Sequence[Any]) -> str:
         return f"{name}{unit}"
     if name in INTERVALS:
         over = _over(rows, "ci_low" if name == "95 % interval" else "beyond_floor_ci_low")
-        return name if not over else f"95 % {over}" if name == "95 % interval" else f"{name}, {over}"
+        if not over:
+            return name
+        level = percent(first.get("n_replicates"), first.get("replicate_unit"))
+        return f"{level} {over}" if name == "95 % interval" else f"{name.replace('95 %', level)}, {over}"
     return name
 
 

@@ -50,6 +50,11 @@ def median_interval(values: Sequence[float]) -> MedianInterval | None:
     return MedianInterval(low, high, LEVEL)
 
 
+def percent(n: int | None, unit: str | None) -> str:
+    """Return what intervals over `n` replicates, or sessions, cover, as text: ``95 %``."""
+    return "93.8 %" if n == FEWEST and unit == "replicate" else "95 %"
+
+
 def _coverage(n: int, k: int) -> float:
     """Return the probability that the median lies between the k-th smallest and the k-th largest of n values."""
     return 1.0 - 2.0 * sum(comb(n, i) for i in range(k)) / float(2**n)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tactbench.core.leaderboard.columns import COLUMNS, OF_FORCE
+from tactbench.core.leaderboard.columns import COLUMNS, IF_KNOWN
 from tactbench.core.leaderboard.formats import to_markdown
 from tactbench.core.leaderboard.records import records
 from tactbench.core.leaderboard.table import build_table
@@ -24,7 +24,7 @@ def test_the_floor_is_said_once_and_the_error_beyond_it_stands_beside_the_score(
     table = build_table(rows)
     (line, _) = table.blocks[0].lines
     cells = dict(zip(table.columns, line.cells, strict=True))
-    assert [cells[name] for name in OF_FORCE] == ["0.1234", "0.0000 … 0.2000", "0.0512"]
+    assert [cells[name] for name in IF_KNOWN if name in cells] == ["0.1234", "0.0000 … 0.2000", "0.0512"]
     (note,) = told(table, "Floor")
     assert "a/question 0.6875 N; b/question 0.6875 N." in note
     assert told(table, "True error (SIM)")
@@ -36,7 +36,7 @@ def test_the_floor_is_said_once_and_the_error_beyond_it_stands_beside_the_score(
 
 def test_without_floors_a_table_has_no_columns_for_them():
     table = build_table([row("a"), row("b")])
-    assert table.columns == tuple(name for name in COLUMNS if name not in OF_FORCE)
+    assert table.columns == tuple(name for name in COLUMNS if name not in IF_KNOWN)
     assert not told(table, "Floor")
     assert not told(table, "True error")
 
