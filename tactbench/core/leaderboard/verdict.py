@@ -96,7 +96,7 @@ def _too_few(rows: Sequence[Row], names: Sequence[str]) -> str:
         return f"Not enough to tell: these rows keep no replicates. {names[0]} has the best score."
     unit = str(rows[0].get("replicate_unit") or "replicate")
     have = f"one {unit}" if n == 1 else f"{n} {unit}s"
-    more = " Give --repeats 8." if rows[0]["simulated"] else ""
+    more = " Give --repeats 8." if rows[0]["simulated"] and rows[0]["repeats"] < FEWEST else ""
     return f"Not enough to tell: {have}, and an interval or a rank needs {FEWEST}. {names[0]} has the best score.{more}"
 
 

@@ -115,6 +115,8 @@ def header(name: str, rows: Sequence[Any]) -> str:
         return metric_name(first)
     if name in ("beyond floor", "true error"):
         return f"{name}{unit}"
+    if name == "95 % interval" and all(row.get("n_replicates") and row["ci_low"] is None for row in rows):
+        return "range"
     if name in INTERVALS:
         over = _over(rows, "ci_low" if name == "95 % interval" else "beyond_floor_ci_low")
         if not over:

@@ -20,8 +20,8 @@ COMMAND = [
 
 
 @contextmanager
-def started(folder):
-    """Start the command as the foreground job of a new terminal; give the process and our end of the terminal."""
+def started(folder, command=COMMAND):
+    """Start a command as the foreground job of a new terminal; give the process and our end of the terminal."""
     ours, theirs = pty.openpty()
 
     def own_terminal():
@@ -30,7 +30,7 @@ def started(folder):
 
     env = {**os.environ, "COLUMNS": "140", "LINES": "40", "TERM": "xterm-256color", "PYTHONPATH": ""}
     try:
-        with ending(COMMAND, cwd=folder, env=env, stdin=theirs, stdout=theirs, stderr=theirs,
+        with ending(command, cwd=folder, env=env, stdin=theirs, stdout=theirs, stderr=theirs,
                     preexec_fn=own_terminal) as process:  # fmt: skip
             os.close(theirs)
             yield process, ours
@@ -89,3 +89,14 @@ def test_the_bar_shows_both_stages_and_the_table_comes_last(tmp_path):
         assert process.wait(60) == 0
     assert "15/15" in seen
     assert seen.index("recording") < seen.index("evaluating") < seen.index("macro F1")
+
+
+def test_the_table_appears_after_the_first_replicate_and_stays_off_the_end(tmp_path):
+    command = [*COMMAND[:-4], "--estimator", "logistic", "--no-latency"]
+    command[command.index("--repeats") + 1] = "2"
+    with started(tmp_path, command) as (process, ours):
+        seen = read_until(ours, "Try next:", 100)
+        assert process.wait(60) == 0
+    first = seen.index("one replicate")
+    assert first < seen.index("replicate 2 of 2: evaluating") < seen.rindex("range 0.")
+    assert seen.rindex("one replicate") < seen.rindex("replicate 2 of 2"), "the last table alone is left"
