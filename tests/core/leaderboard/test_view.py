@@ -68,7 +68,7 @@ def test_too_few_replicates_have_a_range_that_is_called_one():
     few = row("a", n_replicates=3, score_min=0.4, score_max=0.75, **none)
     (grid,) = grids(build_table([few, row("b", n_replicates=1, **none)]), DEFAULT_VIEW)
     assert [line[4] for line in grid.lines] == ["range 0.4000 … 0.7500", "one replicate"]
-    assert grid.headers[4] == "95 % interval"
+    assert grid.headers[4] == "range"
 
 
 def test_a_delay_is_shown_where_it_is_known():
