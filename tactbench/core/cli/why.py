@@ -75,14 +75,14 @@ def _replicates(found: Subject) -> list[str]:
     """Return what the cell came to over its replicates, and what each of them scored."""
     from tactbench.core.leaderboard.names import metric_name
     from tactbench.core.leaderboard.numbers import ABSENT, interval, score
-    from tactbench.core.statistics.median import percent
+    from tactbench.core.statistics.median import counted, percent
     from tactbench.core.statistics.replicates import over_replicates
 
     name = found.cell.name.removesuffix(f"/{found.cell.repeat}")
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
     unit, many = str(row["unit"]), row["n_replicates"]
     ends = interval(row["ci_low"], row["ci_high"], unit)
-    over = f"{many} {row['replicate_unit']}{'s' if many != 1 else ''}"
+    over = counted(many, str(row["replicate_unit"]))
     told = f"{metric_name(row)} {score(row['score'], unit)}"
     told += (
         f", {percent(many, row['replicate_unit'])} over {over}: {ends}" if ends != ABSENT else f" ({over}: no interval)"

@@ -11,7 +11,7 @@ from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.statistics.excess import beyond_floor
-from tactbench.core.statistics.median import FEWEST, percent
+from tactbench.core.statistics.median import FEWEST, counted, percent
 
 Row = Mapping[str, Any]
 
@@ -95,7 +95,7 @@ def _too_few(rows: Sequence[Row], names: Sequence[str]) -> str:
     if not n:
         return f"Not enough to tell: these rows keep no replicates. {names[0]} has the best score."
     unit = str(rows[0].get("replicate_unit") or "replicate")
-    have = f"one {unit}" if n == 1 else f"{n} {unit}s"
+    have = f"one {unit}" if n == 1 else counted(n, unit)
     more = " Give --repeats 8." if rows[0]["simulated"] and rows[0]["repeats"] < FEWEST else ""
     return f"Not enough to tell: {have}, and an interval or a rank needs {FEWEST}. {names[0]} has the best score.{more}"
 
@@ -122,7 +122,7 @@ def _level(row: Row) -> str:
 
 
 def _replicates(row: Row) -> str:
-    return f"{row.get('n_replicates')} {row.get('replicate_unit')}s" if row.get("n_replicates") else "replicates"
+    return counted(row["n_replicates"], str(row["replicate_unit"])) if row.get("n_replicates") else "replicates"
 
 
 def _may_be_trivial(row: Row) -> bool:

@@ -14,7 +14,7 @@ from tactbench.core.leaderboard.numbers import ABSENT
 from tactbench.core.leaderboard.sections import Section
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.text import command_line, visible
-from tactbench.core.statistics.median import percent
+from tactbench.core.statistics.median import counted, percent
 
 CELL = "cell"
 """The column of cells' names, as `why` and `rerun` take them."""
@@ -130,7 +130,7 @@ def _over(rows: Sequence[Any], key: str) -> str:
     """Return what all intervals of a block are over: ``over 8 replicates``; empty if it differs or is not known."""
     found = {(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row.get(key) is not None}
     count, unit = next(iter(found)) if len(found) == 1 else (None, None)
-    return f"over {count} {visible(str(unit or 'replicate'))}{'s' if count != 1 else ''}" if count else ""
+    return f"over {counted(count, visible(str(unit or 'replicate')))}" if count else ""
 
 
 def sections(table: Table, view: View) -> tuple[Section, ...]:

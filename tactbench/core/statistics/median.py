@@ -50,6 +50,13 @@ def median_interval(values: Sequence[float]) -> MedianInterval | None:
     return MedianInterval(low, high, LEVEL)
 
 
+def counted(n: int, unit: str) -> str:
+    """Return so many of a unit of replication as text: ``8 replicates``, ``20 presses``, ``1 session``."""
+    if unit.startswith("block"):
+        return f"{n} {unit.replace('block', 'blocks', 1)}"
+    return f"{n} {unit}" if n == 1 else f"{n} {unit}{'es' if unit.endswith('s') else 's'}"
+
+
 def percent(n: int | None, unit: str | None) -> str:
     """Return what intervals over `n` replicates, or sessions, cover, as text: ``95 %``."""
     return "93.8 %" if n == FEWEST and unit == "replicate" else "95 %"

@@ -12,6 +12,7 @@ from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.statistics.influence import Together, scores_of, together
+from tactbench.core.statistics.median import counted
 from tactbench.core.statistics.student import NORMAL, quantile, two_sided
 
 Row = Mapping[str, Any]
@@ -105,7 +106,7 @@ def _paired(first: Row, second: Row, value: float, sign: float, group: Together,
     n = len(group.names) / run
     p, smallest = exchanged(first, second, run)
     unit = str(first["replicates"]["unit"])
-    over = f"paired over {len(group.names)} {_several(unit, len(group.names))}"
+    over = f"paired over {counted(len(group.names), unit)}"
     if first["replicates"].get("of") == "beyond":
         over += ", of the errors beyond the floor"
     own = value + carried * _to_own(group)
@@ -186,12 +187,6 @@ def _to_own(group: Together) -> FloatArray:
 
 def _in_time(group: Together) -> str:
     return ": spread between sessions is not in it" if group.in_time else ""
-
-
-def _several(unit: str, n: int) -> str:
-    if unit.startswith("block"):
-        return unit.replace("block", "blocks", 1)
-    return unit if n == 1 else unit + ("es" if unit.endswith("s") else "s")
 
 
 def exchanged(first: Row, second: Row, run: int = 1) -> tuple[float, float]:
