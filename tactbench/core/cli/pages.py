@@ -96,7 +96,7 @@ def _scene(scene: Scene) -> tuple[str, str, str, str]:
     place, profile = scene.placement, scene.profile
     nominal = place.x.value == 0 and place.s.value == 0
     where = "nominal" if nominal else f"{place.x} along, {place.s} across"
-    scatter = f" ± {place.scatter}" if place.scatter.value else ""
+    scatter = f", scatter {place.scatter}" if place.scatter.value else ""
     slide = f", slides {scene.slide}" if scene.slide else ""
     force = f"{profile.start.value:g} to {profile.end}, after {profile.hold}"
     return str(scene.indenter), where + scatter, force + slide, str(profile.duration)
