@@ -37,6 +37,10 @@ class PlainTable:
     notes: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
     """One word a line: ``result``, ``baseline``, ``failed`` …; empty: all alike."""
+    said: tuple[str, ...] = ()
+    """What it comes to, in sentences above it."""
+    anchor: str = ""
+    """Where links to the whole table lead; empty: nowhere."""
 
 
 def plain(

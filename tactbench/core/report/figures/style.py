@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
 
@@ -25,6 +25,8 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
 GREY = "#767676"
 LINES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 """Of things without an order."""
+_NAMES = {BLUE: "blue", VERMILLION: "red", GREEN: "green", PURPLE: "pink", ORANGE: "orange", SKY: "light blue",
+          BLACK: "black"}  # fmt: skip
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
 
@@ -86,6 +88,26 @@ def ordered(n: int) -> list[Any]:
 
     map_ = matplotlib.colormaps["viridis"]
     return [map_(value) for value in np.linspace(0.0, 0.88, n)] if n > 1 else [map_(0.0)]
+
+
+def sensor_colours(rows: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+    """Return a colour for each sensor of a folder, the same in all its figures."""
+    names = sorted({str(row["sensor"]) for row in rows})
+    return {name: cycled(LINES, place) for place, name in enumerate(names)}
+
+
+def colour_name(colour: str) -> str:
+    """Return what a caption calls one of `LINES`."""
+    return _NAMES[colour]
+
+
+def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
+    """Put below a figure what its panels name, each name once."""
+    told: dict[str, Any] = {}
+    for here in shown:
+        handles, labels = here.get_legend_handles_labels()
+        told.update(zip(labels, handles, strict=True))
+    figure.legend(told.values(), told.keys(), loc="outside lower center", ncols=min(len(told), 3), **more)
 
 
 def corner(axes: Axes, text: str, *, right: bool = False) -> None:
