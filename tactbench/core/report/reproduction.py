@@ -101,13 +101,13 @@ def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tu
         few = f"{_replicates(row)}: too few for an interval, so whether it is reproduced cannot be said"
         return "no interval", f"{few}; {_difference(row, published)}"
     if row["ci_low"] <= published <= row["ci_high"]:
-        said = f"inside: the published lies in our interval over {_replicates(row)}"
+        said = f"inside: the published lies in our 95 % interval{_over(row)}"
         if predicted is not None and not predicted.low <= published <= predicted.high:
             said += f"; but {_of_calibration(predicted, published, row['unit'])}"
         return "inside", said
     end = "below" if published < row["ci_low"] else "above"
-    parts = [f"outside: {_difference(row, published)}, and the published lies {end} our interval"]
-    if row["ci_method"]:
+    parts = [f"outside: {_difference(row, published)}, and the published lies {end} our 95 % interval{_over(row)}"]
+    if row.get("replicate_unit") != "replicate":
         parts.append(f"the interval is by {_without_brackets(row['ci_method'])}")
     if predicted is not None:
         parts.append(_of_calibration(predicted, published, row["unit"]))
@@ -119,6 +119,10 @@ def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tu
 def _replicates(row: Row) -> str:
     n, unit = int(row.get("n_replicates") or 1), str(row.get("replicate_unit") or "replicate")
     return f"one {unit}" if n == 1 else f"{n} {unit}s"
+
+
+def _over(row: Row) -> str:
+    return f" over {_replicates(row)}" if row.get("n_replicates") else ""
 
 
 def _difference(row: Row, published: float) -> str:

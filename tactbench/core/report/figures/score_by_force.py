@@ -129,8 +129,9 @@ def _caption(group: Group, shown: list[Panel], counted: list[str], told: list[st
     line = f" Dotted: {trivial}, the trivial baseline, in the same bands, a line a sensor." if trivial else ""
     return (
         f"{metric_name(group.task)} of the test set by force, one line a sensor ({coloured(group, shown)}): "
-        f"{'; '.join(told)}. Bands are below 1.5 N, from 1.5 N to below 3 N, and 3 N and above, by the reference "
-        f"force smoothed within a recording by a centred mean over {WINDOW_S:g} s, since a single reading of the reference is noisy; test "
-        f"rows in them: {'; '.join(counted)}. A class that is missing in a band counts as 0. Bars: 95 % intervals, "
-        f"bootstrap over blocks of time within recordings; spread between sessions is not in them.{line}{marks(group)}"
+        f"{'; '.join(told)}. Bands are below 1.5 N, from 1.5 N to below 3 N, and 3 N and above, by the reference force "
+        f"smoothed within a recording by a centred mean over {WINDOW_S:g} s, since a single reading of the reference "
+        f"is noisy; test rows in them: {'; '.join(counted)}. A class that is missing in a band counts as 0. Bars: 95 % "
+        f"intervals, bootstrap over blocks of time within recordings; spread between sessions is not in "
+        f"them.{line}{marks(group)}"
     )
