@@ -8,12 +8,12 @@ from typing import Any
 
 from tactbench.core.leaderboard.numbers import score
 from tactbench.core.matrix.keys import RELEVANT
+from tactbench.core.report.figures.published_and_ours import COLUMN
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.leaderboards import block_anchor
-from tactbench.core.report.pictures import picture
 from tactbench.core.report.plain import Entry, PlainTable, plain
 from tactbench.core.report.reproduction import reproduce
-from tactbench.core.report.section import Answer, Section, Subject
+from tactbench.core.report.section import Answer, Picture, Section, Subject
 
 _FACTS = ("tactbench", "commit", "python", "platform", "machine", "cpu", "cores", "host", "jobs")
 
@@ -24,7 +24,11 @@ MOST_TASKS = 2
 
 def answers_section(subject: Subject) -> Section:
     """Return the first section: published scores and ours in one picture, and what came out in three sentences."""
-    pictures = tuple(picture(one, subject) for one in subject.drawn if one.name == PUBLISHED)
+    drawn = {one.name: one for one in subject.drawn}
+    pictures: tuple[Picture, ...] = ()
+    if PUBLISHED in drawn and COLUMN in drawn:
+        one = drawn[PUBLISHED]
+        pictures = (Picture(one.title, one.caption, one.png.read_bytes(), narrow=drawn[COLUMN].png.read_bytes()),)
     answers = [*_published(subject), *_tasks(subject)]
     simulated = sum(bool(row["simulated"]) for row in subject.rows if row["status"] == "done")
     said = ("SIM: simulated by a twin of the sensor; no sensor was pressed.",) if simulated else ()

@@ -15,6 +15,7 @@ from tactbench.core.report.findings import findings_section
 from tactbench.core.report.leaderboards import leaderboards_section
 from tactbench.core.report.opening import about_section, answers_section
 from tactbench.core.report.pictures import pictures_section
+from tactbench.core.report.plain import WORDY
 from tactbench.core.report.published import published_section
 from tactbench.core.report.section import Maker, Section, Subject
 from tactbench.core.report.sensors import sensors_section
@@ -84,5 +85,6 @@ def _render(sections: Sequence[Section]) -> str:
         style_hash=policy_hash(style),
         script_hash=policy_hash(script),
         sections=sections,
+        wordy=WORDY,
     )
     return html + "\n"

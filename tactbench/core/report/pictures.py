@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tactbench.core.report.drawn import Drawn
+from tactbench.core.report.figures.published_and_ours import COLUMN
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.section import Picture, Section, Subject
 
@@ -16,7 +17,7 @@ def picture(one: Drawn, subject: Subject) -> Picture:
 
 def pictures_section(subject: Subject) -> Section:
     """Return the section of figures: those that were drawn for this page."""
-    drawn = [one for one in subject.drawn if one.name != PUBLISHED]
+    drawn = [one for one in subject.drawn if one.name not in (PUBLISHED, COLUMN)]
     if not drawn:
         none = "None was drawn from these results: `tactbench run` makes what the paper's figures show."
         return Section("figures", "Figures", missing=subject.undrawn or (none,))

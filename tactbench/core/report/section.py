@@ -83,6 +83,8 @@ class Picture:
     png: bytes
     cells: tuple[tuple[str, str], ...] = ()
     """Name and anchor of the cells it shows."""
+    narrow: bytes = b""
+    """The same for a narrow screen; empty: there is none."""
 
     @property
     def wide(self) -> bool:

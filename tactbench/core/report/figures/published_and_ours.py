@@ -25,8 +25,11 @@ from tactbench.core.report.reproduction import Reproduction, reproduce
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 NAME = "published-and-ours"
+COLUMN = f"{NAME}-column"
+"""The same with its panels below each other, for a column of a paper and a narrow screen."""
 ACROSS = 2
 """Panels beside each other."""
 _LINE_IN = 0.24
@@ -49,24 +52,32 @@ def draw_published(material: Material, folder: Path) -> list[Drawn]:
         return []
     every = [line for lines in tasks.values() for line in lines]
     colours = sensor_colours(material.rows)
-    across = min(len(tasks), ACROSS)
-    down = -(-len(tasks) // ACROSS)
-    most = max(map(len, tasks.values()))
-    with styled():
-        figure, axes = panels(
-            down, across, 0.75 + _LINE_IN * most, width_in=PAGE_IN if across > 1 else COLUMN_IN
-        )  # fmt: skip
-        for here in axes.flat[len(tasks) :]:
-            here.set_visible(False)
-        for here, lines in zip(axes.flat, tasks.values(), strict=False):
-            _panel(here, lines, colours)
-        simulated = all(line.row["simulated"] for line in every if line.row)
-        figure.suptitle("Published scores and ours" + (" (SIM: ours are simulated)" if simulated else ""))
-        handles = _legend([line.row for line in every if line.row])
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), across + 1))
-        png, pdf = write(figure, NAME, folder)
     keys = tuple(dict.fromkeys(str(line.row["key"]) for line in every if line.row and line.row["key"]))
-    return [Drawn(NAME, "Published scores and ours", _caption(every, colours), png, pdf, keys)]
+    drawn = []
+    with styled():
+        for name, across in ((NAME, min(len(tasks), ACROSS)), (COLUMN, 1)):
+            figure = _figure(list(tasks.values()), across, colours)
+            png, pdf = write(figure, name, folder)
+            drawn.append(Drawn(name, "Published scores and ours", _caption(every, colours), png, pdf, keys))
+    return drawn
+
+
+def _figure(tasks: Sequence[Sequence[Reproduction]], across: int, colours: Mapping[str, str]) -> Figure:
+    down = -(-len(tasks) // across)
+    heights = [0.75 + _LINE_IN * max(map(len, tasks[one * across : (one + 1) * across])) for one in range(down)]
+    figure, axes = panels(
+        down, across, sum(heights) / down, width_in=PAGE_IN if across > 1 else COLUMN_IN, height_ratios=heights
+    )  # fmt: skip
+    for here in axes.flat[len(tasks) :]:
+        here.set_visible(False)
+    for here, lines in zip(axes.flat, tasks, strict=False):
+        _panel(here, lines, colours)
+    rows = [line.row for lines in tasks for line in lines if line.row]
+    simulated = all(row["simulated"] for row in rows)
+    figure.suptitle("Published scores and ours" + (" (SIM: ours are simulated)" if simulated else ""))
+    handles = _legend(rows)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), across + 1))
+    return figure
 
 
 def _panel(here: Axes, lines: Sequence[Reproduction], colours: Mapping[str, str]) -> None:

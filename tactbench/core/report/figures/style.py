@@ -17,6 +17,8 @@ COLUMN_IN = 3.5
 PAGE_IN = 7.16
 """Width of both columns, for what does not fit in one."""
 FONT_PT = 7.0
+LEGEND_LETTERS = 42
+"""Letters of three names that fit side by side below a column, their marks beside them."""
 
 # Okabe and Ito 2008, Color universal design.
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
@@ -25,7 +27,7 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
 GREY = "#767676"
 LINES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 """Of things without an order."""
-_NAMES = {BLUE: "blue", VERMILLION: "red", GREEN: "green", PURPLE: "pink", ORANGE: "orange", SKY: "light blue",
+_NAMES = {BLUE: "blue", VERMILLION: "orange-red", GREEN: "green", PURPLE: "pink", ORANGE: "amber", SKY: "light blue",
           BLACK: "black"}  # fmt: skip
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
@@ -54,7 +56,7 @@ _RC: dict[str, Any] = {
     "legend.frameon": False,
     "legend.handlelength": 2.0,
     "figure.constrained_layout.w_pad": 0.04,
-    "figure.constrained_layout.h_pad": 0.045,
+    "figure.constrained_layout.h_pad": 0.06,
     "pdf.fonttype": 42,  # publishers refuse type 3; every further font of a PDF costs a tenth of a second: none is bold
     "savefig.facecolor": "white",
     "text.parse_math": False,  # a name with two dollar signs is a name
@@ -107,7 +109,9 @@ def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
     for here in shown:
         handles, labels = here.get_legend_handles_labels()
         told.update(zip(labels, handles, strict=True))
-    figure.legend(told.values(), told.keys(), loc="outside lower center", ncols=min(len(told), 3), **more)
+    wide = figure.get_figwidth() > COLUMN_IN
+    ncols = 2 if sum(map(len, told)) > LEGEND_LETTERS and not wide else 3
+    figure.legend(told.values(), told.keys(), loc="outside lower center", ncols=min(len(told), ncols), **more)
 
 
 def corner(axes: Axes, text: str, *, right: bool = False) -> None:
