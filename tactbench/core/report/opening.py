@@ -43,10 +43,10 @@ def _published(subject: Subject) -> list[Answer]:
         return []
     told = [one for one in lines if one.verdict != "no interval"]
     if not told:
-        few = f"{len(lines)} published numbers stand beside ours, which are of too few replicates for an interval."
+        few = f"Published numbers beside ours: {len(lines)}; ours are of too few replicates for an interval."
         return [Answer(few, "reproduction", "published numbers and ours")]
     inside = sum(one.verdict == "inside" for one in told)
-    said = f"{inside} of {len(told)} published numbers lie in the 95 % interval of ours"
+    said = f"Published numbers in the 95 % interval of ours: {inside} of {len(told)}"
     outside = [
         f"{one.title} (published {score(one.published, one.unit)}, ours {score(one.row['score'], one.unit)})"
         for one in told

@@ -29,7 +29,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
     shown = [panel for panel in group.panels if "train" in panel.answers]
     if not shown:
         raise NotApplicable(f"split {group.row['split']!r} has a training set a fold; none stands for all")
-    figure, axes = panels(len(shown), 2, 1.05, sharey="row")
+    figure, axes = panels(len(shown), 2, 1.35, sharey="row")
     metric, unit = metric_name(group.task), group.task.unit
     clocked = all(_clocked(panel.answers[role]) for panel in shown for role in SHOWN)
     for place, panel in enumerate(shown):

@@ -148,7 +148,7 @@ def _caption(lines: Sequence[Reproduction], colours: Mapping[str, str]) -> str:
     if any(len(row.get("replicate_scores") or []) > 1 for row in rows):
         parts.append("Small strokes are the replicates.")
     if any(row["simulated"] for row in rows):
-        parts.append("SIM: ours are simulated, no hardware was touched.")
+        parts.append("SIM: simulated, no hardware was touched.")
     if any(row["dagger"] for row in rows):
         parts.append("†: each set, the test set too, is scaled by its own mean and deviation.")
     references = "; ".join(dict.fromkeys(line.reference for line in lines))

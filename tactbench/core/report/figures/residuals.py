@@ -19,7 +19,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
 
     count = len(group.panels)
     rows, columns = -(-count // ACROSS), min(count, ACROSS)
-    figure, axes = panels(rows, columns, 1.75, sharex=True, sharey=True)
+    figure, axes = panels(rows, columns, 2.3, sharex=True, sharey=True)
     unit = suffix(group.task.unit)
     every = [
         values for panel in group.panels for values in (panel.answers["test"].y_true, panel.answers["test"].y_pred)
