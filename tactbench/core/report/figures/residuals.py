@@ -37,7 +37,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
         here.set_title(panel.sensor)
         here.set_aspect("equal")
         for axis in (here.xaxis, here.yaxis):
-            axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+            axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
         corner(here, f"{metric_name(group.task)} {score(panel.row['score'], group.task.unit)}{unit}")
     for here in axes.flat[max(count - columns, 0) : count]:  # nothing stands below them
         here.tick_params(labelbottom=True)
