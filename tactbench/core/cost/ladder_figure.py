@@ -47,7 +47,7 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
             axis.errorbar(
                 row[time], row["score"],
                 xerr=[[row[time] - row[low]], [row[high] - row[time]]],
-                yerr=_spread(row),
+                yerr=[[max(0.0, row["score"] - row["ci_low"])], [max(0.0, row["ci_high"] - row["score"])]],
                 fmt=shape, color=colour, ms=6, lw=0.8, alpha=0.9,
             )  # fmt: skip
         best = sorted((row for row in rows if row[mark]), key=lambda row: float(row[time]))
@@ -83,13 +83,6 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
     return figure
 
 
-def _spread(row: Record) -> list[list[float]] | None:
-    """Return how far the interval reaches below and above the score; None where too few replicates have one."""
-    if row["ci_low"] is None or row["ci_high"] is None:
-        return None
-    return [[max(0.0, row["score"] - row["ci_low"])], [max(0.0, row["ci_high"] - row["score"])]]
-
-
 def _near(rows: Sequence[Record], higher_is_better: bool) -> tuple[list[Record], list[Record]]:
     """Return the rows to be drawn, and the trivial ones so far off that the others would shrink to a line.
 
@@ -117,8 +110,7 @@ def _bars(axis: Any, rows: Sequence[Record], time: str) -> list[Box]:
     boxes = []
     for row in rows:
         x, y = axis.transData.transform((row[time], row["score"]))
-        known = _spread(row) is not None
-        left, bottom = axis.transData.transform((row[low], row["ci_low"] if known else row["score"]))
-        right, top = axis.transData.transform((row[high], row["ci_high"] if known else row["score"]))
+        left, bottom = axis.transData.transform((row[low], row["ci_low"]))
+        right, top = axis.transData.transform((row[high], row["ci_high"]))
         boxes += [Box(x - 1, bottom, x + 1, top), Box(left, y - 1, right, y + 1)]
     return boxes

@@ -134,10 +134,3 @@ def test_a_far_baseline_is_told_of_and_does_not_squeeze_the_figure(ladder, tmp_p
     figure = draw_ladder(ladder._replace(rows=far), [tmp_path / "a.png"])
     assert figure.axes[0].get_ylim()[1] < 10.0
     assert any(text.get_text() == "further above: mean at 90" for text in figure.axes[0].texts)
-
-
-def test_a_row_without_interval_is_drawn_without_a_bar(ladder, tmp_path):
-    none = [{**row, "ci_low": None, "ci_high": None} for row in ladder.rows]
-    figure = draw_ladder(ladder._replace(rows=none), [tmp_path / "a.png"])
-    assert [text.get_text() for text in figure.axes[0].texts] != []
-    assert not any(bars.has_yerr for bars in figure.axes[0].containers)
