@@ -172,3 +172,35 @@ def test_a_keyboard_reader_can_skip_the_contents(opened):
     assert opened.execute_script("return arguments[0].getBoundingClientRect().left >= 0", first)
     first.send_keys("\ue007")
     assert opened.execute_script("return location.hash") == "#main"
+
+
+@pytest.mark.parametrize(("width", "where"), [(390, "main"), (1280, "#reproduction")])
+def test_sentences_in_tables_are_read_without_scrolling_them(opened, width, where):
+    metrics = {"width": width, "height": 844, "deviceScaleFactor": 1, "mobile": False}
+    opened.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    boxes = opened.execute_script(
+        "return [...document.querySelectorAll(`${arguments[0]} .box`)].filter(one => one.querySelector('.wordy'))"
+        ".map(one => [one.scrollWidth, one.clientWidth])",
+        where,
+    )
+    assert boxes
+    assert [pair for pair in boxes if pair[0] > pair[1]] == []
+
+
+def test_several_notes_are_folded_until_they_are_asked_for_or_printed(opened):
+    folded = opened.find_elements("css selector", "details.folded")
+    assert folded
+    assert not any(one.get_attribute("open") for one in folded)
+    assert not folded[0].find_element("css selector", "li").is_displayed()
+    opened.execute_script("window.dispatchEvent(new Event('beforeprint'))")
+    assert all(one.get_attribute("open") for one in folded)
+
+
+def test_what_came_out_is_the_first_thing_and_its_links_lead_to_their_tables(opened):
+    links = opened.find_elements("css selector", "main > section:first-child .answers a")
+    assert [one.get_dom_attribute("href") for one in links] == ["#reproduction", "#leaderboard-1", "#leaderboard-2"]
+    for link in links:
+        target = opened.find_element("css selector", link.get_dom_attribute("href"))
+        link.click()
+        top = opened.execute_script("return arguments[0].getBoundingClientRect().top", target)
+        assert -1 <= top <= opened.execute_script("return window.innerHeight")

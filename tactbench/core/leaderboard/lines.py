@@ -69,7 +69,7 @@ def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[
         "sensor": sheet.sensors,
         "estimator": sheet.answers,
         "score": list(map(add, scores(sheet["score"], units), score_marks(sheet))),
-        "95 % interval": _intervals(sheet, units),
+        "95 % interval": row_intervals(sheet, units),
         "beyond floor": scores(sheet.known("score_beyond_floor"), units),
         "95 % beyond": intervals(sheet.known("beyond_floor_ci_low"), sheet.known("beyond_floor_ci_high"), units),
         "true error": scores(sheet.known("true_score"), units),
@@ -102,7 +102,7 @@ def _right(sheet: Sheet) -> list[str]:
     return [ABSENT if right is None or of is None else f"{right:.3g} of {of:.3g}" for right, of in told]
 
 
-def _intervals(sheet: Sheet, units: Sequence[str]) -> list[str]:
+def row_intervals(sheet: Sheet, units: Sequence[str]) -> list[str]:
     """Return intervals; where too few replicates carry one, the range of their scores, named so."""
     told = intervals(sheet["ci_low"], sheet["ci_high"], units)
     counts = sheet.known("n_replicates")

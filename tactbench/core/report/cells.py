@@ -14,7 +14,9 @@ Row = Mapping[str, Any]
 
 def cells_section(subject: Subject) -> Section:
     """Return the section of cells."""
-    said = ("Everything that is known about each cell. Times are in the unit that ends their name.",)
+    said: tuple[str, ...] = ("Everything that is known about each cell. Times are in the unit that ends their name.",)
+    if any(len(row.get("seeds") or []) > 1 for row in subject.rows):
+        said += ("Of several replicates, key, recordings, candidates and effects are those of the first.",)
     return Section(
         "cells", "Every cell", said=said, details=tuple(_details(row, subject.anchors) for row in subject.rows)
     )
@@ -36,7 +38,7 @@ def _details(row: Row, anchors: Mapping[str, str]) -> Details:
             if all(isinstance(one, Mapping) for one in value):
                 tables.append(_records(title, value))
             else:
-                lists.append((title, tuple(map(str, value))))
+                lists.append((title, tuple(map(_text, value))))
     return Details(
         anchor=anchors[row["cell"]],
         title=str(row["cell"]),
@@ -71,4 +73,10 @@ def _entry(value: Any) -> Entry:
         return Entry(ABSENT)
     if isinstance(value, bool):
         return Entry("yes" if value else "no")
-    return Entry(f"{value:.6g}" if isinstance(value, float) else str(value), finite(value))
+    return Entry(_text(value), finite(value))
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_text, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -22,9 +22,9 @@ def findings_section(subject: Subject) -> Section:
     if subject.calibrated is not None:
         tables += subject.calibrated.tables
     if not tables:
-        return Section("findings", "Findings", missing=tuple(lacks))
+        return Section("findings", "The paper's findings", missing=tuple(lacks))
     notes = subject.calibrated.notes if subject.calibrated else ()
-    return Section("findings", "Findings", missing=tuple(lacks), tables=tuple(tables), notes=notes)
+    return Section("findings", "The paper's findings", missing=tuple(lacks), tables=tuple(tables), notes=notes)
 
 
 def _frequencies(subject: Subject) -> PlainTable | None:

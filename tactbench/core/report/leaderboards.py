@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from tactbench.core.leaderboard.sheet import Sheet
-from tactbench.core.leaderboard.table import NUMERIC, Block, Line, build_table
+from tactbench.core.leaderboard.table import NUMERIC, Block, Line
 from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
 from tactbench.core.report.section import Section, Subject
@@ -16,15 +17,23 @@ Row = Mapping[str, Any]
 
 def leaderboards_section(subject: Subject) -> Section:
     """Return the section of leaderboards, failed and skipped cells with their reasons."""
-    table = build_table(subject.rows)
+    table = subject.leaderboard
     rows = {row["cell"]: row for row in subject.rows}
-    tables = tuple(_table(block, table.columns, rows, subject.anchors) for block in table.blocks)
+    tables = tuple(
+        _table(block, table.columns, rows, subject.anchors, block_anchor(place))
+        for place, block in enumerate(table.blocks)
+    )
     said = ("Click a heading to sort by it; click it again to turn the order round.",)
     return Section("leaderboards", "Leaderboards", said=said, tables=tables, notes=table.notes)
 
 
+def block_anchor(place: int) -> str:
+    """Return where the page shows the block at this place of the table."""
+    return f"leaderboard-{place + 1}"
+
+
 def _table(
-    block: Block, columns: tuple[str, ...], rows: Mapping[str, Row], anchors: Mapping[str, str]
+    block: Block, columns: tuple[str, ...], rows: Mapping[str, Row], anchors: Mapping[str, str], anchor: str
 ) -> PlainTable:  # fmt: skip
     members = [rows[line.cell] for line in block.lines]
     sheet = Sheet(members)
@@ -35,7 +44,8 @@ def _table(
         reason = "" if row["status"] == "done" else str(row["reason"])
         lines.append([*_entries(line, columns, own, anchors[line.cell]), Entry(reason)])
     kinds = [line.kind for line in block.lines]
-    return plain(block.title, (*columns, "reason"), lines, numeric=NUMERIC, kinds=kinds)
+    told = plain(block.title, (*columns, "reason"), lines, numeric=NUMERIC, kinds=kinds)
+    return replace(told, said=block.verdict, anchor=anchor)
 
 
 def _entries(

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tactbench.core.leaderboard.numbers import interval, score, suffix
+from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.leaderboard.table import LOWER_IS_BETTER, sensor_name
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.report.reproduction import row_interval
 
 Row = Mapping[str, Any]
 _SAME = ("sensor", "task", "rig", "protocol", "split", "repeat")
@@ -45,7 +46,7 @@ class Contrast:
     @staticmethod
     def told(row: Row) -> str:
         """Return a score and its interval as text."""
-        return f"{score(row['score'], row['unit'])} ({interval(row['ci_low'], row['ci_high'], row['unit'])})"
+        return f"{score(row['score'], row['unit'])} ({row_interval(row)})"
 
 
 def contrasts(rows: Sequence[Row], registry: Registry) -> list[Contrast]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +69,7 @@ def make_report(
             "report.",
             hint="Finish some with `tactbench run --out DIR`.",
         )
-    material = Material(material.store, material.registry, readable)
+    material = replace(material, rows=readable)
     try:
         (out / "figures").mkdir(parents=True, exist_ok=True)
         undrawn: list[str] = []

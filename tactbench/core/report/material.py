@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,15 +29,22 @@ class Material:
         Where specs of sensors and tasks are looked up.
     rows
         One a cell, the latest of each name.
+    replicates
+        The rows as they are stored, one a cell and replicate, by key.
     """
 
     store: Store
     registry: Registry
     rows: tuple[Row, ...]
+    replicates: Mapping[str, Row] = field(default_factory=dict)
 
     def answers(self, row: Mapping[str, Any]) -> dict[str, Answers]:
         """Return what a cell answered, by role; empty if it did not finish."""
         return self.store.answers(str(row["key"]))
+
+    def replicate(self, row: Row) -> Row:
+        """Return the row of the one replicate whose answers and recordings a cell's row leads to."""
+        return self.replicates.get(str(row["key"]), row)
 
     def recordings(self, row: Mapping[str, Any]) -> list[Path]:
         """Return the files of a cell's recordings, in the order that ``Answers.recording`` counts.
@@ -64,4 +71,5 @@ def open_material(store: Store, registry: Registry) -> Material:
     rows = store.rows()
     good = checked(rows)[0]
     known = {id(row) for row in good}
-    return Material(store, registry, (*over_replicates(good), *(row for row in rows if id(row) not in known)))
+    shown = (*over_replicates(good), *(row for row in rows if id(row) not in known))
+    return Material(store, registry, shown, {str(row["key"]): row for row in good})

@@ -1,4 +1,4 @@
-"""What the page is: of what it was made, where, and what is simulated."""
+"""What the page opens with, what came out; and what it ends with: of what it was made, where, what is simulated."""
 
 from __future__ import annotations
 
@@ -6,22 +6,78 @@ import json
 from collections import Counter
 from typing import Any
 
+from tactbench.core.leaderboard.numbers import score
 from tactbench.core.matrix.keys import RELEVANT
+from tactbench.core.report.figures.published_and_ours import COLUMN
+from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
+from tactbench.core.report.leaderboards import block_anchor
 from tactbench.core.report.plain import Entry, PlainTable, plain
-from tactbench.core.report.section import Section, Subject
+from tactbench.core.report.reproduction import reproduce
+from tactbench.core.report.section import Answer, Picture, Section, Subject
 
 _FACTS = ("tactbench", "commit", "python", "platform", "machine", "cpu", "cores", "host", "jobs")
 
 
-def opening(subject: Subject) -> Section:
-    """Return the first section."""
+MOST_TASKS = 2
+"""So many tasks are named in the first section; the leaderboards have them all."""
+
+
+def answers_section(subject: Subject) -> Section:
+    """Return the first section: published scores and ours in one picture, and what came out in three sentences."""
+    drawn = {one.name: one for one in subject.drawn}
+    pictures: tuple[Picture, ...] = ()
+    if PUBLISHED in drawn and COLUMN in drawn:
+        one = drawn[PUBLISHED]
+        pictures = (Picture(one.title, one.caption, one.png.read_bytes(), narrow=drawn[COLUMN].png.read_bytes()),)
+    answers = [*_published(subject), *_tasks(subject)]
+    simulated = sum(bool(row["simulated"]) for row in subject.rows if row["status"] == "done")
+    said = ("SIM: simulated by a twin of the sensor; no sensor was pressed.",) if simulated else ()
+    return Section("answers", "What came out", said=said, pictures=pictures, answers=tuple(answers))
+
+
+def _published(subject: Subject) -> list[Answer]:
+    """Return how many published numbers lie in the interval of ours."""
+    lines = [one for one in reproduce(subject.material.registry, subject.rows, subject.calibrated)
+             if one.row is not None and one.row["status"] == "done"]  # fmt: skip
+    if not lines:
+        return []
+    told = [one for one in lines if one.verdict != "no interval"]
+    if not told:
+        few = f"Published numbers beside ours: {len(lines)}; ours are of too few replicates for an interval."
+        return [Answer(few, "reproduction", "published numbers and ours")]
+    inside = sum(one.verdict == "inside" for one in told)
+    said = f"Published numbers in the 95 % interval of ours: {inside} of {len(told)}"
+    outside = [
+        f"{one.title} (published {score(one.published, one.unit)}, ours {score(one.row['score'], one.unit)})"
+        for one in told
+        if one.row is not None and one.verdict == "outside"
+    ]
+    said += f"; outside: {', '.join(outside)}." if outside else "."
+    return [Answer(said, "reproduction", "published numbers and ours")]
+
+
+def _tasks(subject: Subject) -> list[Answer]:
+    """Return what the first table of each task comes to, without how finely it resolves."""
+    found: dict[str, Answer] = {}
+    for place, block in enumerate(subject.leaderboard.blocks):
+        row, ranked = block.lines[0].row, sum(line.placing is not None for line in block.lines)
+        if not block.verdict or row["task"] in found:
+            continue
+        said = (*block.verdict[:1], *block.verdict[2 if ranked > 1 else 1 :])  # the second is on resolution
+        asked = f"{row['task']} under {row['protocol']}{' †' if row['dagger'] else ''}"
+        asked += ", SIM" if row["simulated"] else ""
+        found[row["task"]] = Answer(f"{asked}: {' '.join(said)}", block_anchor(place), f"table of {row['task']}")
+    return list(found.values())[:MOST_TASKS]
+
+
+def about_section(subject: Subject) -> Section:
+    """Return the last section."""
     counts = Counter(str(row["status"]) for row in subject.rows)
     told = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
-    seeds = ", ".join(str(seed) for seed in sorted({row["seed"] for row in subject.rows}))
+    seeds = ", ".join(map(str, sorted({seed for row in subject.rows for seed in row.get("seeds") or [row["seed"]]})))
     said = [
-        "How good are the answers of tactile sensors, and what do they cost in time? Each number below links to the "
-        "cell that it is from, with everything that is known about it.",
-        f"{len(subject.rows)} cells: {told}. Seed: {seeds}.",
+        "Each number on this page links to the cell that it is from, with everything that is known about it.",
+        f"{len(subject.rows)} cells: {told}. Seeds: {seeds}.",
     ]
     facts = _facts(subject)
     if facts:
@@ -33,7 +89,7 @@ def opening(subject: Subject) -> Section:
     lacks = "Versions and host are not known: the results have no run.json; `tactbench run` writes one."
     return Section(
         "about",
-        "What this is",
+        "What this was made of",
         said=(*said, *_simulated(subject)),
         tables=tuple(tables),
         missing=() if facts else (lacks,),

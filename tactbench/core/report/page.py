@@ -13,8 +13,9 @@ from tactbench.core.report.compared import compared_section
 from tactbench.core.report.costs import costs_section
 from tactbench.core.report.findings import findings_section
 from tactbench.core.report.leaderboards import leaderboards_section
-from tactbench.core.report.opening import opening
+from tactbench.core.report.opening import about_section, answers_section
 from tactbench.core.report.pictures import pictures_section
+from tactbench.core.report.plain import WORDY
 from tactbench.core.report.published import published_section
 from tactbench.core.report.section import Maker, Section, Subject
 from tactbench.core.report.sensors import sensors_section
@@ -23,15 +24,16 @@ TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 
 # Anchor, title and maker of each section: a section that cannot be made says so under its own title.
 SECTIONS: tuple[tuple[str, str, Maker], ...] = (
-    ("about", "What this is", opening),
+    ("answers", "What came out", answers_section),
     ("reproduction", "Published numbers, and ours", published_section),
-    ("sensors", "Sensors", sensors_section),
-    ("findings", "Findings", findings_section),
-    ("figures", "Figures", pictures_section),
     ("leaderboards", "Leaderboards", leaderboards_section),
+    ("figures", "Figures", pictures_section),
+    ("findings", "The paper's findings", findings_section),
+    ("sensors", "Sensors", sensors_section),
     ("compared", "The same questions asked otherwise", compared_section),
     ("cost", "What accuracy costs in time", costs_section),
     ("cells", "Every cell", cells_section),
+    ("about", "What this was made of", about_section),
 )
 
 
@@ -83,5 +85,6 @@ def _render(sections: Sequence[Section]) -> str:
         style_hash=policy_hash(style),
         script_hash=policy_hash(script),
         sections=sections,
+        wordy=WORDY,
     )
     return html + "\n"

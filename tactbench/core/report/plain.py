@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from tactbench.core.leaderboard.markdown import markdown_grid, markdown_note
 
 ABSENT = "–"
+WORDY = 60
+"""Letters from which a field wraps as prose."""
 _DIGITS = r"[-+−]?[\d\u202f]+(?:\.\d+)?(?:[eE][-+]?\d+)?"
 _NUMBER = re.compile(rf"({_DIGITS})(?: … {_DIGITS})?(?: %)?(?: ?[†‡*])*")
 
@@ -37,6 +39,15 @@ class PlainTable:
     notes: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
     """One word a line: ``result``, ``baseline``, ``failed`` …; empty: all alike."""
+    said: tuple[str, ...] = ()
+    """What it comes to, in sentences above it."""
+    anchor: str = ""
+    """Where links to the whole table lead; empty: nowhere."""
+
+    @property
+    def wordy(self) -> bool:
+        """Whether it has sentences in its fields: on a narrow screen its lines are stacked, field below field."""
+        return any(len(entry.text) > WORDY for line in self.lines for entry in line)
 
 
 def plain(

@@ -17,8 +17,9 @@ def published_section(subject: Subject) -> Section:
     if not table.lines:
         return Section("reproduction", "Published numbers, and ours", missing=("No task installed here states any.",))
     said = (
-        "`inside` means that the published number lies in the interval of our score. The calibrated range is where the "
-        "simulation can put the number, over everything it cannot know.",
+        "Each number is held against the 95 % interval of our score over its replicates: inside, it is reproduced as "
+        "far as they can tell. The calibrated range is where the simulation can put the number, over everything it "
+        "cannot know.",
     )
     missing = () if subject.calibrated else ("There is no calibrated range yet: `tactbench calibrate` finds it.",)
     return Section("reproduction", "Published numbers, and ours", said=said, tables=(table,), missing=missing)

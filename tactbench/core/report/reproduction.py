@@ -7,14 +7,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from tactbench.core.leaderboard.lines import row_intervals
 from tactbench.core.leaderboard.numbers import interval, score, suffix
+from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import LOWER_IS_BETTER
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.calibrated import Calibrated, PredictiveRange
 from tactbench.core.spec.task import Published, TaskSpec
+from tactbench.core.statistics.median import counted, percent
 
 Row = Mapping[str, Any]
-Verdict = Literal["inside", "outside", "no answer"]
+Verdict = Literal["inside", "outside", "no interval", "no answer"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Reproduction:
     """What stands beside it; None: nothing has been run."""
     predicted: PredictiveRange | None
     verdict: Verdict
-    """`inside`: the published number lies in the interval of our score."""
+    """`inside`: the published number lies in the interval of our score; `no interval`: too few replicates have one."""
     sentence: str
 
 
@@ -96,12 +99,19 @@ def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tu
     if row["status"] != "done":
         return "no answer", f"{row['status']}: {row['reason']}"
     if row["ci_low"] is None or row["ci_high"] is None:
-        return "no answer", "the row has no interval to compare with"
+        few = f"{_replicates(row)}: too few for an interval, so whether it is reproduced cannot be said"
+        return "no interval", f"{few}; {_difference(row, published)}"
     if row["ci_low"] <= published <= row["ci_high"]:
+        said = f"inside: the published lies in our {_level(row)} interval{_over(row)}"
         if predicted is not None and not predicted.low <= published <= predicted.high:
-            return "inside", f"inside; but {_of_calibration(predicted, published, row['unit'])}"
-        return "inside", "inside"
-    parts = [_difference(row, published), f"the interval is by {_without_brackets(row['ci_method'])}"]
+            said += f"; but {_of_calibration(predicted, published, row['unit'])}"
+        return "inside", said
+    end = "below" if published < row["ci_low"] else "above"
+    parts = [
+        f"outside: {_difference(row, published)}, and the published lies {end} our {_level(row)} interval{_over(row)}"
+    ]
+    if row.get("replicate_unit") != "replicate":
+        parts.append(f"the interval is by {_without_brackets(row['ci_method'])}")
     if predicted is not None:
         parts.append(_of_calibration(predicted, published, row["unit"]))
     elif row["simulated"]:
@@ -109,9 +119,24 @@ def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tu
     return "outside", "; ".join(parts)
 
 
+def _replicates(row: Row) -> str:
+    n, unit = int(row.get("n_replicates") or 1), str(row.get("replicate_unit") or "replicate")
+    return f"one {unit}" if n == 1 else counted(n, unit)
+
+
+def _level(row: Row) -> str:
+    return percent(row.get("n_replicates"), row.get("replicate_unit"))
+
+
+def _over(row: Row) -> str:
+    return f" over {_replicates(row)}" if row.get("n_replicates") else ""
+
+
 def _difference(row: Row, published: float) -> str:
     ours, unit = row["score"], row["unit"]
     by = abs(ours - published)
+    if by == 0:
+        return "ours is the published"
     share = f" ({100 * by / abs(published):.1f} %)" if published else ""
     better = (ours < published) == (row["metric"] in LOWER_IS_BETTER)
     where = "below" if ours < published else "above"
@@ -226,8 +251,12 @@ def records(lines: Iterable[Reproduction]) -> list[dict[str, Any]]:
 
 def told_interval(line: Reproduction) -> str:
     """Return the interval of our score as text."""
-    row = line.row
-    return interval(row["ci_low"], row["ci_high"], line.unit) if row else "–"
+    return row_interval(line.row) if line.row is not None and line.row["status"] == "done" else "–"
+
+
+def row_interval(row: Row) -> str:
+    """Return a row's interval as the tables show it: "one replicate" where there is but one, the range of a few."""
+    return row_intervals(Sheet([row]), [row["unit"]])[0]
 
 
 def told_range(line: Reproduction) -> str:

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.leaderboard.table import answer_name
+from tactbench.core.leaderboard.table import Table, answer_name, build_table
 from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.material import Material
@@ -38,6 +38,11 @@ class Subject:
     def folder(self) -> Path:
         """The result folder."""
         return self.material.store.folder
+
+    @cached_property
+    def leaderboard(self) -> Table:
+        """The rows as ranked tables."""
+        return build_table(self.rows)
 
     @cached_property
     def anchors(self) -> dict[str, str]:
@@ -78,6 +83,8 @@ class Picture:
     png: bytes
     cells: tuple[tuple[str, str], ...] = ()
     """Name and anchor of the cells it shows."""
+    narrow: bytes = b""
+    """The same for a narrow screen; empty: there is none."""
 
     @property
     def wide(self) -> bool:
@@ -99,12 +106,24 @@ class Details:
 
 
 @dataclass(frozen=True)
+class Answer:
+    """One thing that came out, and where the page shows it."""
+
+    text: str
+    anchor: str
+    place: str
+    """What the link is called."""
+
+
+@dataclass(frozen=True)
 class Section:
     """A part of the page. Text between backticks is shown as code; none of it is markup."""
 
     anchor: str
     title: str
     said: tuple[str, ...] = ()
+    answers: tuple[Answer, ...] = ()
+    """Below the pictures: what came out, each with a link."""
     tables: tuple[PlainTable, ...] = ()
     notes: tuple[str, ...] = ()
     """Below the tables."""

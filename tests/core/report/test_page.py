@@ -64,15 +64,16 @@ def test_every_section_is_in_the_contents_in_order(subject):
     html = make_page(subject).html
     named = re.findall(r'<section id="([^"]+)"', html)
     assert named == [
-        "about",
+        "answers",
         "reproduction",
-        "sensors",
-        "findings",
-        "figures",
         "leaderboards",
+        "figures",
+        "findings",
+        "sensors",
         "compared",
         "cost",
         "cells",
+        "about",
     ]
     assert re.findall(r'<li><a href="#([^"]+)"', html)[: len(named)] == named
 
@@ -251,3 +252,49 @@ def test_a_hundred_cells_take_less_than_a_second(material):
         seconds.append(time.process_time() - began)
     # The promise is one second; the quickest of three is least disturbed.
     assert min(seconds) < 1.0
+
+
+def replicated(material, scores):
+    """Return the material with its rows over as many replicates as there are scores."""
+    from tactbench.core.statistics.replicates import over_replicates
+
+    rows = []
+    for one in material.replicates.values():
+        for place, factor in enumerate(scores, start=1):
+            cell = f"{str(one['cell']).removesuffix('/1')}/{place}"
+            own = {"cell": cell, "repeat": place, "repeats": len(scores), "seed": place}
+            if one["status"] == "done":
+                own |= {"score": one["score"] * factor, "key": f"{one['key']}{place}"}
+            rows.append({**one, **own})
+    return Material(material.store, material.registry, tuple(over_replicates(rows)))
+
+
+def test_the_page_opens_with_what_came_out_each_with_a_link(material):
+    few = make_page(Subject(material)).html
+    opening = few[few.index('<section id="answers"') : few.index('<section id="reproduction"')]
+    assert "Published numbers beside ours: 2; ours are of too few replicates for an interval." in opening
+    assert "force under karl2016 †, SIM: Not enough to tell: one replicate" in opening
+    assert re.findall(r'href="#([^"]+)"', opening) == ["reproduction", "leaderboard-1", "leaderboard-2"]
+    eight = replicated(material, [0.97, 0.98, 0.99, 1.0, 1.0, 1.01, 1.02, 1.03])
+    many = make_page(Subject(eight)).html
+    opening = many[many.index('<section id="answers"') : many.index('<section id="reproduction"')]
+    assert re.search(r"Published numbers in the 95 % interval of ours: \d of 2", opening)
+    assert "(95 % over 8 replicates:" in opening
+
+
+def test_every_sentence_of_a_verdict_stands_above_its_table(material):
+    subject = Subject(replicated(material, [0.97, 0.98, 0.99, 1.0, 1.0, 1.01, 1.02, 1.03]))
+    text = Reader(make_page(subject).html).text
+    told = [sentence for block in subject.leaderboard.blocks for sentence in block.verdict]
+    assert len(told) > len(subject.leaderboard.blocks) - 1
+    assert [sentence for sentence in told if " ".join(sentence.split()) not in text] == []
+
+
+def test_several_notes_are_folded_and_none_is_lost(material):
+    subject = Subject(material)
+    html = make_page(subject).html
+    assert len(subject.leaderboard.notes) > 1
+    folded = re.findall(r'<details class="folded">.*?</details>', html, flags=re.S)
+    assert any(f"{len(subject.leaderboard.notes)} notes</summary>" in one for one in folded)
+    text = Reader(html).text
+    assert [one for one in subject.leaderboard.notes if " ".join(one.replace("`", "").split()) not in text] == []

@@ -24,7 +24,29 @@ def predicted(low, high, **more):
 
 @pytest.mark.parametrize("published", [0.58, 0.68, 0.78])
 def test_inside_the_interval_is_inside_bounds_included(published):
-    assert verdict(force_row(ci_low=0.58, ci_high=0.78), published, None) == ("inside", "inside")
+    row = force_row(ci_low=0.58, ci_high=0.78, n_replicates=8, replicate_unit="replicate")
+    assert verdict(row, published, None) == (
+        "inside",
+        "inside: the published lies in our 95 % interval over 8 replicates",
+    )
+
+
+@pytest.mark.parametrize(
+    ("count", "unit", "says"), [(1, "replicate", "one replicate: too few"), (3, "session", "3 sessions: too few")]
+)
+def test_too_few_replicates_for_an_interval_are_said_in_its_place(count, unit, says):
+    row = force_row(ci_low=None, ci_high=None, n_replicates=count, replicate_unit=unit)
+    word, sentence = verdict(row, 0.88, None)
+    assert word == "no interval"
+    assert sentence.startswith(says)
+    assert "ours is 0.2000 N (22.7 %) below the published" in sentence
+
+
+def test_a_miss_says_on_which_side_of_the_interval_the_published_lies():
+    row = force_row(ci_low=0.58, ci_high=0.78, n_replicates=8, replicate_unit="replicate")
+    above, below = (verdict(row, published, predicted(0.1, 1.0))[1] for published in (0.9, 0.5))
+    assert "the published lies above our 95 % interval over 8 replicates" in above
+    assert "the published lies below our 95 % interval over 8 replicates" in below
 
 
 @pytest.mark.parametrize(
@@ -40,7 +62,7 @@ def test_inside_the_interval_is_inside_bounds_included(published):
 def test_a_miss_says_by_how_much_and_which_way_is_better(metric, unit, published, says):
     word, sentence = verdict(force_row(metric=metric, unit=unit), published, None)
     assert word == "outside"
-    assert sentence.startswith(says)
+    assert sentence.startswith(f"outside: {says}, and the published lies")
 
 
 def test_a_miss_says_what_is_not_in_its_interval_by_the_interval_s_own_words():

@@ -19,6 +19,7 @@ from tactbench.core.report.figures import (
 )
 from tactbench.core.report.figures.few_shot import draw_few_shot
 from tactbench.core.report.figures.group import Group, Remark, groups
+from tactbench.core.report.figures.published_and_ours import draw_published
 from tactbench.core.report.figures.saving import save
 from tactbench.core.report.figures.sketch import Sketch
 from tactbench.core.report.figures.style import styled
@@ -53,7 +54,7 @@ def draw_figures(
     Returns
     -------
     list of Drawn
-        In the order of a report: by group of comparable cells, as the cells come.
+        In the order of a report: published scores and ours, then by group of comparable cells, as the cells come.
 
     Raises
     ------
@@ -68,9 +69,13 @@ def draw_figures(
         raise UsageError(f"The folder {folder} cannot be made: {error.strerror}.", hint="Give another one.") from error
     work = [(group, draw) for group in _worth_drawing(material, say) for draw in FIGURES[group.task.kind]]
     refused: dict[tuple[str, str], list[str]] = {}
-    drawn: list[Drawn] = []
     if not work:
-        return drawn
+        return []
+    drawn: list[Drawn] = []
+    try:
+        drawn += draw_published(material, folder)
+    except Exception as error:
+        say(f"No picture of published scores and ours: {type(error).__name__}: {error}")
     told.begin("drawing", len(work))
     with styled():
         for group, draw in work:

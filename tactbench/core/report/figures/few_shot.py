@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,19 @@ from tactbench.core.leaderboard.table import METRIC_NAMES
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures.saving import write
 from tactbench.core.report.figures.sketch import with_unit
-from tactbench.core.report.figures.style import COLUMN_IN, DASHES, GREY, LINES, MARKERS, PAGE_IN, cycled, panels, styled
+from tactbench.core.report.figures.style import (
+    COLUMN_IN,
+    DASHES,
+    GREY,
+    MARKERS,
+    PAGE_IN,
+    colour_name,
+    cycled,
+    legend,
+    panels,
+    sensor_colours,
+    styled,
+)
 from tactbench.core.report.material import Material
 
 _NAME = "few-shot"
@@ -44,27 +56,24 @@ def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
         for here in axes.flat[len(tasks) :]:
             here.set_visible(False)
         lines = list(dict.fromkeys(_name(curve) for curve in curves))
+        colours = sensor_colours(material.rows)
         for here, (task, own) in zip(axes.flat, tasks.items(), strict=False):
-            _panel(here, own, lines)
+            _panel(here, own, lines, colours)
             here.set_title(task)
-        told: dict[str, Any] = {}
-        for here in axes.flat:
-            handles, labels = here.get_legend_handles_labels()
-            told.update(zip(labels, handles, strict=True))
-        figure.legend(told.values(), told.keys(), loc="outside lower center", ncols=3)
+        legend(figure, axes.flat)
         png, pdf = write(figure, _NAME, folder)
     keys = tuple(row["key"] for row in answers if shots(str(row["split"])) and row["key"])
-    return [Drawn(_NAME, "What few sessions are worth", _caption(curves), png, pdf, keys)]
+    return [Drawn(_NAME, "What few sessions are worth", _caption(curves, colours), png, pdf, keys)]
 
 
-def _panel(here: Any, own: Sequence[Curve], lines: Sequence[str]) -> None:
+def _panel(here: Any, own: Sequence[Curve], lines: Sequence[str], colours: Mapping[str, str]) -> None:
     for order, curve in enumerate(own):
         place = lines.index(_name(curve))
-        points = np.array(curve.points)
+        points = np.array(curve.points, dtype=np.float64)  # an end that is not known is NaN, and has no bar
         spread = np.abs(points[:, 2:] - points[:, 1:2]).T
         at = np.log2(points[:, 0]) + 0.06 * (order - (len(own) - 1) / 2)
         here.errorbar(
-            at, points[:, 1], yerr=spread, color=cycled(LINES, place), marker=cycled(MARKERS, place), markersize=4,
+            at, points[:, 1], yerr=spread, color=colours[curve.sensor], marker=cycled(MARKERS, place), markersize=4,
             linestyle=cycled(DASHES, place), capsize=2, label=_name(curve),
         )  # fmt: skip
     trivial = [curve.baseline for curve in own if curve.baseline is not None]
@@ -81,10 +90,11 @@ def _name(curve: Curve) -> str:
     return f"{curve.sensor}, {curve.estimator.partition(' (')[0]}"
 
 
-def _caption(curves: Sequence[Curve]) -> str:
+def _caption(curves: Sequence[Curve], colours: Mapping[str, str]) -> str:
+    sensors = ", ".join(f"{name} {colour_name(colours[name])}" for name in dict.fromkeys(one.sensor for one in curves))
     simulated = " SIM: simulated, no hardware was touched." if any(curve.simulated for curve in curves) else ""
     return (
         "Score on the same test sessions after training on the first n sessions, each a recording of every surface; a "
-        "panel a task. Training sets are nested. Bars: 95 % intervals over test sessions; which sessions came first is "
-        f"one draw. Dotted: the trivial baseline, mean over the lines.{simulated}"
+        f"panel a task; sensors by colour: {sensors}. Training sets are nested. Bars: the 95 % intervals of the "
+        f"tables, where there are any. Dotted: the trivial baseline, mean over the lines.{simulated}"
     )

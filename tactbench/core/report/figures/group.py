@@ -9,6 +9,7 @@ from typing import Any
 from tactbench.core.errors import TactbenchError
 from tactbench.core.leaderboard.table import answer_name
 from tactbench.core.matrix.store import Row
+from tactbench.core.report.figures.style import sensor_colours
 from tactbench.core.report.material import Material
 from tactbench.core.samples import Answers
 from tactbench.core.spec.task import TaskSpec
@@ -21,6 +22,7 @@ class Panel:
     """One sensor's cell, with what it answered."""
 
     row: Row
+    """of the replicate that is shown"""
     answers: Mapping[str, Answers]
     """by role"""
 
@@ -46,6 +48,11 @@ class Group:
         return self.panels[0].row
 
     @property
+    def colours(self) -> dict[str, str]:
+        """A colour a sensor, the same in all figures of the folder."""
+        return sensor_colours(self.material.rows)
+
+    @property
     def keys(self) -> tuple[str, ...]:
         """Keys of the cells."""
         return tuple(str(panel.row["key"]) for panel in self.panels)
@@ -55,7 +62,7 @@ def groups(material: Material, remark: Remark) -> list[Group]:
     """Return the groups of finished cells, a figure's worth each.
 
     Of several estimators the first that the task names for itself is shown, or else the first in the folder; of several
-    repeats the first. Whatever is not shown is told to `remark`.
+    replicates the one whose answers the cell's row leads to. Whatever is not shown is told to `remark`.
     """
     alike: dict[tuple[Any, ...], list[Row]] = {}
     for told in material.store.troubles:
@@ -97,12 +104,12 @@ def _group(material: Material, rows: list[Row], remark: Remark) -> Group | None:
 def _panels(material: Material, rows: list[Row], remark: Remark) -> dict[str, Panel]:
     """Return the first readable cell of each sensor."""
     found: dict[str, Panel] = {}
-    for row in sorted(rows, key=lambda row: int(row["repeat"])):
+    for row in rows:
         if row["sensor"] in found:
             continue
         answers = material.answers(row)
         if "test" in answers:
-            found[row["sensor"]] = Panel(row, answers)
+            found[row["sensor"]] = Panel(material.replicate(row), answers)
         else:
             remark(f"{row['cell']} is in no figure: cells/{row['key']}.h5 cannot be read. Run it again.")
     order = list(dict.fromkeys(row["sensor"] for row in rows))

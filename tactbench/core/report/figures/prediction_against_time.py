@@ -1,4 +1,4 @@
-"""What a regression answers against time: truth in blue dots, prediction as a red line."""
+"""What a regression answers against time: reference in grey dots, prediction as a line of the sensor's colour."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.report.figures.group import Group, Panel, Remark
-from tactbench.core.report.figures.sketch import Sketch, heading, marks, metric_name, quantity, sensors, with_unit
-from tactbench.core.report.figures.style import BLUE, VERMILLION, corner, panels
+from tactbench.core.report.figures.sketch import Sketch, coloured, heading, marks, metric_name, quantity, with_unit
+from tactbench.core.report.figures.style import GREY, corner, legend, panels
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
@@ -29,7 +29,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
     shown = [panel for panel in group.panels if "train" in panel.answers]
     if not shown:
         raise NotApplicable(f"split {group.row['split']!r} has a training set a fold; none stands for all")
-    figure, axes = panels(len(shown), 2, 1.05, sharey="row")
+    figure, axes = panels(len(shown), 2, 1.35, sharey="row")
     metric, unit = metric_name(group.task), group.task.unit
     clocked = all(_clocked(panel.answers[role]) for panel in shown for role in SHOWN)
     for place, panel in enumerate(shown):
@@ -39,25 +39,25 @@ def draw(group: Group, remark: Remark) -> Sketch:
             order, breaks = _in_time(time, answers)
             line = np.insert(answers.y_pred[order].astype(np.float64), breaks, np.nan)
             here.plot(
-                time[order], answers.y_true[order], ".", color=BLUE, markersize=1.2, markeredgewidth=0,
-                rasterized=True, label="truth",
+                time[order], answers.y_true[order], ".", color=GREY, markersize=1.2, markeredgewidth=0,
+                rasterized=True, label="reference",
             )  # fmt: skip
             here.plot(
-                np.insert(time[order], breaks, np.nan), line, "-", color=VERMILLION, linewidth=0.7, label="prediction"
-            )
+                np.insert(time[order], breaks, np.nan), line, "-", color=group.colours[panel.sensor], linewidth=0.7,
+                label=f"prediction, {panel.sensor}",
+            )  # fmt: skip
             here.set_title(f"{panel.sensor}, {WORDS[role]}")
             corner(here, f"{metric} {score(_score(panel, role, group.task), unit)}{suffix(unit)}")
             if place == len(shown) - 1:
                 here.set_xlabel("time [s]" if clocked else "row of the recording")
         axes[place, 0].set_ylabel(with_unit(quantity(group.task), group.task.unit))
     figure.suptitle(heading(group))
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, markerscale=4)
+    legend(figure, axes[:, 0], markerscale=4)
     caption = (
-        f"Predicted {quantity(group.task)} (red line) and the reference's reading of it (blue dots) against time, "
-        f"one row a sensor ({sensors(group)}); left the training set, right the test set. In the corner the {metric} "
-        f"of the set. Recordings of one set stand end to end; samples that the protocol discards are missing."
-        f"{marks(group)}"
+        f"Predicted {quantity(group.task)} (line) and the reference's reading of it (grey dots) against time, "
+        f"one row a sensor ({coloured(group, shown)}); left the training set, right the test set. In the corner "
+        f"the {metric} of the set. Recordings of one set stand end to end; samples that the protocol "
+        f"discards are missing.{marks(group)}"
     )
     title = f"{quantity(group.task).capitalize()} against time"
     return Sketch("prediction-against-time", title, caption, group, figure)

@@ -1,4 +1,4 @@
-"""What a regression answers against the target: perfect answers would lie on the red line."""
+"""What a regression answers against the target: perfect answers would lie on the black line."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.report.figures.group import Group, Remark
-from tactbench.core.report.figures.sketch import Sketch, heading, marks, metric_name, quantity, sensors, with_unit
-from tactbench.core.report.figures.style import BLUE, VERMILLION, corner, panels
+from tactbench.core.report.figures.sketch import Sketch, coloured, heading, marks, metric_name, quantity, with_unit
+from tactbench.core.report.figures.style import BLACK, corner, legend, panels
 
 ACROSS = 2
 """Panels beside each other."""
@@ -19,7 +19,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
 
     count = len(group.panels)
     rows, columns = -(-count // ACROSS), min(count, ACROSS)
-    figure, axes = panels(rows, columns, 1.75, sharex=True, sharey=True)
+    figure, axes = panels(rows, columns, 2.3, sharex=True, sharey=True)
     unit = suffix(group.task.unit)
     every = [
         values for panel in group.panels for values in (panel.answers["test"].y_true, panel.answers["test"].y_pred)
@@ -30,14 +30,14 @@ def draw(group: Group, remark: Remark) -> Sketch:
     for here, panel in zip(axes.flat, group.panels, strict=False):
         test = panel.answers["test"]
         here.plot(
-            test.y_true, test.y_pred, ".", color=BLUE, markersize=1.6, markeredgewidth=0, alpha=0.5, rasterized=True,
-            label="test rows",
+            test.y_true, test.y_pred, ".", color=group.colours[panel.sensor], markersize=1.6, markeredgewidth=0,
+            alpha=0.5, rasterized=True, label=f"test rows, {panel.sensor}",
         )  # fmt: skip
-        here.plot([low, high], [low, high], "-", color=VERMILLION, linewidth=1.0, label="perfect answers")
+        here.plot([low, high], [low, high], "-", color=BLACK, linewidth=1.0, label="perfect answers")
         here.set_title(panel.sensor)
         here.set_aspect("equal")
         for axis in (here.xaxis, here.yaxis):
-            axis.set_major_locator(MaxNLocator(5))
+            axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
         corner(here, f"{metric_name(group.task)} {score(panel.row['score'], group.task.unit)}{unit}")
     for here in axes.flat[max(count - columns, 0) : count]:  # nothing stands below them
         here.tick_params(labelbottom=True)
@@ -45,14 +45,14 @@ def draw(group: Group, remark: Remark) -> Sketch:
     for here in axes[:, 0]:
         here.set_ylabel(with_unit("predicted", group.task.unit))
     figure.suptitle(heading(group))
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, markerscale=3)
+    legend(figure, axes.flat[:count], markerscale=3)
     bias = "; ".join(
         f"{panel.sensor} {np.mean(panel.answers['test'].y_pred - panel.answers['test'].y_true):+.3g}"
         for panel in group.panels
     )
     caption = (
-        f"Predicted against target {quantity(group.task)} on the test set, one panel a sensor ({sensors(group)}). "
-        f"Perfect predictions lie on the red line. Mean of prediction minus target: {bias}{unit}.{marks(group)}"
+        f"Predicted against target {quantity(group.task)} on the test set, one panel a sensor "
+        f"({coloured(group, group.panels)}). Perfect predictions lie on the black line. "
+        f"Mean of prediction minus target: {bias}{unit}.{marks(group)}"
     )
     return Sketch("residuals", f"Predicted against target {quantity(group.task)}", caption, group, figure)

@@ -14,8 +14,8 @@ from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.metrics import Metric, metric_called
 from tactbench.core.leaderboard.numbers import interval, score, whole
 from tactbench.core.report.figures.group import Group, Panel, Remark
-from tactbench.core.report.figures.sketch import Sketch, heading, marks, metric_name, sensors
-from tactbench.core.report.figures.style import DASHES, GREY, LINES, MARKERS, cycled, panels
+from tactbench.core.report.figures.sketch import Sketch, coloured, heading, marks, metric_name
+from tactbench.core.report.figures.style import DASHES, GREY, MARKERS, cycled, panels
 from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
 from tactbench.core.samples import Answers, FloatArray
 
@@ -56,8 +56,8 @@ def draw(group: Group, remark: Remark) -> Sketch:
         values = np.array([band.score for band in bands])
         spread = np.abs([[band.low, band.high] for band in bands] - values[:, None]).T
         here.errorbar(
-            at + shift, values, yerr=spread, color=cycled(LINES, place), marker=cycled(MARKERS, place), markersize=4,
-            linestyle=cycled(DASHES, place), capsize=2, label=panel.sensor,
+            at + shift, values, yerr=spread, color=group.colours[panel.sensor], marker=cycled(MARKERS, place),
+            markersize=4, linestyle=cycled(DASHES, place), capsize=2, label=panel.sensor,
         )  # fmt: skip
         counted.append(f"{panel.sensor} {', '.join(whole(band.rows) for band in found)}")
         told.append(f"{panel.sensor} {', '.join(_told(band, group.task.unit) for band in found)}")
@@ -70,7 +70,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
     figure.suptitle(heading(group))
     figure.legend(loc="outside lower center", ncols=3)
     return Sketch(
-        "score-by-force", f"{metric_name(group.task)} by force", _caption(group, counted, told), group, figure
+        "score-by-force", f"{metric_name(group.task)} by force", _caption(group, shown, counted, told), group, figure
     )
 
 
@@ -124,13 +124,14 @@ def _told(band: Band, unit: str) -> str:
     return f"{score(band.score, unit)} ({interval(band.low, band.high, unit)})" if band.rows else "–"
 
 
-def _caption(group: Group, counted: list[str], told: list[str]) -> str:
+def _caption(group: Group, shown: list[Panel], counted: list[str], told: list[str]) -> str:
     trivial = next((panel.row["estimator"] for panel in group.baselines.values()), None)
     line = f" Dotted: {trivial}, the trivial baseline, in the same bands, a line a sensor." if trivial else ""
     return (
-        f"{metric_name(group.task)} of the test set by force, one line a sensor ({sensors(group)}): {'; '.join(told)}. "
-        f"Bands are below 1.5 N, from 1.5 N to below 3 N, and 3 N and above, by the reference force smoothed within a "
-        f"recording by a centred mean over {WINDOW_S:g} s, since a single reading of the reference is noisy; test "
-        f"rows in them: {'; '.join(counted)}. A class that is missing in a band counts as 0. Bars: 95 % intervals, "
-        f"bootstrap over blocks of time within recordings; spread between sessions is not in them.{line}{marks(group)}"
+        f"{metric_name(group.task)} of the test set by force, one line a sensor ({coloured(group, shown)}): "
+        f"{'; '.join(told)}. Bands are below 1.5 N, from 1.5 N to below 3 N, and 3 N and above, by the reference force "
+        f"smoothed within a recording by a centred mean over {WINDOW_S:g} s, since a single reading of the reference "
+        f"is noisy; test rows in them: {'; '.join(counted)}. A class that is missing in a band counts as 0. Bars: 95 % "
+        f"intervals, bootstrap over blocks of time within recordings; spread between sessions is not in "
+        f"them.{line}{marks(group)}"
     )

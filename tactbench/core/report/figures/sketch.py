@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.leaderboard.table import METRIC_NAMES, answer_name
-from tactbench.core.report.figures.group import Group
+from tactbench.core.report.figures.group import Group, Panel
+from tactbench.core.report.figures.style import colour_name
 from tactbench.core.spec.task import LabelTarget, TaskSpec
 
 if TYPE_CHECKING:
@@ -44,7 +46,7 @@ def heading(group: Group, *more: str) -> str:
     parts = [row["task"], answer_name(row), row["protocol"] + (" †" if row["dagger"] else "")]
     if row["split"] not in (None, "roles"):
         parts.append(f"split {row['split']}" + (" ‡" if row["stamps"] else ""))
-    parts += ["SIM" if row["simulated"] else f"rig {row['rig']}", *more]
+    parts += ["SIM" if row["simulated"] else f"rig {row['rig']}", *more, *_shown(row)]
     lines = [parts[0]]
     for part in parts[1:]:
         if len(lines[-1]) + len(part) < LINE:
@@ -55,7 +57,7 @@ def heading(group: Group, *more: str) -> str:
 
 
 def marks(group: Group) -> str:
-    """Return what the marks in the heading mean, and which repeat is shown."""
+    """Return what the marks in the heading mean, and which replicate is shown."""
     row = group.row
     said = [""]
     if row["simulated"]:
@@ -63,9 +65,15 @@ def marks(group: Group) -> str:
     if row["dagger"]:
         said.append("†: each set, the test set too, is scaled by its own mean and deviation.")
     said += [f"‡: {stamp}" for stamp in row["stamps"]]
-    if row["repeats"] > 1:
-        said.append(f"Repeat {row['repeat']} of {row['repeats']}.")
+    said += [f"Shown: {one}; the tables are over all of them." for one in _shown(row)]
     return " ".join(said)
+
+
+def _shown(row: Mapping[str, Any]) -> list[str]:
+    """Return which of several replicates a figure of single answers shows; of recordings, which of several seeds."""
+    if row["repeats"] <= 1:
+        return []
+    return [f"{'replicate' if row['simulated'] else 'seed'} {row['repeat']} of {row['repeats']}"]
 
 
 def quantity(task: TaskSpec) -> str:
@@ -84,6 +92,11 @@ def with_unit(words: str, unit: str) -> str:
 def metric_name(task: TaskSpec) -> str:
     """Return a metric as the tables call it."""
     return METRIC_NAMES.get(task.metric, task.metric)
+
+
+def coloured(group: Group, shown: Sequence[Panel]) -> str:
+    """Return the sensors with the names of their colours."""
+    return ", ".join(f"{panel.sensor} {colour_name(group.colours[panel.sensor])}" for panel in shown)
 
 
 def sensors(group: Group) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
 
@@ -17,6 +17,8 @@ COLUMN_IN = 3.5
 PAGE_IN = 7.16
 """Width of both columns, for what does not fit in one."""
 FONT_PT = 7.0
+LEGEND_LETTERS = 42
+"""Letters of three names that fit side by side below a column, their marks beside them."""
 
 # Okabe and Ito 2008, Color universal design.
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
@@ -25,6 +27,8 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
 GREY = "#767676"
 LINES = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 """Of things without an order."""
+_NAMES = {BLUE: "blue", VERMILLION: "orange-red", GREEN: "green", PURPLE: "pink", ORANGE: "amber", SKY: "light blue",
+          BLACK: "black"}  # fmt: skip
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
 
@@ -52,7 +56,7 @@ _RC: dict[str, Any] = {
     "legend.frameon": False,
     "legend.handlelength": 2.0,
     "figure.constrained_layout.w_pad": 0.04,
-    "figure.constrained_layout.h_pad": 0.045,
+    "figure.constrained_layout.h_pad": 0.06,
     "pdf.fonttype": 42,  # publishers refuse type 3; every further font of a PDF costs a tenth of a second: none is bold
     "savefig.facecolor": "white",
     "text.parse_math": False,  # a name with two dollar signs is a name
@@ -86,6 +90,28 @@ def ordered(n: int) -> list[Any]:
 
     map_ = matplotlib.colormaps["viridis"]
     return [map_(value) for value in np.linspace(0.0, 0.88, n)] if n > 1 else [map_(0.0)]
+
+
+def sensor_colours(rows: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+    """Return a colour for each sensor of a folder, the same in all its figures."""
+    names = sorted({str(row["sensor"]) for row in rows})
+    return {name: cycled(LINES, place) for place, name in enumerate(names)}
+
+
+def colour_name(colour: str) -> str:
+    """Return what a caption calls one of `LINES`."""
+    return _NAMES[colour]
+
+
+def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
+    """Put below a figure what its panels name, each name once."""
+    told: dict[str, Any] = {}
+    for here in shown:
+        handles, labels = here.get_legend_handles_labels()
+        told.update(zip(labels, handles, strict=True))
+    wide = figure.get_figwidth() > COLUMN_IN
+    ncols = 2 if sum(map(len, told)) > LEGEND_LETTERS and not wide else 3
+    figure.legend(told.values(), told.keys(), loc="outside lower center", ncols=min(len(told), ncols), **more)
 
 
 def corner(axes: Axes, text: str, *, right: bool = False) -> None:

@@ -114,6 +114,7 @@ def _curves(
     if values[0] > 0 and values[-1] / values[0] >= LOG_FROM:
         here.set_xscale("log")
         here.xaxis.set_major_formatter("{x:g}")
+    here.margins(x=0.06, y=0.1)
     rings = set()
     for fold in dict.fromkeys(str(one["fold"]) for one in search):
         value, own = (_of_fold(chosen, key, fold) for key in (name, "k"))

@@ -12,6 +12,10 @@
     if (link) unfold(link.hash);
   });
   window.addEventListener("hashchange", () => unfold(location.hash));
+  // Paper cannot be unfolded.
+  window.addEventListener("beforeprint", () => {
+    for (const notes of document.querySelectorAll("details.folded")) notes.open = true;
+  });
   const first = unfold(location.hash);
   if (first) first.scrollIntoView();
 

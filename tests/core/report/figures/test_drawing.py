@@ -12,6 +12,7 @@ from tactbench.core.report.figures import draw_figures
 
 from .made import opened, results
 
+PUBLISHED = ["published-and-ours", "published-and-ours-column"]
 FORCE = ["prediction-against-time", "residuals", "validation-curve"]
 CURVATURE = ["confusion", "score-by-force", "embedding"]
 
@@ -39,7 +40,7 @@ def draw(folder, out, told=None):
 
 
 def kinds(drawn):
-    return [next(kind for kind in FORCE + CURVATURE if one.name.startswith(kind)) for one in drawn]
+    return [next((kind for kind in FORCE + CURVATURE if one.name.startswith(kind)), one.name) for one in drawn]
 
 
 @pytest.fixture(scope="module")
@@ -58,8 +59,8 @@ def one_failed(tmp_path_factory):
 
 def test_the_paper_s_figures_are_drawn_as_pdf_and_png_and_nothing_else(all_of_it):
     drawn, said, out = all_of_it
-    assert kinds(drawn) == FORCE + CURVATURE
-    assert len({one.name for one in drawn}) == 6
+    assert kinds(drawn) == PUBLISHED + FORCE + CURVATURE
+    assert len({one.name for one in drawn}) == 8
     assert {path for one in drawn for path in (one.png, one.pdf)} == set(out.iterdir())
     for one in drawn:
         assert one.png.read_bytes().startswith(b"\x89PNG")
@@ -109,17 +110,17 @@ def test_the_same_bytes_in_another_process_whatever_the_user_s_style(all_of_it, 
 
 def test_a_failed_cell_is_named_and_the_others_are_drawn(one_failed, tmp_path):
     drawn, said = draw(one_failed, tmp_path / "figures")
-    assert kinds(drawn) == FORCE
+    assert kinds(drawn) == PUBLISHED + FORCE
     assert all(len(one.keys) == 1 for one in drawn)
     (reason,) = (one for one in said if one.startswith("beta/force"))
     assert "is in no figure: failed: In recording 'flat-test', t0 has no sample at all." in reason
 
 
 def test_a_figure_that_cannot_be_written_stops_no_other(one_failed, tmp_path, all_of_it):
-    blocked = tmp_path / "figures" / all_of_it[0][0].png.name
+    blocked = tmp_path / "figures" / all_of_it[0][len(PUBLISHED)].png.name
     blocked.mkdir(parents=True)
     drawn, said = draw(one_failed, tmp_path / "figures")
-    assert kinds(drawn) == FORCE[1:]
+    assert kinds(drawn) == PUBLISHED + FORCE[1:]
     assert any(one.startswith("No prediction against time of force") for one in said)
 
 
@@ -131,8 +132,8 @@ def test_an_unreadable_shard_costs_its_own_panel_and_where_it_is_all_its_figures
     for row, content in zip(lost, (b"", b"no HDF5", b"\x89HDF\r\n\x1a\n"), strict=True):
         (folder / "cells" / f"{row['key']}.h5").write_bytes(content)
     drawn, said = draw(folder, tmp_path / "figures")
-    assert kinds(drawn) == FORCE
-    assert [len(one.keys) for one in drawn] == [1, 1, 1]
+    assert kinds(drawn) == PUBLISHED + FORCE
+    assert [len(one.keys) for one in drawn[len(PUBLISHED) :]] == [1, 1, 1]
     for row in lost:
         assert any(row["cell"] in one and "shard is missing or cut" in one for one in said)
     assert any("No figures of curvature" in one for one in said)
@@ -142,7 +143,7 @@ def test_one_sensor_fills_its_row_and_missing_recordings_cost_the_embedding_only
     folder = results(tmp_path, sensors=("alpha",))
     (tmp_path / "recordings").rename(tmp_path / "elsewhere")
     drawn, said = draw(folder, tmp_path / "figures")
-    assert kinds(drawn) == FORCE + CURVATURE[:-1]
+    assert kinds(drawn) == PUBLISHED + FORCE + CURVATURE[:-1]
     assert all(len(one.keys) == 1 for one in drawn)
     assert any(one.startswith("No embedding of alpha/curvature") and "is not there any more" in one for one in said)
 
