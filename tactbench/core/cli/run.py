@@ -124,6 +124,7 @@ def _suggest(row: Mapping[str, Any]) -> None:
         tries = {
             "tactbench run": "the paper's whole matrix",
             f"tactbench run --task {row['task']} --protocol deployable": "as in use: tared before each press",
+            "tactbench leaderboard --format latex": "the table for a paper: SIM, † and intervals stay in it",
             f"tactbench show {row['sensor']}": "what the sensor is, and who says so",
         }
     else:

@@ -15,6 +15,8 @@ from tactbench.core.statistics.median import FEWEST, counted, percent
 
 Row = Mapping[str, Any]
 
+PUBLISHED = "Published figures"
+"""How the sentence on them begins."""
 _CHEAPER = 1.2
 """A cost that is so many times lower is said: less is within what timings of one machine differ by."""
 _SPARED = ("answer_delay_ms", "fit_s")
@@ -42,7 +44,8 @@ def verdict_of(
     -------
     tuple of str
         One of three verdicts (a clear winner; a tie at the top; not enough to tell), then, where intervals allow it,
-        how many neighbouring rows are separable and whether the first place hangs on one replicate.
+        how many neighbouring rows are separable, whether the first place hangs on one replicate and between what scores
+        single ones lie; then answers that need no touch, and where published figures lie.
     """
     if not ranked:
         return (f"None of {below} answers is better than the trivial one.",) if below else ()
@@ -65,8 +68,38 @@ def verdict_of(
         said = f"Tie at the top: {names[0]} has the best score, and {others} cannot be told from it."
         if times:
             said += _cheapest([rows[place] for place in leaders], [names[place] for place in leaders])
-    more = [_resolution(ranked, len(leaders), names)] if len(rows) > 1 else []
-    return (said, *more, *_without_touch(rows, trivial))
+    how = [_resolution(ranked, len(leaders), names)] if len(rows) > 1 else []
+    return (
+        said,
+        " ".join([*how, _single(rows, names)]).strip(),
+        *_without_touch(rows, trivial),
+        *_published(rows, names),
+    )
+
+
+def _single(rows: Sequence[Row], names: Sequence[str]) -> str:
+    """Return between what scores single replicates of each sensor's best answer lie."""
+    best: dict[str, str] = {}
+    for row, name in zip(rows, names, strict=True):
+        if row.get("replicate_unit") == "replicate" and row.get("score_min") is not None:
+            best.setdefault(row["sensor"], f"{name} {interval(row['score_min'], row['score_max'], row['unit'])}")
+    return f"Single replicates: {', '.join(best.values())}." if best else ""
+
+
+def _published(rows: Sequence[Row], names: Sequence[str]) -> list[str]:
+    """Return where published figures lie beside the intervals of ours."""
+    told = []
+    for row, name in zip(rows, names, strict=True):
+        if row.get("published") is None or row["ci_low"] is None:
+            continue
+        inside = row["ci_low"] <= row["published"] <= row["ci_high"]
+        where = "inside" if inside else "below" if row["published"] < row["ci_low"] else "above"
+        ends = interval(row["ci_low"], row["ci_high"], row["unit"])
+        told.append(f"{name} {score(row['published'], row['unit'])} lies {where} our {ends}")
+    if not told:
+        return []
+    tests = " This tests the simulation, not the sensor." if rows[0]["simulated"] else ""
+    return [f"{PUBLISHED}: {'; '.join(told)}.{tests}"]
 
 
 def _without_touch(rows: Sequence[Row], trivial: Sequence[Row]) -> list[str]:

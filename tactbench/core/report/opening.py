@@ -60,10 +60,10 @@ def _tasks(subject: Subject) -> list[Answer]:
     """Return what the first table of each task comes to, without how finely it resolves."""
     found: dict[str, Answer] = {}
     for place, block in enumerate(subject.leaderboard.blocks):
-        row, ranked = block.lines[0].row, sum(line.placing is not None for line in block.lines)
+        row = block.lines[0].row
         if not block.verdict or row["task"] in found:
             continue
-        said = (*block.verdict[:1], *block.verdict[2 if ranked > 1 else 1 :])  # the second is on resolution
+        said = (*block.verdict[:1], *(one for one in block.verdict[2:] if not one.startswith(PUBLISHED)))
         asked = f"{row['task']} under {row['protocol']}{' †' if row['dagger'] else ''}"
         asked += ", SIM" if row["simulated"] else ""
         found[row["task"]] = Answer(f"{asked}: {' '.join(said)}", block_anchor(place), f"table of {row['task']}")

@@ -29,7 +29,7 @@ def test_a_clear_winner_is_named_with_its_interval():
     assert said.startswith("ols is best: ")
     assert "95 % over 8 replicates" in said
     assert how.startswith("2 of 2 neighbouring rows separable; 0 tied with the first.")
-    assert how.endswith("Without any one replicate the first stays first.")
+    assert "Without any one replicate the first stays first. Single replicates: ols 0." in how
 
 
 def test_in_a_tie_all_co_leaders_are_named_and_cost_decides():
@@ -92,3 +92,10 @@ def test_it_stands_above_the_table_in_markdown():
     rows = over_replicates([*replicates([0.5] * 8), *replicates([0.4] * 8, estimator="ols")])
     text = to_markdown(rows)
     assert text.index("is best") < text.index("| # |")
+
+
+def test_published_figures_are_placed_beside_our_interval():
+    rows = [one | {"published": 0.9} for one in replicates([0.5, 0.4, 0.6, 0.5, 0.4, 0.6, 0.5, 0.5])]
+    said = build_table(over_replicates(rows)).blocks[0].verdict[-1]
+    assert said.startswith("Published figures: lasso 0.9000 lies above our 0.4")
+    assert said.endswith("This tests the simulation, not the sensor.")
