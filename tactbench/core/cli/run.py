@@ -113,16 +113,20 @@ def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path,
     remark(f"Files: {folder}/leaderboard.html, .md, .csv, .json; scores.json; recordings/; cells/; run.json")
     tell_stopped(outcome.failures, folder)
     if shape == "table":
-        _suggest(rows[0])
+        _suggest(rows)
 
 
-def _suggest(row: Mapping[str, Any]) -> None:
+def _suggest(rows: Sequence[Mapping[str, Any]]) -> None:
     """Say what to try next, fitting to what was just run."""
     from tactbench.core.cli.screen import remark
 
+    row = rows[0]
     if row["simulated"]:
-        tries = {
-            "tactbench run": "the paper's whole matrix",
+        whole = all(len({row[key] for row in rows}) > 1 for key in ("sensor", "task"))
+        first = (
+            {"tactbench report": "all of it as one page"} if whole else {"tactbench run": "the paper's whole matrix"}
+        )
+        tries = first | {
             f"tactbench run --task {row['task']} --protocol deployable": "as in use: tared before each press",
             "tactbench leaderboard --format latex": "the table for a paper: SIM, † and intervals stay in it",
             f"tactbench show {row['sensor']}": "what the sensor is, and who says so",

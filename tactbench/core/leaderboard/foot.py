@@ -34,6 +34,11 @@ def foot_of(sheet: Sheet, provenance: Sequence[Row], times: bool) -> tuple[str, 
         return (f"{_WITHOUT} {seeds}",)
     runs = len(set(filter(None, sheet.known("made_by"))))
     of_runs = f" of {runs} kind{'s' if runs != 1 else ''} of runs (versions, machine, settings)" if runs else ""
+    if any((n or 0) > 1 and unit == "replicate" for n, unit in
+           zip(sheet.known("n_replicates"), sheet.known("replicate_unit"), strict=True)):  # fmt: skip
+        seeds += (
+            " One a replicate, which is everything recorded anew; scores are medians, intervals those of the median."
+        )
     return (f"{len(sheet.rows)} cells{of_runs}. {seeds}", *(cut(visible(said), LONGEST) for said in _told(provenance)))
 
 

@@ -97,8 +97,9 @@ def _floor_notes(sheet: Sheet) -> list[str]:
     if floors:
         each = "; ".join(f"{where} {_floor(list(found), unit)}" for (where, unit), found in floors.items())
         told.append(
-            f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond "
-            "floor is sqrt(max(0, RMSE² − floor²)); ranks go by it where all answers of a block have it."
+            f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond floor "
+            "is sqrt(max(0, RMSE² − floor²)) of each replicate; a smaller RMSE is below it by chance. Ranks go by it "
+            "where all answers of a block have it."
         )
     return told
 
@@ -162,8 +163,8 @@ def _no_better_notes(sheet: Sheet) -> list[str]:
             names.setdefault((question_name(row), _probing(row)), {})[f"{answer_name(row)} ({row['protocol']})"] = None
     return [
         visible(
-            f"{where}/{', '.join(who)} cannot be told from the trivial baseline; who scores no better has no place. "
-            f"See how the recordings differ before blaming the sensor: `{command}`."
+            f"{where}/{', '.join(who)} cannot be told from the trivial baseline: "
+            f"see how the recordings differ before blaming the sensor: `{command}`."
         )
         for (where, command), who in names.items()
     ]

@@ -65,7 +65,8 @@ def verdict_of(
         said = f"{names[0]} is best: {_measured(best)}."
     else:
         others = ", ".join(names[place] for place in leaders[1:])
-        said = f"Tie at the top: {names[0]} has the best score, and {others} cannot be told from it."
+        by = "the smallest error beyond the floor" if beyond_floor([best]) else "the best score"
+        said = f"Tie at the top: {names[0]} has {by}, and {others} cannot be told from it."
         if times:
             said += _cheapest([rows[place] for place in leaders], [names[place] for place in leaders])
     how = [_resolution(ranked, len(leaders), names)] if len(rows) > 1 else []
@@ -73,7 +74,7 @@ def verdict_of(
         said,
         " ".join([*how, _single(rows, names)]).strip(),
         *_without_touch(rows, trivial),
-        *_published(rows, names),
+        *_published([*rows, *trivial], [*names, *_names(trivial, rows)]),
     )
 
 
@@ -133,9 +134,9 @@ def _too_few(rows: Sequence[Row], names: Sequence[str]) -> str:
     return f"Not enough to tell: {have}, and an interval or a rank needs {FEWEST}. {names[0]} has the best score.{more}"
 
 
-def _names(rows: Sequence[Row]) -> list[str]:
+def _names(rows: Sequence[Row], like: Sequence[Row] = ()) -> list[str]:
     """Return what tells rows apart: the estimator, with the sensor before it where there are several."""
-    several = len({row["sensor"] for row in rows}) > 1
+    several = len({row["sensor"] for row in like or rows}) > 1
     return [f"{row['sensor']}/{answer_name(row)}" if several else answer_name(row) for row in rows]
 
 
@@ -183,7 +184,10 @@ def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:
 def _resolution(ranked: Sequence[tuple[Row, Placing]], leaders: int, names: Sequence[str]) -> str:
     """Return how many neighbours can be told apart, and whether the first place hangs on one replicate."""
     apart = sum(one.apart for _, one in ranked)
-    said = f"{apart} of {len(ranked) - 1} neighbouring rows separable; {leaders - 1} tied with the first."
+    behind = len(ranked) - leaders
+    said = (
+        f"{apart} of {len(ranked) - 1} neighbouring rows separable; {leaders - 1} tied with the first, {behind} behind."
+    )
     ways = sum(one.first_without for _, one in ranked)
     if not ways:
         return said

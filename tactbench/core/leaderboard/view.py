@@ -164,7 +164,7 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
         return tuple(all_of_it if more else [])
     out = ("--out", view.folder) if view.folder else ()
     why = command_line("tactbench", "why", _by_column(table, first)[CELL], *out)
-    return (*(all_of_it if more else []), f"What a row rests on: `{why}`.")
+    return (*(all_of_it if more else []), f"What a row rests on, its delay part by part: `{why}`.")
 
 
 def _listed(parts: Sequence[str]) -> str:

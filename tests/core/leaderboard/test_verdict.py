@@ -28,7 +28,7 @@ def test_a_clear_winner_is_named_with_its_interval():
     said, how = verdict(ols=0.3, lasso=0.5, forest=0.9)
     assert said.startswith("ols is best: ")
     assert "95 % over 8 replicates" in said
-    assert how.startswith("2 of 2 neighbouring rows separable; 0 tied with the first.")
+    assert how.startswith("2 of 2 neighbouring rows separable; 0 tied with the first, 2 behind.")
     assert "Without any one replicate the first stays first. Single replicates: ols 0." in how
 
 

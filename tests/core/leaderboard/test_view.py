@@ -89,7 +89,7 @@ def test_three_notes_are_shown_the_most_important_first_and_a_command_for_the_ot
     assert commands(table, DEFAULT_VIEW)[0].startswith(f"{hidden} more notes and all columns: `tactbench leaderboard")
     assert notes(table, WHOLE) == table.notes
     order = [next(n for n, note in enumerate(table.notes) if text in note) for text in (
-        "Floor,", "no better", "chosen on validation", "before the press", "SIM:",
+        "Floor,", "cannot be told", "chosen on validation", "before the press", "SIM:",
     )]  # fmt: skip
     assert order == sorted(order)
 
@@ -108,7 +108,8 @@ def test_the_commands_name_folder_and_cell():
         "1 more note and all columns: `tactbench leaderboard 'my results' --notes --wide`."
         if len(table.notes) == 4
         else "All columns: `tactbench leaderboard 'my results' --wide`.",
-        "What a row rests on: `tactbench why a/question/twin/deployable:session/lasso --out 'my results'`.",
+        "What a row rests on, its delay part by part: "
+        "`tactbench why a/question/twin/deployable:session/lasso --out 'my results'`.",
     )
     assert told[1] in plain_text(table, view=View(folder="my results"))
     assert len(commands(table, WHOLE)) == 1
