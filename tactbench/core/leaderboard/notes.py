@@ -98,8 +98,8 @@ def _floor_notes(sheet: Sheet) -> list[str]:
         each = "; ".join(f"{where} {_floor(list(found), unit)}" for (where, unit), found in floors.items())
         told.append(
             f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond "
-            "floor is sqrt(max(0, RMSE² − floor²)) of each replicate; a smaller RMSE is below it by chance. Ranks go by "
-            "it where all answers of a block have it."
+            "floor is sqrt(max(0, RMSE² − floor²)) of each replicate; a smaller RMSE is below it by chance. Ranks go "
+            "by it where all answers of a block have it."
         )
     return told
 

@@ -174,7 +174,7 @@ def test_a_terminal_shows_the_cells_of_the_table(rows, times, view):
 def test_nothing_is_cut_off_or_broken_within_a_word(rows, width, view):
     table = build_table(rows)
     text = plain_text(table, width, view)
-    _, _, gone = text.partition("too narrow for: ")
+    gone = " ".join(text.partition("too narrow for: ")[2].split())  # the note itself may break between words
     for grid in grids(table, view):
         for name, *column in zip(grid.columns, grid.headers, *grid.lines, strict=True):
             if column[0] not in gone:
