@@ -1,0 +1,470 @@
+"""The iCub skin's CAN frames: values to bytes and back, for the boards (MTB, MTB4) that carry its fingertips.
+
+A triangle is 12 taxels read by one AD7147 chip; a fingertip is one triangle; a board carries up to 16. Facts are
+[sourced] from robotology/icub-firmware (IF: ``embot_prot_can*.cpp``, ``embot_app_application_theSkin.cpp``,
+``AD7147.cpp``), robotology/icub-firmware-shared (``iCubCanProto_*.h``) and robotology/icub-main
+(IM: ``CanBusSkin.cpp``) unless said. Nothing here has met a real board.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from tactbench.plugin import Block, Quality, RigError, UsageError
+
+BIT_RATE = 1_000_000
+"""Bits a second on the bus [sourced: IM, rate index 0, "1 MB/s" in its comment]."""
+TAXELS = 12
+HEAD, TAIL = 0x40, 0xC0
+"""First byte of the frame with taxels 0 to 6, and of that with taxels 7 to 11 and the error word."""
+IN_HEAD = 7
+"""Taxels in the head."""
+POLLING, OLD_SKIN, SKIN = 2, 3, 4
+"""Classes, bits 8 to 10 of an identifier. Class 3 also belongs to other analog sensors."""
+BROADCAST = 0xF
+"""Destination that every board takes as its own."""
+NO_ACK, NOT_CONNECTED, RESERVED = 0x1, 0x2, 0xC
+"""Low bits of the error word: some taxel gave no answer; the chip gave none; no source gives these a meaning."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A CAN data frame. Remote and error frames are the link's business."""
+
+    id: int
+    data: bytes
+    extended: bool = False
+    """29-bit identifier; these boards have none."""
+    t_ns: int = 0
+    """Host time of receipt, nanoseconds."""
+
+
+@dataclass(frozen=True)
+class BoardSetup:
+    """Skin type, period and reading at rest; the board then has no triangle enabled [sourced: IF theSkin].
+
+    Types: 0 compensated for temperature, 1 palm and fingertip, 2 not compensated, 3 hand of the ergoCub, 7 raw test,
+    8 compensated, version 2. The defaults are IM's (the firmware's own: 50 ms, 245) with type 1.
+    """
+
+    skin_type: int = 1
+    period_ms: int = 40
+    no_load: int = 240
+
+
+@dataclass(frozen=True)
+class TriangleSetup:
+    """Shift, converter offset and enabling of triangles `first` to `last`.
+
+    The board then stops sending and takes a new baseline of *all* triangles, so nothing may touch the skin. A range
+    that does not ascend within 0 to 15 is passed over [sourced: IF theSkin].
+    """
+
+    first: int = 0
+    last: int = 15
+    shift: int = 2
+    enabled: bool = True
+    cdc_offset: int = 0x2200
+
+
+@dataclass(frozen=True)
+class Transmit:
+    """Start or stop sending."""
+
+    on: bool
+
+
+@dataclass(frozen=True)
+class OldSetup:
+    """Old set-up. MTB4 firmware takes its own defaults instead of the numbers, a new baseline, and *starts*, 40 ms."""
+
+    timer: int = 1
+    cdc_offset: int = 0x2000
+    time: int = 0
+
+
+@dataclass(frozen=True)
+class OldSetup2:
+    """Second half of the old set-up; unknown to MTB4 firmware."""
+
+    shift: int = 2
+    shift_3_1: int = 0x22
+    no_load: int = 240
+    param: int = 0
+    enabled: int = 0xFFFF
+
+
+@dataclass(frozen=True)
+class VersionRequest:
+    """Ask for the firmware's version, naming the protocol that is needed: the only command with an answer."""
+
+    major: int = 2
+    minor: int = 0
+
+
+Command: TypeAlias = BoardSetup | TriangleSetup | Transmit | OldSetup | OldSetup2 | VersionRequest
+
+
+@dataclass(frozen=True)
+class Version:
+    """Answer to :class:`VersionRequest` [sourced: IF embot_prot_can.cpp, Message_GET_VERSION]."""
+
+    board_type: int
+    """11 is the MTB4 [sourced: icub-firmware, eobrd_cantype_mtb4]."""
+    firmware: tuple[int, int, int]
+    protocol: tuple[int, int]
+    fits: bool
+    """The board speaks the protocol asked for."""
+
+
+def polling_id(board: int, source: int = 0) -> int:
+    """Return the identifier of a command to `board` (15: to all) from `source`; raises UsageError outside 0 to 15."""
+    return POLLING << 8 | _within("source", source, 15) << 4 | _within("board", board, 15)
+
+
+def skin_id(board: int, triangle: int, *, old: bool = False) -> int:
+    """Return the identifier of a triangle's two frames; raises UsageError for numbers outside 0 to 15.
+
+    `old`: of class 3, as early firmware sends.
+    """
+    kind = OLD_SKIN if old else SKIN
+    return kind << 8 | _within("board", board, 15) << 4 | _within("triangle", triangle, 15)
+
+
+def command_frame(board: int, command: Command, *, source: int = 0) -> Frame:
+    """Return the frame that carries `command`.
+
+    Parameters
+    ----------
+    board
+        Destination, 0 to 14, or :data:`BROADCAST`.
+    source
+        Sender, 0 for a host.
+
+    Raises
+    ------
+    UsageError
+        If a number does not fit its field, or a range of triangles does not ascend within 0 to 15.
+    """
+    match command:
+        case BoardSetup(skin_type, period_ms, no_load):
+            numbers = [0x4D, skin_type, period_ms, no_load]
+        case TriangleSetup(first, last, shift, enabled, cdc):
+            _within("first triangle", first, _within("last triangle", last, 15))
+            numbers = [0x50, first, last, shift, int(enabled), *_low_high(cdc)]
+        case Transmit(on):
+            numbers = [0x07, 0 if on else 1]
+        case OldSetup(timer, cdc, time):
+            numbers = [0x4C, 1, 1, timer, *_low_high(cdc), *_low_high(time)]
+        case OldSetup2(shift, shift_3_1, no_load, param, enabled_mask):
+            numbers = [0x4E, shift, shift_3_1, no_load, param, *_low_high(enabled_mask), 0x0A]
+        case VersionRequest(major, minor):
+            numbers = [0x1C, major, minor]
+    return Frame(polling_id(board, source), bytes(_within("a byte of the command", n, 255) for n in numbers))
+
+
+def read_command(frame: Frame) -> tuple[int, Command] | None:
+    """Return (destination board, command), or None if `frame` is none of these commands or too short for it."""
+    if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or not frame.data:
+        return None
+    board, code, data = frame.id & 0xF, frame.data[0] & 0x7F, frame.data[1:]  # IF masks the code so
+    found: Command
+    if code == 0x4D and len(data) >= 3:
+        found = BoardSetup(*data[:3])
+    elif code == 0x50 and len(data) >= 6:
+        found = TriangleSetup(data[0], data[1], data[2], bool(data[3] & 1), data[4] | data[5] << 8)
+    elif code == 0x07 and data:
+        found = Transmit(data[0] == 0)
+    elif code == 0x4C and len(data) >= 7:
+        found = OldSetup(data[2], data[3] | data[4] << 8, data[5] | data[6] << 8)
+    elif code == 0x4E and len(data) >= 6:
+        found = OldSetup2(data[0], data[1], data[2], data[3], data[4] | data[5] << 8)
+    elif code == 0x1C and len(data) < 7:  # with 7 it is a board's answer
+        found = VersionRequest(*(*data, 0, 0)[:2])
+    else:
+        return None
+    return board, found
+
+
+def version_frame(board: int, version: Version, *, to: int = 0) -> Frame:
+    """Return the answer of `board` to the :class:`VersionRequest` of `to`; raises UsageError as command_frame does."""
+    numbers = (0x1C, version.board_type, *version.firmware, *version.protocol, int(version.fits))
+    return Frame(polling_id(to, board), bytes(_within("a byte of the version", n, 255) for n in numbers))
+
+
+def read_version(frame: Frame) -> tuple[int, Version] | None:
+    """Return (board that answers, its version), or None if `frame` is no such answer."""
+    if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or len(frame.data) != 8:
+        return None
+    code, kind, major, minor, build, protocol_major, protocol_minor, fits = frame.data
+    if code & 0x7F != 0x1C:
+        return None
+    return frame.id >> 4 & 0xF, Version(kind, (major, minor, build), (protocol_major, protocol_minor), fits == 1)
+
+
+def skin_frames(
+    board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, old: bool = False, t_ns: int = 0
+) -> tuple[Frame, Frame]:
+    """Return head and tail.
+
+    Parameters
+    ----------
+    taxels
+        (12,) readings, 0 to 255.
+    word
+        Error word: bit 4 + i is taxel i out of range, then :data:`NO_ACK` and :data:`NOT_CONNECTED`.
+
+    Raises
+    ------
+    UsageError
+        If there are not 12 readings or a number does not fit its field.
+    """
+    if len(taxels) != TAXELS:
+        raise UsageError(f"A triangle has {TAXELS} taxels, not {len(taxels)}.", hint="Give all its readings.")
+    values = bytes(_within("a reading", value, 255) for value in taxels)
+    identifier = skin_id(board, triangle, old=old)
+    errors = _within("the error word", word, 0xFFFF).to_bytes(2, "big")
+    return (
+        Frame(identifier, bytes([HEAD]) + values[:IN_HEAD], t_ns=t_ns),
+        Frame(identifier, bytes([TAIL]) + values[IN_HEAD:] + errors, t_ns=t_ns),
+    )
+
+
+def out_of_range(word: int) -> tuple[int, ...]:
+    """Return the taxels, 0 to 11, that the error word calls out of range."""
+    return tuple(taxel for taxel in range(TAXELS) if word >> 4 + taxel & 1)
+
+
+def reading(change: int, no_load: int, shift: int) -> tuple[int, bool]:
+    """Return the byte a board sends, and whether it calls the taxel out of range [sourced: IF theSkin, fill].
+
+    Parameters
+    ----------
+    change
+        Converter result minus baseline minus drift; pressure makes it positive and the byte smaller.
+    no_load
+        Byte at rest.
+    shift
+        Bits of the change that are dropped (arithmetically).
+    """
+    least, most = -((255 - no_load) << shift), no_load << shift
+    beyond = change <= 2 * least or change >= 2 * most
+    if change <= least:
+        return 255, beyond
+    if change >= most:
+        return 0, beyond
+    return no_load - (change >> shift), beyond
+
+
+@dataclass(frozen=True)
+class Sample:
+    """12 taxels of one triangle; nothing in it is interpolated or carried over from another sample."""
+
+    board: int
+    triangle: int
+    sequence: int
+    """Samples of this triangle before it, counted by the decoder: the boards send no counter and no time."""
+    t_ns: int
+    """Host time of its first frame, nanoseconds."""
+    taxels: bytes
+    """(12,) counts, as the sensor's spec has them: 0 to 255, falling under pressure; 0 where missing."""
+    quality: tuple[Quality, ...]
+    """(12,)"""
+    word: int | None
+    """Error word; None if the tail is missing, or that of old firmware, which has none."""
+
+
+@dataclass
+class Counts:
+    """What was found in the frames of one triangle."""
+
+    samples: int = 0
+    missing_heads: int = 0
+    missing_tails: int = 0
+    doubled: int = 0
+    """Frames kept out because they came twice."""
+    malformed: int = 0
+    """Frames kept out for their length."""
+    without_word: int = 0
+    """Samples whose tail had no error word."""
+    not_connected: int = 0
+    no_ack: int = 0
+    out_of_range: list[int] = field(default_factory=lambda: [0] * TAXELS)
+    """(12,) samples in which the error word called the taxel out of range."""
+    long_intervals: int = 0
+    """Samples more than 1.5 periods after the one before: both frames lost, or a late host; only a fit of the clocks
+    can tell."""
+
+
+@dataclass
+class _Triangle:
+    counts: Counts = field(default_factory=Counts)
+    head: Frame | None = None
+    """Waits for its tail."""
+    tail: Frame | None = None
+    """The last one."""
+    doubled: tuple[int, ...] = ()
+    """Taxels of frames that came twice since the last sample."""
+    last_ns: int | None = None
+
+
+class SkinDecoder:
+    """From frames, as they come from a bus or a log, to samples.
+
+    Head and tail make a sample if the tail comes less than half a period after the head. Two heads or two tails in a
+    row are one frame doubled if they are equal and less than half a period apart; otherwise a half is missing. What
+    cannot be known from such frames: a whole sample lost, or doubled; which of two equal heads in a burst was doubled
+    and which lost its tail.
+
+    Quality of a sample: missing halves are MISSING, and a head without tail, hence without error word, is SUSPECT.
+    A taxel out of range or at 0 or 255 is SATURATED, one out of range also SUSPECT (the board's own test for broken
+    taxels). No acknowledgement and reserved bits make all taxels SUSPECT, not connected makes all MISSING. A doubled
+    frame makes its taxels SUSPECT in the sample it is found before. A board in the raw test (type 7) sends the low
+    bytes of its results, which nothing in the frames tells from readings.
+
+    Parameters
+    ----------
+    period_s
+        The boards' period, seconds.
+    old_ids
+        Also take class 3, which other analog sensors on the bus share.
+
+    Attributes
+    ----------
+    counts
+        (board, triangle) -> :class:`Counts`.
+    foreign
+        Frames that were no skin data.
+
+    Raises
+    ------
+    UsageError
+        If the period is not positive. No frame makes `feed` raise.
+    """
+
+    def __init__(self, period_s: float, *, old_ids: bool = False) -> None:
+        if not period_s > 0:
+            raise UsageError(f"A period of {period_s} s is not positive.", hint="Give the boards' period in seconds.")
+        self.foreign = 0
+        self._period_ns = 1e9 * period_s
+        self._classes = (OLD_SKIN, SKIN) if old_ids else (SKIN,)
+        self._triangles: dict[tuple[int, int], _Triangle] = {}
+
+    @property
+    def counts(self) -> dict[tuple[int, int], Counts]:
+        """(board, triangle) -> what was found so far."""
+        return {key: triangle.counts for key, triangle in self._triangles.items()}
+
+    def feed(self, frame: Frame) -> list[Sample]:
+        """Return the samples, at most two, that `frame` completes or proves incomplete."""
+        data = frame.data
+        known = not frame.extended and 0 <= frame.id <= 0x7FF and frame.id >> 8 in self._classes
+        if not known or not data or data[0] not in (HEAD, TAIL):
+            self.foreign += 1
+            return []
+        key = (frame.id >> 4 & 0xF, frame.id & 0xF)
+        triangle = self._triangles.setdefault(key, _Triangle())
+        # Old firmware's tail ends with taxel 11.
+        if not (len(data) == 8 or (data[0] == TAIL and 1 + TAXELS - IN_HEAD <= len(data) < 8)):
+            triangle.counts.malformed += 1
+            return []
+        head = triangle.head
+        if data[0] == HEAD:
+            if head is not None and self._near(head, frame) and head.data == data:
+                triangle.counts.doubled += 1
+                triangle.doubled += tuple(range(IN_HEAD))
+                return []
+            triangle.head = frame
+            return [] if head is None else [self._sample(key, triangle, head, None)]
+        last, triangle.head, triangle.tail = triangle.tail, None, frame
+        if head is None:
+            if last is not None and self._near(last, frame) and last.data == data:
+                triangle.counts.doubled += 1
+                triangle.doubled += tuple(range(IN_HEAD, TAXELS))
+                return []
+            return [self._sample(key, triangle, None, frame)]
+        if self._near(head, frame):
+            return [self._sample(key, triangle, head, frame)]
+        return [self._sample(key, triangle, head, None), self._sample(key, triangle, None, frame)]
+
+    def flush(self, before_ns: int | None = None) -> list[Sample]:
+        """Return samples of heads that still wait for their tails: those from before `before_ns`, or all."""
+        found = []
+        for key, triangle in self._triangles.items():
+            head = triangle.head
+            if head is not None and (before_ns is None or head.t_ns < before_ns):
+                triangle.head = None
+                found.append(self._sample(key, triangle, head, None))
+        return found
+
+    def _near(self, first: Frame, second: Frame) -> bool:
+        return 0 <= second.t_ns - first.t_ns < self._period_ns / 2
+
+    def _sample(self, key: tuple[int, int], triangle: _Triangle, head: Frame | None, tail: Frame | None) -> Sample:
+        counts = triangle.counts
+        first = head or tail
+        assert first is not None
+        if triangle.last_ns is not None and first.t_ns - triangle.last_ns > 1.5 * self._period_ns:
+            counts.long_intervals += 1
+        triangle.last_ns = first.t_ns
+        taxels = (head.data[1:] if head else bytes(IN_HEAD)) + (tail.data[1:6] if tail else bytes(TAXELS - IN_HEAD))
+        word = int.from_bytes(tail.data[6:]) if tail and len(tail.data) == 8 else None
+        marks = [Quality.SATURATED if value in (0, 255) else Quality.GOOD for value in taxels]
+        for taxel in triangle.doubled:
+            marks[taxel] |= Quality.SUSPECT
+        for taxel in out_of_range(word or 0):
+            marks[taxel] |= Quality.SATURATED | Quality.SUSPECT
+            counts.out_of_range[taxel] += 1
+        if tail is None or (word or 0) & (NO_ACK | RESERVED):
+            marks = [mark | Quality.SUSPECT for mark in marks]
+        if head is None:
+            marks[:IN_HEAD] = [Quality.MISSING] * IN_HEAD
+        if tail is None:
+            marks[IN_HEAD:] = [Quality.MISSING] * (TAXELS - IN_HEAD)
+        if (word or 0) & NOT_CONNECTED:
+            marks = [Quality.MISSING] * TAXELS
+        counts.missing_heads += head is None
+        counts.missing_tails += tail is None
+        counts.without_word += tail is not None and word is None
+        counts.no_ack += bool((word or 0) & NO_ACK)
+        counts.not_connected += bool((word or 0) & NOT_CONNECTED)
+        counts.samples += 1
+        triangle.doubled = ()
+        return Sample(*key, counts.samples - 1, first.t_ns, taxels, tuple(marks), word)
+
+
+def to_block(samples: Sequence[Sample], stream: str = "taxels") -> Block:
+    """Return samples of one triangle as a block of the sensor's stream.
+
+    Taxel i of the board is channel ``T{i + 1}`` [assumed: the spec's places are assumed as well]. The block has no
+    sequence, which stands for a device's own counter.
+
+    Raises
+    ------
+    RigError
+        If the samples are of several triangles.
+    """
+    if len({(sample.board, sample.triangle) for sample in samples}) > 1:
+        raise RigError("The samples are of several triangles.", hint="Make one block for each (board, triangle).")
+    return Block(
+        stream=stream,
+        t_ns=np.array([sample.t_ns for sample in samples], dtype=np.int64),
+        data=np.array([list(sample.taxels) for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
+        quality=np.array([sample.quality for sample in samples], dtype=np.uint8).reshape(-1, TAXELS),
+    )
+
+
+def _within(what: str, number: int, most: int) -> int:
+    if not 0 <= number <= most:
+        raise UsageError(f"{what[0].upper()}{what[1:]} is {number}.", hint=f"Give 0 to {most}.")
+    return number
+
+
+def _low_high(number: int) -> tuple[int, int]:
+    """Little-endian bytes of a 16-bit number."""
+    _within("a 16-bit number", number, 0xFFFF)
+    return number & 0xFF, number >> 8
