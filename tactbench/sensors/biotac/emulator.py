@@ -209,7 +209,7 @@ class Emulator:
         answer = self._answer
         if answer is None or n == 0:
             return self._idle * n
-        if answer.early is not None and answer.sent == 0 and now_s < answer.ready_s - _ROUNDING_S:
+        if answer.early is not None and now_s < answer.ready_s - _ROUNDING_S:
             answer = self._answer = self._error(answer.early)
         if answer.word:
             self._last = answer

@@ -3,8 +3,9 @@
 A line is ``time batch frame channel value parity [value parity ...]``, separated by blanks, one pair for each sensor;
 time in seconds with six decimals, 0.000000 throughout where the host's clock was not read; channel the number of the
 sampling command; parity 1 means bad [sourced: kth-ros-pkg/biotac_driver, ``bt_save_buffer_data`` in ``biotac.c``].
-Newer tools write a header that ends with ``Begin File`` [sourced: SynTouch QuickStart Guide]; its layout is not certain,
-so it is handed on as it stands and nothing is read from it. Written from these documents; no real log has been read.
+Newer tools write a header that ends with ``Begin File`` [sourced: SynTouch QuickStart Guide]; its layout is not
+certain, so it is handed on as it stands and nothing is read from it. Written from these documents; no real log has been
+read.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from tactbench.sensors.biotac.codec import CHANNELS, INDEX, Fault, Reply
 from tactbench.sensors.biotac.frames import FrameRows, quality_of
 
 _LONGEST_S = 9e9
-"""Nanoseconds since then fit in 64 bits."""
+"""So long a time in nanoseconds fits in 64 bits."""
 
 
 class _Line(NamedTuple):
