@@ -52,8 +52,8 @@ class FrameRows:
     """Gathers words, in the order of a frame, into rows of the spec's streams.
 
     The k-th word of a channel within a frame belongs to the k-th of that stream's rows. A row ends when all of its
-    words are there or a word of another row comes; words that did not come are MISSING, and a row of which no word came
-    is left out, so that its sequence number is.
+    words are there or a word of another row comes; words that did not come are MISSING. A row of which no word came is
+    absent: a gap in the sequence numbers.
 
     Parameters
     ----------
