@@ -1,0 +1,102 @@
+"""Random bytes against the BioTac's codec, scheduler and emulator, and what a word costs.
+
+Nothing may raise; a word passes as a datum only if it is one; after the bytes one frame is whole again. The last two
+lines are seconds of computing for a second of the sensor's 4400 words, emulator and scheduler together, and scheduler
+alone.
+
+Usage: python benchmarks/biotac_random_bytes.py [BYTES] [SEED]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+
+from tactbench.plugin import DataError
+from tactbench.sensors.biotac.codec import PROPERTIES, RESEND, decoded, encoded, property_text
+from tactbench.sensors.biotac.emulator import Emulator
+from tactbench.sensors.biotac.frames import FrameScheduler
+from tactbench.sensors.biotac.text_log import read_text_log
+
+
+def chunks(data: bytes, rng: np.random.Generator) -> list[bytes]:
+    """Cut `data` into pieces of 0 to 5 bytes."""
+    cuts = np.cumsum(rng.integers(0, 6, size=len(data) // 2))
+    cuts = cuts[cuts < len(data)].tolist()
+    return [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
+
+
+def whole_frame(scheduler: FrameScheduler, sent: int) -> bool:
+    """Finish the frame that is begun, run one more, and return whether all of it came."""
+    while scheduler.resend_due or sent % 44:
+        sent += scheduler.word(sent) != RESEND
+        scheduler.take(encoded(1))
+    scheduler.blocks()
+    for n in range(44):
+        scheduler.word(sent + n)
+        scheduler.take(encoded(1000 + n))
+    scheduler.finish()
+    blocks = {block.stream: block for block in scheduler.blocks()}
+    slow, fast = blocks["electrodes"], blocks["vibration"]
+    return not slow.quality[-1].any() and not fast.quality[-22:].any() and slow.data[-1, 1] == 1002
+
+
+def main(count: int, seed: int) -> None:
+    """Print what `count` random bytes came to; raises where something does not hold."""
+    rng = np.random.default_rng(seed)
+    data = rng.bytes(count)
+    words = passed = 0
+    for n in range(0, count - 1, 2):
+        word = data[n : n + 2]
+        reply = decoded(word)
+        words += 1
+        if reply.fault is None:
+            passed += 1
+            assert encoded(reply.value) == word
+    print(f"codec: {words} words, {passed} of them data, each its own encoding")
+
+    scheduler, sent, parts = FrameScheduler(), 0, chunks(data, rng)
+    for part in parts:
+        sent += scheduler.word(sent) != RESEND
+        scheduler.take(part)
+    rows = sum(len(block.data) for block in scheduler.blocks())
+    assert whole_frame(scheduler, sent)
+    print(f"scheduler: {len(parts)} replies of 0 to 5 bytes, {rows} rows; the next frame is whole")
+
+    sensor, now_s = Emulator(), 0.0
+    for part in parts:
+        now_s += float(rng.choice([5e-6, 60e-6]))
+        assert len(sensor.feed(part, now_s)) == len(part)
+    sensor.feed(b"\x80\x00", now_s + 1.0)
+    assert sensor.feed(b"\x00\x00", now_s + 1.001) == encoded(2043)
+    print(f"emulator: {len(parts)} periods of the select; the next exchange is whole")
+
+    names = [name for name in PROPERTIES if name != "sampling frequency"]
+    shown = sum(property_text(name, data[n : n + 100]) is not None for n in range(0, count, 100) for name in names)
+    print(f"properties: {len(names) * -(-count // 100)} read, {shown} of them texts")
+
+    try:
+        log = read_text_log(data.decode("latin-1").splitlines())
+        print(f"text log: {log.left_out.total()} lines left out, {len(log.blocks)} blocks")
+    except DataError as error:
+        print(f"text log: {error}")
+
+    sensor, scheduler = Emulator(), FrameScheduler()
+    for name, alone in (("emulator and scheduler", False), ("scheduler alone", True)):
+        begin = time.perf_counter()
+        for n in range(4400):
+            word = scheduler.word(n)
+            if alone:
+                scheduler.take(b"\x6d\x58")
+            else:
+                sensor.feed(word, 1e-3 * n)
+                scheduler.take(sensor.feed(b"\x00\x00", 1e-3 * n + 60e-6))
+        scheduler.blocks()
+        print(f"{name}: {time.perf_counter() - begin:.3f} s for 4400 words")
+
+
+if __name__ == "__main__":
+    given = [int(text) for text in sys.argv[1:]]
+    main(*(given + [100_000, 1][len(given) :]))

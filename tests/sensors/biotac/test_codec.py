@@ -1,0 +1,260 @@
+"""The BioTac's words: golden vectors BT-1, BT-2, BT-3, BT-5 and BT-6, worked out by hand from the public sources."""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import xor
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tactbench.sensors.biotac.codec import (
+    CHANNELS,
+    COMMAND_RATE,
+    ERRORS,
+    INDEX,
+    PROPERTIES,
+    RESEND,
+    STREAMING_INDEX,
+    Fault,
+    decoded,
+    electrode_ohm,
+    encoded,
+    exchange_s,
+    parity_holds,
+    pressure_pa,
+    property_command,
+    property_text,
+    sampling_command,
+    tac_as_printed,
+    tdc_degc,
+    with_parity,
+)
+from tactbench.sensors.biotac.frames import DEFAULT_FRAME
+from tactbench.sensors.biotac.spec import SPEC
+
+
+def rows(table: str, width: int) -> list[tuple[str, ...]]:
+    words = table.split()
+    assert len(words) % width == 0
+    return [tuple(words[n : n + width]) for n in range(0, len(words), width)]
+
+
+BT1 = rows(
+    """
+    PAC 0 80 1   E5 21 AB 5   E15 31 BF 7   PDC 1 83 3   E6 22 AD 5   E16 32 C1 3
+    TAC 2 85 3   E7 23 AE 5   E17 33 C2 3   TDC 3 86 3   E8 24 B0 3   E18 34 C4 3
+    Hall 15 9E 5 E9 25 B3 5   E19 35 C7 5   V1.1 16 A1 3 E10 26 B5 5  E20 36 C8 3
+    E1 17 A2 3   E11 27 B6 5  E21 37 CB 5   E2 18 A4 3   E12 28 B9 5  E22 38 CD 5
+    E3 19 A7 5   E13 29 BA 5  E23 39 CE 5   E4 20 A8 3   E14 30 BC 5  E24 40 D0 3
+    """,
+    4,
+)
+
+
+@pytest.mark.parametrize(("name", "index", "byte", "ones"), BT1, ids=[f"BT-1-{row[0]}" for row in BT1])
+def test_sampling_commands(name, index, byte, ones):
+    assert with_parity(0x40 | int(index)) == int(byte, 16)
+    assert int(byte, 16).bit_count() == int(ones)
+    if name == "V1.1":
+        assert int(index) == STREAMING_INDEX
+        with pytest.raises(ValueError, match="no channel has the number 16"):
+            sampling_command(STREAMING_INDEX)
+    else:
+        assert sampling_command(INDEX[name]) == bytes([int(byte, 16), 0])
+
+
+def test_the_table_has_every_channel():
+    assert {row[0] for row in BT1} - {"V1.1"} == set(INDEX)
+    assert list(CHANNELS) == [channel.name for channel in SPEC.channels()]
+
+
+BT2 = rows(
+    """
+    0 01 01  63 02 F8   512 20 01  1739 6D 58  3039 BC F8   1 01 08   64 04 01   645 29 29  2000 7C 80  3072 C1 01
+    2 01 10  100 07 20  877 37 68  2021 7F 29  3106 C2 10   7 01 38   127 07 F8  1000 3E 40 2033 7F 89  3500 DA 61
+    8 01 40  128 08 01  1023 3E F8 2047 7F F8  4000 FB 01   15 01 79  255 0E F8  1024 40 01 2048 80 01  4063 FD F8
+    31 01 F8 256 10 01  1365 54 A8 2457 98 C8  4064 FE 01   32 02 01  500 1F A1  1500 5D E0 2730 AB 51  4094 FE F1
+    33 02 08 511 1F F8  1638 67 31 3000 BA C1  4095 FE F8
+    """,
+    3,
+)
+
+
+@pytest.mark.parametrize(("value", "first", "second"), BT2, ids=[f"BT-2-{row[0]}" for row in BT2])
+def test_data_replies(value, first, second):
+    word = bytes.fromhex(first + second)
+    assert encoded(int(value)) == word
+    assert decoded(word) == (int(value), None, None)
+
+
+BT3_ERRORS = [("45", "parity"), ("3F", "unknown"), ("2E", "delay"), ("2D", "sampling"), ("58", "channel"),
+              ("5F", "resend"), ("52", "read-only"), ("57", "writing")]  # fmt: skip
+
+
+@pytest.mark.parametrize(("second", "says"), BT3_ERRORS, ids=[f"BT-3-A5-{row[0]}" for row in BT3_ERRORS])
+def test_error_replies_are_no_data(second, says):
+    reply = decoded(bytes.fromhex("A5" + second))
+    assert reply == (None, Fault.ERROR, int(second, 16))
+    assert says in ERRORS[int(second, 16)]
+
+
+@pytest.mark.parametrize(
+    ("word", "value", "fault"),
+    [
+        ("0000", None, Fault.NOT_CONNECTED),
+        ("FFFF", None, Fault.NOT_CONNECTED),
+        ("ED58", 3787, Fault.PARITY),
+        ("6D50", 1738, Fault.PARITY),
+        ("6D5A", 1739, Fault.PARITY),
+        ("6D5E", 1739, Fault.RESERVED),
+    ],
+    ids=lambda value: f"BT-3-{value}" if isinstance(value, str) and len(value) == 4 else None,
+)
+def test_faulty_words_are_flagged(word, value, fault):
+    assert decoded(bytes.fromhex(word)) == (value, fault, None)
+
+
+def test_bt_5_default_frame():
+    golden = bytes.fromhex(
+        "A2 80 A4 80 A7 80 A8 80 AB 80 AD 80 AE 80 B0 80 B3 80 B5 80 B6 80 B9 80 BA 80 BC 80 BF 80 C1 80 C2 80 C4 80 "
+        "C7 80 83 80 85 80 86 80"
+    )
+    sent = bytes(sampling_command(INDEX[name])[0] for name in DEFAULT_FRAME)
+    assert sent == golden
+    assert (len(sent), sent.count(0x80), len(set(sent))) == (44, 22, 23)
+    assert (reduce(xor, sent), sum(sent) % 256) == (0x21, 0xF3)
+
+
+def test_a_frame_is_the_period_of_the_spec():
+    rates = {stream.name: stream.rate_hz for stream in SPEC.streams}
+    assert len(DEFAULT_FRAME) * rates["electrodes"] == 4400.0
+    assert DEFAULT_FRAME.count("PAC") * rates["electrodes"] == rates["vibration"]
+
+
+@pytest.mark.parametrize(
+    ("count", "kilohm"), [(645, 53.488), (877, 36.693), (1739, 13.548), (3039, 3.475), (3106, 3.184), (4095, 0.0)],
+    ids=lambda value: f"BT-6-E-{value}" if isinstance(value, int) else None,
+)  # fmt: skip
+def test_impedance_of_an_electrode(count, kilohm):
+    # Printed with three decimals.
+    assert electrode_ohm(count) == pytest.approx(1e3 * kilohm, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("count", "degc"), [(500, 13.982), (1000, 29.799), (1500, 40.317), (2000, 48.579), (3000, 61.839), (4095, 73.962)],
+    ids=lambda value: f"BT-6-TDC-{value}" if isinstance(value, int) else None,
+)  # fmt: skip
+def test_temperature(count, degc):
+    assert tdc_degc(count) == pytest.approx(degc, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("count", "printed"), [(1000, -3.0912), (2048, -3.2902)], ids=["BT-6-TAC-1000", "BT-6-TAC-2048"]
+)
+def test_tac_as_printed_lies_outside_its_own_range(count, printed):
+    assert tac_as_printed(count) == pytest.approx(printed, abs=5e-5)
+    (tac,) = SPEC.channels("ac_temperature")
+    assert tac.scale is None
+    assert tac.measures is None
+
+
+@pytest.mark.parametrize(
+    ("channel", "count", "offset", "pascal"),
+    [("PDC", 2100, 2000, 3650.0), ("PDC", 4095, 0, 149467.5), ("PAC", 2121, 2021, 37.0), ("PAC", 2048, 0, 757.76),
+     ("PAC", 0, 2048, -757.76)],
+    ids=["BT-6-PDC", "BT-6-PDC-span", "BT-6-PAC", "BT-6-PAC-up", "BT-6-PAC-down"],
+)  # fmt: skip
+def test_pressure(channel, count, offset, pascal):
+    assert pressure_pa(channel, count, offset) == pytest.approx(pascal, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("n_sensors", "pause_s", "microseconds"), [(1, 0.0, 57.27), (3, 10e-6, 94.55)], ids=["BT-6-one", "BT-6-three"]
+)
+def test_time_of_an_exchange(n_sensors, pause_s, microseconds):
+    # Printed with two decimals.
+    assert exchange_s(n_sensors, word_pause_s=pause_s) == pytest.approx(1e-6 * microseconds, abs=5e-9)
+
+
+def test_bt_6_times():
+    # Printed with three decimals.
+    assert exchange_s(2) - exchange_s(1) == pytest.approx(3.636e-6, abs=5e-10)
+    assert 1.0 / COMMAND_RATE.to("Hz") == pytest.approx(227.273e-6, abs=5e-10)
+
+
+def test_conversions_at_the_ends_of_the_converter():
+    assert electrode_ohm([0, 4095]) == pytest.approx([np.inf, 0.0])
+    assert np.isnan(tdc_degc([0, 1])).tolist() == [True, False]
+    assert np.isnan(tac_as_printed([0, 1])).tolist() == [True, False]
+    with pytest.raises(KeyError):
+        pressure_pa("TAC", 2000, 2000)
+
+
+@pytest.mark.parametrize(
+    ("name", "raw", "shown"),
+    [
+        ("flex version", "42 44", "B.D"),
+        ("software version", "30 32 33 38", "2.38"),
+        ("software version", "30 33 30 31", "3.01"),
+        ("serial number", "42 54 32 50 30 32 32 30 42 31 31 45 30 30 30 34", "BT-2P-02.2.0-B-11-E-0004"),
+        ("cpu speed", "3E 80", "16.0 MIPS"),
+    ],
+    ids=["BT-4-flex", "BT-4-238", "BT-4-301", "BT-4-serial", "BT-4-cpu"],
+)
+def test_properties_as_the_makers_tools_show_them(name, raw, shown):
+    assert property_text(name, bytes.fromhex(raw)) == shown
+    assert len(bytes.fromhex(raw)) == PROPERTIES[name].length
+
+
+@pytest.mark.parametrize("name", [name for name in PROPERTIES if name != "sampling frequency"])
+def test_no_sensor_has_no_properties(name):
+    for idle in (b"\x00", b"\xff"):
+        assert property_text(name, idle * 100) is None
+    assert property_text(name, b"") is None
+
+
+def test_the_frequency_is_not_read_because_no_source_states_its_byte_order():
+    with pytest.raises(ValueError, match="byte order"):
+        property_text("sampling frequency", b"\x11\x30")
+
+
+def test_every_command_that_is_sent_has_odd_parity():
+    sent = [sampling_command(index)[0] for index in INDEX.values()] + [RESEND[0]]
+    sent += [byte for name in PROPERTIES for byte in property_command(name)]
+    assert all(byte.bit_count() % 2 == 1 for byte in sent)
+
+
+def test_what_has_no_word_is_refused():
+    for count in (-1, 4096):
+        with pytest.raises(ValueError, match="12 bits"):
+            encoded(count)
+    for index in (-1, 64):
+        with pytest.raises(ValueError, match="no channel"):
+            sampling_command(index)
+
+
+@given(value=st.integers(0, 4095), bit=st.integers(0, 15))
+def test_a_single_wrong_bit_never_passes_as_a_datum(value, bit):
+    word = encoded(value)
+    assert decoded(word) == (value, None, None)
+    turned = (int.from_bytes(word, "big") ^ 1 << bit).to_bytes(2, "big")
+    assert decoded(turned).fault in (Fault.PARITY, Fault.ERROR)
+
+
+@given(word=st.binary(max_size=6))
+def test_any_bytes_are_read_and_only_true_words_pass(word):
+    reply = decoded(word)
+    if reply.fault is None:
+        assert encoded(reply.value) == word
+    elif reply.fault is Fault.PARITY:
+        assert not all(parity_holds(byte) for byte in word)
+    assert (reply.error is not None) == (reply.fault is Fault.ERROR)
+
+
+@given(raw=st.binary(max_size=100), name=st.sampled_from([name for name in PROPERTIES if name != "sampling frequency"]))
+def test_any_bytes_are_a_property_or_none(raw, name):
+    shown = property_text(name, raw)
+    assert shown is None or shown.isprintable()

@@ -1,0 +1,234 @@
+"""The emulated BioTac on its bytes: golden vectors BT-4, the pause, every fault."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tactbench.sensors.biotac.codec import (
+    INDEX,
+    PROPERTIES,
+    RESEND,
+    Fault,
+    decoded,
+    property_command,
+    property_text,
+    sampling_command,
+)
+from tactbench.sensors.biotac.emulator import DEFAULT_PROPERTIES, EmulatedFault, Emulator, rest_state
+from tactbench.sensors.biotac.frames import DEFAULT_FRAME
+from tactbench.sensors.biotac.spec import SPEC
+
+COUNTS = {**rest_state(0.0), "E1": 1739.0, "PAC": 2021.0, "PDC": 2000.0, "TDC": 1500.0}
+WORD_S = 2 * 8 / 4.4e6
+READ_S = WORD_S + 50e-6
+
+
+def exchange(sensor: Emulator, command: bytes, n: int = 2, at_s: float = 0.0, pause_s: float = 50e-6) -> bytes:
+    sensor.feed(command, at_s)
+    return sensor.feed(bytes(n), at_s + WORD_S + pause_s)
+
+
+@pytest.mark.parametrize(
+    ("command", "answer"),
+    [("A200", "6D58"), ("8000", "7F29"), ("8301", "7C80"), ("8600", "5DE0"), ("2000", "A55F"), ("8100", "A545"),
+     ("C800", "A558"), ("0100", "A53F")],
+    ids=lambda text: f"BT-4-{text}",
+)  # fmt: skip
+def test_exchanges(command, answer):
+    assert exchange(Emulator(lambda t_s: COUNTS), bytes.fromhex(command)) == bytes.fromhex(answer)
+
+
+@pytest.mark.parametrize("resend", ["2000", "5000"], ids=lambda text: f"BT-4-{text}")
+def test_a_resend_repeats_the_last_word(resend):
+    sensor = Emulator(lambda t_s: COUNTS)
+    assert exchange(sensor, bytes.fromhex("8600")) == bytes.fromhex("5DE0")
+    for n in range(1, 3):
+        assert exchange(sensor, bytes.fromhex(resend), at_s=n * 1e-3, pause_s=0.0) == bytes.fromhex("5DE0")
+
+
+def test_a_resend_before_any_word_may_be_ignored():
+    assert exchange(Emulator(early_resend="ignored"), RESEND) == b"\xff\xff"
+
+
+def test_bt_4_too_short_a_pause():
+    sensor = Emulator(lambda t_s: COUNTS)
+    assert exchange(sensor, b"\xa2\x00", pause_s=49.9e-6) == b"\xa5\x2d"
+    assert exchange(sensor, b"\xa2\x00", at_s=1.0) == b"\x6d\x58"
+    # Reading on without a pause, within one period of the select, is as early.
+    assert sensor.feed(b"\xa2\x00\x00\x00", 2.0) == b"\xff\xff\xa5\x2d"
+
+
+def test_bt_4_an_sp_has_more_electrodes():
+    assert exchange(Emulator(lambda t_s: {**COUNTS, "E20": 2048.0}), b"\xc8\x00") == b"\x80\x01"
+
+
+@pytest.mark.parametrize("filler", [b"\x00\x01", b"\x00\x00", b"\x01\x00"])
+def test_every_filler_in_use_reads(filler):
+    sensor = Emulator(lambda t_s: COUNTS)
+    sensor.feed(b"\xa2\x00", 0.0)
+    assert sensor.feed(filler, READ_S) == b"\x6d\x58"
+
+
+@pytest.mark.parametrize(
+    ("command", "properties", "answer"),
+    [
+        ("6110", {"flex version": b"BD"}, "4244"),
+        ("6113", {"software version": b"0238"}, "30323338"),
+        ("6113", {"software version": b"0301"}, "30333031"),
+        ("6115", {"serial number": b"BT2P0220B11E0004"}, "42543250303232304231314530303034"),
+        ("6161", {"cpu speed": b"\x3e\x80"}, "3E80"),
+        ("6170", {"sampling frequency": b"\x11\x30"}, "1130"),
+    ],
+    ids=["BT-4-flex", "BT-4-238", "BT-4-301", "BT-4-serial", "BT-4-cpu", "BT-4-frequency"],
+)
+def test_properties(command, properties, answer):
+    golden = bytes.fromhex(answer)
+    sensor = Emulator(properties=properties)
+    assert exchange(sensor, bytes.fromhex(command), len(golden)) == golden
+    # Byte by byte, as the maker's library reads texts, up to the first FF.
+    sensor.feed(bytes.fromhex(command), 1.0)
+    one_by_one = b"".join(sensor.feed(b"\x00", 1.0 + READ_S + n * 1e-5) for n in range(len(golden) + 1))
+    assert one_by_one == golden + b"\xff"
+
+
+def test_bt_4_no_sensor():
+    sensor = Emulator(faults=[EmulatedFault("not-connected")])
+    assert exchange(sensor, b"\x61\x15", 1) == b"\xff"
+
+
+def test_the_default_properties_are_read_back():
+    sensor = Emulator()
+    shown = {
+        name: property_text(name, exchange(sensor, property_command(name), fact.length, at_s=float(n)))
+        for n, (name, fact) in enumerate(PROPERTIES.items())
+        if name != "sampling frequency"
+    }
+    assert shown == {
+        "flex version": "B.D",
+        "software version": "2.38",
+        "serial number": "BT-2P-02.2.0-B-11-E-0004",
+        "cpu speed": "16.0 MIPS",
+        "sampling pattern": " ".join(DEFAULT_FRAME),
+    }
+    assert all(len(data) == PROPERTIES[name].length for name, data in DEFAULT_PROPERTIES.items())
+
+
+@pytest.mark.parametrize(
+    ("command", "pause_s", "answer"),
+    [("6112", 50e-6, "A545"), ("6192", 50e-6, "A53F"), ("4013", 50e-6, "A552"), ("6113", 10e-6, "A52E")],
+    ids=["even parity", "unknown property", "read-only", "too early"],
+)
+def test_property_commands_that_are_refused(command, pause_s, answer):
+    assert exchange(Emulator(), bytes.fromhex(command), pause_s=pause_s) == bytes.fromhex(answer)
+
+
+def test_the_default_state_is_the_rest_of_the_spec():
+    sensor = Emulator()
+    for n, channel in enumerate(SPEC.channels()):
+        reply = decoded(exchange(sensor, sampling_command(INDEX[channel.name]), at_s=float(n)))
+        # To the converter's step, half a count.
+        assert reply.value == pytest.approx(channel.rest.value, abs=0.5)
+
+
+@given(counts=st.floats(-1e4, 1e4), channel=st.sampled_from(SPEC.channels()))
+def test_what_is_sensed_comes_back_to_the_converters_step(counts, channel):
+    reply = decoded(exchange(Emulator(lambda t_s: {channel.name: counts}), sampling_command(INDEX[channel.name])))
+    assert reply.fault is None
+    assert abs(reply.value - min(max(counts, 0.0), 4095.0)) <= 0.5
+
+
+def test_it_samples_at_the_commands_last_bit():
+    asked = []
+    sensor = Emulator(lambda t_s: asked.append(t_s) or COUNTS)
+    exchange(sensor, b"\xa2\x00", at_s=2.0)
+    assert asked == pytest.approx([2.0 + WORD_S], abs=1e-12)
+
+
+def test_sensors_selected_together_sample_together_and_are_read_one_by_one():
+    sensors = [Emulator(lambda t_s, k=k: {"PAC": 1000.0 * (k + 1) + 1e6 * t_s}) for k in range(3)]
+    for sensor in sensors:
+        sensor.feed(b"\x80\x00", 1e-4)
+    read = [decoded(sensor.feed(b"\x00\x00", 1e-4 + READ_S + k * 2e-5)).value for k, sensor in enumerate(sensors)]
+    assert read == [1104, 2104, 3104]
+
+
+def test_a_word_that_was_not_read_is_gone_with_the_next_command():
+    sensor = Emulator(lambda t_s: COUNTS)
+    sensor.feed(b"\xa2\x00", 0.0)
+    assert exchange(sensor, b"\x80\x00", at_s=1e-3) == b"\x7f\x29"
+    assert sensor.feed(b"\x00", 2e-3) == b"\xff"
+
+
+def test_parity_turns_every_bit_in_turn():
+    sensor = Emulator(lambda t_s: COUNTS, faults=[EmulatedFault("parity")])
+    words = [exchange(sensor, b"\xa2\x00", at_s=float(n)) for n in range(16)]
+    assert {decoded(word).fault for word in words} == {Fault.PARITY}
+    assert {int.from_bytes(word, "big") ^ 0x6D58 for word in words} == {1 << bit for bit in range(16)}
+
+
+def test_a_resend_of_a_turned_word_is_the_word():
+    sensor = Emulator(lambda t_s: COUNTS, faults=[EmulatedFault("parity", every=2)])
+    assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58"
+    assert decoded(exchange(sensor, b"\xa2\x00", at_s=1.0)).fault is Fault.PARITY
+    assert exchange(sensor, RESEND, at_s=2.0) == b"\x6d\x58"
+
+
+def test_faults_concern_their_channels_and_times_only():
+    sensor = Emulator(
+        lambda t_s: COUNTS,
+        faults=[EmulatedFault("dropped-reply", start_s=1.0, end_s=2.0, channels=frozenset({"PAC"}))],
+    )
+    assert exchange(sensor, b"\x80\x00", at_s=0.5) == b"\x7f\x29"
+    assert exchange(sensor, b"\x80\x00", at_s=1.5) == b""
+    assert exchange(sensor, b"\xa2\x00", at_s=1.6) == b"\x6d\x58"
+    assert exchange(sensor, b"\x80\x00", at_s=2.0) == b"\x7f\x29"
+
+
+def test_a_doubled_reply_comes_twice():
+    sensor = Emulator(lambda t_s: COUNTS, faults=[EmulatedFault("doubled-reply")])
+    assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58\x6d\x58"
+
+
+def test_a_stuck_channel_holds_what_it_read_and_lets_go():
+    sensor = Emulator(
+        lambda t_s: {"E1": 1000.0 + 100.0 * t_s, "E2": 1000.0 + 100.0 * t_s},
+        faults=[EmulatedFault("stuck-channel", start_s=1.0, end_s=5.0, channels=frozenset({"E1"}))],
+    )
+    read = [
+        [decoded(exchange(sensor, sampling_command(INDEX[name]), at_s=float(t))).value for t in range(7)]
+        for name in ("E1", "E2")
+    ]
+    assert read == [[1000, 1100, 1100, 1100, 1100, 1500, 1600], [1000, 1100, 1200, 1300, 1400, 1500, 1600]]
+
+
+@pytest.mark.parametrize("idle", [0x00, 0xFF])
+def test_a_sensor_that_is_not_connected_leaves_the_line_and_forgets(idle):
+    sensor = Emulator(lambda t_s: COUNTS, faults=[EmulatedFault("not-connected", start_s=1.0, end_s=2.0)], idle=idle)
+    assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58"
+    assert decoded(exchange(sensor, b"\xa2\x00", at_s=1.0)).fault is Fault.NOT_CONNECTED
+    assert exchange(sensor, RESEND, at_s=2.0) == b"\xa5\x5f"
+    assert exchange(sensor, b"\xa2\x00", at_s=3.0) == b"\x6d\x58"
+
+
+def test_an_error_reply_is_that_which_is_asked_for():
+    sensor = Emulator(faults=[EmulatedFault("error-reply", error=0x57)])
+    assert exchange(sensor, b"\xa2\x00") == b"\xa5\x57"
+
+
+def test_faults_that_are_none_are_refused():
+    with pytest.raises(ValueError, match="no fault is called 'gremlin'"):
+        EmulatedFault("gremlin")
+    with pytest.raises(ValueError, match="every 0"):
+        EmulatedFault("parity", every=0)
+
+
+@given(periods=st.lists(st.binary(max_size=5), max_size=20), pause_us=st.sampled_from([0, 60]))
+def test_any_bytes_are_answered_by_as_many_and_the_next_exchange_is_whole(periods, pause_us):
+    sensor, now_s = Emulator(lambda t_s: COUNTS), 0.0
+    for data in periods:
+        assert len(sensor.feed(data, now_s)) == len(data)
+        now_s += 1e-5 + 1e-6 * pause_us
+    assert exchange(sensor, b"\xa2\x00", at_s=now_s) == b"\x6d\x58"
+    assert sensor.poll(now_s) == b""
