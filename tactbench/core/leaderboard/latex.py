@@ -67,14 +67,14 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
 
 
 def _caption(block: Block, grid: Grid) -> str:
-    """Return the title of a block, what is said of it, how many samples were tested and what its intervals are."""
+    """Return the title of a block, its verdict, how many samples were tested and what its intervals are."""
     rows = [line.row for line in block.lines if line.row["status"] == "done" and not line.row["is_baseline"]]
     counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
     n = f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples" if counts else ""
     task = f"{visible(str(block.lines[0].row['task']))}: "
     how = [f"95 % {text.removeprefix(task)}" for text in interval_notes(Sheet(rows))] if rows else []
     rule = "Below the rule: trivial answers" if "#" not in grid.columns and _first_trivial(grid) else ""
-    said = [text.rstrip(".") for text in (block.title, *grid.said, n, *how, rule) if text]
+    said = [text.rstrip(".") for text in (block.title, *grid.said[:1], n, *how, rule) if text]
     return f"{'. '.join(said)}."
 
 

@@ -9,7 +9,7 @@ from statistics import median, median_low
 from typing import Any
 
 from tactbench.core.matrix.leaving import fill_baselines
-from tactbench.core.statistics.median import FEWEST, median_interval
+from tactbench.core.statistics.median import FEWEST, LEVEL, median_interval
 
 Row = Mapping[str, Any]
 
@@ -104,7 +104,7 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
     parts = _middle([row.get("delay_parts_ms") or {} for row in done])
     return found | {
         **_counted(done, len(done), "replicate", scores),
-        "ci_method": f"order statistics of {len(done)} replicates, {100 * level:.3g} %" if level else "",
+        "ci_method": _method(len(done), level) if level else "",
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
@@ -113,6 +113,11 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         "confusion": _added([row["confusion"] for row in done]),
         "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
     }
+
+
+def _method(n: int, level: float) -> str:
+    less = "" if level == LEVEL else f", {100 * level:.3g} %"
+    return f"order statistics of {n} replicates{less}"
 
 
 def _kept(done: Sequence[Row]) -> dict[str, Any]:
