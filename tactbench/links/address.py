@@ -188,8 +188,8 @@ class LinkAddress:
                 return SpidevLink(self.target, clock=clock, **self.options)
         from tactbench.links.byte_link import ByteLink
 
-        port = self.target if self.kind == "serial" else f"{self.kind}://{self.target}"
-        return ByteLink(port, clock=clock, **self.options)
+        url = self.target if self.kind == "serial" else f"{self.kind}://{self.target}"
+        return ByteLink(url, clock=clock, **self.options)
 
 
 def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:

@@ -17,8 +17,8 @@ Exchange = Callable[[int, bytes, float], bytes]
 """What hangs on the bus: select mask, bytes out, second at which they begin -> as many bytes in."""
 
 BridgeFault = Literal["dropped", "doubled", "damaged"]
-"""``dropped``: batches are carried out, their replies are not sent. ``doubled``: replies are sent twice. ``damaged``: one
-bit of each reply is turned."""
+"""``dropped``: batches are carried out, their replies are not sent. ``doubled``: replies are sent twice. ``damaged``:
+one bit of each reply is turned."""
 
 
 class BridgeEmulator:

@@ -132,4 +132,7 @@ class ByteLink(Link):
     def _release(self) -> None:
         if self._ready is not None:
             self._ready.close()
+        inner = getattr(self._port, "_socket", None)
         self._port.close()
+        if inner is not None:  # pyserial forgets to close a socket that the other end has reset
+            inner.close()

@@ -129,13 +129,13 @@ class CanBus(CanLink):
         import can
 
         super().__init__(f"can://{interface}/{channel}", clock)
-        options: dict[str, object] = {}
+        options: dict[str, Any] = {}
         if interface == "slcan":
             options = {"bitrate": bitrate, "tty_baudrate": baud, "sleep_after_open": settle_s}
         elif interface == "udp_multicast":
             options = {"port": port, "fd": False}
         try:
-            self._bus = can.Bus(channel, interface, ignore_config=True, **options)
+            self._bus: Any = can.Bus(channel, interface, ignore_config=True, **options)
         except (can.CanError, OSError, ValueError) as error:
             raise cannot_open(self.address, error, hint=_hint(interface, channel, error)) from error
 
@@ -152,10 +152,11 @@ class CanBus(CanLink):
             except (can.CanError, OSError, ValueError, IndexError) as error:
                 if os_error_in(error) is not None:
                     raise self._unplugged(error) from error
-                # Bytes that are no frame: python-can's slcan would try the same ones again.
+                # Bytes that are no frame. python-can's slcan would try those that are not ASCII again and again; its
+                # own flush() would drop the frames behind them as well.
                 self.damaged += 1
-                if hasattr(self._bus, "flush"):
-                    self._bus.flush()
+                if hasattr(self._bus, "_buffer"):
+                    self._bus._buffer.clear()
                 message = frame = None
             if frame is not None:
                 return frame

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
@@ -45,24 +46,29 @@ class CanLog(CanLink):
 
     def __init__(self, file: Path) -> None:
         import can
+        from can.io.blf import BLFParseError
 
         super().__init__(f"can://log/{file}")
         self.backward = 0
         self._last_ns = 0
         self._count = 0
         self._start_s = 0.0
-        try:
-            if file.suffix.lower() == ".asc":
-                self.started = _asc_start(self.address, file)
-                self._reader: Any = can.ASCReader(file, relative_timestamp=True)
-            elif file.suffix.lower() == ".blf":
-                self._reader = can.BLFReader(file)
-                self._start_s = self._reader.start_timestamp
-                self.started = datetime.fromtimestamp(self._start_s, UTC).isoformat() if self._start_s else ""
-            else:
-                raise LinkError(f"{file} is not a log that can be read.", hint="Give a file that ends in .asc or .blf.")
-        except (OSError, ValueError, can.CanError, struct.error) as error:
-            raise cannot_open(self.address, error) from error
+        if file.suffix.lower() not in (".asc", ".blf"):
+            raise LinkError(f"{file} is not a log that can be read.", hint="Give a file that ends in .asc or .blf.")
+        with ExitStack() as opened:
+            try:
+                if file.suffix.lower() == ".asc":
+                    text = opened.enter_context(file.open(encoding="utf-8", errors="replace"))
+                    self.started = _asc_start(self.address, text)
+                    text.seek(0)
+                    self._reader: Any = can.ASCReader(text, relative_timestamp=True)
+                else:
+                    self._reader = can.BLFReader(opened.enter_context(file.open("rb")))
+                    self._start_s = self._reader.start_timestamp
+                    self.started = datetime.fromtimestamp(self._start_s, UTC).isoformat() if self._start_s else ""
+            except (OSError, ValueError, BLFParseError, struct.error) as error:
+                raise cannot_open(self.address, error) from error
+            self._file = opened.pop_all()
         self._messages: Iterator[Any] = iter(self._reader)
 
     def receive(self, timeout_s: float) -> CanFrame:
@@ -77,7 +83,7 @@ class CanLog(CanLink):
         LinkClosed
             If the link was closed.
         """
-        import can
+        from can.io.blf import BLFParseError
 
         self._usable(timeout_s)
         while True:
@@ -85,7 +91,7 @@ class CanLog(CanLink):
                 message = next(self._messages)
             except StopIteration:
                 raise LinkEnded(f"The log {self.address} is over after {self._count} frames.") from None
-            except (ValueError, LookupError, OSError, can.CanError, struct.error, zlib.error) as error:
+            except (ValueError, LookupError, OSError, BLFParseError, struct.error, zlib.error) as error:
                 raise LinkError(
                     f"The log {self.address} is damaged after {self._count} frames: {error}.",
                     hint="Use the frames before, or export the log anew.",
@@ -110,22 +116,21 @@ class CanLog(CanLink):
         raise LinkError(f"{self.address} is a log: nothing can be sent to it.", hint="Read it, or open a bus.")
 
     def _release(self) -> None:
-        self._reader.stop()
+        self._file.close()
 
 
-def _asc_start(address: str, file: Path) -> str:
+def _asc_start(address: str, lines: Iterable[str]) -> str:
     """Return the start that the head of an ASC file states."""
     started = ""
-    with file.open(encoding="utf-8", errors="replace") as lines:
-        for line in islice(lines, 50):
-            words = line.split()
-            if [word.lower() for word in words[:1]] == ["date"]:
-                started = " ".join(words[1:])
-            elif [word.lower() for word in words[:2]] == ["begin", "triggerblock"]:
-                return " ".join(words[2:])
-            elif [word.lower() for word in words[2:4]] == ["timestamps", "relative"]:
-                raise LinkError(
-                    f"The times in {address} are relative to the event before, absolute ones were expected.",
-                    hint="Export the log with absolute time stamps.",
-                )
+    for line in islice(lines, 50):
+        words = line.split()
+        if [word.lower() for word in words[:1]] == ["date"]:
+            started = " ".join(words[1:])
+        elif [word.lower() for word in words[:2]] == ["begin", "triggerblock"]:
+            return " ".join(words[2:])
+        elif [word.lower() for word in words[2:4]] == ["timestamps", "relative"]:
+            raise LinkError(
+                f"The times in {address} are relative to the event before, absolute ones were expected.",
+                hint="Export the log with absolute time stamps.",
+            )
     return started

@@ -65,7 +65,7 @@ class DatagramLink(Link):
 
     @property
     def local_port(self) -> int:
-        """This end's port."""
+        """Port of this end."""
         return int(self._socket.getsockname()[1])
 
     def receive(self, timeout_s: float) -> Received:

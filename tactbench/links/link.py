@@ -82,7 +82,7 @@ class Link(ABC):
             raise self._unplugged(self._gone)
         if not 0 <= timeout_s < math.inf:
             raise LinkError(
-                f"{self.address}: a time-out of {timeout_s} s was given, a finite one that is not negative was expected.",
+                f"{self.address}: a time-out of {timeout_s} s was given, a finite one of 0 or more was expected.",
                 hint="Use 0 to ask without waiting.",
             )
         return time.monotonic() + timeout_s

@@ -177,13 +177,14 @@ class SpiBridge(SpiLink):
             if frame.kind not in (Kind.BATCH.reply, Kind.ERROR.reply) or frame.number not in self._waiting:
                 self.unexpected += 1
                 continue
+            if frame.kind == Kind.ERROR.reply:  # may come before the replies to earlier batches, which still run
+                del self._waiting[frame.number]
+                raise self._refused(frame)
             for number in list(self._waiting):
                 lengths = self._waiting.pop(number)
                 if number == frame.number:
                     break
                 self.lost += 1
-            if frame.kind == Kind.ERROR.reply:
-                raise self._refused(frame)
             if len(frame.payload) != BEGIN.size + sum(lengths):
                 raise self._nonsense(frame)
             data = []
@@ -210,8 +211,8 @@ class SpiBridge(SpiLink):
 
     def _nonsense(self, frame: Frame) -> LinkError:
         return LinkError(
-            f"{self.address}: the bridge's reply to request {frame.number} has {len(frame.payload)} bytes, which is not "
-            "what was asked for.",
+            f"{self.address}: the bridge's reply to request {frame.number} has {len(frame.payload)} bytes, other than "
+            "asked for.",
             hint="Is its firmware that of docs/links.md?",
         )
 
