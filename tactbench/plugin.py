@@ -9,6 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import (
     DataError,
+    LinkClosed,
+    LinkEnded,
+    LinkError,
+    LinkTimeout,
+    LinkUnplugged,
     MissingRecordingError,
     NotApplicable,
     PluginContractError,
@@ -72,22 +77,40 @@ from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, P
 if TYPE_CHECKING:
     from tactbench.core.recording.reader import Recording, open_recording
     from tactbench.core.samples import FloatArray
+    from tactbench.links.address import LinkAddress, open_link
+    from tactbench.links.bridge_emulator import BridgeEmulator
+    from tactbench.links.byte_link import ByteLink
+    from tactbench.links.can_link import CanBus, CanFrame, CanLink
+    from tactbench.links.can_log import CanLog
+    from tactbench.links.datagram_link import DatagramLink
+    from tactbench.links.link import Clock, Link, Received
+    from tactbench.links.spi_bridge import SpiBridge
+    from tactbench.links.spi_link import SpiLink, SpiReply, SpiStep
+    from tactbench.links.spidev import SpidevLink
 
 __all__ = [
     "API_VERSION",
     "Acquisition",
     "Block",
     "BondedLayer",
+    "BridgeEmulator",
+    "ByteLink",
+    "CanBus",
+    "CanFrame",
+    "CanLink",
+    "CanLog",
     "ChannelKind",
     "ChannelSpec",
     "ChannelTarget",
     "Check",
+    "Clock",
     "CostJob",
     "CostPoint",
     "CostStudy",
     "Creep",
     "DataError",
     "DataSheet",
+    "DatagramLink",
     "Dome",
     "EffectDescriptor",
     "Environment",
@@ -101,6 +124,13 @@ __all__ = [
     "ForceRamp",
     "Indenter",
     "LabelTarget",
+    "Link",
+    "LinkAddress",
+    "LinkClosed",
+    "LinkEnded",
+    "LinkError",
+    "LinkTimeout",
+    "LinkUnplugged",
     "MissingRecordingError",
     "NotApplicable",
     "Nuisances",
@@ -114,6 +144,7 @@ __all__ = [
     "Quantity",
     "RealFigure",
     "Reason",
+    "Received",
     "Recording",
     "Rig",
     "RigContext",
@@ -134,6 +165,11 @@ __all__ = [
     "SkinState",
     "Slide",
     "Source",
+    "SpiBridge",
+    "SpiLink",
+    "SpiReply",
+    "SpiStep",
+    "SpidevLink",
     "Statement",
     "StreamSpec",
     "Surface",
@@ -150,20 +186,38 @@ __all__ = [
     "load_object",
     "load_registry",
     "measured",
+    "open_link",
     "open_recording",
     "sourced",
 ]
 
-_NEED_NUMPY = {
+_ON_DEMAND = {
+    "BridgeEmulator": "tactbench.links.bridge_emulator",
+    "ByteLink": "tactbench.links.byte_link",
+    "CanBus": "tactbench.links.can_link",
+    "CanFrame": "tactbench.links.can_link",
+    "CanLink": "tactbench.links.can_link",
+    "CanLog": "tactbench.links.can_log",
+    "Clock": "tactbench.links.link",
+    "DatagramLink": "tactbench.links.datagram_link",
     "FloatArray": "tactbench.core.samples",
+    "Link": "tactbench.links.link",
+    "LinkAddress": "tactbench.links.address",
+    "Received": "tactbench.links.link",
     "Recording": "tactbench.core.recording.reader",
+    "SpiBridge": "tactbench.links.spi_bridge",
+    "SpiLink": "tactbench.links.spi_link",
+    "SpiReply": "tactbench.links.spi_link",
+    "SpiStep": "tactbench.links.spi_link",
+    "SpidevLink": "tactbench.links.spidev",
+    "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",
 }
 
 
 def __getattr__(name: str) -> Any:
-    """Import what stands on numpy when somebody asks for it: a plugin that is only listed need not."""
-    if name not in _NEED_NUMPY:
+    """Import what stands on numpy, and links, when somebody asks for it: a plugin that is only listed need not."""
+    if name not in _ON_DEMAND:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = found = getattr(import_module(_NEED_NUMPY[name]), name)
+    globals()[name] = found = getattr(import_module(_ON_DEMAND[name]), name)
     return found

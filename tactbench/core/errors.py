@@ -16,6 +16,11 @@
     │   ├── UnwritableError           the place for it refuses: exit code 2
     │   └── MappingError              (also ValueError) a foreign table does not fit its mapping: exit code 2
     ├── RigError                      a rig cannot carry out a scene
+    ├── LinkError                     a link to a device cannot be opened, or cannot do what it was asked for
+    │   ├── LinkClosed                it was closed
+    │   │   └── LinkEnded             a log is over
+    │   ├── LinkTimeout               nothing came, or nothing could be sent, within the time given
+    │   └── LinkUnplugged             the device, its cable or the other end is gone
     ├── DataError                     (also ValueError) recordings cannot become X and y
     │   └── NotApplicable             the cell is skipped, with this reason
     ├── EngineError                   where cells are computed is gone, or computes with something else
@@ -157,6 +162,26 @@ class MappingError(RecordingError, ValueError):
 
 class RigError(TactbenchError):
     """A rig cannot carry out a scene."""
+
+
+class LinkError(TactbenchError):
+    """A link to a device cannot be opened, or cannot do what it was asked for."""
+
+
+class LinkClosed(LinkError):  # noqa: N818  (names what happened to the link, as its siblings do)
+    """The link was closed."""
+
+
+class LinkEnded(LinkClosed):
+    """A log is over: nothing more can come from it."""
+
+
+class LinkTimeout(LinkError):  # noqa: N818
+    """Nothing came, or nothing could be sent, within the time given; the link may be used on."""
+
+
+class LinkUnplugged(LinkError):  # noqa: N818
+    """The device, its cable or the other end is gone; only closing is left."""
 
 
 class DataError(TactbenchError, ValueError):

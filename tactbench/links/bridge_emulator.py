@@ -1,0 +1,158 @@
+"""The SPI bridge as a model: bytes in, bytes out, on a clock that is passed in.
+
+Also the reference for its firmware: what it answers to what, ``docs/links.md`` says in words.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Callable
+from typing import Literal
+
+from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode
+from tactbench.links.spi_bridge import BEGIN, HELLO, SETUP, STEP
+
+Exchange = Callable[[int, bytes, float], bytes]
+"""What hangs on the bus: select mask, bytes out, second at which they begin -> as many bytes in."""
+
+BridgeFault = Literal["dropped", "doubled", "damaged"]
+"""``dropped``: batches are carried out, their replies are not sent. ``doubled``: replies are sent twice. ``damaged``:
+one bit of each reply is turned."""
+
+
+class BridgeEmulator:
+    """A bridge with one SPI bus.
+
+    Parameters
+    ----------
+    exchange
+        What hangs on the bus.
+    holds
+        Batches it can hold, the running one included.
+    largest_payload
+        Bytes of payload it can take.
+    select_lines
+        Mask of the lines it has.
+    fastest_hz
+        The highest clock it can run, hertz.
+
+    Attributes
+    ----------
+    faults
+        What goes wrong now; may be changed at any time.
+    damaged
+        How many frames came damaged so far; they are not answered.
+    """
+
+    def __init__(
+        self,
+        exchange: Exchange,
+        *,
+        holds: int = 4,
+        largest_payload: int = 4096,
+        select_lines: int = 0xFF,
+        fastest_hz: int = 10_000_000,
+    ) -> None:
+        self.faults: set[BridgeFault] = set()
+        self._exchange = exchange
+        self._holds = holds
+        self._largest = largest_payload
+        self._lines = select_lines
+        self._fastest_hz = fastest_hz
+        self._speed_hz = 0
+        self._free_s = 0.0
+        self._decoder = FrameDecoder()
+        self._due: deque[tuple[float, bytes]] = deque()
+
+    @property
+    def damaged(self) -> int:
+        """How many frames came damaged so far."""
+        return self._decoder.damaged
+
+    def feed(self, data: bytes, now_s: float) -> bytes:
+        """Take bytes from the host and return what is sent by now."""
+        out = self.poll(now_s)
+        for frame in self._decoder.feed(data):
+            out += self._answered(frame, now_s)
+        return out + self.poll(now_s)
+
+    def poll(self, now_s: float) -> bytes:
+        """Return the replies to batches that are over by `now_s`."""
+        out = b""
+        while self._due and self._due[0][0] <= now_s:
+            out += self._due.popleft()[1]
+        return out
+
+    def next_s(self) -> float | None:
+        """Return when the next reply is due; None: none is."""
+        return self._due[0][0] if self._due else None
+
+    def _answered(self, frame: Frame, now_s: float) -> bytes:
+        if frame.version != VERSION:
+            return self._refusal(frame, f"version {frame.version} is unknown")
+        if len(frame.payload) > self._largest:
+            return self._refusal(frame, f"payload above {self._largest} bytes")
+        if frame.kind == Kind.HELLO:
+            about = HELLO.pack(VERSION, self._largest, self._holds, self._lines) + b"tactbench emulator"
+            return encode(Frame(Kind.HELLO.reply, frame.number, about))
+        if frame.kind == Kind.SETUP:
+            return self._set_up(frame)
+        if frame.kind == Kind.BATCH:
+            return self._batch(frame, now_s)
+        return self._refusal(frame, f"kind {frame.kind} is unknown")
+
+    def _set_up(self, frame: Frame) -> bytes:
+        if len(frame.payload) != SETUP.size:
+            return self._refusal(frame, "malformed payload")
+        speed_hz, mode = SETUP.unpack(frame.payload)
+        if mode > 3 or not speed_hz:
+            return self._refusal(frame, "clock or mode is not possible")
+        self._speed_hz = min(speed_hz, self._fastest_hz)
+        return encode(Frame(Kind.SETUP.reply, frame.number, SETUP.pack(self._speed_hz, mode)))
+
+    def _batch(self, frame: Frame, now_s: float) -> bytes:
+        if not self._speed_hz:
+            return self._refusal(frame, "not set up")
+        if len(self._due) >= self._holds:
+            return self._refusal(frame, "full")
+        steps = _steps(frame.payload)
+        if steps is None or any(select & ~self._lines for select, _, _ in steps):
+            return self._refusal(frame, "malformed payload")
+        begin_s = t_s = max(now_s, self._free_s)
+        payload = BEGIN.pack(int(begin_s * 1e6) & 0xFFFFFFFF)
+        for select, pause_us, data in steps:
+            if data:
+                payload += self._exchange(select, data, t_s)
+            t_s += 8 * len(data) / self._speed_hz + pause_us * 1e-6
+        self._free_s = t_s
+        reply = encode(Frame(Kind.BATCH.reply, frame.number, payload))
+        if "damaged" in self.faults:
+            reply = bytes([reply[0], reply[1] ^ 0x80]) + reply[2:]
+        if "doubled" in self.faults:
+            reply += reply
+        if "dropped" in self.faults:
+            reply = b""
+        self._due.append((t_s, reply))
+        return b""
+
+    @staticmethod
+    def _refusal(frame: Frame, reason: str) -> bytes:
+        return encode(Frame(Kind.ERROR.reply, frame.number, reason.encode("ascii")))
+
+
+def _steps(payload: bytes) -> list[tuple[int, int, bytes]] | None:
+    """Return select, pause in us and bytes of each step; None if the payload is no list of steps."""
+    steps = []
+    place = 0
+    while place < len(payload):
+        try:
+            select, pause_us, length = STEP.unpack_from(payload, place)
+        except struct.error:
+            return None
+        place += STEP.size
+        if place + length > len(payload):
+            return None
+        steps.append((select, pause_us, payload[place : place + length]))
+        place += length
+    return steps or None

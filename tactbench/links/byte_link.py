@@ -1,0 +1,138 @@
+"""Byte streams: serial ports, pseudo-terminals, TCP sockets and whatever else pyserial has a URL for."""
+
+from __future__ import annotations
+
+import io
+import selectors
+import time
+from typing import Literal
+
+from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
+
+Parity = Literal["none", "even", "odd"]
+_PARITY = {"none": "N", "even": "E", "odd": "O"}
+
+
+class ByteLink(Link):
+    """A byte stream in both directions.
+
+    Parameters
+    ----------
+    port
+        A device (``/dev/ttyUSB0``, ``COM3``) or a URL of pyserial (``socket://host:port``, ``spy:///dev/ttyUSB0``,
+        ``loop://``, ``rfc2217://host:port``). A device is opened exclusively.
+    baud
+        Bits per second, start and stop bits included.
+    parity, stop_bits
+        Of each byte of eight data bits.
+    clock
+        Stamps what is received.
+
+    Raises
+    ------
+    LinkError
+        If the port cannot be opened.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        *,
+        baud: int = 115200,
+        parity: Parity = "none",
+        stop_bits: int = 1,
+        clock: Clock = time.monotonic_ns,
+    ) -> None:
+        import serial
+
+        super().__init__(port, clock)
+        try:
+            self._port = serial.serial_for_url(
+                port,
+                baudrate=baud,
+                parity=_PARITY[parity],
+                stopbits=stop_bits,
+                timeout=0,
+                write_timeout=WRITE_TIMEOUT_S,
+                exclusive=True,
+            )
+        except (OSError, ValueError) as error:  # pyserial's own are OSErrors
+            raise cannot_open(port, error) from error
+        # Waiting for the file descriptor gives the earliest stamp, and leaves the port's settings alone: pyserial sets
+        # all of them anew for each change of its time-out. Windows' ports, loop and rfc2217 have no descriptor.
+        self._ready: selectors.BaseSelector | None = None
+        try:
+            descriptor = self._port.fileno()
+        except (io.UnsupportedOperation, AttributeError):
+            return
+        self._ready = selectors.DefaultSelector()
+        self._ready.register(descriptor, selectors.EVENT_READ)
+
+    def read(self, timeout_s: float, *, size: int = 65536) -> Received:
+        """Return what has come, as soon as that is at least one byte.
+
+        Parameters
+        ----------
+        timeout_s
+            Seconds to wait; 0 asks without waiting.
+        size
+            The most bytes to return.
+
+        Raises
+        ------
+        LinkTimeout
+            If nothing came.
+        LinkUnplugged
+            If the device is gone, or the other end of a socket or pseudo-terminal.
+        LinkClosed
+            If the link was closed.
+        """
+        deadline = self._usable(timeout_s)
+        left_s = timeout_s
+        try:
+            while True:
+                if self._ready is None:
+                    self._port.timeout = left_s
+                    data = self._port.read(1)
+                    t_ns = self._clock()
+                    if data:
+                        data += self._port.read(min(size - 1, self._port.in_waiting))
+                else:
+                    self._ready.select(left_s)
+                    t_ns = self._clock()
+                    data = self._port.read(size)
+                if data:
+                    return Received(data, t_ns)
+                left_s = deadline - time.monotonic()
+                if left_s <= 0:
+                    raise self._nothing_came(timeout_s)
+        except OSError as error:
+            raise self._unplugged(error) from error
+
+    def write(self, data: bytes) -> None:
+        """Hand `data` to the system, which sends it.
+
+        Raises
+        ------
+        LinkTimeout
+            If the other end does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`.
+        LinkUnplugged, LinkClosed
+            As of :meth:`read`.
+        """
+        from serial import SerialTimeoutException
+
+        self._usable()
+        try:
+            self._port.write(data)
+        except SerialTimeoutException as error:
+            raise self._not_sent(error) from error
+        except OSError as error:
+            raise self._unplugged(error) from error
+
+    def _release(self) -> None:
+        if self._ready is not None:
+            self._ready.close()
+        inner = getattr(self._port, "_socket", None)
+        self._port.close()
+        if inner is not None:  # pyserial forgets to close a socket that the other end has reset
+            inner.close()

@@ -1,0 +1,125 @@
+"""Datagrams over UDP."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+from tactbench.core.errors import LinkError
+from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
+
+LARGEST_DATAGRAM = 65507
+"""Bytes: 65535 of an IPv4 packet less its header of 20 and UDP's of 8 (RFC 791, RFC 768)."""
+
+
+class DatagramLink(Link):
+    """Datagrams to and from one peer; those of others are not seen.
+
+    Parameters
+    ----------
+    host, port
+        The peer.
+    local_port
+        This end's port, for a peer that sends to a fixed one; 0: any free one.
+    buffer_bytes
+        Asked of the system for what is not yet read; it may give less. The usual 212 992 hold 256 datagrams of 36
+        bytes, a quarter of a second at 1 kHz (measured on Linux); what does not fit is lost without an error.
+    clock
+        Stamps what is received.
+
+    Attributes
+    ----------
+    granted_bytes
+        The buffer the system gave. Linux answers twice what was asked for, its own overhead included.
+
+    Raises
+    ------
+    LinkError
+        If the host has no address, or the local port is taken.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        *,
+        local_port: int = 0,
+        buffer_bytes: int = 4 << 20,
+        clock: Clock = time.monotonic_ns,
+    ) -> None:
+        super().__init__(f"udp://{f'[{host}]' if ':' in host else host}:{port}", clock)
+        try:
+            family, kind, protocol, _, peer = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            self._socket = socket.socket(family, kind, protocol)
+        except OSError as error:
+            raise cannot_open(self.address, error) from error
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
+            if local_port:
+                self._socket.bind(("", local_port))
+            self._socket.connect(peer)
+        except OSError as error:
+            self._socket.close()
+            raise cannot_open(self.address, error) from error
+        self.granted_bytes: int = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+
+    @property
+    def local_port(self) -> int:
+        """Port of this end."""
+        return int(self._socket.getsockname()[1])
+
+    def receive(self, timeout_s: float) -> Received:
+        """Return the next datagram, whole.
+
+        Parameters
+        ----------
+        timeout_s
+            Seconds to wait; 0 asks without waiting.
+
+        Raises
+        ------
+        LinkTimeout
+            If none came.
+        LinkUnplugged
+            If the peer's host says that nobody listens there, or the network is gone.
+        LinkClosed
+            If the link was closed.
+        """
+        self._usable(timeout_s)
+        try:
+            self._socket.settimeout(timeout_s)
+            data = self._socket.recv(LARGEST_DATAGRAM)
+            return Received(data, self._clock())
+        except (TimeoutError, BlockingIOError):
+            raise self._nothing_came(timeout_s) from None
+        except OSError as error:
+            raise self._unplugged(error) from error
+
+    def send(self, data: bytes) -> None:
+        """Send one datagram.
+
+        Raises
+        ------
+        LinkError
+            If it is longer than UDP carries.
+        LinkTimeout
+            If the system does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`.
+        LinkUnplugged, LinkClosed
+            As of :meth:`receive`.
+        """
+        self._usable()
+        if len(data) > LARGEST_DATAGRAM:
+            raise LinkError(
+                f"{self.address}: a datagram of {len(data)} bytes was given, at most {LARGEST_DATAGRAM} go out.",
+                hint="Send it in parts.",
+            )
+        try:
+            self._socket.settimeout(WRITE_TIMEOUT_S)
+            self._socket.send(data)
+        except TimeoutError as error:
+            raise self._not_sent(error) from error
+        except OSError as error:
+            raise self._unplugged(error) from error
+
+    def _release(self) -> None:
+        self._socket.close()

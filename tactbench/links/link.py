@@ -1,0 +1,138 @@
+"""What all links have in common: open when made, closed once, and named errors for what can go wrong."""
+
+from __future__ import annotations
+
+import errno
+import math
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
+
+Clock = Callable[[], int]
+"""Returns nanoseconds of a clock that never goes back, as :func:`time.monotonic_ns` does."""
+
+WRITE_TIMEOUT_S = 1.0
+"""Assumed: the other end takes what is sent within this time, or is stuck. 9600 baud carry 960 bytes in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """Bytes and when the first of them was in the host."""
+
+    data: bytes
+    t_ns: int
+    """Nanoseconds of the link's clock."""
+
+
+class Link(ABC):
+    """A connection to a device: open when it is made, until :meth:`close` or the end of its ``with`` block.
+
+    One thread uses a link. Time-outs are waits in real time, whatever the clock.
+
+    Parameters
+    ----------
+    address
+        What it is called in messages.
+    clock
+        Stamps what is received.
+    """
+
+    def __init__(self, address: str, clock: Clock = time.monotonic_ns) -> None:
+        self.address = address
+        self._clock = clock
+        self._closed = False
+        self._gone: BaseException | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the link; once closed, or unplugged and closed, this does nothing."""
+        if not self._closed:
+            self._closed = True
+            self._release()
+
+    @abstractmethod
+    def _release(self) -> None:
+        """Give back what the link holds; called once, also after the other end is gone, and raises nothing."""
+
+    def _usable(self, timeout_s: float = 0.0) -> float:
+        """Return when a wait of `timeout_s` ends, in seconds of :func:`time.monotonic`.
+
+        Raises
+        ------
+        LinkClosed, LinkUnplugged
+            If nothing can be done with this link any more.
+        LinkError
+            If `timeout_s` is negative or not finite.
+        """
+        if self._closed:
+            raise LinkClosed(f"The link {self.address} is closed.", hint="Open a new one.")
+        if self._gone is not None:
+            raise self._unplugged(self._gone)
+        if not 0 <= timeout_s < math.inf:
+            raise LinkError(
+                f"{self.address}: a time-out of {timeout_s} s was given, a finite one of 0 or more was expected.",
+                hint="Use 0 to ask without waiting.",
+            )
+        return time.monotonic() + timeout_s
+
+    def _unplugged(self, cause: BaseException) -> LinkUnplugged:
+        self._gone = cause
+        return LinkUnplugged(
+            f"The other end of {self.address} is gone: {cause}.",
+            hint="Check cable, power and other end, close this link and open a new one.",
+        )
+
+    def _nothing_came(self, timeout_s: float) -> LinkTimeout:
+        return LinkTimeout(
+            f"Nothing came from {self.address} within {timeout_s:g} s.",
+            hint="Is the device on, started and set to the same speed? Then wait longer.",
+        )
+
+    def _not_sent(self, cause: BaseException) -> LinkTimeout:
+        return LinkTimeout(
+            f"{self.address} did not take what was sent within {WRITE_TIMEOUT_S:g} s ({cause}); part of it may have "
+            "gone out.",
+            hint="Is the other end reading, or, on CAN, does any node acknowledge?",
+        )
+
+
+_HINTS = {
+    errno.ENOENT: "Check the name and the cable; `python -m serial.tools.list_ports` lists serial ports.",
+    errno.EACCES: "Your user may not open it: join the group that owns the device (often dialout) and log in again.",
+    errno.EAGAIN: "Another program has it open: end that one.",
+    errno.EBUSY: "Another program has it open: end that one.",
+    errno.EADDRINUSE: "Another program uses this local port: end that one, or choose another port.",
+    errno.EAFNOSUPPORT: "This machine's kernel does not have that kind of network; CAN needs Linux with CONFIG_CAN.",
+    errno.ENODEV: "There is no such interface; `ip link` lists them.",
+    errno.ECONNREFUSED: "Nothing listens there: check host and port, and that the device is on.",
+}
+
+
+def os_error_in(error: BaseException) -> OSError | None:
+    """Return the system's error that `error` is or was raised from; the innermost with a number, if one has."""
+    found: OSError | None = None
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and (found is None or cause.errno is not None):
+            found = cause
+        cause = cause.__cause__ or cause.__context__
+    return found
+
+
+def cannot_open(address: str, error: BaseException, *, hint: str = "") -> LinkError:
+    """Return the error of a link that does not open, with the next step for the system's reason."""
+    reason = os_error_in(error)
+    number = reason.errno if reason is not None and reason.errno is not None else 0
+    return LinkError(f"{address} cannot be opened: {error}.", hint=hint or _HINTS.get(number, "Check its address."))

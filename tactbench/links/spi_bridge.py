@@ -1,0 +1,220 @@
+"""SPI behind a microcontroller that speaks our bridge's frames over a serial port."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections import deque
+from collections.abc import Sequence
+
+from tactbench.core.errors import LinkError, LinkTimeout
+from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode
+from tactbench.links.byte_link import ByteLink
+from tactbench.links.link import Clock
+from tactbench.links.spi_link import SpiLink, SpiReply, SpiStep
+
+HELLO = struct.Struct("<HHBB")
+"""Payload of the reply to HELLO, before the name: firmware, largest payload, batches held, select lines."""
+SETUP = struct.Struct("<IB")
+"""Payload of SETUP and of its reply: clock in hertz, mode."""
+STEP = struct.Struct("<BHH")
+"""Head of a step in BATCH: select, pause in us, number of bytes."""
+BEGIN = struct.Struct("<I")
+"""Head of the reply to BATCH: when it began, us."""
+
+_ASK_S = 0.2
+"""Assumed: a bridge that runs answers HELLO within this time, else it is asked again."""
+
+
+class SpiBridge(SpiLink):
+    """An SPI bus behind a bridge of our format, version 1 (``docs/links.md``).
+
+    Parameters
+    ----------
+    port
+        The bridge's port, as :class:`ByteLink` takes it.
+    speed_hz
+        Clock of the SPI bus, at most, hertz.
+    mode
+        SPI mode, 0 to 3.
+    baud
+        Of the port, bits per second; a bridge with USB of its own takes any.
+    wake_s
+        Seconds within which the bridge must answer: many microcontrollers start anew when their port is opened.
+    clock
+        Stamps what is received.
+
+    Attributes
+    ----------
+    name, firmware
+        What the bridge says of itself.
+    select_lines
+        Mask of the select lines it has.
+    speed_hz
+        The SPI clock it runs, hertz.
+    lost, unexpected
+        Replies that never came though later ones did; and replies to no batch that waits for one: doubled or late.
+
+    Raises
+    ------
+    LinkError
+        If the port cannot be opened, nothing answers, or the bridge speaks another version or cannot do `mode`.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        *,
+        speed_hz: int,
+        mode: int = 0,
+        baud: int = 115200,
+        wake_s: float = 3.0,
+        clock: Clock = time.monotonic_ns,
+    ) -> None:
+        super().__init__(f"spi://bridge/{port}", clock)
+        self.lost = 0
+        self.unexpected = 0
+        self._decoder = FrameDecoder()
+        self._frames: deque[tuple[Frame, int]] = deque()
+        self._began_ns = 0
+        self._waiting: dict[int, tuple[int, ...]] = {}
+        self._bytes = ByteLink(port, baud=baud, clock=clock)
+        try:
+            self._greet(wake_s)
+            self._set_up(speed_hz, mode)
+        except BaseException:
+            self._bytes.close()
+            raise
+
+    @property
+    def damaged(self) -> int:
+        """How many frames came damaged so far."""
+        return self._decoder.damaged
+
+    def _greet(self, wake_s: float) -> None:
+        deadline = time.monotonic() + wake_s
+        while True:
+            self._bytes.write(b"\0" + encode(Frame(Kind.HELLO, 0)))
+            try:
+                hello = self._answer(Kind.HELLO, min(_ASK_S, wake_s))
+                break
+            except LinkTimeout as error:
+                if time.monotonic() >= deadline:
+                    raise LinkError(
+                        f"{self.address}: nothing there answered as an SPI bridge within {wake_s:g} s.",
+                        hint="Is it the bridge's port, and does the bridge run the firmware of docs/links.md?",
+                    ) from error
+        try:
+            self.firmware, self._largest, self._holds, self.select_lines = HELLO.unpack_from(hello.payload)
+        except struct.error as error:
+            raise self._nonsense(hello) from error
+        self.name = hello.payload[HELLO.size :].decode("ascii", "replace")
+
+    def _set_up(self, speed_hz: int, mode: int) -> None:
+        self._bytes.write(encode(Frame(Kind.SETUP, 0, SETUP.pack(speed_hz, mode))))
+        reply = self._answer(Kind.SETUP, 1.0)
+        try:
+            self.speed_hz, _ = SETUP.unpack(reply.payload)
+        except struct.error as error:
+            raise self._nonsense(reply) from error
+
+    def _answer(self, kind: Kind, timeout_s: float) -> Frame:
+        """Return the reply to a request that is no batch; what else comes is not looked at."""
+        deadline = time.monotonic() + timeout_s
+        while True:
+            frame, _ = self._next(timeout_s, deadline)
+            if frame.version != VERSION:
+                raise LinkError(
+                    f"{self.address}: the bridge speaks version {frame.version} of the format, expected is {VERSION}.",
+                    hint="Update the bridge's firmware, or tactbench.",
+                )
+            if frame.kind == Kind.ERROR.reply:
+                raise self._refused(frame)
+            if frame.kind == kind.reply:
+                return frame
+
+    def _next(self, timeout_s: float, deadline: float) -> tuple[Frame, int]:
+        """Return the next frame and when its first byte was in the host."""
+        while not self._frames:
+            left_s = deadline - time.monotonic()
+            try:
+                received = self._bytes.read(max(0.0, left_s))
+            except LinkTimeout:
+                raise self._nothing_came(timeout_s) from None
+            if not self._decoder.within_frame:
+                self._began_ns = received.t_ns
+            for frame in self._decoder.feed(received.data):
+                self._frames.append((frame, self._began_ns))
+                self._began_ns = received.t_ns
+            if self._decoder.within_frame and b"\0" in received.data:
+                self._began_ns = received.t_ns
+        return self._frames.popleft()
+
+    def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
+        for step in steps:
+            if step.select & ~self.select_lines or step.select < 0:
+                raise LinkError(
+                    f"{self.address}: {step} was given, the bridge has select lines {self.select_lines:#x}.",
+                    hint="Select lines that it has.",
+                )
+        payload = b"".join(STEP.pack(step.select, step.pause_us, len(step.data)) + step.data for step in steps)
+        if len(payload) > self._largest:
+            raise LinkError(
+                f"{self.address}: a batch of {len(payload)} bytes was given, the bridge takes {self._largest}.",
+                hint="Send it in parts.",
+            )
+        if len(self._waiting) >= self._holds:
+            raise LinkError(
+                f"{self.address}: the bridge holds {self._holds} batches, and that many wait for their replies.",
+                hint="Receive a reply first; where none comes, close the link and open it again.",
+            )
+        self._bytes.write(encode(Frame(Kind.BATCH, number, payload)))
+        self._waiting[number] = tuple(len(step.data) for step in steps)
+
+    def _collect(self, timeout_s: float, deadline: float) -> SpiReply:
+        while True:
+            frame, t_ns = self._next(timeout_s, deadline)
+            if frame.kind not in (Kind.BATCH.reply, Kind.ERROR.reply) or frame.number not in self._waiting:
+                self.unexpected += 1
+                continue
+            if frame.kind == Kind.ERROR.reply:  # may come before the replies to earlier batches, which still run
+                del self._waiting[frame.number]
+                raise self._refused(frame)
+            for number in list(self._waiting):
+                lengths = self._waiting.pop(number)
+                if number == frame.number:
+                    break
+                self.lost += 1
+            if len(frame.payload) != BEGIN.size + sum(lengths):
+                raise self._nonsense(frame)
+            data = []
+            place = BEGIN.size
+            for length in lengths:
+                data.append(frame.payload[place : place + length])
+                place += length
+            return SpiReply(frame.number, tuple(data), t_ns, BEGIN.unpack_from(frame.payload)[0])
+
+    def transfer(self, data: bytes, *, select: int = 1, pause_us: int = 0, timeout_s: float = 1.0) -> bytes:  # noqa: D102
+        try:
+            return super().transfer(data, select=select, pause_us=pause_us, timeout_s=timeout_s)
+        except LinkTimeout:
+            # Given up: its reply, should it come late, is unexpected.
+            self._waiting.pop(self._number, None)
+            raise
+
+    def _refused(self, frame: Frame) -> LinkError:
+        reason = frame.payload.decode("ascii", "replace") or "it gives no reason"
+        return LinkError(
+            f"{self.address}: the bridge refuses request {frame.number}: {reason}.",
+            hint="See the errors of the bridge in docs/links.md.",
+        )
+
+    def _nonsense(self, frame: Frame) -> LinkError:
+        return LinkError(
+            f"{self.address}: the bridge's reply to request {frame.number} has {len(frame.payload)} bytes, other than "
+            "asked for.",
+            hint="Is its firmware that of docs/links.md?",
+        )
+
+    def _release(self) -> None:
+        self._bytes.close()

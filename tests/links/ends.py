@@ -1,0 +1,195 @@
+"""The far ends of links, made of what the machine has: pseudo-terminals, sockets, buses of one process."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from tactbench.plugin import BridgeEmulator, CanFrame, Link, SpiStep, open_link
+
+
+@dataclass
+class End:
+    """A link, and what its tests do at the far end."""
+
+    link: Link
+    say: Callable[[], None]
+    """Makes the far end send something."""
+    hear: Callable[[float], object]
+    """Receives at the near end."""
+    tell: Callable[[], object]
+    """Sends at the near end."""
+    unplug: Callable[[], None] | None = None
+
+
+class Pty:
+    """The master of a pseudo-terminal."""
+
+    def __init__(self) -> None:
+        self.master, slave = os.openpty()
+        self.name = os.ttyname(slave)
+        self._slave: int | None = slave
+
+    def opened(self) -> None:
+        """Let go of the slave, which the link has open by now."""
+        if self._slave is not None:
+            os.close(self._slave)
+            self._slave = None
+
+    def read(self, timeout_s: float = 2.0) -> bytes:
+        ready, _, _ = select.select([self.master], [], [], timeout_s)
+        return os.read(self.master, 65536) if ready else b""
+
+    def read_until(self, end: bytes) -> bytes:
+        data = b""
+        while not data.endswith(end):
+            part = self.read()
+            assert part, f"only {data!r} came"
+            data += part
+        return data
+
+    def write(self, data: bytes) -> None:
+        os.write(self.master, data)
+
+    def unplug(self) -> None:
+        self.opened()
+        if self.master >= 0:
+            os.close(self.master)
+            self.master = -1
+
+
+@contextmanager
+def pty() -> Iterator[Pty]:
+    end = Pty()
+    try:
+        yield end
+    finally:
+        end.unplug()
+
+
+@contextmanager
+def serving(emulator: BridgeEmulator) -> Iterator[Pty]:
+    """A bridge emulator on a pseudo-terminal, in real time."""
+    with pty() as end:
+        stop, stopped = os.pipe()
+
+        def serve() -> None:
+            while True:
+                due = emulator.next_s()
+                wait_s = None if due is None else max(0.0, due - time.monotonic())
+                ready, _, _ = select.select([end.master, stop], [], [], wait_s)
+                if stop in ready:
+                    return
+                try:
+                    data = os.read(end.master, 65536) if ready else b""
+                    os.write(end.master, emulator.feed(data, time.monotonic()))
+                except OSError:
+                    return
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        unplug = end.unplug
+
+        def end_service() -> None:
+            os.write(stopped, b"x")
+            thread.join()
+            unplug()
+
+        end.unplug = end_service  # type: ignore[method-assign]
+        try:
+            yield end
+        finally:
+            end_service()
+            end.unplug = unplug  # type: ignore[method-assign]
+            os.close(stop)
+            os.close(stopped)
+
+
+def loopback(select: int, data: bytes, now_s: float) -> bytes:
+    """MOSI wired to MISO."""
+    return data
+
+
+@contextmanager
+def byte_stream(clock: Callable[[], int]) -> Iterator[End]:
+    with pty() as far, open_link(f"serial://{far.name}?baud=115200", clock) as link:
+        yield End(link, lambda: far.write(b"a"), link.read, lambda: link.write(b"b"), far.unplug)
+
+
+@contextmanager
+def tcp(clock: Callable[[], int]) -> Iterator[End]:
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        open_link(f"socket://127.0.0.1:{server.getsockname()[1]}", clock) as link,
+        server.accept()[0] as far,
+    ):
+        yield End(link, lambda: far.sendall(b"a"), link.read, lambda: link.write(b"b"), far.close)
+
+
+@contextmanager
+def loop(clock: Callable[[], int]) -> Iterator[End]:
+    with open_link("loop://", clock) as link:
+        yield End(link, lambda: link.write(b"a"), link.read, lambda: link.write(b"b"))
+
+
+@contextmanager
+def datagrams(clock: Callable[[], int]) -> Iterator[End]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as far:
+        far.bind(("127.0.0.1", 0))
+        with open_link(f"udp://127.0.0.1:{far.getsockname()[1]}", clock) as link:
+
+            def unplug() -> None:
+                far.close()
+                link.send(b"is anybody there?")
+
+            def say() -> None:
+                far.sendto(b"a", ("127.0.0.1", link.local_port))
+
+            yield End(link, say, link.receive, lambda: link.send(b"b"), unplug)
+
+
+@contextmanager
+def virtual_can(clock: Callable[[], int]) -> Iterator[End]:
+    with open_link("can://virtual/alike", clock) as link, open_link("can://virtual/alike") as far:
+        frame = CanFrame(0x4E0, b"\x40")
+        yield End(link, lambda: far.send(frame), link.receive, lambda: link.send(frame))
+
+
+@contextmanager
+def slcan(clock: Callable[[], int]) -> Iterator[End]:
+    with (
+        pty() as far,
+        open_link(f"can://slcan/{far.name}?bitrate=1000000&settle_s=0", clock) as link,
+    ):
+        frame = CanFrame(0x20E, b"\x4d")
+        yield End(link, lambda: far.write(b"t4E0140\r"), link.receive, lambda: link.send(frame), far.unplug)
+
+
+@contextmanager
+def spi_bridge(clock: Callable[[], int]) -> Iterator[End]:
+    with (
+        serving(BridgeEmulator(loopback)) as far,
+        open_link(f"spi://bridge/{far.name}?speed_hz=1000000", clock) as link,
+    ):
+
+        def send() -> object:
+            return link.send([SpiStep(b"ab")])
+
+        yield End(link, send, link.receive, send, far.unplug)
+
+
+ENDS = {
+    "pty": byte_stream,
+    "socket": tcp,
+    "loop": loop,
+    "udp": datagrams,
+    "can-virtual": virtual_can,
+    "can-slcan": slcan,
+    "spi-bridge": spi_bridge,
+}

@@ -1,0 +1,97 @@
+"""Addresses: every part is understood or refused with the next step."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.links.address import KINDS
+from tactbench.plugin import LinkAddress, LinkError, UsageError, open_link
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_examples_are_addresses(kind):
+    assert LinkAddress.parse(KINDS[kind].example).kind == kind
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "target", "options"),
+    [
+        ("serial:///dev/ttyUSB0?baud=9600&parity=even&stop_bits=2", "serial", "/dev/ttyUSB0",
+         {"baud": 9600, "parity": "even", "stop_bits": 2}),
+        ("serial://COM3?baud=921600", "serial", "COM3", {"baud": 921600}),
+        ("serial:///dev/my%20port?baud=9600", "serial", "/dev/my port", {"baud": 9600}),
+        ("can://socketcan/can0?bitrate=1000000", "can/socketcan", "can0", {"bitrate": 1000000}),
+        ("can://slcan//dev/ttyACM0?bitrate=500000&settle_s=0.5", "can/slcan", "/dev/ttyACM0",
+         {"bitrate": 500000, "settle_s": 0.5}),
+        ("can://log//data/a.asc", "can/log", "/data/a.asc", {}),
+        ("udp://192.168.1.1:49152", "udp", "192.168.1.1:49152", {}),
+        ("udp://[::1]:49152?local_port=5000", "udp", "[::1]:49152", {"local_port": 5000}),
+        ("spi://spidev/0.1?speed_hz=4400000&mode=3", "spi/spidev", "0.1", {"speed_hz": 4400000, "mode": 3}),
+        ("spi://bridge/socket://10.0.0.2:4001?speed_hz=1", "spi/bridge", "socket://10.0.0.2:4001", {"speed_hz": 1}),
+    ],
+)  # fmt: skip
+def test_parts(text, kind, target, options):
+    address = LinkAddress.parse(text)
+    assert (address.text, address.kind, address.target, dict(address.options)) == (text, kind, target, options)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("/dev/ttyUSB0", "serial:///dev/ttyUSB0?baud=115200"),
+        ("serail:///dev/ttyUSB0?baud=9600", "Did you mean 'serial'"),
+        ("can://sockcan/can0", "Did you mean 'socketcan'"),
+        ("can://can0", "Known: log, slcan, socketcan, udp_multicast, virtual"),
+        ("serial:///dev/ttyUSB0?baut=9600", "Did you mean 'baud'"),
+        ("serial:///dev/ttyUSB0", "does not give baud"),
+        ("serial://?baud=9600", "does not say what to open"),
+        ("serial:///dev/ttyUSB0?baud=fast", "gives baud=fast, expected is a positive whole number"),
+        ("serial:///dev/ttyUSB0?baud=0", "positive whole number"),
+        ("serial:///dev/ttyUSB0?baud=9600&baud=9600", "gives baud twice"),
+        ("serial:///dev/ttyUSB0?baud=9600&", "key=value"),
+        ("serial:///dev/ttyUSB0?baud", "key=value"),
+        ("serial:///dev/ttyUSB0?baud=9600&parity=mark", "one of none, even, odd"),
+        ("can://slcan//dev/ttyACM0", "does not give bitrate"),
+        ("can://slcan//dev/ttyACM0?bitrate=1000000&settle_s=nan", "seconds, 0 to 60"),
+        ("can://virtual/bus?bitrate=1000000", "takes none"),
+        ("can://virtual/", "does not say what to open"),
+        ("udp://192.168.1.1", "does not end in a port"),
+        ("udp://192.168.1.1:70000", "does not end in a port"),
+        ("udp://:49152", "names no host"),
+        ("socket://localhost", "does not end in a port"),
+        ("spi://spidev/0.0?speed_hz=4400000&mode=4", "one of 0, 1, 2, 3"),
+    ],
+)
+def test_what_is_wrong_is_said(text, said):
+    with pytest.raises(UsageError) as raised:
+        LinkAddress.parse(text)
+    assert said in str(raised.value)
+
+
+@settings(max_examples=200)
+@given(st.text(max_size=40) | st.builds("{}://{}?{}".format, st.sampled_from([*KINDS]), st.text(), st.text()))
+def test_any_text_is_an_address_or_a_usage_error(text):
+    try:
+        kind = LinkAddress.parse(text).kind
+    except UsageError as error:
+        kind, hint = None, error.hint
+    assert kind in KINDS or hint
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("serial:///dev/there-is-none?baud=9600", "list_ports"),
+        ("socket://127.0.0.1:1", "Nothing listens there"),
+        ("can://slcan/dev/there-is-none?bitrate=1000000", "can://slcan//dev/ttyACM0"),
+        ("can://log/there-is-none.asc", "cannot be opened"),
+        ("can://log/there-is-none.txt", "ends in .asc or .blf"),
+        ("spi://spidev/zero?speed_hz=1", "spi://spidev/0.0"),
+    ],
+)
+def test_what_does_not_open_says_what_to_do(address, said):
+    with pytest.raises(LinkError) as raised:
+        open_link(address)
+    assert said in str(raised.value)

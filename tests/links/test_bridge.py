@@ -1,0 +1,340 @@
+"""The SPI bridge: frames, the emulator byte by byte, and the link to it over a pseudo-terminal."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode
+from tactbench.links.spi_bridge import HELLO, SETUP
+from tactbench.plugin import BridgeEmulator, LinkError, LinkTimeout, SpiBridge, SpiStep
+from tests.links.ends import loopback, pty, serving
+
+ROOT = Path(__file__).resolve().parents[2]
+
+FRAMES = st.builds(
+    Frame,
+    kind=st.integers(0, 255),
+    number=st.integers(0, 65535),
+    payload=st.binary(max_size=64)
+    | st.integers(240, 520).map(lambda n: b"\x01" * n)
+    | st.integers(240, 520).map(bytes),
+    version=st.integers(0, 255),
+)
+
+
+@pytest.mark.parametrize(
+    ("frame", "sent"),
+    [
+        (Frame(Kind.HELLO, 0), "03 01 01 01 01 01 05 {crc} 00"),
+        (Frame(Kind.SETUP, 7, SETUP.pack(4_400_000, 0)), "04 01 02 07 02 05 04 80 23 43 01 05 {crc} 00"),
+    ],
+    ids=["hello", "setup"],
+)
+def test_bytes_of_a_frame(frame, sent):
+    body = bytes([1, frame.kind]) + frame.number.to_bytes(2, "little") + len(frame.payload).to_bytes(2, "little")
+    crc = crc32(body + frame.payload)
+    assert 0 not in crc, "the stuffing above is written for a CRC without a zero"
+    assert encode(frame) == bytes.fromhex(sent.format(crc=crc.hex()))
+
+
+def crc32(data: bytes) -> bytes:
+    """CRC-32 of IEEE 802.3, bit by bit, as a microcontroller would."""
+    register = 0xFFFFFFFF
+    for byte in data:
+        register ^= byte
+        for _ in range(8):
+            register = (register >> 1) ^ (0xEDB88320 if register & 1 else 0)
+    return (register ^ 0xFFFFFFFF).to_bytes(4, "little")
+
+
+def test_vectors_of_the_document():
+    """A bus that answers each byte's complement; requests at 1 s, replies by 2 s."""
+    block = (ROOT / "docs" / "links.md").read_text(encoding="utf-8").split("```text\n")[1].split("```")[0]
+    lines = [(line[0], bytes.fromhex(line[1:])) for line in block.splitlines()]
+    assert [side for side, _ in lines] == list("><" * 3)
+    emulator = BridgeEmulator(Told())
+    for (_, request), (_, reply) in zip(lines[::2], lines[1::2], strict=True):
+        (frame,) = FrameDecoder().feed(request)
+        assert encode(frame) == request
+        assert emulator.feed(request, 1.0) + emulator.poll(2.0) == reply
+
+
+@settings(max_examples=100)
+@given(st.lists(FRAMES, max_size=5), st.integers(1, 40))
+def test_frames_come_back_in_any_pieces(frames, piece):
+    data = b"".join(map(encode, frames))
+    decoder = FrameDecoder()
+    found = [frame for place in range(0, len(data), piece) for frame in decoder.feed(data[place : place + piece])]
+    assert (found, decoder.damaged, decoder.within_frame) == (frames, 0, False)
+
+
+@settings(max_examples=100)
+@given(st.binary(max_size=300), FRAMES)
+def test_after_any_bytes_the_next_frame_but_one_is_whole(noise, frame):
+    """One zero byte ends the noise; a frame right behind it without one is lost with it."""
+    decoder = FrameDecoder()
+    decoder.feed(noise)
+    assert decoder.feed(encode(frame) + encode(frame))[-1] == frame
+
+
+@settings(max_examples=100)
+@given(st.lists(FRAMES, min_size=3, max_size=3), st.data())
+def test_one_turned_bit_costs_at_most_the_frame_it_hit_and_the_next(frames, data):
+    sent = [encode(frame) for frame in frames]
+    place = data.draw(st.integers(0, len(sent[0]) - 1))
+    sent[0] = bytearray(sent[0])
+    sent[0][place] ^= 1 << data.draw(st.integers(0, 7))
+    decoder = FrameDecoder()
+    found = decoder.feed(b"".join(sent))
+    assert found in (frames[1:], frames[2:])
+    assert decoder.damaged
+
+
+def test_an_endless_frame_does_not_fill_the_memory():
+    decoder = FrameDecoder()
+    for _ in range(40):
+        assert decoder.feed(b"\x05" * 4096) == []
+    assert decoder.damaged == 1
+    assert len(decoder._pending) < 70_000
+    assert decoder.feed(b"\0" + encode(Frame(1, 2)))[-1] == Frame(1, 2)
+
+
+class Told:
+    """What hangs on the emulated bus: writes down what it is told and answers the complement."""
+
+    def __init__(self):
+        self.told = []
+
+    def __call__(self, select, data, now_s):
+        self.told.append((select, data, now_s))
+        return bytes(255 - byte for byte in data)
+
+
+def replies(data):
+    return FrameDecoder().feed(data)
+
+
+def batch(*steps):
+    parts = [bytes([s.select]) + s.pause_us.to_bytes(2, "little") + len(s.data).to_bytes(2, "little") for s in steps]
+    return b"".join(head + step.data for head, step in zip(parts, steps, strict=True))
+
+
+def ready(**options):
+    bus = Told()
+    emulator = BridgeEmulator(bus, **options)
+    emulator.feed(encode(Frame(Kind.SETUP, 0, SETUP.pack(1_000_000, 0))), 0.0)
+    return emulator, bus
+
+
+def test_a_batch_runs_by_the_bus_clock_and_its_pauses():
+    """At 1 MHz two bytes take 16 us: the second transfer begins after 16 + 50 us, the reply is due after 92 us."""
+    emulator, bus = ready()
+    request = encode(Frame(Kind.BATCH, 5, batch(SpiStep(b"\x81\x00", 3, 50), SpiStep(b"\0\0", 1, 10))))
+    assert emulator.feed(request, 2.0) == b""
+    assert [(select, data) for select, data, _ in bus.told] == [(3, b"\x81\x00"), (1, b"\0\0")]
+    assert [t_s for *_, t_s in bus.told] == pytest.approx([2.0, 2.000066], abs=1e-12)
+    assert emulator.next_s() == pytest.approx(2.000092, abs=1e-12)
+    assert emulator.poll(2.00009) == b""
+    (reply,) = replies(emulator.poll(2.0001))
+    assert reply == Frame(0x83, 5, (2_000_000).to_bytes(4, "little") + b"\x7e\xff\xff\xff")
+
+
+def test_the_next_batch_begins_when_the_last_is_over():
+    emulator, bus = ready()
+    request = [encode(Frame(Kind.BATCH, n, batch(SpiStep(b"\0" * 125)))) for n in range(2)]  # 1 ms each
+    emulator.feed(request[0] + request[1], 1.0)
+    assert [t_s for *_, t_s in bus.told] == pytest.approx([1.0, 1.001], abs=1e-12)
+    assert [frame.number for frame in replies(emulator.poll(1.5))] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("frame", "reason"),
+    [
+        (Frame(Kind.HELLO, 9, version=2), "version 2 is unknown"),
+        (Frame(0x55, 9), "kind 85 is unknown"),
+        (Frame(Kind.SETUP, 9, b"\0"), "malformed payload"),
+        (Frame(Kind.SETUP, 9, SETUP.pack(1000, 4)), "clock or mode is not possible"),
+        (Frame(Kind.BATCH, 9), "malformed payload"),
+        (Frame(Kind.BATCH, 9, batch(SpiStep(b"abc"))[:-1]), "malformed payload"),
+        (Frame(Kind.BATCH, 9, batch(SpiStep(b"a", 0x80))), "malformed payload"),
+        (Frame(Kind.BATCH, 9, batch(SpiStep(bytes(200)))), "payload above 100 bytes"),
+    ],
+)
+def test_the_bridge_says_why_it_refuses(frame, reason):
+    emulator, _ = ready(largest_payload=100, select_lines=0x07)
+    assert replies(emulator.feed(encode(frame), 0.0)) == [Frame(0xFF, 9, reason.encode())]
+
+
+def test_a_bridge_that_was_not_set_up_refuses_batches():
+    data = BridgeEmulator(loopback).feed(encode(Frame(Kind.BATCH, 1, batch(SpiStep(b"a")))), 0.0)
+    assert replies(data) == [Frame(0xFF, 1, b"not set up")]
+
+
+def test_the_bridge_holds_so_many_batches():
+    emulator, _ = ready(holds=2)
+    data = emulator.feed(b"".join(encode(Frame(Kind.BATCH, n, batch(SpiStep(b"a", 1, 1000)))) for n in range(3)), 0.0)
+    assert replies(data) == [Frame(0xFF, 2, b"full")]
+
+
+@settings(max_examples=100)
+@given(st.binary(max_size=400))
+def test_the_bridge_survives_any_bytes(noise):
+    emulator, _ = ready()
+    emulator.feed(noise + b"\0", 0.0)
+    (hello,) = replies(emulator.feed(encode(Frame(Kind.HELLO, 1)), 0.0))
+    assert hello.kind == Kind.HELLO.reply
+
+
+needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
+
+
+@pytest.fixture
+def emulator():
+    return BridgeEmulator(Told(), fastest_hz=4_000_000, select_lines=0x07, largest_payload=1000, holds=3)
+
+
+@pytest.fixture
+def link(emulator):
+    with serving(emulator) as far, SpiBridge(far.name, speed_hz=4_400_000) as link:
+        yield link
+
+
+@needs_pty
+def test_the_bridge_introduces_itself(link):
+    assert (link.name, link.firmware, link.select_lines, link.speed_hz) == ("tactbench emulator", 1, 7, 4_000_000)
+
+
+@needs_pty
+def test_a_transfer(link):
+    assert link.transfer(b"\x00\x01\xff", select=2) == b"\xff\xfe\x00"
+
+
+@needs_pty
+def test_batches_are_answered_in_order(link):
+    numbers = [link.send([SpiStep(bytes([n]), 1, 50), SpiStep(b"", pause_us=5), SpiStep(b"\0\0")]) for n in range(3)]
+    found = [link.receive(2.0) for _ in numbers]
+    assert [reply.number for reply in found] == numbers == [0, 1, 2]
+    assert [reply.data for reply in found] == [(bytes([255 - n]), b"", b"\xff\xff") for n in range(3)]
+    # 3 bytes at 4 MHz take 6 us, the pauses 55 us: a batch begins 61 us or more after the one before.
+    assert (found[1].device_us - found[0].device_us) % 2**32 >= 60
+    assert (found[2].device_us - found[1].device_us) % 2**32 >= 60
+
+
+@needs_pty
+@pytest.mark.parametrize(
+    ("steps", "said"),
+    [
+        ([], "without a step"),
+        ([SpiStep(b"a", 8)], "select lines 0x7"),
+        ([SpiStep(b"a", pause_us=70000)], "65535 us"),
+        ([SpiStep(bytes(1000))], "the bridge takes 1000"),
+    ],
+)
+def test_impossible_batches_are_refused_before_they_are_sent(link, steps, said):
+    with pytest.raises(LinkError, match=said):
+        link.send(steps)
+    assert link.transfer(b"\xff") == b"\x00"
+
+
+@needs_pty
+def test_more_than_the_bridge_holds_is_refused(link):
+    for _ in range(3):
+        link.send([SpiStep(b"a")])
+    with pytest.raises(LinkError, match="Receive a reply first"):
+        link.send([SpiStep(b"a")])
+    for _ in range(3):
+        link.receive(2.0)
+    assert link.transfer(b"\xff") == b"\x00"
+
+
+@needs_pty
+@pytest.mark.parametrize("fault", ["dropped", "damaged"])
+def test_a_reply_that_does_not_come_is_a_timeout_and_then_a_gap(link, emulator, fault):
+    emulator.faults.add(fault)
+    first = link.send([SpiStep(b"a")])
+    with pytest.raises(LinkTimeout):
+        link.receive(0.1)
+    emulator.faults.clear()
+    second = link.send([SpiStep(b"\x01")])
+    reply = link.receive(2.0)
+    assert (reply.number, reply.data) == (second, (b"\xfe",)) == (first + 1, (b"\xfe",))
+    assert (link.lost, link.damaged) == (1, 1 if fault == "damaged" else 0)
+
+
+@needs_pty
+def test_a_transfer_given_up_leaves_room(link, emulator):
+    emulator.faults.add("dropped")
+    for _ in range(5):
+        with pytest.raises(LinkTimeout):
+            link.transfer(b"a", timeout_s=0.02)
+    emulator.faults.clear()
+    assert link.transfer(b"\xff") == b"\x00"
+
+
+@needs_pty
+def test_a_doubled_reply_is_counted_once(link, emulator):
+    emulator.faults.add("doubled")
+    assert [link.transfer(bytes([n])) for n in range(3)] == [b"\xff", b"\xfe", b"\xfd"]
+    with pytest.raises(LinkTimeout):
+        link.receive(0.1)
+    assert link.unexpected == 3
+
+
+@needs_pty
+def test_what_is_no_bridge_is_said(tmp_path):
+    with pty() as far, pytest.raises(LinkError, match="answered as an SPI bridge within"):
+        SpiBridge(far.name, speed_hz=1000, wake_s=0.05)
+
+
+@needs_pty
+def test_a_bridge_of_another_version_is_refused():
+    class Newer(BridgeEmulator):
+        def feed(self, data, now_s):
+            about = HELLO.pack(2, 10, 1, 1)
+            return encode(Frame(Kind.HELLO.reply, 0, about, version=2)) if data else b""
+
+    with serving(Newer(loopback)) as far, pytest.raises(LinkError, match="speaks version 2"):
+        SpiBridge(far.name, speed_hz=1000)
+
+
+@needs_pty
+def test_a_mode_that_the_bridge_cannot_do_is_refused():
+    with serving(BridgeEmulator(loopback)) as far, pytest.raises(LinkError, match="clock or mode"):
+        SpiBridge(far.name, speed_hz=1000, mode=7)
+
+
+@needs_pty
+def test_biotac_frames_at_full_rate_lose_nothing(link):
+    """Ten frames of 44 samples, three of them ahead: two bytes, 50 us, two bytes each (4400 samples a second)."""
+    steps = [step for n in range(44) for step in (SpiStep(bytes([n, 0]), 7, 50), SpiStep(b"\0\1", 1, 150))]
+    for number in range(12):
+        if number >= 2:
+            reply = link.receive(5.0)
+            assert reply.number == number - 2
+            assert reply.data[::2] == tuple(bytes([255 - n, 255]) for n in range(44))
+        if number < 10:
+            link.send(steps)
+    assert (link.lost, link.damaged, link.unexpected) == (0, 0, 0)
+
+
+def test_stamp_of_a_reply_is_that_of_its_first_byte():
+    """A reply that comes in two pieces, the clock standing at 1 for the first, at 2 for the second."""
+    if os.name != "posix":
+        pytest.skip("pseudo-terminals are POSIX")
+    ticks = [0]
+    with serving(BridgeEmulator(loopback)) as far, SpiBridge(far.name, speed_hz=1000, clock=lambda: ticks[0]) as link:
+        reply = encode(Frame(0x83, 0, bytes(4) + b"ab"))
+        link._waiting[0] = (2,)
+        for t_ns, part in ((1, reply[:5]), (2, reply[5:])):
+            ticks[0] = t_ns
+            far.write(part)
+            if t_ns == 1:
+                with pytest.raises(LinkTimeout):
+                    link.receive(0.05)
+        found = link.receive(2.0)
+        assert (found.t_ns, found.data) == (1, (b"ab",))

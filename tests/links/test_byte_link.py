@@ -1,0 +1,71 @@
+"""Byte streams on pseudo-terminals, sockets and pyserial's other URLs."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import pytest
+
+from tactbench.plugin import ByteLink, LinkError, LinkTimeout, open_link
+from tests.links.ends import pty
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
+
+ALL_BYTES = bytes(range(256))
+
+
+@pytest.fixture
+def far():
+    with pty() as end:
+        yield end
+
+
+def test_every_byte_passes_unchanged_both_ways(far):
+    with ByteLink(far.name) as link:
+        link.write(ALL_BYTES)
+        assert far.read_until(b"\xff") == ALL_BYTES
+        far.write(ALL_BYTES)
+        data = b""
+        while len(data) < 256:
+            data += link.read(2.0).data
+        assert data == ALL_BYTES
+
+
+def test_what_has_come_is_returned_at_once_and_no_more_than_asked(far):
+    with ByteLink(far.name) as link:
+        far.write(b"abcdef")
+        assert link.read(2.0, size=4).data == b"abcd"
+        assert link.read(0).data == b"ef"
+
+
+def test_stamp_is_taken_when_the_first_byte_is_there(far):
+    """Not when the wait began: the clock stands at 1 until the far end writes, and at 2 from then on."""
+    now = [1]
+    with ByteLink(far.name, clock=lambda: now[0]) as link:
+
+        def write() -> None:
+            now[0] = 2
+            far.write(b"a")
+
+        timer = threading.Timer(0.05, write)
+        timer.start()
+        assert link.read(5.0).t_ns == 2
+        timer.join()
+
+
+def test_a_port_is_opened_by_one_only(far):
+    with ByteLink(far.name), pytest.raises(LinkError, match="Another program has it open"):
+        ByteLink(far.name)
+
+
+def test_a_far_end_that_does_not_read_is_a_timeout(far):
+    with ByteLink(far.name) as link, pytest.raises(LinkTimeout, match="did not take"):
+        link.write(bytes(1 << 20))  # a pseudo-terminal holds some ten thousand
+
+
+def test_spy_shows_the_bytes_on_stderr(far, capsys):
+    with open_link(f"spy://{far.name}?baud=9600") as link:
+        link.write(b"POS\r")
+        assert far.read_until(b"\r") == b"POS\r"
+    assert "50 4F 53 0D" in capsys.readouterr().err

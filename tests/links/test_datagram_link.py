@@ -1,0 +1,75 @@
+"""Datagrams on loopback."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from tactbench.plugin import DatagramLink, LinkError, LinkTimeout, open_link
+
+
+@pytest.fixture
+def far():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
+        end.bind(("127.0.0.1", 0))
+        end.settimeout(5.0)
+        yield end
+
+
+def test_datagrams_stay_whole_and_apart(far):
+    with DatagramLink("127.0.0.1", far.getsockname()[1]) as link:
+        link.send(b"request")
+        data, sender = far.recvfrom(100)
+        assert data == b"request"
+        for reply in (b"a" * 36, b"", b"b" * 60000):
+            far.sendto(reply, sender)
+            assert link.receive(5.0).data == reply
+
+
+def test_only_the_peer_is_heard(far):
+    with DatagramLink("127.0.0.1", far.getsockname()[1]) as link:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.sendto(b"stranger", ("127.0.0.1", link.local_port))
+        far.sendto(b"peer", ("127.0.0.1", link.local_port))
+        assert link.receive(5.0).data == b"peer"
+        with pytest.raises(LinkTimeout):
+            link.receive(0)
+
+
+def test_the_buffer_holds_a_second_of_force_at_1_khz(far):
+    """36 bytes a datagram: the usual buffer holds 256 of them."""
+    with DatagramLink("127.0.0.1", far.getsockname()[1]) as link:
+        if link.granted_bytes < 1 << 20:
+            pytest.skip(f"this system gives a buffer of {link.granted_bytes} bytes at most")
+        for number in range(1000):
+            far.sendto(number.to_bytes(36, "big"), ("127.0.0.1", link.local_port))
+        assert [int.from_bytes(link.receive(5.0).data, "big") for _ in range(1000)] == list(range(1000))
+
+
+def test_a_local_port_can_be_asked_for_once(far):
+    with open_link(f"udp://127.0.0.1:{far.getsockname()[1]}") as free:
+        local_port = free.local_port
+        with pytest.raises(LinkError, match="choose another port"):
+            open_link(f"udp://127.0.0.1:{far.getsockname()[1]}?local_port={local_port}")
+    with open_link(f"udp://127.0.0.1:{far.getsockname()[1]}?local_port={local_port}") as link:
+        assert link.local_port == local_port
+
+
+def test_ipv6(far):
+    try:
+        six = socket.socket(socket.AF_INET6, socket.SOCK_DGRAM)
+        six.bind(("::1", 0))
+    except OSError as error:
+        pytest.skip(f"no IPv6 here: {error}")
+    with six, open_link(f"udp://[::1]:{six.getsockname()[1]}") as link:
+        link.send(b"x")
+        assert six.recv(10) == b"x"
+
+
+def test_what_is_too_long_is_refused_and_the_link_lives_on(far):
+    with DatagramLink("127.0.0.1", far.getsockname()[1]) as link:
+        with pytest.raises(LinkError, match="65507"):
+            link.send(bytes(65508))
+        link.send(b"x")
+        assert far.recv(10) == b"x"
