@@ -15,10 +15,10 @@ import sys
 import time
 from dataclasses import fields
 
+from tactbench.plugin import CanFrame
 from tactbench.sensors.icub.codec import (
     BoardSetup,
     Counts,
-    Frame,
     SkinDecoder,
     Transmit,
     TriangleSetup,
@@ -33,15 +33,15 @@ PERIOD_S = 0.02
 COMMANDS = (0x4D, 0x50, 0x07, 0x4C, 0x4E, 0x1C)
 
 
-def anything(generator: random.Random, t_ns: int) -> Frame:
+def anything(generator: random.Random, t_ns: int) -> CanFrame:
     """Return a frame that may be anything."""
     kind = generator.random()
     data = generator.randbytes(generator.randrange(9))
     if kind < 0.5:
-        return Frame(0x400 | generator.randrange(256), bytes([generator.choice((0x40, 0xC0))]) + data, False, t_ns)
+        return CanFrame(0x400 | generator.randrange(256), bytes([generator.choice((0x40, 0xC0))]) + data, False, t_ns)
     if kind < 0.75:
-        return Frame(0x20E, bytes([generator.choice(COMMANDS)]) + data[:7], False, t_ns)
-    return Frame(generator.randrange(-1, 1 << 30), data, generator.random() < 0.5, t_ns)
+        return CanFrame(0x20E, bytes([generator.choice(COMMANDS)]) + data[:7], False, t_ns)
+    return CanFrame(generator.randrange(-1, 1 << 30), data, generator.random() < 0.5, t_ns)
 
 
 def main() -> int:

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality, RigError, UsageError
+from tactbench.plugin import Block, CanFrame, Quality, RigError, UsageError
 
 BIT_RATE = 1_000_000
 """Bits a second on the bus [sourced: IM, rate index 0, "1 MB/s" in its comment]."""
@@ -29,18 +29,6 @@ BROADCAST = 0xF
 """Destination that every board takes as its own."""
 NO_ACK, NOT_CONNECTED, RESERVED = 0x1, 0x2, 0xC
 """Low bits of the error word: some taxel gave no answer; the chip gave none; no source gives these a meaning."""
-
-
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """A CAN data frame. Remote and error frames are the link's business."""
-
-    id: int
-    data: bytes
-    extended: bool = False
-    """29-bit identifier; these boards have none."""
-    t_ns: int = 0
-    """Host time of receipt, nanoseconds."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +123,7 @@ def skin_id(board: int, triangle: int, *, old: bool = False) -> int:
     return kind << 8 | _within("board", board, 15) << 4 | _within("triangle", triangle, 15)
 
 
-def command_frame(board: int, command: Command, *, source: int = 0) -> Frame:
+def command_frame(board: int, command: Command, *, source: int = 0) -> CanFrame:
     """Return the frame that carries `command`.
 
     Parameters
@@ -164,10 +152,10 @@ def command_frame(board: int, command: Command, *, source: int = 0) -> Frame:
             numbers = [0x4E, shift, shift_3_1, no_load, param, *_low_high(enabled_mask), 0x0A]
         case VersionRequest(major, minor):
             numbers = [0x1C, major, minor]
-    return Frame(polling_id(board, source), bytes(_within("a byte of the command", n, 255) for n in numbers))
+    return CanFrame(polling_id(board, source), bytes(_within("a byte of the command", n, 255) for n in numbers))
 
 
-def read_command(frame: Frame) -> tuple[int, Command] | None:
+def read_command(frame: CanFrame) -> tuple[int, Command] | None:
     """Return (destination board, command), or None if `frame` is none of these commands or too short for it."""
     if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or not frame.data:
         return None
@@ -190,13 +178,13 @@ def read_command(frame: Frame) -> tuple[int, Command] | None:
     return board, found
 
 
-def version_frame(board: int, version: Version, *, to: int = 0) -> Frame:
+def version_frame(board: int, version: Version, *, to: int = 0) -> CanFrame:
     """Return the answer of `board` to the :class:`VersionRequest` of `to`; raises UsageError as command_frame does."""
     numbers = (0x1C, version.board_type, *version.firmware, *version.protocol, int(version.fits))
-    return Frame(polling_id(to, board), bytes(_within("a byte of the version", n, 255) for n in numbers))
+    return CanFrame(polling_id(to, board), bytes(_within("a byte of the version", n, 255) for n in numbers))
 
 
-def read_version(frame: Frame) -> tuple[int, Version] | None:
+def read_version(frame: CanFrame) -> tuple[int, Version] | None:
     """Return (board that answers, its version), or None if `frame` is no such answer."""
     if frame.extended or not 0 <= frame.id <= 0x7FF or frame.id >> 8 != POLLING or len(frame.data) != 8:
         return None
@@ -208,7 +196,7 @@ def read_version(frame: Frame) -> tuple[int, Version] | None:
 
 def skin_frames(
     board: int, triangle: int, taxels: Sequence[int], word: int = 0, *, old: bool = False, t_ns: int = 0
-) -> tuple[Frame, Frame]:
+) -> tuple[CanFrame, CanFrame]:
     """Return head and tail.
 
     Parameters
@@ -229,8 +217,8 @@ def skin_frames(
     identifier = skin_id(board, triangle, old=old)
     errors = _within("the error word", word, 0xFFFF).to_bytes(2, "big")
     return (
-        Frame(identifier, bytes([HEAD]) + values[:IN_HEAD], t_ns=t_ns),
-        Frame(identifier, bytes([TAIL]) + values[IN_HEAD:] + errors, t_ns=t_ns),
+        CanFrame(identifier, bytes([HEAD]) + values[:IN_HEAD], t_ns=t_ns),
+        CanFrame(identifier, bytes([TAIL]) + values[IN_HEAD:] + errors, t_ns=t_ns),
     )
 
 
@@ -303,9 +291,9 @@ class Counts:
 @dataclass
 class _Triangle:
     counts: Counts = field(default_factory=Counts)
-    head: Frame | None = None
+    head: CanFrame | None = None
     """Waits for its tail."""
-    tail: Frame | None = None
+    tail: CanFrame | None = None
     """The last one."""
     doubled: tuple[int, ...] = ()
     """Taxels of frames that came twice since the last sample."""
@@ -359,7 +347,7 @@ class SkinDecoder:
         """(board, triangle) -> what was found so far."""
         return {key: triangle.counts for key, triangle in self._triangles.items()}
 
-    def feed(self, frame: Frame) -> list[Sample]:
+    def feed(self, frame: CanFrame) -> list[Sample]:
         """Return the samples, at most two, that `frame` completes or proves incomplete."""
         data = frame.data
         known = not frame.extended and 0 <= frame.id <= 0x7FF and frame.id >> 8 in self._classes
@@ -401,10 +389,12 @@ class SkinDecoder:
                 found.append(self._sample(key, triangle, head, None))
         return found
 
-    def _near(self, first: Frame, second: Frame) -> bool:
+    def _near(self, first: CanFrame, second: CanFrame) -> bool:
         return 0 <= second.t_ns - first.t_ns < self._period_ns / 2
 
-    def _sample(self, key: tuple[int, int], triangle: _Triangle, head: Frame | None, tail: Frame | None) -> Sample:
+    def _sample(
+        self, key: tuple[int, int], triangle: _Triangle, head: CanFrame | None, tail: CanFrame | None
+    ) -> Sample:
         counts = triangle.counts
         first = head or tail
         assert first is not None

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import Literal, TypeAlias
 
-from tactbench.plugin import UsageError
+from tactbench.plugin import CanFrame, UsageError
 from tactbench.sensors.icub.codec import (
     BIT_RATE,
     BROADCAST,
@@ -26,7 +26,6 @@ from tactbench.sensors.icub.codec import (
     TAXELS,
     BoardSetup,
     Command,
-    Frame,
     OldSetup,
     Transmit,
     TriangleSetup,
@@ -192,7 +191,7 @@ class Board:
         self._setup = BoardSetup(skin_type=0, period_ms=50, no_load=245)
         self._active = [True] * 16
 
-    def command(self, command: Command, now_s: float, source: int = 0) -> list[Frame]:
+    def command(self, command: Command, now_s: float, source: int = 0) -> list[CanFrame]:
         """Carry out `command` from `source` at `now_s` and return what is answered."""
         if not self._baseline:
             self._calibrate(now_s)  # IF starts its chips with the first command
@@ -226,7 +225,7 @@ class Board:
                 self.ignored += 1
         return []
 
-    def tick(self) -> list[Frame]:
+    def tick(self) -> list[CanFrame]:
         """Read all chips at :attr:`next_s` and return head and tail of every enabled triangle."""
         now_s = self.next_s
         self.next_s += self._setup.period_ms * 1e-3
@@ -234,7 +233,7 @@ class Board:
         if self._no_acks >= FORCED_AFTER:
             self._no_acks = 0
             self._calibrate(now_s)
-        frames: list[Frame] = []
+        frames: list[CanFrame] = []
         for triangle in range(16):
             if self._active[triangle]:
                 taxels, word = self._fill(triangle, now_s)
@@ -244,7 +243,7 @@ class Board:
                 frames += skin_frames(self.address, triangle, taxels, word)
         return frames
 
-    def sent(self, frames: Iterable[Frame], now_s: float) -> list[tuple[float, Frame]]:
+    def sent(self, frames: Iterable[CanFrame], now_s: float) -> list[tuple[float, CanFrame]]:
         """Return when each of `frames` is ready for the bus, seconds, after faults of sending."""
         ready = []
         for frame in frames:
@@ -314,7 +313,7 @@ class Board:
         return taxels, word
 
 
-def frame_s(frame: Frame) -> float:
+def frame_s(frame: CanFrame) -> float:
     """Return how long a frame with an 11-bit identifier holds the bus, seconds, with all possible stuff bits.
 
     [derived: CAN 2.0A, 44 bits and 8 a byte, of which 34 and 8 a byte are stuffed after each fourth, and 3 between
@@ -346,11 +345,11 @@ class Bus:
         if len(self.boards) < len(listed):
             raise UsageError("Two boards have one address.", hint="Give each board an address of its own.")
         self._number = count()
-        self._later: list[tuple[float, int, Board, Frame]] = []
+        self._later: list[tuple[float, int, Board, CanFrame]] = []
         """Heap of frames by the time at which they are ready."""
-        self._waiting: list[tuple[int, int, Board, Frame]] = []
+        self._waiting: list[tuple[int, int, Board, CanFrame]] = []
         """Heap of ready frames by identifier."""
-        self._on_wire: tuple[float, Frame] | None = None
+        self._on_wire: tuple[float, CanFrame] | None = None
         self._free_s = -math.inf
         self._queued = dict.fromkeys(self.boards, 0)
 
@@ -361,7 +360,7 @@ class Bus:
             return self._on_wire[0]
         return self._begin_s()
 
-    def feed(self, frame: Frame, now_s: float) -> list[Frame]:
+    def feed(self, frame: CanFrame, now_s: float) -> list[CanFrame]:
         """Return what `poll(now_s)` does, after which every board that `frame` addresses carries it out."""
         out = self.poll(now_s)
         found = read_command(frame)
@@ -373,9 +372,9 @@ class Bus:
                 self._queue(board, board.command(command, now_s, source=frame.id >> 4 & 0xF), now_s)
         return out
 
-    def poll(self, now_s: float) -> list[Frame]:
+    def poll(self, now_s: float) -> list[CanFrame]:
         """Return the frames that ended up to `now_s`, in order, each with the time of its end."""
-        out: list[Frame] = []
+        out: list[CanFrame] = []
         while True:
             if self._on_wire:
                 end_s, frame = self._on_wire
@@ -410,7 +409,7 @@ class Bus:
             _, number, board, frame = heapq.heappop(self._later)
             heapq.heappush(self._waiting, (frame.id, number, board, frame))
 
-    def _queue(self, board: Board, frames: Iterable[Frame], now_s: float) -> None:
+    def _queue(self, board: Board, frames: Iterable[CanFrame], now_s: float) -> None:
         for ready_s, frame in board.sent(frames, now_s):
             if self._queued[board.address] >= QUEUE_FRAMES:
                 board.lost += 1

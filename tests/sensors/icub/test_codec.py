@@ -10,12 +10,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Quality, RigError, UsageError
+from tactbench.plugin import CanFrame, Quality, RigError, UsageError
 from tactbench.sensors.icub.codec import (
     NO_ACK,
     NOT_CONNECTED,
     BoardSetup,
-    Frame,
     OldSetup,
     OldSetup2,
     Sample,
@@ -111,15 +110,15 @@ CHANGES = {
 """(reading at rest, shift) -> change and byte, with a star where the taxel is called out of range."""
 
 
-def frame(identifier: int, data: str, t_ns: int = 0) -> Frame:
-    return Frame(identifier, bytes.fromhex(data), t_ns=t_ns)
+def frame(identifier: int, data: str, t_ns: int = 0) -> CanFrame:
+    return CanFrame(identifier, bytes.fromhex(data), t_ns=t_ns)
 
 
-def pair(t_ns: int = 0, value: int = 240, word: int = 0) -> tuple[Frame, Frame]:
+def pair(t_ns: int = 0, value: int = 240, word: int = 0) -> tuple[CanFrame, CanFrame]:
     return skin_frames(14, 3, [value] * 12, word, t_ns=t_ns)
 
 
-def fed(decoder: SkinDecoder, *frames: Frame) -> list[Sample]:
+def fed(decoder: SkinDecoder, *frames: CanFrame) -> list[Sample]:
     return [sample for one in frames for sample in decoder.feed(one)]
 
 
@@ -331,8 +330,8 @@ def test_class_three_belongs_to_others_unless_asked_for():
 def test_frames_of_wrong_length_and_kind_are_kept_out():
     decoder = SkinDecoder(PERIOD_S)
     head, tail = pair()
-    assert fed(decoder, replace(head, extended=True), Frame(0x4E3, b""), Frame(0x4E3, bytes([64]))) == []
-    assert fed(decoder, Frame(0x4E3, tail.data[:5])) == []
+    assert fed(decoder, replace(head, extended=True), CanFrame(0x4E3, b""), CanFrame(0x4E3, bytes([64]))) == []
+    assert fed(decoder, CanFrame(0x4E3, tail.data[:5])) == []
     assert (decoder.foreign, decoder.counts[14, 3].malformed) == (2, 2)
     (sample,) = fed(decoder, head, tail)
     assert set(sample.quality) == {GOOD}
@@ -372,7 +371,7 @@ def test_a_block_is_of_one_triangle():
 
 
 frames = st.builds(
-    Frame,
+    CanFrame,
     st.one_of(st.integers(-1, 0x1FFFFFFF), st.sampled_from([0x4E3, 0x3E3, 0x20E, 0x2E0])),
     st.one_of(
         st.binary(max_size=64),
@@ -389,7 +388,7 @@ frames = st.builds(
 
 @given(st.lists(frames, max_size=30))
 @settings(max_examples=100, deadline=None)
-@example([Frame(0x4E3, bytes([0x40]) * 8, t_ns=-5)])
+@example([CanFrame(0x4E3, bytes([0x40]) * 8, t_ns=-5)])
 def test_any_frames_are_survived_and_the_next_sample_is_whole(given_frames):
     decoder = SkinDecoder(PERIOD_S, old_ids=True)
     for one in given_frames:
@@ -439,7 +438,7 @@ def _adapter() -> can.BusABC:
     return can.Bus(interface="slcan", channel="loop://", bitrate=1_000_000, sleep_after_open=0)
 
 
-def _lawicel(one: Frame) -> bytes:
+def _lawicel(one: CanFrame) -> bytes:
     """What python-can's slcan writes for a frame, after having read the same frame back from it."""
     bus = _adapter()
     try:
@@ -450,7 +449,7 @@ def _lawicel(one: Frame) -> bytes:
         port.write(text)
         heard = bus.recv(timeout=1.0)
         assert heard is not None
-        assert Frame(heard.arbitration_id, bytes(heard.data), heard.is_extended_id) == one
+        assert CanFrame(heard.arbitration_id, bytes(heard.data), heard.is_extended_id) == one
         return text
     finally:
         bus.shutdown()

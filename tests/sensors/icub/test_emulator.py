@@ -10,12 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Quality, UsageError
+from tactbench.plugin import CanFrame, Quality, UsageError
 from tactbench.sensors.icub.codec import (
     BROADCAST,
     BoardSetup,
     Command,
-    Frame,
     OldSetup,
     OldSetup2,
     Sample,
@@ -45,7 +44,7 @@ def fingertip(press: Callable[[float], Iterable[float]]) -> Callable[[int, float
     return lambda triangle, now_s: results_of(243.0 - d for d in press(now_s)) if triangle == 3 else None
 
 
-def told(bus: Bus, *commands: Command, to: int = 14, now_s: float = 0.0) -> list[Frame]:
+def told(bus: Bus, *commands: Command, to: int = 14, now_s: float = 0.0) -> list[CanFrame]:
     return [frame for command in commands for frame in bus.feed(command_frame(to, command), now_s)]
 
 
@@ -126,13 +125,13 @@ def test_the_old_set_up_starts_with_defaults_and_40_ms():
 def test_what_the_firmware_passes_over_is_counted():
     board = Board(14, still)
     bus = started(Bus([board]))
-    bus.feed(Frame(0x20E, bytes.fromhex("50 05 04 02 01 00 22")), 0.0)
-    bus.feed(Frame(0x20E, bytes.fromhex("50 00 10 02 01 00 22")), 0.0)
+    bus.feed(CanFrame(0x20E, bytes.fromhex("50 05 04 02 01 00 22")), 0.0)
+    bus.feed(CanFrame(0x20E, bytes.fromhex("50 00 10 02 01 00 22")), 0.0)
     told(bus, BoardSetup(skin_type=3))
     assert board.ignored == 3
     assert len(bus.poll(0.05)) == 2
-    assert bus.feed(Frame(0x20E, b""), 0.05) == []
-    assert bus.feed(Frame(0x20D, bytes([7, 1])), 0.05) == []  # another board's
+    assert bus.feed(CanFrame(0x20E, b""), 0.05) == []
+    assert bus.feed(CanFrame(0x20D, bytes([7, 1])), 0.05) == []  # another board's
     assert len(bus.poll(0.09)) == 2
 
 
@@ -351,7 +350,7 @@ def test_boards_share_the_bus_one_frame_at_a_time():
 
 def test_the_length_of_a_frame_is_that_of_the_spec_s_delay():
     # 2 frames of 135 bits, as SensorSpec.link_delay derives it; it states 10 microseconds.
-    assert 2 * frame_s(Frame(0x4E3, bytes(8))) == pytest.approx(PAIR_S, abs=1e-12)
+    assert 2 * frame_s(CanFrame(0x4E3, bytes(8))) == pytest.approx(PAIR_S, abs=1e-12)
 
 
 def test_a_bus_that_is_too_slow_loses_frames_and_says_so():
@@ -387,7 +386,7 @@ def test_how_often_it_is_polled_changes_nothing(times):
 @given(
     st.lists(
         st.builds(
-            Frame,
+            CanFrame,
             st.one_of(st.integers(0, 0x7FF), st.sampled_from([0x20E, 0x20F])),
             st.builds(
                 lambda code, rest: bytes([code]) + rest,
