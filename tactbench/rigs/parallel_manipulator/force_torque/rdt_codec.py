@@ -37,8 +37,8 @@ _RECORD = struct.Struct(">III6i")
 _HEADER = 0x1234
 RECORD_BYTES = _RECORD.size
 MOST_BUFFERED = 40
-"""Records in one datagram of buffered transfer, at most (sourced: ATI manual 9620-05-NET FT, section 7.4, as quoted in a
-public client)."""
+"""Records in one datagram of buffered transfer, at most (sourced: ATI manual 9620-05-NET FT, section 7.4, as quoted in
+a public client)."""
 SEQUENCE_MODULUS = 1 << 32
 
 
@@ -60,8 +60,8 @@ class Request(NamedTuple):
     """One request."""
 
     command: Command
-    count: int = 0
-    """Records wanted; 0: until stopped."""
+    records: int = 0
+    """How many are wanted; 0: until stopped."""
 
 
 class Record(NamedTuple):
@@ -78,9 +78,9 @@ class Record(NamedTuple):
 
 def encode_request(request: Request) -> bytes:
     """Return the 8 bytes of a request; raises ValueError for a count that 32 bits do not hold."""
-    if not 0 <= request.count < SEQUENCE_MODULUS:
-        raise ValueError(f"a count is 0 to 2^32 - 1, not {request.count}")
-    return _REQUEST.pack(_HEADER, request.command, request.count)
+    if not 0 <= request.records < SEQUENCE_MODULUS:
+        raise ValueError(f"a count is 0 to 2^32 - 1, not {request.records}")
+    return _REQUEST.pack(_HEADER, request.command, request.records)
 
 
 def decode_request(data: bytes) -> Request:
@@ -248,8 +248,8 @@ class Step(Enum):
 def step(previous: int, current: int) -> tuple[Step, int]:
     """Return how `current` follows `previous`, and how many records were lost between them.
 
-    Differences are modulo 2^32: 0 is a duplicate, 1 in order, up to 2^31 - 1 a gap, above out of order (sourced: pyNetFT,
-    sequence.cpp).
+    Differences are modulo 2^32: 0 is a duplicate, 1 in order, up to 2^31 - 1 a gap, above out of order (sourced:
+    pyNetFT, sequence.cpp).
     """
     delta = (current - previous) % SEQUENCE_MODULUS
     if delta == 0:
@@ -273,7 +273,7 @@ class RecordCounts:
     rejected: int = 0
     """Datagrams that are none of this protocol."""
     lost: int = 0
-    """Records that never came: gaps, less those that came late."""
+    """Records missing where they were due; those that came late are among them."""
     duplicates: int = 0
     late: int = 0
     restarts: int = 0
@@ -326,12 +326,15 @@ class RecordReader:
         counts.received += 1
         how, lost = (Step.IN_ORDER, 0) if self._previous is None else step(self._previous, record.rdt_sequence)
         if how is Step.OUT_OF_ORDER:
-            if self._behind and step(self._behind[-1], record.rdt_sequence)[0] is not Step.IN_ORDER:
+            after = step(self._behind[-1], record.rdt_sequence)[0] if self._behind else Step.IN_ORDER
+            if after is Step.DUPLICATE:
+                counts.duplicates += 1
+                return None
+            if after is not Step.IN_ORDER:
                 self._behind.clear()
             self._behind.append(record.rdt_sequence)
             if len(self._behind) < RESTART_RUN:
                 counts.late += 1
-                counts.lost = max(counts.lost - 1, 0)
                 return None
             counts.restarts += 1
         self._behind.clear()

@@ -146,7 +146,7 @@ class RdtEmulator:
         match request.command:
             case Command.START_REALTIME | Command.START_BUFFERED:
                 ended = self._ended()
-                self._left = request.count or None
+                self._left = request.records or None
                 self._buffered = request.command is Command.START_BUFFERED
                 self._sequence = self._first_sequence
                 # The first sample after the request: a sample is not older than what asks for it.

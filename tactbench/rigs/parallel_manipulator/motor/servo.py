@@ -80,8 +80,8 @@ class Profile:
     def braking_speed(away_m: float, tick_s: float, braking: float) -> float:
         """Return the speed of the next tick from which whole ticks of braking end on the target, `away_m` from here.
 
-        n ticks of speed v, v - a h, …, v - (n - 1) a h cover h (n v - a h n (n - 1) / 2), n the least number of ticks that
-        reaches (derived).
+        n ticks of speed v, v - a h, …, v - (n - 1) a h cover h (n v - a h n (n - 1) / 2), n the least number of ticks
+        that reaches (derived).
         """
         step = braking * tick_s
         n = max(1, math.ceil(math.sqrt(0.25 + 2.0 * abs(away_m) / (step * tick_s)) - 0.5))
