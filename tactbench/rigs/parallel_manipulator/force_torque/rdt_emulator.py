@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 from xml.sax.saxutils import escape
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import UsageError
+from tactbench.rigs.parallel_manipulator.fault import Fault, concerned
 from tactbench.rigs.parallel_manipulator.force_torque.rdt_codec import (
     MOST_BUFFERED,
     SEQUENCE_MODULUS,
@@ -27,8 +31,17 @@ SENSOR_RATE_HZ = 7000
 """The box samples at 7 kHz and sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
 public client)."""
 
-FAULTS = ("dropped", "doubled", "out of order", "saturated")
-"""The first three by chance for each datagram, `share` of them; `saturated` for every record."""
+
+@dataclass(frozen=True)
+class DatagramFault(Fault):
+    """A fault of the sensor, or of the way its datagrams take."""
+
+    known: ClassVar[Mapping[str, str]] = {
+        "dropped": "a datagram does not arrive",
+        "doubled": "a datagram arrives twice",
+        "out-of-order": "a datagram arrives after the next one",
+        "saturated": "the sensor is at an end of its range",
+    }
 
 
 class RdtEmulator:
@@ -38,8 +51,6 @@ class RdtEmulator:
     ----------
     wrench
         Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] at a time [s].
-    rng
-        Draws the datagrams that a fault hits; each fault has a generator of its own, spawned from it.
     scale
         Counts per unit; the default is usual (sourced: pyNetFT).
     rate_hz
@@ -49,26 +60,25 @@ class RdtEmulator:
         FT8577, quoted in a public script).
     threshold_n
         A force on one axis that sets the monitor condition, which stays until it is reset; None: no condition.
-    share
-        Part of the datagrams, 0 to 1, that a fault hits while it is on.
     buffer_records
         Records in a datagram of buffered transfer.
     first_sequence
         Of records and samples, to begin near the wrap of the counters.
+    faults
+        What is wrong with it; may be changed at any time.
     """
 
     def __init__(
         self,
         wrench: Callable[[float], Sequence[float]],
-        rng: np.random.Generator,
         *,
         scale: CountScale | None = None,
         rate_hz: float = 1000.0,
         largest: Sequence[float] = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25),
         threshold_n: float | None = None,
-        share: float = 0.1,
         buffer_records: int = MOST_BUFFERED,
         first_sequence: int = 1,
+        faults: Iterable[DatagramFault] = (),
     ) -> None:
         if not 0.0 < rate_hz <= SENSOR_RATE_HZ:
             raise UsageError(f"A Net F/T box sends up to {SENSOR_RATE_HZ} records a second, not {rate_hz:g}.")
@@ -82,11 +92,10 @@ class RdtEmulator:
         self._wrench = wrench
         self._largest = np.asarray(largest, dtype=float)
         self._threshold_n = threshold_n
-        self._share = share
         self._buffer_records = buffer_records
         self._first_sequence = first_sequence
-        self._draw = dict(zip(FAULTS, rng.spawn(len(FAULTS)), strict=True))
-        self._faults: set[str] = set()
+        self.faults = list(faults)
+        self._seen: Counter[Fault] = Counter()
         self._bias: npt.NDArray[np.int64] = np.zeros(6, dtype=np.int64)
         self._latched = False
         self._now_s = 0.0
@@ -110,12 +119,6 @@ class RdtEmulator:
             f"<cfgcpf>{self.scale.per_newton!r}</cfgcpf><cfgcpt>{self.scale.per_newton_metre!r}</cfgcpt>"
             "<scfgfu>N</scfgfu><scfgtu>Nm</scfgtu></netft>\n"
         ).encode()
-
-    def set_fault(self, name: str, on: bool = True) -> None:
-        """Switch a fault of `FAULTS` on or off; raises UsageError for another name."""
-        if name not in FAULTS:
-            raise UsageError(f"The force sensor has no fault {name!r}.", hint=f"Known: {', '.join(FAULTS)}.")
-        (self._faults.add if on else self._faults.discard)(name)
 
     def feed(self, datagram: bytes, now_s: float) -> list[bytes]:
         """Take one datagram of the host; return what `poll` returns.
@@ -145,7 +148,7 @@ class RdtEmulator:
     def _carry_out(self, request: Request) -> list[bytes]:
         match request.command:
             case Command.START_REALTIME | Command.START_BUFFERED:
-                ended = self._ended()
+                ended = self._ended(self._now_s)
                 self._left = request.records or None
                 self._buffered = request.command is Command.START_BUFFERED
                 self._sequence = self._first_sequence
@@ -153,7 +156,7 @@ class RdtEmulator:
                 self._next = math.floor(self._now_s * SENSOR_RATE_HZ) + 1
                 return ended
             case Command.STOP:
-                return self._ended()
+                return self._ended(self._now_s)
             case Command.SET_SOFTWARE_BIAS:
                 self._bias = self.scale.counts(self._sensed(self._now_s)[0])
             case Command.RESET_CONDITION_LATCH:
@@ -163,11 +166,14 @@ class RdtEmulator:
     def _sensed(self, at_s: float) -> tuple[npt.NDArray[np.float64], bool]:
         """Return what the sensor can read of the wrench, and whether it is at an end of its range."""
         wrench = np.asarray(self._wrench(at_s), dtype=float)
-        beyond = bool((np.abs(wrench) >= self._largest).any()) or "saturated" in self._faults
+        beyond = bool((np.abs(wrench) >= self._largest).any()) or any(
+            fault.name == "saturated" and fault.active(at_s) for fault in self.faults
+        )
         return np.clip(wrench, -self._largest, self._largest), beyond
 
     def _one(self, sample: int) -> list[bytes]:
-        wrench, saturated = self._sensed(sample / SENSOR_RATE_HZ)
+        at_s = sample / SENSOR_RATE_HZ
+        wrench, saturated = self._sensed(at_s)
         if self._threshold_n is not None and (np.abs(wrench[:3]) > self._threshold_n).any():
             self._latched = True
         status = (Status.SATURATION_OR_CONVERTER if saturated else 0) | (
@@ -187,13 +193,13 @@ class RdtEmulator:
         if self._buffered:
             self._buffer.append(encode_record(record))
             if len(self._buffer) == self._buffer_records:
-                sent += self._on_the_way(self._flushed())
+                sent += self._on_the_way(self._flushed(), at_s)
         else:
-            sent += self._on_the_way(encode_record(record))
+            sent += self._on_the_way(encode_record(record), at_s)
         if self._left is not None:
             self._left -= 1
             if self._left == 0:
-                sent += self._ended()
+                sent += self._ended(at_s)
         return sent
 
     def _flushed(self) -> bytes:
@@ -201,26 +207,26 @@ class RdtEmulator:
         self._buffer.clear()
         return datagram
 
-    def _ended(self) -> list[bytes]:
+    def _ended(self, at_s: float) -> list[bytes]:
         """Stop sending; return what is still under way (assumed: a started buffer is sent)."""
         self._next = None
-        sent = self._on_the_way(self._flushed()) if self._buffer else []
+        sent = self._on_the_way(self._flushed(), at_s) if self._buffer else []
         if self._held is not None:
             sent.append(self._held)
             self._held = None
         return sent
 
-    def _on_the_way(self, datagram: bytes) -> list[bytes]:
-        """Return what arrives of a datagram, in the order of arrival."""
-        if self._hit("dropped"):
+    def _on_the_way(self, datagram: bytes, at_s: float) -> list[bytes]:
+        """Return what arrives of a datagram sent at a time, in the order of arrival."""
+        dropped, doubled, late = (
+            concerned(self.faults, name, at_s, self._seen) for name in ("dropped", "doubled", "out-of-order")
+        )
+        if dropped:
             return []
-        arriving = [datagram, datagram] if self._hit("doubled") else [datagram]
+        arriving = [datagram, datagram] if doubled else [datagram]
         if self._held is not None:
             arriving.append(self._held)
             self._held = None
-        elif self._hit("out of order"):
+        elif late:
             self._held = arriving.pop()
         return arriving
-
-    def _hit(self, fault: str) -> bool:
-        return fault in self._faults and bool(self._draw[fault].random() < self._share)

@@ -165,11 +165,11 @@ class Drive:
             # The switch defines zero (assumed: GOHOSEQ as its programming by the maker's tools has it).
             self._homing = False
             self._origin_m = self._target_m
-        # A target once reached stays reached until the next motion (assumed).
-        self._attained = self._velocity is None and (self._attained or attained)
-        if self._notify_end and attained:
+        if self._notify_end and attained and not self._attained:
             self._notify_end = False
             notices.append("p")
+        # A target once reached stays reached until the next motion (assumed).
+        self._attained = self._velocity is None and (self._attained or attained)
         at_m = self._notify_at_m
         if at_m is not None and (before_m - at_m) * (position_m - at_m) <= 0.0:
             self._notify_at_m = None

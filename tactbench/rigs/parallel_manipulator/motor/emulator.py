@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from tactbench.plugin import UsageError
+from tactbench.rigs.parallel_manipulator.fault import Fault, concerned
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
 from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
 from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel
 
-FAULTS = ("motor fault", "late answers", "garbled line", "flash defect")
-"""`motor fault`: too hot, without power; `late answers`: by `late_s`; `garbled line`: one byte of every line is another
-one; `flash defect`: SAVE fails."""
+
+@dataclass(frozen=True)
+class MotorFault(Fault):
+    """A fault of the drive or its line."""
+
+    known: ClassVar[Mapping[str, str]] = {
+        "motor-fault": "too hot: without power until it is over and the drive is enabled again",
+        "late-answers": "answers, not notices, come later by delay_s",
+        "garbled-line": "one byte of a line is another one",
+        "flash-defect": "SAVE fails",
+    }
+    delay_s: float = 0.25
+    """Seven times the longest answer at 9600 baud."""
 
 
 class MotorEmulator:
@@ -30,8 +43,8 @@ class MotorEmulator:
         Units of the drive; mechanics of the motor.
     reference_switch_m
         Where GOHOSEQ finds its switch [m]; None: there is none, and GOHOSEQ is answered "Command not available".
-    late_s
-        How much later than usual answers come while `late answers` is on.
+    faults
+        What is wrong with it; may be changed at any time.
     start_s
         Time of power-on.
     """
@@ -44,33 +57,21 @@ class MotorEmulator:
         profile: MotorProfile | None = None,
         model: MotorModel | None = None,
         reference_switch_m: float | None = None,
-        late_s: float = 0.25,
+        faults: Iterable[MotorFault] = (),
         start_s: float = 0.0,
     ) -> None:
         model = model or MotorModel()
         self.drive = Drive(load, profile or MotorProfile(), model, reference_switch_m)
-        self._late_s = late_s
+        self.faults = list(faults)
         self._answer_time_s = model.answer_time.to("s")
         self._rng = rng
-        self._faults: set[str] = set()
+        self._seen: Counter[Fault] = Counter()
         self._reader = CommandReader()
         self._start_s = self._now_s = self._in_free_s = self._out_free_s = start_s
         self._ticks = 0
         self._in: deque[tuple[float, int]] = deque()
         self._answers: deque[tuple[float, str]] = deque()
         self._out: deque[tuple[float, int]] = deque()
-
-    def set_fault(self, name: str, on: bool = True) -> None:
-        """Switch a fault of `FAULTS` on or off; raises UsageError for another name."""
-        if name not in FAULTS:
-            raise UsageError(f"The motor has no fault {name!r}.", hint=f"Known: {', '.join(FAULTS)}.")
-        (self._faults.add if on else self._faults.discard)(name)
-        self.drive.flash_defect = "flash defect" in self._faults
-        if name == "motor fault" and on:
-            self.drive.overheat()
-            self._notice("f", self._now_s)
-        elif name == "motor fault":
-            self.drive.hot = False
 
     def feed(self, data: bytes, now_s: float) -> bytes:
         """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.
@@ -117,15 +118,27 @@ class MotorEmulator:
                 self._send(text, due_s)
             elif tick_s <= now_s:
                 self._ticks += 1
+                self._heat(tick_s)
                 for letter in self.drive.tick(tick_s):
                     self._notice(letter, tick_s)
             else:
                 break
         self._now_s = now_s
 
+    def _active(self, name: str, at_s: float) -> MotorFault | None:
+        return next((fault for fault in self.faults if fault.name == name and fault.active(at_s)), None)
+
+    def _heat(self, at_s: float) -> None:
+        hot = self._active("motor-fault", at_s) is not None
+        if hot and not self.drive.hot:
+            self.drive.overheat()
+            self._notice("f", at_s)
+        self.drive.hot = hot
+
     def _carry_out(self, command: Command, at_s: float) -> None:
         if command.node not in (None, self.drive.settings.node):
             return
+        self.drive.flash_defect = self._active("flash-defect", at_s) is not None
         try:
             answer = self.drive.answer(command)
             refused = False
@@ -134,7 +147,8 @@ class MotorEmulator:
         # Without ANSW2 queries and SAVE are answered, and nothing else (assumed).
         silent = self.drive.settings.answer_mode < 2 and (refused or answer == OK)
         if answer and not silent:
-            due_s = at_s + self._answer_time_s + (self._late_s if "late answers" in self._faults else 0.0)
+            late = self._active("late-answers", at_s)
+            due_s = at_s + self._answer_time_s + (late.delay_s if late else 0.0)
             # Answers keep the order of their commands, also when the fault ends between two of them.
             self._answers.append((max(due_s, self._answers[-1][0]) if self._answers else due_s, answer))
 
@@ -144,7 +158,7 @@ class MotorEmulator:
 
     def _send(self, text: str, at_s: float) -> None:
         line = bytearray(text.encode("ascii") + b"\r\n")
-        if "garbled line" in self._faults:
+        if concerned(self.faults, "garbled-line", at_s, self._seen):
             # Any other byte than the right one: also a digit for a digit, which no host can notice.
             line[int(self._rng.integers(len(line)))] ^= int(self._rng.integers(1, 256))
         byte_s = line_time_s(1, self.drive.settings.baud)

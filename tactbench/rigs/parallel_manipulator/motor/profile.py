@@ -1,7 +1,7 @@
 """What the integers of one drive mean: its units and largest arguments, as data.
 
-No public document that was read states the units of the linear drives (MCLM 300x RS), and Karl et al. 2016 name no motor:
-these are assumed, and a rig states its own.
+No public document that was read states the units of the linear drives (MCLM 300x RS), and Karl et al. 2016 name no
+motor: these are assumed, and a rig states its own.
 """
 
 from __future__ import annotations

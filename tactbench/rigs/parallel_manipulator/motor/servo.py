@@ -65,12 +65,15 @@ class Profile:
 
     def to_position(self, target_m: float, tick_s: float, speed: float, acceleration: float, braking: float) -> None:
         """Go one tick towards a target [m]; speed [m/s], acceleration and braking [m/s^2], all positive."""
+        if self.position_m == target_m and abs(self.speed_m_s) <= braking * tick_s * (1 + 1e-9):
+            self.speed_m_s = 0.0
+            return
         away = target_m - self.position_m
         wanted = math.copysign(min(speed, self.braking_speed(away, tick_s, braking)), away)
         self._go(wanted, tick_s, acceleration, braking)
-        # The last tick ends within rounding of its target; on it, the motion is over.
+        # The last tick ends within rounding of its target.
         if abs(target_m - self.position_m) < 1e-12 and abs(self.speed_m_s) <= braking * tick_s * (1 + 1e-9):
-            self.stop_at(target_m)
+            self.position_m = target_m
 
     def to_speed(self, speed_m_s: float, tick_s: float, acceleration: float, braking: float) -> None:
         """Go one tick towards a speed [m/s]."""
