@@ -303,6 +303,7 @@ class Drive:
             # Assumed: a target beyond the limits is approached as far as they allow.
             target_m = min(max(self._loaded_m, lower), upper) if self.settings.limits_on else self._loaded_m
             self._loaded_m, self._target_m = None, target_m
+        # Assumed: without a target loaded since, the last one counts, also after motion at a speed.
         self._velocity, self._attained, self._homing = None, False, False
 
     def _need_power(self) -> None:
