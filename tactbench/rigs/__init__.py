@@ -1,1 +1,1 @@
-"""Rigs: the simulated twin, replayed recordings."""
+"""Rigs: the simulated twin, replayed recordings, devices of a parallel manipulator."""

@@ -1,0 +1,351 @@
+"""Net F/T raw data transfer (RDT): requests and records as bytes, without input or output.
+
+UDP, port 49152 of the sensor. A request has 8 bytes, a record 36, both big-endian (sourced: netft/pyNetFT,
+core/src/detail/protocol.cpp, sequence.cpp and status.cpp).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, IntEnum, IntFlag
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field
+
+from tactbench.plugin import Quality, RigError
+from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import (
+    FORCE_UNITS,
+    TORQUE_UNITS,
+    AtiFileError,
+    elements,
+    unit,
+)
+
+if TYPE_CHECKING:
+    from tactbench.plugin import FloatArray
+
+PORT = 49152
+CONFIGURATION_PATH = "/netftapi2.xml"
+"""What HTTP GET asks the sensor for: counts per unit, and the units."""
+
+_REQUEST = struct.Struct(">HHI")
+_RECORD = struct.Struct(">III6i")
+_HEADER = 0x1234
+RECORD_BYTES = _RECORD.size
+MOST_BUFFERED = 40
+"""Records in one datagram of buffered transfer, at most (sourced: ATI manual 9620-05-NET FT, section 7.4, as quoted in
+a public client)."""
+SEQUENCE_MODULUS = 1 << 32
+
+
+class DatagramError(RigError, ValueError):
+    """A datagram is not one of this protocol."""
+
+
+class Command(IntEnum):
+    """What a request asks for."""
+
+    STOP = 0x0000
+    START_REALTIME = 0x0002
+    START_BUFFERED = 0x0003
+    RESET_CONDITION_LATCH = 0x0041
+    SET_SOFTWARE_BIAS = 0x0042
+
+
+class Request(NamedTuple):
+    """One request."""
+
+    command: Command
+    records: int = 0
+    """How many are wanted; 0: until stopped."""
+
+
+class Record(NamedTuple):
+    """One record."""
+
+    rdt_sequence: int
+    """Counts records sent, modulo 2^32."""
+    ft_sequence: int
+    """Counts the sensor's own samples, modulo 2^32."""
+    status: int
+    counts: tuple[int, int, int, int, int, int]
+    """Fx, Fy, Fz, Tx, Ty, Tz."""
+
+
+def encode_request(request: Request) -> bytes:
+    """Return the 8 bytes of a request; raises ValueError for a count that 32 bits do not hold."""
+    if not 0 <= request.records < SEQUENCE_MODULUS:
+        raise ValueError(f"a count is 0 to 2^32 - 1, not {request.records}")
+    return _REQUEST.pack(_HEADER, request.command, request.records)
+
+
+def decode_request(data: bytes) -> Request:
+    """Return the request in a datagram; raises DatagramError if there is none."""
+    if len(data) != _REQUEST.size:
+        raise DatagramError(f"A request has {_REQUEST.size} bytes, not {len(data)}.")
+    header, command, count = _REQUEST.unpack(data)
+    if header != _HEADER:
+        raise DatagramError(f"A request begins with {_HEADER:04X}, not {header:04X}.")
+    try:
+        return Request(Command(command), count)
+    except ValueError:
+        raise DatagramError(f"There is no command {command:04X}.") from None
+
+
+def encode_record(record: Record) -> bytes:
+    """Return the 36 bytes of a record; raises ValueError for numbers that 32 bits do not hold."""
+    try:
+        return _RECORD.pack(record.rdt_sequence, record.ft_sequence, record.status, *record.counts)
+    except struct.error as error:
+        raise ValueError(f"{record} does not fit its 32-bit fields: {error}") from error
+
+
+def decode_record(data: bytes) -> Record:
+    """Return the record in a datagram; raises DatagramError if its length is not 36."""
+    if len(data) != RECORD_BYTES:
+        raise DatagramError(f"A record has {RECORD_BYTES} bytes, not {len(data)}.")
+    rdt, ft, status, *counts = _RECORD.unpack(data)
+    return Record(rdt, ft, status, tuple(counts))
+
+
+def decode_buffer(data: bytes) -> list[Record]:
+    """Return the records in a datagram of buffered transfer; raises DatagramError if it is none."""
+    n, rest = divmod(len(data), RECORD_BYTES)
+    if rest or not 1 <= n <= MOST_BUFFERED:
+        raise DatagramError(
+            f"A buffer has 1 to {MOST_BUFFERED} records of {RECORD_BYTES} bytes, not {len(data)} bytes."
+        )
+    return [decode_record(data[start : start + RECORD_BYTES]) for start in range(0, len(data), RECORD_BYTES)]
+
+
+class Status(IntFlag):
+    """Bits of a record's status word (sourced: pyNetFT, status.cpp); undefined ones are kept."""
+
+    ERROR_SUMMARY = 0x80000000
+    CPU_OR_RAM = 0x40000000
+    DIGITAL_BOARD = 0x20000000
+    ANALOG_BOARD = 0x10000000
+    SERIAL_LINK = 0x08000000
+    PROGRAM_MEMORY = 0x04000000
+    HALTED_CONFIGURATION = 0x02000000
+    SETTINGS_VALIDATION = 0x01000000
+    CONFIGURATION_DOES_NOT_FIT = 0x00800000
+    NETWORK = 0x00400000
+    CAN = 0x00200000
+    RDT = 0x00100000
+    ETHERNET_IP = 0x00080000
+    DEVICE_NET = 0x00040000
+    SATURATION_OR_CONVERTER = 0x00020000
+    CONDITION_LATCHED = 0x00010000
+    WATCHDOG_TIMEOUT = 0x00004000
+    STACK_CHECK = 0x00002000
+    SERIAL_EEPROM = 0x00001000
+    SERIAL_FLASH = 0x00000800
+    ANALOG_BOARD_WATCHDOG = 0x00000400
+    EXCITATION_TOO_HIGH = 0x00000200
+    EXCITATION_TOO_LOW = 0x00000100
+    ARTIFICIAL_GROUND = 0x00000080
+    ANALOG_SUPPLY_TOO_HIGH = 0x00000040
+    ANALOG_SUPPLY_TOO_LOW = 0x00000020
+    SERIAL_LINK_DATA_UNAVAILABLE = 0x00000010
+    REFERENCE_OR_POWER = 0x00000008
+    TEMPERATURE = 0x00000004
+    HTTP = 0x00000002
+
+
+class Health(Enum):
+    """What a status word means for the values beside it."""
+
+    HEALTHY = "healthy"
+    WARNING = "warning"
+    """A threshold set in the sensor was passed; the values are good."""
+    ERROR = "error"
+    """The values must not be used."""
+
+
+def health(status: int) -> Health:
+    """Return what a status word means: 0, exactly 80010000, or anything else (sourced: pyNetFT, status.cpp)."""
+    if status == 0:
+        return Health.HEALTHY
+    return Health.WARNING if status == Status.ERROR_SUMMARY | Status.CONDITION_LATCHED else Health.ERROR
+
+
+def quality(status: int) -> Quality:
+    """Return the mark of all six channels: a saturated sensor is told apart from other errors."""
+    if health(status) is not Health.ERROR:
+        return Quality.GOOD
+    known = Status.ERROR_SUMMARY | Status.CONDITION_LATCHED | Status.SATURATION_OR_CONVERTER
+    marks = Quality.SATURATED if status & Status.SATURATION_OR_CONVERTER else Quality.GOOD
+    return marks | Quality.SUSPECT if status & ~int(known) or not marks else marks
+
+
+class CountScale(BaseModel):
+    """Counts per unit, as the sensor's configuration states them."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    per_newton: float = Field(gt=0.0, allow_inf_nan=False)
+    per_newton_metre: float = Field(gt=0.0, allow_inf_nan=False)
+    product: str = ""
+
+    def wrench(self, counts: npt.ArrayLike) -> FloatArray:
+        """Return (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] of (…, 6) counts."""
+        wrench: FloatArray = np.asarray(counts, dtype=float) / self._divisors()
+        return wrench
+
+    def counts(self, wrench: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """Return the (…, 6) nearest counts of a (…, 6) wrench [N, N*m], within the 32 bits of a record."""
+        nearest = np.rint(np.asarray(wrench, dtype=float) * self._divisors())
+        return np.clip(nearest, -(2**31), 2**31 - 1).astype(np.int64)
+
+    def _divisors(self) -> FloatArray:
+        return np.repeat([self.per_newton, self.per_newton_metre], 3)
+
+
+def read_configuration(data: bytes) -> CountScale:
+    """Return the scale in the sensor's ``netftapi2.xml``.
+
+    Raises
+    ------
+    AtiFileError
+        If `data` is no such file, if a tag that is needed is not there exactly once, or for an unknown unit.
+    """
+    texts: dict[str, str] = {}
+    needed = ("prodname", "cfgcpf", "cfgcpt", "scfgfu", "scfgtu")
+    for element in elements(data):
+        if element.name in needed:
+            if element.name in texts:
+                raise AtiFileError(f"The tag {element.name} stands twice in the sensor's configuration.")
+            texts[element.name] = element.text.strip()
+    missing = [name for name in needed if name not in texts]
+    if missing:
+        raise AtiFileError(f"The sensor's configuration has no {', '.join(missing)}.")
+    force_n, torque_nm = unit(FORCE_UNITS, texts["scfgfu"], "force"), unit(TORQUE_UNITS, texts["scfgtu"], "torque")
+    try:
+        per_force, per_torque = float(texts["cfgcpf"]), float(texts["cfgcpt"])
+        return CountScale(
+            per_newton=per_force / force_n, per_newton_metre=per_torque / torque_nm, product=texts["prodname"]
+        )
+    except ValueError as error:
+        raise AtiFileError(
+            f"Counts per unit are positive numbers, not {texts['cfgcpf']!r} and {texts['cfgcpt']!r}."
+        ) from error
+
+
+class Step(Enum):
+    """How one sequence number follows another."""
+
+    IN_ORDER = "in order"
+    DUPLICATE = "duplicate"
+    GAP = "gap"
+    OUT_OF_ORDER = "out of order"
+
+
+def step(previous: int, current: int) -> tuple[Step, int]:
+    """Return how `current` follows `previous`, and how many records were lost between them.
+
+    Differences are modulo 2^32: 0 is a duplicate, 1 in order, up to 2^31 - 1 a gap, above out of order (sourced:
+    pyNetFT, sequence.cpp).
+    """
+    delta = (current - previous) % SEQUENCE_MODULUS
+    if delta == 0:
+        return Step.DUPLICATE, 0
+    if delta == 1:
+        return Step.IN_ORDER, 0
+    return (Step.GAP, delta - 1) if delta < SEQUENCE_MODULUS // 2 else (Step.OUT_OF_ORDER, 0)
+
+
+RESTART_RUN = 4
+"""Records behind the last one, each in order after the other, that mean a restarted sensor and not late datagrams
+(assumed)."""
+
+
+@dataclass
+class RecordCounts:
+    """What came in: ``received = passed on + duplicates + late``."""
+
+    received: int = 0
+    """Records, whatever became of them."""
+    rejected: int = 0
+    """Datagrams that are none of this protocol."""
+    lost: int = 0
+    """Records missing where they were due; those that came late are among them."""
+    duplicates: int = 0
+    late: int = 0
+    restarts: int = 0
+    warnings: int = 0
+    errors: int = 0
+    """Records passed on with an error status, saturated ones among them."""
+    saturated: int = 0
+
+
+class Sample(NamedTuple):
+    """A record that is passed on."""
+
+    record: Record
+    lost_before: int
+    """Records missing directly before it."""
+    quality: Quality
+
+
+class RecordReader:
+    """Datagrams into records in order: duplicates and late ones are kept out and counted, gaps marked, never filled.
+
+    Parameters
+    ----------
+    buffered
+        Whether datagrams may hold several records.
+    """
+
+    def __init__(self, *, buffered: bool = False) -> None:
+        self.counts = RecordCounts()
+        self._buffered = buffered
+        self._previous: int | None = None
+        self._behind: list[int] = []
+
+    def restart(self) -> None:
+        """Expect a new count: after every start request."""
+        self._previous = None
+        self._behind.clear()
+
+    def feed(self, datagram: bytes) -> list[Sample]:
+        """Return the records of a datagram that are passed on; raises nothing."""
+        try:
+            records: Sequence[Record] = decode_buffer(datagram) if self._buffered else [decode_record(datagram)]
+        except DatagramError:
+            self.counts.rejected += 1
+            return []
+        return [sample for record in records if (sample := self._taken(record)) is not None]
+
+    def _taken(self, record: Record) -> Sample | None:
+        counts = self.counts
+        counts.received += 1
+        how, lost = (Step.IN_ORDER, 0) if self._previous is None else step(self._previous, record.rdt_sequence)
+        if how is Step.OUT_OF_ORDER:
+            after = step(self._behind[-1], record.rdt_sequence)[0] if self._behind else Step.IN_ORDER
+            if after is Step.DUPLICATE:
+                counts.duplicates += 1
+                return None
+            if after is not Step.IN_ORDER:
+                self._behind.clear()
+            self._behind.append(record.rdt_sequence)
+            if len(self._behind) < RESTART_RUN:
+                counts.late += 1
+                return None
+            counts.restarts += 1
+        self._behind.clear()
+        if how is Step.DUPLICATE:
+            counts.duplicates += 1
+            return None
+        self._previous = record.rdt_sequence
+        counts.lost += lost
+        marks = quality(record.status)
+        found = health(record.status)
+        counts.warnings += found is Health.WARNING
+        counts.errors += found is Health.ERROR
+        counts.saturated += bool(marks & Quality.SATURATED)
+        return Sample(record, lost, marks)

@@ -1,0 +1,232 @@
+"""A Net F/T box as a model without input or output: requests in, datagrams out, on a clock that is passed in."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+from xml.sax.saxutils import escape
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.plugin import UsageError
+from tactbench.rigs.parallel_manipulator.fault import Fault, concerned
+from tactbench.rigs.parallel_manipulator.force_torque.rdt_codec import (
+    MOST_BUFFERED,
+    SEQUENCE_MODULUS,
+    Command,
+    CountScale,
+    DatagramError,
+    Record,
+    Request,
+    Status,
+    decode_request,
+    encode_record,
+)
+
+SENSOR_RATE_HZ = 7000
+"""The box samples at 7 kHz and sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
+public client)."""
+
+
+@dataclass(frozen=True)
+class DatagramFault(Fault):
+    """A fault of the sensor, or of the way its datagrams take."""
+
+    known: ClassVar[Mapping[str, str]] = {
+        "dropped": "a datagram does not arrive",
+        "doubled": "a datagram arrives twice",
+        "out-of-order": "a datagram arrives after the next one",
+        "saturated": "the sensor is at an end of its range",
+    }
+
+
+class RdtEmulator:
+    """A box and its sensor.
+
+    Parameters
+    ----------
+    wrench
+        Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] at a time [s].
+    scale
+        Counts per unit; the default is usual (sourced: pyNetFT).
+    rate_hz
+        Records a second; the box takes the next rate above that divides 7000.
+    largest
+        (6,) where the sensor saturates [N, N*m]; the default is that of a Nano17 SI-25-0.25 (sourced: calibration file
+        FT8577, quoted in a public script).
+    threshold_n
+        A force on one axis that sets the monitor condition, which stays until it is reset; None: no condition.
+    buffer_records
+        Records in a datagram of buffered transfer.
+    first_sequence
+        Of records and samples, to begin near the wrap of the counters.
+    faults
+        What is wrong with it; may be changed at any time.
+    """
+
+    def __init__(
+        self,
+        wrench: Callable[[float], Sequence[float]],
+        *,
+        scale: CountScale | None = None,
+        rate_hz: float = 1000.0,
+        largest: Sequence[float] = (25.0, 25.0, 35.0, 0.25, 0.25, 0.25),
+        threshold_n: float | None = None,
+        buffer_records: int = MOST_BUFFERED,
+        first_sequence: int = 1,
+        faults: Iterable[DatagramFault] = (),
+    ) -> None:
+        if not 0.0 < rate_hz <= SENSOR_RATE_HZ:
+            raise UsageError(f"A Net F/T box sends up to {SENSOR_RATE_HZ} records a second, not {rate_hz:g}.")
+        if not 1 <= buffer_records <= MOST_BUFFERED:
+            raise UsageError(f"A buffer holds 1 to {MOST_BUFFERED} records, not {buffer_records}.")
+        self.scale = scale or CountScale(per_newton=1e6, per_newton_metre=1e6, product="EMULATED Net F/T")
+        self.every = max(1, int(SENSOR_RATE_HZ // rate_hz))
+        """Samples of the sensor from one record to the next."""
+        self.rejected = 0
+        """Datagrams that were no request."""
+        self._wrench = wrench
+        self._largest = np.asarray(largest, dtype=float)
+        self._threshold_n = threshold_n
+        self._buffer_records = buffer_records
+        self._first_sequence = first_sequence
+        self.faults = list(faults)
+        self._seen: Counter[Fault] = Counter()
+        self._bias: npt.NDArray[np.int64] = np.zeros(6, dtype=np.int64)
+        self._latched = False
+        self._now_s = 0.0
+        self._next: int | None = None
+        self._left: int | None = None
+        self._sequence = first_sequence
+        self._buffered = False
+        self._buffer: list[bytes] = []
+        self._held: bytes | None = None
+
+    @property
+    def rate_hz(self) -> float:
+        """Records a second as the box sends them."""
+        return SENSOR_RATE_HZ / self.every
+
+    def configuration(self) -> bytes:
+        """Return what the box answers to a GET of ``/netftapi2.xml``."""
+        return (
+            '<?xml version="1.0" encoding="UTF-8"?>\n<netft>'
+            f"<prodname>{escape(self.scale.product)}</prodname>"
+            f"<cfgcpf>{self.scale.per_newton!r}</cfgcpf><cfgcpt>{self.scale.per_newton_metre!r}</cfgcpt>"
+            "<scfgfu>N</scfgfu><scfgtu>Nm</scfgtu></netft>\n"
+        ).encode()
+
+    def feed(self, datagram: bytes, now_s: float) -> list[bytes]:
+        """Take one datagram of the host; return what `poll` returns.
+
+        Times do not go back: an earlier one counts as the latest seen.
+        """
+        sent = self.poll(now_s)
+        try:
+            request = decode_request(datagram)
+        except DatagramError:
+            self.rejected += 1
+            return sent
+        return sent + self._carry_out(request)
+
+    def poll(self, now_s: float) -> list[bytes]:
+        """Go on to `now_s`; return the datagrams that are due by then."""
+        self._now_s = max(self._now_s, now_s)
+        sent: list[bytes] = []
+        while self._next is not None and self._next / SENSOR_RATE_HZ <= self._now_s:
+            sent += self._one(self._next)
+        return sent
+
+    def next_event_s(self) -> float:
+        """Return when the next record is due; infinite while nothing is being sent."""
+        return math.inf if self._next is None else self._next / SENSOR_RATE_HZ
+
+    def _carry_out(self, request: Request) -> list[bytes]:
+        match request.command:
+            case Command.START_REALTIME | Command.START_BUFFERED:
+                ended = self._ended(self._now_s)
+                self._left = request.records or None
+                self._buffered = request.command is Command.START_BUFFERED
+                self._sequence = self._first_sequence
+                # The first sample after the request: a sample is not older than what asks for it.
+                self._next = math.floor(self._now_s * SENSOR_RATE_HZ) + 1
+                return ended
+            case Command.STOP:
+                return self._ended(self._now_s)
+            case Command.SET_SOFTWARE_BIAS:
+                self._bias = self.scale.counts(self._sensed(self._now_s)[0])
+            case Command.RESET_CONDITION_LATCH:
+                self._latched = False
+        return []
+
+    def _sensed(self, at_s: float) -> tuple[npt.NDArray[np.float64], bool]:
+        """Return what the sensor can read of the wrench, and whether it is at an end of its range."""
+        wrench = np.asarray(self._wrench(at_s), dtype=float)
+        beyond = bool((np.abs(wrench) >= self._largest).any()) or any(
+            fault.name == "saturated" and fault.active(at_s) for fault in self.faults
+        )
+        return np.clip(wrench, -self._largest, self._largest), beyond
+
+    def _one(self, sample: int) -> list[bytes]:
+        at_s = sample / SENSOR_RATE_HZ
+        wrench, saturated = self._sensed(at_s)
+        if self._threshold_n is not None and (np.abs(wrench[:3]) > self._threshold_n).any():
+            self._latched = True
+        status = (Status.SATURATION_OR_CONVERTER if saturated else 0) | (
+            Status.CONDITION_LATCHED if self._latched else 0
+        )
+        counts = np.clip(self.scale.counts(wrench) - self._bias, -(2**31), 2**31 - 1)
+        fx, fy, fz, tx, ty, tz = counts.tolist()
+        record = Record(
+            self._sequence,
+            (sample + self._first_sequence) % SEQUENCE_MODULUS,
+            int(status | Status.ERROR_SUMMARY if status else 0),
+            (fx, fy, fz, tx, ty, tz),
+        )
+        self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
+        self._next = sample + self.every
+        sent: list[bytes] = []
+        if self._buffered:
+            self._buffer.append(encode_record(record))
+            if len(self._buffer) == self._buffer_records:
+                sent += self._on_the_way(self._flushed(), at_s)
+        else:
+            sent += self._on_the_way(encode_record(record), at_s)
+        if self._left is not None:
+            self._left -= 1
+            if self._left == 0:
+                sent += self._ended(at_s)
+        return sent
+
+    def _flushed(self) -> bytes:
+        datagram = b"".join(self._buffer)
+        self._buffer.clear()
+        return datagram
+
+    def _ended(self, at_s: float) -> list[bytes]:
+        """Stop sending; return what is still under way (assumed: a started buffer is sent)."""
+        self._next = None
+        sent = self._on_the_way(self._flushed(), at_s) if self._buffer else []
+        if self._held is not None:
+            sent.append(self._held)
+            self._held = None
+        return sent
+
+    def _on_the_way(self, datagram: bytes, at_s: float) -> list[bytes]:
+        """Return what arrives of a datagram sent at a time, in the order of arrival."""
+        dropped, doubled, late = (
+            concerned(self.faults, name, at_s, self._seen) for name in ("dropped", "doubled", "out-of-order")
+        )
+        if dropped:
+            return []
+        arriving = [datagram, datagram] if doubled else [datagram]
+        if self._held is not None:
+            arriving.append(self._held)
+            self._held = None
+        elif late:
+            self._held = arriving.pop()
+        return arriving

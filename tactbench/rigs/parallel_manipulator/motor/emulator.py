@@ -1,0 +1,168 @@
+"""The motor's drive at the end of its line: bytes in, bytes out, on a clock that is passed in; no input or output."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from tactbench.rigs.parallel_manipulator.fault import Fault, concerned
+from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
+from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
+from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel
+
+
+@dataclass(frozen=True)
+class MotorFault(Fault):
+    """A fault of the drive or its line."""
+
+    known: ClassVar[Mapping[str, str]] = {
+        "motor-fault": "too hot: without power until it is over and the drive is enabled again",
+        "late-answers": "answers, not notices, come later by delay_s",
+        "garbled-line": "one byte of a line is another one",
+        "flash-defect": "SAVE fails",
+    }
+    delay_s: float = 0.25
+    """Seven times the longest answer at 9600 baud."""
+
+
+class MotorEmulator:
+    """A drive with its motor, and its line's pace.
+
+    Parameters
+    ----------
+    load
+        Force on the motor [N] at a position [m] and a time [s], positive against positive motion.
+    rng
+        Draws the bytes of garbled lines.
+    profile, model
+        Units of the drive; mechanics of the motor.
+    reference_switch_m
+        Where GOHOSEQ finds its switch [m]; None: there is none, and GOHOSEQ is answered "Command not available".
+    faults
+        What is wrong with it; may be changed at any time.
+    start_s
+        Time of power-on.
+    """
+
+    def __init__(
+        self,
+        load: Load,
+        rng: np.random.Generator,
+        *,
+        profile: MotorProfile | None = None,
+        model: MotorModel | None = None,
+        reference_switch_m: float | None = None,
+        faults: Iterable[MotorFault] = (),
+        start_s: float = 0.0,
+    ) -> None:
+        model = model or MotorModel()
+        self.drive = Drive(load, profile or MotorProfile(), model, reference_switch_m)
+        self.faults = list(faults)
+        self._answer_time_s = model.answer_time.to("s")
+        self._rng = rng
+        self._seen: Counter[Fault] = Counter()
+        self._reader = CommandReader()
+        self._start_s = self._now_s = self._in_free_s = self._out_free_s = start_s
+        self._ticks = 0
+        self._in: deque[tuple[float, int]] = deque()
+        self._answers: deque[tuple[float, str]] = deque()
+        self._out: deque[tuple[float, int]] = deque()
+
+    def feed(self, data: bytes, now_s: float) -> bytes:
+        """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.
+
+        Times do not go back: an earlier one counts as the latest seen.
+        """
+        now_s = max(now_s, self._now_s)
+        byte_s = line_time_s(1, self.drive.settings.baud)
+        self._in_free_s = max(self._in_free_s, now_s)
+        for byte in data:
+            self._in_free_s += byte_s
+            self._in.append((self._in_free_s, byte))
+        return self.poll(now_s)
+
+    def poll(self, now_s: float) -> bytes:
+        """Go on to `now_s`; return the bytes whose last bit has left the drive by then."""
+        now_s = max(now_s, self._now_s)
+        while self._in and self._in[0][0] <= now_s:
+            at_s, byte = self._in.popleft()
+            self._go_to(at_s)
+            for command in self._reader.feed(bytes([byte])):
+                self._carry_out(command, at_s)
+        self._go_to(now_s)
+        found = bytearray()
+        while self._out and self._out[0][0] <= now_s:
+            found.append(self._out.popleft()[1])
+        return bytes(found)
+
+    def next_event_s(self) -> float:
+        """Return when something may happen next: a byte in, an answer, a byte out, or a tick of the drive."""
+        queued = [due[0] for queue in (self._in, self._answers, self._out) for due in list(queue)[:1]]
+        return min([self._tick_s(), *queued])
+
+    def _tick_s(self) -> float:
+        """Return the time of the next tick."""
+        return self._start_s + (self._ticks + 1) * self.drive.servo.tick_s
+
+    def _go_to(self, now_s: float) -> None:
+        # Ticks stand on a grid of their own, and answers have their times: when it is asked for changes nothing.
+        while True:
+            tick_s = self._tick_s()
+            if self._answers and self._answers[0][0] <= min(tick_s, now_s):
+                due_s, text = self._answers.popleft()
+                self._send(text, due_s)
+            elif tick_s <= now_s:
+                self._ticks += 1
+                self._heat(tick_s)
+                for letter in self.drive.tick(tick_s):
+                    self._notice(letter, tick_s)
+            else:
+                break
+        self._now_s = now_s
+
+    def _active(self, name: str, at_s: float) -> MotorFault | None:
+        return next((fault for fault in self.faults if fault.name == name and fault.active(at_s)), None)
+
+    def _heat(self, at_s: float) -> None:
+        hot = self._active("motor-fault", at_s) is not None
+        if hot and not self.drive.hot:
+            self.drive.overheat()
+            self._notice("f", at_s)
+        self.drive.hot = hot
+
+    def _carry_out(self, command: Command, at_s: float) -> None:
+        if command.node not in (None, self.drive.settings.node):
+            return
+        self.drive.flash_defect = self._active("flash-defect", at_s) is not None
+        try:
+            answer = self.drive.answer(command)
+            refused = False
+        except Refused as refusal:
+            answer, refused = str(refusal), True
+        # Without ANSW2 queries and SAVE are answered, and nothing else (assumed).
+        silent = self.drive.settings.answer_mode < 2 and (refused or answer == OK)
+        if answer and not silent:
+            late = self._active("late-answers", at_s)
+            due_s = at_s + self._answer_time_s + (late.delay_s if late else 0.0)
+            # Answers keep the order of their commands, also when the fault ends between two of them.
+            self._answers.append((max(due_s, self._answers[-1][0]) if self._answers else due_s, answer))
+
+    def _notice(self, letter: str, at_s: float) -> None:
+        if self.drive.settings.answer_mode:
+            self._send(letter, at_s)
+
+    def _send(self, text: str, at_s: float) -> None:
+        line = bytearray(text.encode("ascii") + b"\r\n")
+        if concerned(self.faults, "garbled-line", at_s, self._seen):
+            # Any other byte than the right one: also a digit for a digit, which no host can notice.
+            line[int(self._rng.integers(len(line)))] ^= int(self._rng.integers(1, 256))
+        byte_s = line_time_s(1, self.drive.settings.baud)
+        self._out_free_s = max(self._out_free_s, at_s)
+        for byte in line:
+            self._out_free_s += byte_s
+            self._out.append((self._out_free_s, byte))

@@ -1,0 +1,274 @@
+"""Golden vectors of the ASCII protocol, streams cut anywhere, and faults on the line."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.plugin import RigError, assumed
+from tactbench.rigs.parallel_manipulator.motor.codec import (
+    LONGEST_LINE,
+    Command,
+    CommandReader,
+    Configuration,
+    FaultStatus,
+    GeneralStatus,
+    Kind,
+    Line,
+    LineReader,
+    OperationStatus,
+    answers,
+    encode,
+    fault_status,
+    general_status,
+    line_time_s,
+    newer_generation,
+)
+from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
+
+# FH-1: command, bytes, what the drive reads. All are answered OK.
+ANSWERED_OK = [
+    ("EN", "45 4E 0D", Command("EN")),
+    ("DI", "44 49 0D", Command("DI")),
+    ("1EN", "31 45 4E 0D", Command("EN", node=1)),
+    ("LA 1000", "4C 41 20 31 30 30 30 0D", Command("LA", 1000)),
+    ("LA1000", "4C 41 31 30 30 30 0D", Command("LA", 1000)),
+    ("M", "4D 0D", Command("M")),
+    ("LR-250", "4C 52 2D 32 35 30 0D", Command("LR", -250)),
+    ("V100", "56 31 30 30 0D", Command("V", 100)),
+    ("HO", "48 4F 0D", Command("HO")),
+    ("HO500", "48 4F 35 30 30 0D", Command("HO", 500)),
+    ("NP1000", "4E 50 31 30 30 30 0D", Command("NP", 1000)),
+    ("NPOFF", "4E 50 4F 46 46 0D", Command("NPOFF")),
+    ("SP50", "53 50 35 30 0D", Command("SP", 50)),
+    ("AC100", "41 43 31 30 30 0D", Command("AC", 100)),
+    ("DEC100", "44 45 43 31 30 30 0D", Command("DEC", 100)),
+    ("LL30000", "4C 4C 33 30 30 30 30 0D", Command("LL", 30000)),
+    ("LL-30000", "4C 4C 2D 33 30 30 30 30 0D", Command("LL", -30000)),
+    ("APL1", "41 50 4C 31 0D", Command("APL", 1)),
+    ("LPC800", "4C 50 43 38 30 30 0D", Command("LPC", 800)),
+    ("LCC300", "4C 43 43 33 30 30 0D", Command("LCC", 300)),
+]
+
+OVERTEMPERATURE = "Overtemperature - drive disabled"
+# FH-2: command, its bytes, the drive's bytes, the lines in them.
+ANSWERED = [
+    ("POS", "50 4F 53 0D", "39 38 39 35 36 0D 0A", [Line(Kind.VALUE, "98956")]),
+    ("POS", "50 4F 53 0D", "2D 31 35 30 30 0D 0A", [Line(Kind.VALUE, "-1500")]),
+    ("2POS", "32 50 4F 53 0D", "30 0D 0A", [Line(Kind.VALUE, "0")]),
+    ("pos", "70 6F 73 0D", "39 38 39 35 36 0D 0A", [Line(Kind.VALUE, "98956")]),
+    ("M", "4D 0D", "4F 4B 0D 0A 70 0D 0A", [Line(Kind.OK, "OK"), Line(Kind.NOTICE, "p")]),
+    ("M", "4D 0D", "70 0D 0A 4F 4B 0D 0A", [Line(Kind.NOTICE, "p"), Line(Kind.OK, "OK")]),
+    ("GRC", "47 52 43 0D", "31 32 30 0D 0A", [Line(Kind.VALUE, "120")]),
+    ("GRC", "47 52 43 0D", "76 0D 0A 31 32 30 0D 0A", [Line(Kind.NOTICE, "v"), Line(Kind.VALUE, "120")]),
+    ("TEM", "54 45 4D 0D", "33 32 0D 0A", [Line(Kind.VALUE, "32")]),
+    ("OST", "4F 53 54 0D", "36 35 35 33 36 0D 0A", [Line(Kind.VALUE, "65536")]),
+    ("OST", "4F 53 54 0D", "36 35 35 35 32 0D 0A", [Line(Kind.VALUE, "65552")]),
+    ("OST", "4F 53 54 0D", "31 36 0D 0A", [Line(Kind.VALUE, "16")]),
+    ("OST", "4F 53 54 0D", "36 35 37 39 32 0D 0A", [Line(Kind.VALUE, "65792")]),
+    ("GST", "47 53 54 0D", "31 30 30 31 31 30 30 0D 0A", [Line(Kind.VALUE, "1001100")]),
+    ("GFS", "47 46 53 0D", "30 31 30 30 0D 0A", [Line(Kind.VALUE, "0100")]),
+    ("CST", "43 53 54 0D", "39 32 32 30 0D 0A", [Line(Kind.VALUE, "9220")]),
+    (
+        "XYZ",
+        "58 59 5A 0D",
+        "55 6E 6B 6E 6F 77 6E 20 63 6F 6D 6D 61 6E 64 0D 0A",
+        [Line(Kind.REFUSAL, "Unknown command")],
+    ),
+    (
+        "LPC-5",
+        "4C 50 43 2D 35 0D",
+        "49 6E 76 61 6C 69 64 20 70 61 72 61 6D 65 74 65 72 0D 0A",
+        [Line(Kind.REFUSAL, "Invalid parameter")],
+    ),
+    (
+        "GOHOSEQ",
+        "47 4F 48 4F 53 45 51 0D",
+        "43 6F 6D 6D 61 6E 64 20 6E 6F 74 20 61 76 61 69 6C 61 62 6C 65 0D 0A",
+        [Line(Kind.REFUSAL, "Command not available")],
+    ),
+    (
+        "EN",
+        "45 4E 0D",
+        "4F 76 65 72 74 65 6D 70 65 72 61 74 75 72 65 20 2D 20 64 72 69 76 65 20 64 69 73 61 62 6C 65 64 0D 0A",
+        [Line(Kind.REFUSAL, OVERTEMPERATURE)],
+    ),
+    (
+        "SAVE",
+        "53 41 56 45 0D",
+        "45 45 50 52 4F 4D 20 77 72 69 74 69 6E 67 20 64 6F 6E 65 0D 0A",
+        [Line(Kind.TEXT, "EEPROM writing done")],
+    ),
+    ("SAVE", "53 41 56 45 0D", "46 6C 61 73 68 20 64 65 66 65 63 74 0D 0A", [Line(Kind.REFUSAL, "Flash defect")]),
+    ("LA1000", "4C 41 31 30 30 30 0D", "", []),
+    ("BAUD19200", "42 41 55 44 31 39 32 30 30 0D", "", []),
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "sent", "command"), ANSWERED_OK, ids=[f"FH-1.{i + 1}-{row[0]}" for i, row in enumerate(ANSWERED_OK)]
+)
+def test_commands_that_are_answered_ok(text, sent, command):
+    assert CommandReader().feed(bytes.fromhex(sent)) == [command]
+    assert encode(command.name, command.argument, node=command.node) == text.replace(" ", "").encode() + b"\r"
+
+
+@pytest.mark.parametrize(
+    ("text", "sent", "answer", "lines"), ANSWERED, ids=[f"FH-2.{i + 1}-{row[0]}" for i, row in enumerate(ANSWERED)]
+)
+def test_answers(text, sent, answer, lines):
+    assert bytes.fromhex(sent) == text.encode() + b"\r"
+    (command,) = CommandReader().feed(bytes.fromhex(sent))
+    assert encode(command.name, command.argument, node=command.node) == text.upper().encode() + b"\r"
+    assert LineReader().feed(bytes.fromhex(answer)) == lines
+    for line in lines:
+        assert answers(line, command.name) == (line.kind is not Kind.NOTICE)
+
+
+def test_one_bytes_at_a_time_says_the_same():
+    whole = b"".join(bytes.fromhex(row[2]) for row in ANSWERED)
+    reader = LineReader()
+    lines = [line for byte in whole for line in reader.feed(bytes([byte]))]
+    assert lines == [line for row in ANSWERED for line in row[3]]
+    assert (reader.counts.garbled, reader.counts.notices, reader.counts.refusals) == (0, 3, 5)
+
+
+@pytest.mark.parametrize(
+    ("pieces", "lines"),
+    [
+        ([b"O", b"K\r", b"\n"], [Line(Kind.OK, "OK")]),
+        ([b"989", b"56\r\nOK\r\n"], [Line(Kind.VALUE, "98956"), Line(Kind.OK, "OK")]),
+        ([b"v\r\n120\r\n"], [Line(Kind.NOTICE, "v"), Line(Kind.VALUE, "120")]),
+        ([b"p\r\np\r\nOK\r\n"], [Line(Kind.NOTICE, "p"), Line(Kind.NOTICE, "p"), Line(Kind.OK, "OK")]),
+    ],
+    ids=["FH-splits.1", "FH-splits.2", "FH-splits.3", "FH-splits.4"],
+)
+def test_splits(pieces, lines):
+    reader = LineReader()
+    assert [line for piece in pieces for line in reader.feed(piece)] == lines
+
+
+def test_status_words_of_the_vectors():
+    assert OperationStatus(65552) == OperationStatus.POSITION_ATTAINED | OperationStatus.CURRENT_LIMITATION
+    assert OperationStatus(65792) == OperationStatus.POSITION_ATTAINED | OperationStatus.INPUT_1
+    assert general_status("1001100") == GeneralStatus(True, False, False, True, True, False, False)
+    assert fault_status("0100") == FaultStatus(False, True, False, False)
+    assert Configuration(9220) == (
+        Configuration.ACKNOWLEDGES | Configuration.POWER_STAGE | Configuration.POSITION_LIMITS
+    )
+    for bad in ("", "100110", "10011000", "100110x"):
+        with pytest.raises(ValueError, match="7 characters"):
+            general_status(bad)
+
+
+@pytest.mark.parametrize(
+    ("n", "baud", "ms"),
+    [(4, 9600, 4.167), (11, 9600, 11.458), (11, 19200, 5.729), (11, 115200, 0.955), (34, 9600, 35.417)],
+)
+def test_line_times(n, baud, ms):
+    assert 1e3 * line_time_s(n, baud) == pytest.approx(ms, abs=5e-4)  # Digits printed.
+
+
+def test_binary_frames_of_newer_drives_are_recognised():
+    frame = bytes.fromhex("53 07 01 01 41 60 00 73 45")
+    assert newer_generation(frame)
+    assert newer_generation(frame + b"more")
+    for cut in range(len(frame)):
+        assert not newer_generation(frame[:cut])
+    for place in range(len(frame)):
+        damaged = bytearray(frame)
+        damaged[place] ^= 0x10
+        assert not newer_generation(bytes(damaged))
+    assert not newer_generation(b"SP50\r")
+    assert not newer_generation(b"S\x00E")
+
+
+@given(st.lists(st.binary(max_size=40), max_size=12))
+@settings(max_examples=60)
+def test_any_bytes_are_survived_and_the_next_line_is_read(pieces):
+    reader, drive = LineReader(), CommandReader()
+    for piece in pieces:
+        reader.feed(piece)
+        drive.feed(piece)
+    # The line under way is spoilt by what came before; the one after it is not.
+    assert reader.feed(b"\r\n98956\r\n")[-1] == Line(Kind.VALUE, "98956")
+    assert drive.feed(b"\rLA1000\r")[-1] == Command("LA", 1000)
+
+
+@given(st.binary(min_size=1, max_size=300), st.data())
+@settings(max_examples=60)
+def test_cuts_do_not_matter(data, draw):
+    cut = draw.draw(st.integers(0, len(data)))
+    whole, halves = LineReader(), LineReader()
+    assert whole.feed(data) == halves.feed(data[:cut]) + halves.feed(data[cut:])
+    assert whole.counts == halves.counts
+
+
+@given(st.integers(-(10**18), 10**18), st.sampled_from([None, 1, 255]), st.sampled_from(["LA", "V", "CORRIDOR"]))
+@settings(max_examples=40)
+def test_a_command_comes_back(argument, node, name):
+    assert CommandReader().feed(encode(name, argument, node=node)) == [Command(name, argument, node)]
+
+
+def test_a_line_without_end_is_given_up_in_bounded_memory():
+    reader = LineReader()
+    assert reader.feed(b"7" * 100_000) == []
+    (line,) = reader.feed(b"\r\n")
+    assert line.kind is Kind.GARBLED
+    assert len(line.text) < 2 * LONGEST_LINE
+    assert reader.feed(b"1\r\n") == [Line(Kind.VALUE, "1")]
+    assert reader.counts.garbled == 1
+    drive = CommandReader()
+    assert drive.feed(b"L" * 100_000 + b"\r") == [Command("")]
+
+
+@pytest.mark.parametrize("raw", [b"98\xb956\r\n", b"98956\n", b"\r\n", b"OK\r\r\n", b"z\r\n", b"98\r56\r\n"])
+def test_what_no_drive_sends_is_garbled(raw):
+    reader = LineReader()
+    assert {line.kind for line in reader.feed(raw)} == {Kind.GARBLED}
+    assert reader.counts.garbled == 1
+
+
+def test_an_unfinished_line_can_be_forgotten():
+    reader = LineReader()
+    reader.feed(b"98")
+    reader.clear()
+    assert reader.feed(b"7\r\n") == [Line(Kind.VALUE, "7")]
+
+
+@pytest.mark.parametrize("name", ["", "L A", "LA1", "LÄ", "LA\r"])
+def test_names_that_are_none(name):
+    with pytest.raises(ValueError, match="letters"):
+        encode(name)
+
+
+@pytest.mark.parametrize("node", [0, 256, -1])
+def test_nodes_that_are_none(node):
+    with pytest.raises(ValueError, match="1 to 255"):
+        encode("EN", node=node)
+
+
+@given(st.floats(-1.0, 1.0))
+@settings(max_examples=60)
+def test_a_position_comes_back_to_half_an_increment(position_m):
+    profile = MotorProfile()
+    back = profile.position_m(profile.increments(position_m))
+    # Half of 6 um, and the rounding of a metre.
+    assert abs(back - position_m) <= 3e-6 + 1e-15
+
+
+def test_limits_are_rounded_down_and_never_to_nothing():
+    profile = MotorProfile()
+    assert [profile.speed(v) for v in (0.05, 0.0519, -0.0519, 0.0)] == [50, 51, -51, 0]
+    assert [profile.current(i) for i in (0.8, 0.7999)] == [800, 799]
+    assert profile.acceleration(1.5) == 1500
+    # What the drive's unit cannot express is refused, not made zero.
+    with pytest.raises(RigError, match="below the drive's unit"):
+        profile.speed(0.0004)
+    with pytest.raises(RigError, match="at most 12000"):
+        profile.current(13.0)
+    with pytest.raises(RigError, match="no number"):
+        profile.increments(float("nan"))
+    with pytest.raises(RigError, match="at most"):
+        profile.increments(1e9)
+    fine = MotorProfile(speed_unit=assumed(1.0, "um/s", "test"))
+    assert fine.speed(0.0004) == 400
