@@ -38,7 +38,7 @@ def arrays(sensor: str, folder: Path) -> Contestant:
     """Return the plain forest with the arrays of its cell."""
     registry = load_registry()
     choice = TaskChoice(name=TASK, protocol=PROTOCOL, estimators=(EstimatorChoice(name="majority"),))
-    outcome = carry_out(MatrixSpec(sensors=(sensor,), tasks=(choice,)), Store(folder))
+    outcome = carry_out(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder))
     spec = registry.tasks[TASK].spec
     data = load_dataset(spec, outcome.recordings[outcome.rows[0]["cell"]])
     return contestant(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1, threads=1)
