@@ -16,8 +16,8 @@ from tactbench.core.matrix.progress import Progress
 class Display(Progress, Protocol):
     """Progress, and what is known so far."""
 
-    def show(self, text: str) -> None:
-        """Show `text` while the rest is under way, in place of what was shown before; not in a log."""
+    def show(self, text: Callable[[], str]) -> None:
+        """Show what `text` returns while the rest is under way, in place of what was shown before; not in a log."""
 
 
 _QUIET_S = 5.0
@@ -91,8 +91,8 @@ class Lines:
     def working(self, what: str) -> None:
         """Say nothing: what is under way is no line."""
 
-    def show(self, text: str) -> None:
-        """Show nothing: only the last table is for a log."""
+    def show(self, text: Callable[[], str]) -> None:
+        """Show nothing, and make nothing: only the last table is for a log."""
 
 
 class _Bar:
@@ -146,9 +146,9 @@ class _Bar:
     def working(self, what: str) -> None:
         self._shown.update(self._task, now=what, refresh=True)
 
-    def show(self, text: str) -> None:
-        """Show `text` above the bars that follow."""
-        self._text = text
+    def show(self, text: Callable[[], str]) -> None:
+        """Show what `text` returns above the bars that follow."""
+        self._text = text()
 
     def end(self) -> None:
         if self._shown is not None:

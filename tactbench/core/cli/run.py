@@ -68,7 +68,7 @@ def command(
     with progress() as told:
         outcome = run_matrix(
             matrix, store, choice=choice, recordings=folder, progress=told,
-            shown=lambda rows: told.show(_so_far(rows)),
+            shown=lambda rows: told.show(lambda: _so_far(rows)),
         )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
     rows = over_replicates(outcome.rows)

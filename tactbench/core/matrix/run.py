@@ -137,9 +137,9 @@ def _carry_out(
         found.rows |= evaluated.rows
         found.computed += evaluated.computed
         rows += [found.rows[cell.name] for cell in some]
-        fill_baselines(rows)
         if number < len(rounds) and evaluated.computed:
             shown(tuple(rows))
+    fill_baselines(rows)
     sources.save()
     recorded.save()
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
