@@ -26,8 +26,10 @@ from tactbench.core.plugins.cost import CostJob, CostPoint, CostStudy
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import (
     Acquisition,
+    DeviceAcquisition,
     Estimator,
     Explained,
+    Operator,
     Reason,
     Rig,
     RigContext,
@@ -40,14 +42,16 @@ from tactbench.core.samples import Block, Quality, SkinGrid, SkinState
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
-from tactbench.core.spec.recording import PlanEntry, Scalar
+from tactbench.core.spec.recording import Emulation, PlanEntry, Scalar, StreamClock, StreamCounts
 from tactbench.core.spec.rig import (
+    DeviceDescriptor,
     EffectDescriptor,
     EstimatorDescriptor,
     RigDescriptor,
     SensorDescriptor,
     TaskDescriptor,
 )
+from tactbench.core.spec.rig_file import DeviceEntry, EmulationSettings, ForceEntry, NamedDevice, RigFile
 from tactbench.core.spec.scene import (
     Environment,
     ForceRamp,
@@ -77,6 +81,16 @@ from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, P
 if TYPE_CHECKING:
     from tactbench.core.recording.reader import Recording, open_recording
     from tactbench.core.samples import FloatArray
+    from tactbench.devices.driver import Driver, DriverFactory, DriverSettings
+    from tactbench.devices.emulator import (
+        DeviceEmulator,
+        EmulatorFactory,
+        EmulatorSettings,
+        Senses,
+        Sent,
+        SpiDeviceEmulator,
+    )
+    from tactbench.devices.fault import Fault, fault_concerns
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
     from tactbench.links.byte_link import ByteLink
@@ -111,15 +125,28 @@ __all__ = [
     "DataError",
     "DataSheet",
     "DatagramLink",
+    "DeviceAcquisition",
+    "DeviceDescriptor",
+    "DeviceEmulator",
+    "DeviceEntry",
     "Dome",
+    "Driver",
+    "DriverFactory",
+    "DriverSettings",
     "EffectDescriptor",
+    "Emulation",
+    "EmulationSettings",
+    "EmulatorFactory",
+    "EmulatorSettings",
     "Environment",
     "Estimator",
     "EstimatorDescriptor",
     "Explained",
+    "Fault",
     "FloatArray",
     "FluidBackedShell",
     "FoamPad",
+    "ForceEntry",
     "ForceLoop",
     "ForceRamp",
     "Indenter",
@@ -132,8 +159,10 @@ __all__ = [
     "LinkTimeout",
     "LinkUnplugged",
     "MissingRecordingError",
+    "NamedDevice",
     "NotApplicable",
     "Nuisances",
+    "Operator",
     "PhysicalRange",
     "Placement",
     "PlanEntry",
@@ -150,12 +179,15 @@ __all__ = [
     "RigContext",
     "RigDescriptor",
     "RigError",
+    "RigFile",
     "Role",
     "Scalar",
     "Scenario",
     "Scene",
+    "Senses",
     "SensorDescriptor",
     "SensorSpec",
+    "Sent",
     "SheetTable",
     "Shelf",
     "Simulation",
@@ -166,11 +198,14 @@ __all__ = [
     "Slide",
     "Source",
     "SpiBridge",
+    "SpiDeviceEmulator",
     "SpiLink",
     "SpiReply",
     "SpiStep",
     "SpidevLink",
     "Statement",
+    "StreamClock",
+    "StreamCounts",
     "StreamSpec",
     "Surface",
     "TactbenchError",
@@ -182,6 +217,7 @@ __all__ = [
     "Verdict",
     "assumed",
     "derived",
+    "fault_concerns",
     "hookimpl",
     "load_object",
     "load_registry",
@@ -200,16 +236,27 @@ _ON_DEMAND = {
     "CanLog": "tactbench.links.can_log",
     "Clock": "tactbench.links.link",
     "DatagramLink": "tactbench.links.datagram_link",
+    "DeviceEmulator": "tactbench.devices.emulator",
+    "Driver": "tactbench.devices.driver",
+    "DriverFactory": "tactbench.devices.driver",
+    "DriverSettings": "tactbench.devices.driver",
+    "EmulatorFactory": "tactbench.devices.emulator",
+    "EmulatorSettings": "tactbench.devices.emulator",
+    "Fault": "tactbench.devices.fault",
     "FloatArray": "tactbench.core.samples",
     "Link": "tactbench.links.link",
     "LinkAddress": "tactbench.links.address",
     "Received": "tactbench.links.link",
     "Recording": "tactbench.core.recording.reader",
+    "Senses": "tactbench.devices.emulator",
+    "Sent": "tactbench.devices.emulator",
     "SpiBridge": "tactbench.links.spi_bridge",
+    "SpiDeviceEmulator": "tactbench.devices.emulator",
     "SpiLink": "tactbench.links.spi_link",
     "SpiReply": "tactbench.links.spi_link",
     "SpiStep": "tactbench.links.spi_link",
     "SpidevLink": "tactbench.links.spidev",
+    "fault_concerns": "tactbench.devices.fault",
     "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",
 }

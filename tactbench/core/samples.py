@@ -43,6 +43,8 @@ class Quality(IntFlag):
     """The converter stood at its end."""
     SUSPECT = 4
     """Parity, checksum or sequence error."""
+    GAP = 8
+    """The sample is good, but rows before it were lost: on the way here, or between reading and writing."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +53,16 @@ class Block:
 
     stream: str
     t_ns: IntArray | None
-    """(n,) nanoseconds; None when there is no clock."""
+    """(n,) nanoseconds; None when there is no clock. Where the device has a clock of its own: when the host had the
+    sample."""
     data: npt.NDArray[Any]
     """(n, channels), in the units of the stream's channels."""
     quality: npt.NDArray[np.uint8] | None = None
     """(n, channels) of :class:`Quality`; None: all good."""
     sequence: IntArray | None = None
-    """(n,) the device's own counter, if it has one."""
+    """(n,) the device's own number of each sample, if it has one, counted on over its wraps."""
+    device_ns: IntArray | None = None
+    """(n,) nanoseconds of the device's own clock, if it has one, counted on over its wraps."""
 
 
 @dataclass(frozen=True)

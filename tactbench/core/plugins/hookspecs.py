@@ -1,4 +1,4 @@
-"""The five hooks: the whole door fits on this screen.
+"""The six hooks: the whole door fits on this screen.
 
 Each hook returns descriptors: a name, a spec, and *where* the code is as an import string, so that listing plugins
 imports nothing heavy.
@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import pluggy
 
 from tactbench.core.spec.rig import (
+    DeviceDescriptor,
     EffectDescriptor,
     EstimatorDescriptor,
     RigDescriptor,
@@ -36,6 +37,11 @@ def tactbench_sensors() -> Sequence[SensorDescriptor]:  # type: ignore[empty-bod
 @hookspec
 def tactbench_rigs() -> Sequence[RigDescriptor]:  # type: ignore[empty-body]
     """Return the rigs this plugin brings."""
+
+
+@hookspec
+def tactbench_devices() -> Sequence[DeviceDescriptor]:  # type: ignore[empty-body]
+    """Return the force sensors and motors this plugin brings."""
 
 
 @hookspec

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from tactbench.core.samples import Block, SkinGrid, SkinState
-from tactbench.core.spec.recording import PlanEntry, Scalar
+from tactbench.core.spec.recording import Emulation, PlanEntry, Scalar, StreamClock, StreamCounts
 from tactbench.core.spec.rig import EffectDescriptor, SensorDescriptor
+from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 
@@ -47,6 +48,30 @@ class Acquisition(Protocol):
         """
 
     def __iter__(self) -> Iterator[Block]: ...
+
+
+class DeviceAcquisition(Acquisition, Protocol):
+    """An acquisition from devices says more, once it is over."""
+
+    @property
+    def clocks(self) -> Mapping[str, StreamClock]:
+        """By stream: where its times come from; without the lines, which are fitted to the blocks."""
+
+    @property
+    def stream_counts(self) -> Mapping[str, StreamCounts]:
+        """By stream: what became of its rows, as far as the rig knows."""
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """What its drivers counted, by device and name."""
+
+    @property
+    def emulation(self) -> Emulation | None:
+        """None: all devices were real."""
+
+    @property
+    def ended(self) -> str:
+        """Why it ended before its time; empty: it did not."""
 
 
 class Rig(Protocol):
@@ -120,6 +145,13 @@ class Estimator(Protocol):
         """Answer."""
 
 
+class Operator(Protocol):
+    """Whoever stands at a rig of real devices."""
+
+    def asked(self, text: str) -> None:
+        """Show what is to be done, and return when it is; raises RigError if nobody is there to do it."""
+
+
 @dataclass(frozen=True)
 class RigContext:
     """What a rig is built from: ``RigDescriptor.where`` is called with exactly this."""
@@ -128,6 +160,10 @@ class RigContext:
     """All installed effects; the twin plans with them."""
     recordings: Path | None = None
     """Folder given by ``--recordings``."""
+    rig_file: RigFile | None = None
+    """The file given by ``--rig-file``."""
+    operator: Operator | None = None
+    """None: nobody is there."""
 
 
 class RigFactory(Protocol):

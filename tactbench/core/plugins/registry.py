@@ -20,6 +20,7 @@ import pluggy
 from tactbench.core.errors import DuplicateNameError, PluginContractError, PluginError, UnknownNameError
 from tactbench.core.plugins import hookspecs
 from tactbench.core.spec.rig import (
+    DeviceDescriptor,
     EffectDescriptor,
     EstimatorDescriptor,
     RigDescriptor,
@@ -27,7 +28,9 @@ from tactbench.core.spec.rig import (
     TaskDescriptor,
 )
 
-D = TypeVar("D", SensorDescriptor, RigDescriptor, TaskDescriptor, EstimatorDescriptor, EffectDescriptor)
+D = TypeVar(
+    "D", SensorDescriptor, RigDescriptor, DeviceDescriptor, TaskDescriptor, EstimatorDescriptor, EffectDescriptor
+)
 
 
 @dataclass(frozen=True)
@@ -110,16 +113,18 @@ class Registry:
 
     sensors: Shelfful[SensorDescriptor] = field(default_factory=lambda: Shelfful("sensor"))
     rigs: Shelfful[RigDescriptor] = field(default_factory=lambda: Shelfful("rig"))
+    devices: Shelfful[DeviceDescriptor] = field(default_factory=lambda: Shelfful("device"))
     tasks: Shelfful[TaskDescriptor] = field(default_factory=lambda: Shelfful("task"))
     estimators: Shelfful[EstimatorDescriptor] = field(default_factory=lambda: Shelfful("estimator"))
     effects: Shelfful[EffectDescriptor] = field(default_factory=lambda: Shelfful("effect"))
     plugins: list[PluginRow] = field(default_factory=list)
 
     def shelves(self) -> Mapping[str, Shelfful[Any]]:
-        """Return the five shelves by the name of their hook's plural."""
+        """Return the six shelves by the name of their hook's plural."""
         return {
             "sensors": self.sensors,
             "rigs": self.rigs,
+            "devices": self.devices,
             "tasks": self.tasks,
             "estimators": self.estimators,
             "effects": self.effects,
@@ -139,6 +144,7 @@ class Registry:
 _KINDS: dict[str, type[Any]] = {
     "sensors": SensorDescriptor,
     "rigs": RigDescriptor,
+    "devices": DeviceDescriptor,
     "tasks": TaskDescriptor,
     "estimators": EstimatorDescriptor,
     "effects": EffectDescriptor,

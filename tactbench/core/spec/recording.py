@@ -28,6 +28,70 @@ class PlanEntry(Frozen):
     """Included or left out because the scene asked for it by name."""
 
 
+class ClockSegment(Frozen):
+    """host = device + offset + drift (device - middle), all since 1970 or whatever the two clocks count from."""
+
+    middle_ns: int
+    """Where on the device's clock the line is given: the middle of the stretch it was fitted to."""
+    offset_ns: int
+    """Host's clock minus device's at `middle_ns`."""
+    drift: float
+    """By how much the host's clock runs faster than the device's [s/s]."""
+    bound_ns: int
+    """The line's error within its stretch is at most this, if delays sometimes reach their least value; the constant
+    part of the delay comes on top."""
+    points: int
+    """Pairs of stamps it was fitted to."""
+
+
+class StreamClock(Frozen):
+    """Where the times of one stream come from."""
+
+    source: Literal["device", "host", "simulated"]
+    """`device`: its own clock, put on the host's by `segments`. `host`: the host's, when the sample came, or was asked
+    for. `simulated`: the virtual time of emulated devices."""
+    method: Literal["none", "hull-1way", "hull-2way"] = "none"
+    """How the device's clock was put on the host's."""
+    delay_ns: tuple[int, int] = (0, 0)
+    """From and to: what the sample's way to the host takes at least; it cannot be seen one way and is not taken off."""
+    segments: tuple[ClockSegment, ...] = ()
+    """In order; between two middles, times go over from one line to the next."""
+    wraps: int = 0
+    """How often the device's counter began anew."""
+    breaks: int = 0
+    """Where it was lost and the device's time starts again."""
+
+
+class StreamCounts(Frozen):
+    """What became of the rows of one stream: received = written + dropped + duplicates + late."""
+
+    received: int = 0
+    written: int = 0
+    dropped: int = 0
+    """Lost between reading and writing, because writing was behind."""
+    duplicates: int = 0
+    """Kept out: their number had come before."""
+    late: int = 0
+    """Kept out: they came after rows that follow them."""
+    gaps: int = 0
+    """Rows that never came, by the device's own numbers."""
+
+
+class Emulation(Frozen):
+    """That devices were emulated, and how."""
+
+    time: Literal["virtual", "real"]
+    factor: float | None = None
+    """Seconds of the devices for one of the wall clock; None: not measured."""
+    seed: int = 0
+    physics: str = ""
+    """The simulated rig whose samples moved them."""
+    devices: tuple[str, ...] = ()
+    """Which ones; the others were real."""
+    faults: tuple[str, ...] = ()
+    """``device: fault``, as the rig file writes them."""
+
+
 class RecordingMeta(Frozen):
     """The attributes of one recording: written once, never changed."""
 
@@ -41,8 +105,15 @@ class RecordingMeta(Frozen):
     simulated: bool = False
     own_rates_hz: dict[str, float] = Field(default_factory=dict)
     """By stream: the rate at which the sensor itself samples it, where the recording has it at another [Hz]."""
-    clock: Literal["device", "host", "nominal", "none"] = "device"
-    """Who made the time stamps: the device, the host that read it, `row / rate`, or nobody (row order only)."""
+    emulation: Emulation | None = None
+    """None: no device was emulated. Otherwise `simulated` is true as well: what they sense is computed."""
+    clock: Literal["device", "host", "simulated", "nominal", "none"] = "device"
+    """Who made the time stamps: the device, the host that read it, the simulation, `row / rate`, or nobody (row order
+    only)."""
+    clocks: dict[str, StreamClock] = Field(default_factory=dict)
+    """By stream, where streams have clocks of their own; their `t_ns` are then on the host's."""
+    streams: dict[str, StreamCounts] = Field(default_factory=dict)
+    """By stream: what became of its rows, where they came from devices."""
     session: str = "1"
     trial: str = ""
     role: Role | None = None

@@ -1,4 +1,4 @@
-"""What a rig, an estimator and an effect are, without loading their code."""
+"""What a sensor, a device, a rig, an estimator and an effect are, without loading their code."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from tactbench.core.spec.task import TaskSpec
 
 _WHERE = r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"
 _NAME = r"^[a-z][a-z0-9_-]*$"
+EmulatedLink = Literal["bytes", "can", "datagram", "spi"]
 
 
 class SensorDescriptor(Frozen):
@@ -21,12 +22,32 @@ class SensorDescriptor(Frozen):
     transducer: str | None = Field(default=None, pattern=_WHERE)
     """``module:callable`` -> :class:`tactbench.plugin.Transducer`; needed on the twin only."""
     driver: str | None = Field(default=None, pattern=_WHERE)
-    """``module:callable`` for real hardware."""
+    """``module:callable`` -> :class:`tactbench.plugin.Driver`, called with DriverSettings; for real devices."""
+    emulator: str | None = Field(default=None, pattern=_WHERE)
+    """``module:callable`` -> the device as a model at the far end of `emulated_link`, called with EmulatorSettings."""
+    emulated_link: EmulatedLink | None = None
+    """What the driver speaks through; needed where there is an emulator."""
 
     @property
     def name(self) -> str:
         """The sensor's name."""
         return self.spec.name
+
+
+class DeviceDescriptor(Frozen):
+    """A device that is no tactile sensor, and where its code is: a reference force sensor, a motor."""
+
+    name: str = Field(pattern=_NAME)
+    title: str
+    kind: Literal["force", "motor"]
+    """What a rig uses it for. The streams of a force sensor have channels of kind `force`."""
+    driver: str = Field(pattern=_WHERE)
+    """``module:callable`` -> :class:`tactbench.plugin.Driver`, called with DriverSettings; of a motor, what its rig
+    expects."""
+    emulator: str | None = Field(default=None, pattern=_WHERE)
+    """As of a sensor."""
+    emulated_link: EmulatedLink | None = None
+    """As of a sensor."""
 
 
 class TaskDescriptor(Frozen):

@@ -12,8 +12,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import UsageError
-from tactbench.rigs.parallel_manipulator.fault import Fault, concerned
+from tactbench.plugin import Fault, UsageError, fault_concerns
 from tactbench.rigs.parallel_manipulator.force_torque.rdt_codec import (
     MOST_BUFFERED,
     SEQUENCE_MODULUS,
@@ -219,7 +218,7 @@ class RdtEmulator:
     def _on_the_way(self, datagram: bytes, at_s: float) -> list[bytes]:
         """Return what arrives of a datagram sent at a time, in the order of arrival."""
         dropped, doubled, late = (
-            concerned(self.faults, name, at_s, self._seen) for name in ("dropped", "doubled", "out-of-order")
+            fault_concerns(self.faults, name, at_s, self._seen) for name in ("dropped", "doubled", "out-of-order")
         )
         if dropped:
             return []

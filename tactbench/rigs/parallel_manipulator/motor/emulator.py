@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tactbench.rigs.parallel_manipulator.fault import Fault, concerned
+from tactbench.plugin import Fault, fault_concerns
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
 from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
@@ -158,7 +158,7 @@ class MotorEmulator:
 
     def _send(self, text: str, at_s: float) -> None:
         line = bytearray(text.encode("ascii") + b"\r\n")
-        if concerned(self.faults, "garbled-line", at_s, self._seen):
+        if fault_concerns(self.faults, "garbled-line", at_s, self._seen):
             # Any other byte than the right one: also a digit for a digit, which no host can notice.
             line[int(self._rng.integers(len(line)))] ^= int(self._rng.integers(1, 256))
         byte_s = line_time_s(1, self.drive.settings.baud)

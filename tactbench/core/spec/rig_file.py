@@ -1,0 +1,89 @@
+"""A rig file: which devices stand on which links, for rigs of real devices and for their emulators."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from tactbench.core.spec.quantity import Frozen
+from tactbench.core.spec.recording import Scalar
+
+EMULATED = "emulated"
+"""Stands for a link's address where the device's emulator is to be started."""
+
+
+class DeviceEntry(Frozen):
+    """One device."""
+
+    link: str = Field(min_length=1)
+    """Address of its link (``docs/links.md``), or ``emulated``."""
+    options: dict[str, Scalar | bool] = Field(default_factory=dict)
+    """What its driver needs to know beside the link."""
+    faults: tuple[str, ...] = ()
+    """Faults of its emulator: ``name`` or ``name:key=value,…``."""
+
+    @property
+    def emulated(self) -> bool:
+        """Whether its emulator is to be started."""
+        return self.link == EMULATED
+
+    @model_validator(mode="after")
+    def _faults_of_emulators(self) -> DeviceEntry:
+        if self.faults and not self.emulated:
+            raise ValueError("only an emulated device has faults to choose; use link: emulated, or leave them out")
+        return self
+
+
+class ForceEntry(DeviceEntry):
+    """The reference force sensor."""
+
+    device: str
+    """Name of the device (``tactbench list devices``)."""
+    channel: str = "fz"
+    """Its channel along which the sensor is pressed."""
+    sign: Literal[-1, 1] = 1
+    """-1: pressing makes that channel fall."""
+
+
+class NamedDevice(DeviceEntry):
+    """A further device, such as a motor."""
+
+    device: str
+    """Name of the device (``tactbench list devices``)."""
+
+
+class EmulationSettings(Frozen):
+    """How the emulated devices of a rig are moved."""
+
+    time: Literal["virtual", "real"] = "virtual"
+    """`virtual`: as fast as it can be computed, the same each time; `real`: by the wall clock."""
+    physics: str = "twin"
+    """The simulated rig whose samples the emulated devices read."""
+    seed: int = Field(default=1, ge=0)
+    """Of what is drawn in emulators; the scene's own seed is the run's."""
+
+
+class RigFile(Frozen):
+    """What a rig of real devices is made of."""
+
+    version: Literal[1] = 1
+    rig: str
+    """Name of the rig (``tactbench list rigs``) that the file is for."""
+    title: str = ""
+    """Shown with its recordings."""
+    sensors: dict[str, DeviceEntry] = Field(min_length=1)
+    """By the sensor's name; a run uses the one it asks for."""
+    force: ForceEntry | None = None
+    devices: dict[str, NamedDevice] = Field(default_factory=dict)
+    """Further devices by their part in the rig, such as `motor`."""
+    emulation: EmulationSettings = EmulationSettings()
+    settings: dict[str, Any] = Field(default_factory=dict)
+    """The rig's own, which it checks itself."""
+
+    def entries(self) -> dict[str, DeviceEntry]:
+        """Return every device by its name in messages: the sensor's name, ``force``, or its part in the rig."""
+        found: dict[str, DeviceEntry] = dict(self.sensors)
+        if self.force is not None:
+            found["force"] = self.force
+        return found | self.devices

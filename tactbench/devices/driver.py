@@ -1,0 +1,106 @@
+"""What a driver is: one device behind one link, read in blocks."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+from tactbench.core.samples import Block
+from tactbench.core.spec.sensor import StreamSpec
+from tactbench.links.link import Clock, Link
+
+
+@dataclass(frozen=True)
+class DriverSettings:
+    """What a driver is built from."""
+
+    open_link: Callable[[], Link]
+    """Opens the link that the rig file names, or the emulator's."""
+    streams: tuple[StreamSpec, ...] = ()
+    """Streams of the sensor's spec; empty for a device that is no sensor."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """What the rig file says of this device beside its link; the driver refuses what it does not know."""
+    clock: Clock = time.monotonic_ns
+    """The host's clock, the same as the link's; virtual where time is virtual."""
+
+
+class Driver(ABC):
+    """One device: open once it is made, until :meth:`close` or the end of its ``with`` block.
+
+    One thread uses a driver. Its only waits are its link's, so that it runs in virtual time as in real time.
+
+    What is wrong with single samples is in their blocks' quality and in :attr:`counts`, and raises nothing; what ends
+    the reading raises: :class:`~tactbench.core.errors.LinkUnplugged` of the link, or a RigError of the device.
+    """
+
+    @property
+    @abstractmethod
+    def streams(self) -> tuple[StreamSpec, ...]:
+        """What it reads, as it is set up now; rates as far as they are known."""
+
+    @property
+    @abstractmethod
+    def counts(self) -> Mapping[str, int]:
+        """What was counted since it was opened, by name: parity errors, frames lost … An empty one: all was well."""
+
+    @abstractmethod
+    def identify(self) -> Mapping[str, str]:
+        """Return what the device says of itself (model, serial, firmware), to be asked before :meth:`start`.
+
+        Raises
+        ------
+        LinkTimeout, LinkUnplugged, RigError
+            If it does not answer, or is another device.
+        """
+
+    @abstractmethod
+    def start(self) -> None:
+        """Set the device up and let it sample; raises as :meth:`identify`."""
+
+    @abstractmethod
+    def read(self, timeout_s: float) -> list[Block]:
+        """Return what has come since the last call, a block a stream that has any.
+
+        Parameters
+        ----------
+        timeout_s
+            Seconds to wait for the first; 0 asks without waiting. An empty list: nothing came, which is no error.
+
+        Returns
+        -------
+        list of Block
+            ``t_ns`` on the host's clock, as well as the driver knows it when the sample comes: of a device with a
+            counter the time of receipt. ``device_ns`` where the device has a clock of its own, counted on over its
+            wraps. ``sequence`` where it numbers its samples: counted on over its wraps, too.
+        """
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Let the device stop sampling; what is still under way is dropped. Raises nothing if it is gone."""
+
+    def tare(self) -> bool:
+        """Let the device take its present reading as zero; return whether it can do so itself."""
+        return False
+
+    @abstractmethod
+    def close(self) -> None:
+        """Stop if it is sampling, and close the link; once closed, this does nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class DriverFactory(Protocol):
+    """What ``SensorDescriptor.driver`` and ``DeviceDescriptor.driver`` name."""
+
+    def __call__(self, settings: DriverSettings) -> Driver:
+        """Open the link; raises UsageError for options that are not known, LinkError if it cannot be opened."""
