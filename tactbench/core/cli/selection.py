@@ -19,6 +19,7 @@ _OPTIONS = (
     click.option("--task", "tasks", multiple=True, metavar="NAME", help="Question to ask; may be repeated."),
     click.option("--rig", metavar="NAME", help="What carries out the scenes: twin (default), replay …"),
     click.option("--recordings", type=click.Path(path_type=Path), metavar="DIR", help="Recordings for --rig replay."),
+    click.option("--rig-file", metavar="FILE", help="Devices and links of a rig of real or emulated devices."),
     click.option("--protocol", "protocols", multiple=True, metavar="NAME",
                  help="How recordings become X and y; may be repeated. Default: the task's first."),
     click.option("--split", "splits", multiple=True, metavar="NAME",
@@ -80,6 +81,7 @@ def _matrix(
     sensors: tuple[str, ...],
     tasks: tuple[str, ...],
     rig: str | None,
+    rig_file: str | None,
     protocols: tuple[str, ...],
     splits: tuple[str, ...],
     estimators: tuple[str, ...],
@@ -94,8 +96,9 @@ def _matrix(
 
     matrix = matrix_called(config) if config else default_matrix()
     change: dict[str, Any] = {}
-    if rig or replaying:
-        change["rig"] = rig or "replay"
+    if rig or replaying or rig_file:
+        change["rig"] = rig or (rig_of_file(rig_file) if rig_file else "replay")
+        change["rig_file"] = rig_file
     if sensors:
         change["sensors"] = tuple(dict.fromkeys(sensors))
     elif change.get("rig", matrix.rig) != matrix.rig:
@@ -120,3 +123,11 @@ def _matrix(
         over["estimators"] = tuple(EstimatorChoice(name=name) for name in dict.fromkeys(estimators))
     change["tasks"] = tuple(choice.model_copy(update=over) for choice in chosen)
     return matrix.model_copy(update=change)
+
+
+def rig_of_file(file: str) -> str:
+    """Return the name of the rig that a rig file is for; raises ConfigError if it is none."""
+    from tactbench.core.spec.rig_file import RigFile
+    from tactbench.core.spec.yaml_file import load_yaml
+
+    return load_yaml(Path(file), RigFile).rig

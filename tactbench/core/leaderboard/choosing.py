@@ -77,7 +77,7 @@ class Choice:
             row, criteria = one.row, [asdict(criterion) for criterion in one.criteria]
             known = {
                 key: row.get(key)
-                for key in ("cell", "sensor", "estimator", "params", "simulated", "baseline", "ci_method")
+                for key in ("cell", "sensor", "estimator", "params", "simulated", "emulated", "baseline", "ci_method")
             }
             found.append({**known, "score": one.score, "low": one.low, "high": one.high, "criteria": criteria})
         return {

@@ -105,7 +105,7 @@ def few_shot_curves(rows: Iterable[Row]) -> list[Curve]:
 
 
 def _key(row: Row) -> tuple[Any, ...]:
-    return row["task"], "sim" if row["simulated"] else row["rig"], row["repeat"]
+    return row["task"], hardware_name(row), row["repeat"]
 
 
 def _worth_showing(members: Sequence[Row]) -> list[Row]:

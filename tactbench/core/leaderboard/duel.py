@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.table import answer_name
+from tactbench.core.leaderboard.names import EMULATED, SIMULATED, answer_name, hardware_name
 from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.holm import holm
 from tactbench.core.statistics.overlap import OverFolds, over_folds
@@ -149,8 +149,7 @@ def _compared(kind: Kind, first: str, second: str, first_rows: Sequence[Row], se
 
 def _key(kind: Kind, row: Row) -> Key:
     """Return what two rows must have in common: hardware first, then protocol, then all else."""
-    hardware = "sim" if row["simulated"] else row["rig"]
-    return (hardware, row["protocol"], row["split"], row["task"], row["repeat"], _common(kind, row))
+    return (hardware_name(row), row["protocol"], row["split"], row["task"], row["repeat"], _common(kind, row))
 
 
 def _common(kind: Kind, row: Row) -> str:
@@ -163,7 +162,10 @@ def _why_alone(kind: Kind, row: Row, missing: str, others: Mapping[Key, Row]) ->
     """Return why `row` has nothing to stand against."""
     hardware, protocol, split, *rest = _key(kind, row)
     near = [key for key in others if list(key[3:]) == rest]
-    if any(key[1:3] == (protocol, split) and (key[0] == "sim") != (hardware == "sim") for key in near):
+    elsewhere = {key[0] for key in near if key[1:3] == (protocol, split)} - {hardware}
+    if any(name.startswith(EMULATED) for name in (*elsewhere, hardware)) and elsewhere:
+        return "EMULATED is never compared with SIM or hardware"
+    if any((name == SIMULATED) != (hardware == SIMULATED) for name in elsewhere):
         return "SIM is never compared with hardware"
     if any(key[:2] == (hardware, protocol) for key in near):
         return f"{missing} was asked with another split"

@@ -126,7 +126,7 @@ def notes_of(duels: Sequence[Duel]) -> list[str]:
     elif found:
         notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
     if any(duel.row["simulated"] for duel in found):
-        notes.append("SIM: simulated by the twin; says nothing of hardware.")
+        notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
     return list(dict.fromkeys([*notes, *_averages(found)]))
 
 
@@ -135,7 +135,7 @@ def _averages(found: Sequence[Duel]) -> list[str]:
     groups: dict[tuple[Any, ...], list[Duel]] = {}
     for duel in found:
         row = duel.row
-        groups.setdefault((row["simulated"], row["protocol"]), []).append(duel)
+        groups.setdefault((hardware_name(row), row["protocol"]), []).append(duel)
     notes = []
     for (_, protocol), members in groups.items():
         pairs = [(duel.first_row, duel.second_row) for duel in members]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
 from itertools import chain, compress
 from typing import Any
@@ -30,10 +31,19 @@ def mark_notes(sheet: Sheet) -> list[str]:
 
 
 def simulation_notes(sheet: Sheet) -> list[str]:
-    """Return what SIM means, and what the simulations assumed."""
+    """Return what SIM and EMULATED mean, and what the simulations assumed."""
     assumed = list(compress(sheet["assumptions"], sheet["simulated"]))
     told = dict.fromkeys(map(_assumptions, dict(zip(marks_of(assumed), assumed, strict=True)).values()))
-    return [f"SIM: simulated by the twin, never ranked against hardware. Assumed: {one}." for one in told]
+    emulated = sheet.known("emulated")
+    marks = [
+        text
+        for text, some in (
+            ("SIM: simulated by the twin", [*compress(map(operator.not_, emulated), sheet["simulated"])]),
+            ("EMULATED: read through the drivers from emulated devices that the twin moved", emulated),
+        )
+        if any(some)
+    ]
+    return [f"{'; '.join(marks)}; never ranked against hardware. Assumed: {one}." for one in told]
 
 
 def _assumptions(assumptions: Mapping[str, Any]) -> str:

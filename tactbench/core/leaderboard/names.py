@@ -17,6 +17,8 @@ _name = lru_cache(maxsize=4096)(visible)
 
 SIMULATED = "SIM (twin)"
 """What is said of simulated rows in place of a rig."""
+EMULATED = "EMULATED"
+"""What is said of rows whose recordings came from emulated devices, before their rig."""
 METRIC_NAMES = {
     "rmse": "RMSE",
     "mae": "MAE",
@@ -29,7 +31,14 @@ METRIC_NAMES = {
 
 def sensor_name(row: Row) -> str:
     """Return a sensor's name, marked where it was simulated."""
-    return _name(f"{row['sensor']} SIM" if row["simulated"] else str(row["sensor"]))
+    return _name(" ".join(filter(None, (str(row["sensor"]), origin_mark(row)))))
+
+
+def origin_mark(row: Row) -> str:
+    """Return ``SIM`` or ``EMULATED`` for a row that no sensor was pressed for, else nothing."""
+    if row.get("emulated"):
+        return EMULATED
+    return "SIM" if row["simulated"] else ""
 
 
 def answer_name(row: Row) -> str:
@@ -47,7 +56,9 @@ def metric_name(row: Row) -> str:
 
 
 def hardware_name(row: Row) -> str:
-    """Return what carried out a row's scenes: the twin, or a rig by its name."""
+    """Return what carried out a row's scenes: the twin, emulated devices on a rig, or a rig by its name."""
+    if row.get("emulated"):
+        return f"{EMULATED} (rig {row['rig']})"
     return SIMULATED if row["simulated"] else f"rig {row['rig']}"
 
 

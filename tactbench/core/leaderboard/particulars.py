@@ -4,8 +4,8 @@ from __future__ import annotations
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "Configuration": (
-        "cell", "key", "sensor", "task", "rig", "simulated", "protocol", "dagger", "split", "estimator", "is_baseline",
-        "looks_at", "repeat", "repeats", "seed", "threads",
+        "cell", "key", "sensor", "task", "rig", "simulated", "emulated", "protocol", "dagger", "split", "estimator",
+        "is_baseline", "looks_at", "repeat", "repeats", "seed", "threads",
     ),
     "Answer": (
         "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method",

@@ -21,7 +21,7 @@ JSON_KEYS = (
     "published_reference", "published_remark", "n_recordings",
     "n_sessions", "n_train", "n_test", "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50",
     "latency_ms_p95", "latency_ms_max", "latency_n", "answer_delay_ms", "delay_parts_ms", "threads", "peak_rss_mb",
-    "wall_s", "concurrency", "host", "made_by", "simulated",
+    "wall_s", "concurrency", "host", "made_by", "simulated", "emulated",
     "dagger", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "fold_sizes", "confusion",
     "classes", "recordings", "key", "replicates",
 )  # fmt: skip

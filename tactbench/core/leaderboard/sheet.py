@@ -125,7 +125,7 @@ class Sheet(Mapping[str, Sequence[Any]]):
     @cached_property
     def sensors(self) -> list[str]:
         """The name of each row's sensor, as shown."""
-        return self.told(sensor_name, "sensor", "simulated")
+        return self.told(sensor_name, "sensor", "simulated", "emulated")
 
     @cached_property
     def answers(self) -> list[str]:

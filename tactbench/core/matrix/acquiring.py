@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 
 from tactbench.core.errors import UnwritableError
@@ -15,8 +15,9 @@ from tactbench.core.matrix.material import Order, need_of
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.plugins.interfaces import Rig
+from tactbench.core.plugins.interfaces import Operator, Rig
 from tactbench.core.plugins.registry import installed
+from tactbench.core.spec.rig_file import RigFile
 
 GRACE_S = 5.0
 """Seconds that a real rig has to stand still and let go of its devices when its time is up."""
@@ -29,16 +30,21 @@ def acquire_missing(
     choice: EngineChoice,
     told: Progress,
     meanwhile: Callable[[], None] | None = None,
+    operator: Operator | None = None,
 ) -> None:
     """Make the recordings that `cells` lack, and note in `material` which were made and what went wrong.
 
-    Simulations do not disturb each other and are not timed by the wall: they use all cores. A real rig does one scene
-    at a time, and is asked to end before it is ended. A scene that its process does not survive costs its recording.
+    Simulations do not disturb each other and are not timed by the wall: they use all cores; so are emulated devices in
+    virtual time. A real rig does one scene at a time, and is asked to end before it is ended. A scene that its process
+    does not survive costs its recording. Where somebody stands at the rig, scenes are carried out in this process,
+    which has the terminal.
 
     Parameters
     ----------
     meanwhile
         Done here while others are busy.
+    operator
+        Who stands at a rig of real devices.
 
     Raises
     ------
@@ -53,12 +59,14 @@ def acquire_missing(
     book.note_recordings(missing)
     from tactbench.core.recording.format import partial_path
 
-    simulated = all(installed().rigs[order.rig].simulated for order in missing)
+    simulated = all(_computed(order) for order in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     told.begin("recording", len(missing), alone=False)
-    pool = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S)
     try:
-        outcomes = pool.each(record, missing, meanwhile)
+        if operator is not None and not simulated:
+            outcomes = _one_by_one(missing, operator)
+        else:
+            outcomes = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S).each(record, missing, meanwhile)
         for order, outcome in outcomes:
             if isinstance(outcome, UnwritableError):
                 raise outcome  # the disk is no cell's fault, and refuses the next one too
@@ -75,19 +83,40 @@ def acquire_missing(
         raise
 
 
+def _computed(order: Order) -> bool:
+    """Whether a scene needs nothing but this machine, and no wall clock."""
+    if installed().rigs[order.rig].simulated:
+        return True
+    if not order.rig_file:
+        return False
+    devices = RigFile.model_validate_json(order.rig_file)
+    used = [devices.sensors.get(order.sensor), devices.force, *devices.devices.values()]
+    return devices.emulation.time == "virtual" and all(entry is None or entry.emulated for entry in used)
+
+
+def _one_by_one(orders: Sequence[Order], operator: Operator) -> Iterator[tuple[Order, str | Exception]]:
+    """Carry out scenes in this process; what a rig raises is the scene's outcome."""
+    for order in orders:
+        try:
+            yield order, record(order, operator)
+        except Exception as error:
+            yield order, error
+
+
 @lru_cache(maxsize=4)
-def _rig(name: str) -> Rig:
-    return built(name, installed())  # type: ignore[return-value]
+def _rig(name: str, rig_file: str, operator: Operator | None) -> Rig:
+    devices = RigFile.model_validate_json(rig_file) if rig_file else None
+    return built(name, installed(), rig_file=devices, operator=operator)  # type: ignore[return-value]
 
 
-def record(order: Order) -> str:
+def record(order: Order, operator: Operator | None = None) -> str:
     """Make one recording and return its content digest. Raises whatever the rig raises."""
     from tactbench.core.acquisition import acquire
 
     registry = installed()
     rig = registry.rigs[order.rig]
     made = acquire(
-        _rig(order.rig),
+        _rig(order.rig, order.rig_file, operator),  # type: ignore[arg-type]
         registry.sensors[order.sensor],
         rig,
         order.scene,

@@ -132,6 +132,7 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
         "host": "",
         "made_by": "",
         "simulated": simulated,
+        "emulated": False,
         "dagger": False,
         "stamps": [],
         "remarks": [],
@@ -194,6 +195,7 @@ def _told_by(metas: Sequence[RecordingMeta]) -> Row:
     first = metas[0] if metas else None
     return {
         "simulated": any(meta.simulated for meta in metas),
+        "emulated": any(meta.emulation is not None for meta in metas),
         "sim_s": sum(seconds) if seconds else None,
         "assumptions": _assumed(metas),
         "plan": [entry.model_dump() for entry in first.plan] if first else [],

@@ -33,7 +33,7 @@ class Explanation:
 def recording_entry(order: Order, keys: Keys) -> Entry:
     """Return what went into a recording's key, for the book."""
     scene = {"role": order.role, "seed": order.seed, "scene": order.scene.model_dump()}
-    return Entry(_name(order), order.path.stem[-12:], scene, keys.maker(order.sensor, order.rig))
+    return Entry(_name(order), order.path.stem[-12:], scene, keys.maker(order.sensor, order.rig, order.rig_file))
 
 
 @dataclass(frozen=True)

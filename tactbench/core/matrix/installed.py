@@ -6,15 +6,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tactbench.core.errors import RigError, TactbenchError
-from tactbench.core.plugins.interfaces import Rig, RigContext, Shelf
+from tactbench.core.errors import RigError, TactbenchError, UsageError
+from tactbench.core.plugins.interfaces import Operator, Rig, RigContext, Shelf
 from tactbench.core.plugins.registry import Registry, load_object
+from tactbench.core.spec.rig_file import RigFile
 
 
-def rig_of(name: str, registry: Registry, recordings: Path | None = None) -> Rig | Shelf:
-    """Build the rig called `name`."""
+def rig_of(
+    name: str,
+    registry: Registry,
+    recordings: Path | None = None,
+    rig_file: RigFile | None = None,
+    operator: Operator | None = None,
+) -> Rig | Shelf:
+    """Build the rig called `name`; raises UsageError if the rig file is for another one."""
     descriptor = registry.rigs[name]
-    built = load_object(descriptor.where)(RigContext(effects=tuple(registry.effects), recordings=recordings))
+    if rig_file is not None and rig_file.rig != name:
+        raise UsageError(
+            f"The rig file is for the rig {rig_file.rig!r}, asked for is {name!r}.",
+            hint=f"Use --rig {rig_file.rig}, or another rig file.",
+        )
+    context = RigContext(effects=tuple(registry.effects), recordings=recordings, rig_file=rig_file, operator=operator)
+    built = load_object(descriptor.where)(context)
     if not (hasattr(built, "open") or hasattr(built, "recordings")):
         raise RigError(
             f"The rig {name!r} has neither open() nor recordings().", hint="See docs/plugins.md: a Rig or a Shelf."
@@ -22,10 +35,16 @@ def rig_of(name: str, registry: Registry, recordings: Path | None = None) -> Rig
     return built  # type: ignore[no-any-return]
 
 
-def built(name: str, registry: Registry, recordings: Path | None = None) -> Rig | Shelf:
+def built(
+    name: str,
+    registry: Registry,
+    recordings: Path | None = None,
+    rig_file: RigFile | None = None,
+    operator: Operator | None = None,
+) -> Rig | Shelf:
     """Build the rig called `name`; raises RigError where its own code fails, whatever that raises."""
     with _its_own_code(f"The rig {name!r} could not be built"):
-        return rig_of(name, registry, recordings)
+        return rig_of(name, registry, recordings, rig_file, operator)
 
 
 def listed(name: str, shelf: Shelf) -> list[Path]:

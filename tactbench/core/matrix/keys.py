@@ -18,6 +18,7 @@ from tactbench.core.matrix.distributions import installed_distributions, normal
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.source import Source, SourceDigests
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
 
 RELEVANT = ("numpy", "scipy", "scikit-learn")
@@ -54,7 +55,7 @@ class Keys:
         self._registry = registry
         self._sources = sources
         self._answers: dict[tuple[str, str], Fixed] = {}
-        self._makers: dict[tuple[str, str], Fixed] = {}
+        self._makers: dict[tuple[str, str, str], Fixed] = {}
         self._data: dict[tuple[str, ...], str] = {}
 
     def of_cell(self, cell: Cell, data: Sequence[str]) -> str:
@@ -78,28 +79,44 @@ class Keys:
             )
         return self._answers[pair]
 
-    def of_recording(self, sensor: str, rig: str, scene: Scene, role: Role, seed: int) -> str:
+    def of_recording(self, sensor: str, rig: str, scene: Scene, role: Role, seed: int, rig_file: str = "") -> str:
         """Return the key of a recording that `rig` is to make of `scene`."""
         own = [scene.model_dump(), role, seed]
-        return _digest(f"{self.maker(sensor, rig).digest} {_canonical(own)}")
+        return _digest(f"{self.maker(sensor, rig, rig_file).digest} {_canonical(own)}")
 
-    def maker(self, sensor: str, rig: str) -> Fixed:
-        """Return what all recordings by one rig of one sensor share."""
-        if (sensor, rig) not in self._makers:
+    def maker(self, sensor: str, rig: str, rig_file: str = "") -> Fixed:
+        """Return what all recordings by one rig of one sensor share.
+
+        What real devices gave is no less true once the code that read them has changed: of them it is sensor, rig and
+        rig file alone, so that nobody has to press everything again.
+        """
+        if (sensor, rig, rig_file) not in self._makers:
+            devices = RigFile.model_validate_json(rig_file) if rig_file else None
+            if devices is not None and not devices.emulated:
+                return _apart(sensor={"name": sensor}, rig={"name": rig, "file": rig_file})
             maker, carrier = self._registry.sensors.owned(sensor), self._registry.rigs.owned(rig)
             effects = [self._registry.effects.owned(effect.name) for effect in self._registry.effects]
             modules = [maker.module, carrier.module, carrier.descriptor.where]
             modules += [where for where in (maker.descriptor.transducer, maker.descriptor.driver) if where]
+            modules += [] if devices is None else self._behind(devices)
             for effect in effects:
                 modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
-            self._makers[sensor, rig] = _fixed(
+            self._makers[sensor, rig, rig_file] = _fixed(
                 self._sources.behind(modules, "recording"),
                 (),
                 sensor=maker.descriptor.model_dump(),
                 rig=carrier.descriptor.model_dump(),
                 effects={owner.descriptor.name: owner.descriptor.model_dump() for owner in effects},
+                **({"rig file": {"says": rig_file}} if rig_file else {}),
             )
-        return self._makers[sensor, rig]
+        return self._makers[sensor, rig, rig_file]
+
+    def _behind(self, devices: RigFile) -> list[str]:
+        """Return where the code of the devices of a rig file is, and of the simulation that moves the emulated ones."""
+        names = [entry.device for entry in (devices.force, *devices.devices.values()) if entry is not None]
+        owners = [self._registry.devices.owned(name) for name in names]
+        physics = self._registry.rigs.owned(devices.emulation.physics)
+        return [*(owner.module for owner in owners), physics.module, physics.descriptor.where]
 
 
 _ALL: WeakKeyDictionary[SourceDigests, Keys] = WeakKeyDictionary()
@@ -114,10 +131,17 @@ def keys_of(registry: Registry, sources: SourceDigests) -> Keys:
 
 
 def recording_key(
-    sensor: str, rig: str, scene: Scene, role: Role, seed: int, registry: Registry, sources: SourceDigests
+    sensor: str,
+    rig: str,
+    scene: Scene,
+    role: Role,
+    seed: int,
+    registry: Registry,
+    sources: SourceDigests,
+    rig_file: str = "",
 ) -> str:
     """Return the key of a recording that `rig` is to make of `scene`."""
-    return keys_of(registry, sources).of_recording(sensor, rig, scene, role, seed)
+    return keys_of(registry, sources).of_recording(sensor, rig, scene, role, seed, rig_file)
 
 
 def cell_key(cell: Cell, data: Sequence[str], registry: Registry, sources: SourceDigests) -> str:
@@ -150,6 +174,10 @@ def _fixed(source: Source, distributions: tuple[str, ...], **descriptors: Sectio
     imported = {f"import {name}": found for name, found in source.versions.items()}
     sections["versions"] = {**versions(distributions), **imported}
     sections.update({f"source of {package}": files for package, files in source.packages.items()})
+    return _apart(**sections)
+
+
+def _apart(**sections: Section) -> Fixed:
     return Fixed(_digest(_canonical(sections)), sections)
 
 

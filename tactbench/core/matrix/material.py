@@ -33,6 +33,8 @@ class Order:
     role: Role
     seed: int
     path: Path
+    rig_file: str = ""
+    """What the rig file says, as canonical JSON; empty: there is none."""
 
 
 def orders_for(
@@ -53,7 +55,7 @@ def orders_for(
             scene = planned.scene
             if simulation != Simulation():
                 scene = scene.model_copy(update={"simulation": simulation})
-            key = recording_key(cell.sensor, cell.rig, scene, planned.role, cell.seed, registry, sources)
+            key = recording_key(cell.sensor, cell.rig, scene, planned.role, cell.seed, registry, sources, cell.rig_file)
             path = store.recording_path(cell.sensor, scene.name, key)
-            orders[wanted].append(Order(cell.sensor, cell.rig, scene, planned.role, cell.seed, path))
+            orders[wanted].append(Order(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, cell.rig_file))
     return orders

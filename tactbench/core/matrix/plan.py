@@ -13,6 +13,7 @@ from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import REPLICATES, EstimatorChoice, MatrixSpec, TaskChoice
+from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import TaskSpec
 
@@ -42,6 +43,8 @@ class Cell:
     """Whether the latency of single rows is measured."""
     simulation: Simulation = _AS_PLANNED
     """How a simulated rig is asked to carry out its scenes."""
+    rig_file: str = ""
+    """What the rig file says, as canonical JSON; empty: there is none."""
 
     @cached_property
     def name(self) -> str:
@@ -52,7 +55,9 @@ class Cell:
         return "/".join((*path, str(self.repeat)))
 
 
-def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -> list[Cell]:
+def plan_cells(
+    matrix: MatrixSpec, sensors: Sequence[str], registry: Registry, rig_file: RigFile | None = None
+) -> list[Cell]:
     """List the cells of `matrix`, in the order in which they are run and stored.
 
     Parameters
@@ -63,6 +68,8 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
         The sensors to run it on, already checked.
     registry
         Where tasks and estimators are looked up.
+    rig_file
+        Of a rig of devices.
 
     Raises
     ------
@@ -71,6 +78,7 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
         question, or a parameter is not one of the estimator's.
     """
     cells: dict[Cell, None] = {}
+    said = rig_file.model_dump_json() if rig_file else ""
     repeats = matrix.repeats or (REPLICATES if registry.rigs[matrix.rig].simulated else 1)
     for repeat in range(1, repeats + 1):
         for choice in matrix.tasks:
@@ -93,6 +101,7 @@ def plan_cells(matrix: MatrixSpec, sensors: Sequence[str], registry: Registry) -
                         seed=matrix.seed + repeat - 1,
                         latency=matrix.latency,
                         simulation=matrix.simulation,
+                        rig_file=said,
                     )
                     cells[cell] = None  # once, in the order in which they were asked for
     return with_probes(list(cells), registry) if matrix.probe else list(cells)

@@ -20,7 +20,9 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.yaml_file import load_yaml
 
 R = TypeVar("R")
 ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuffled")
@@ -80,13 +82,14 @@ def plan(
         If the matrix asks for something that is not there.
     """
     chosen = choice or EngineChoice()
+    rig_file = load_yaml(Path(matrix.rig_file), RigFile) if matrix.rig_file else None
     if not registry.rigs[matrix.rig].simulated:  # a simulated one is no shelf: it is built when it has to record
-        rig = _greeted(lambda: built(matrix.rig, registry, recordings), chosen)
+        rig = _greeted(lambda: built(matrix.rig, registry, recordings, rig_file), chosen)
         if isinstance(rig, BaseException):
             return _in_vain(matrix, registry, recorded, rig)
         if hasattr(rig, "recordings"):
             return _from_shelf(matrix, registry, cast(Shelf, rig), recorded, chosen)
-    cells = plan_cells(matrix, _named(matrix, registry), registry)
+    cells = plan_cells(matrix, _named(matrix, registry), registry, rig_file)
     for task in {cell.task for cell in cells}:
         _known_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
     return cells, Material(recorded, orders_for(cells, registry, sources, store, matrix.simulation))

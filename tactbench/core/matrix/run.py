@@ -24,6 +24,7 @@ from tactbench.core.matrix.progress import Prefixed, Progress, Silence
 from tactbench.core.matrix.provenance import gather
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
@@ -54,6 +55,7 @@ def run_matrix(
     *,
     choice: EngineChoice | None = None,
     recordings: Path | None = None,
+    operator: Operator | None = None,
     progress: Progress | None = None,
     shown: Callable[[Sequence[Row]], None] | None = None,
 ) -> Outcome:
@@ -62,7 +64,9 @@ def run_matrix(
     The parameters are those of `carry_out`.
     """
     with store.hold():
-        outcome = carry_out(matrix, store, choice=choice, recordings=recordings, progress=progress, shown=shown)
+        outcome = carry_out(
+            matrix, store, choice=choice, recordings=recordings, operator=operator, progress=progress, shown=shown
+        )
         store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
         store.write("scores.json", scores_text(outcome.rows))
     return outcome
@@ -74,6 +78,7 @@ def carry_out(
     *,
     choice: EngineChoice | None = None,
     recordings: Path | None = None,
+    operator: Operator | None = None,
     progress: Progress | None = None,
     shown: Callable[[Sequence[Row]], None] | None = None,
 ) -> Outcome:
@@ -89,6 +94,8 @@ def carry_out(
         Where the work is done, how much of it at once and within which limits; results do not depend on it, times may.
     recordings
         Folder for rigs that replay.
+    operator
+        Who mounts caps and presses, at a rig of real devices.
     progress
         Told what happens.
     shown
@@ -104,7 +111,7 @@ def carry_out(
     chosen = (choice or EngineChoice()).checked()
     chosen.ready()
     with store.hold():
-        return _carry_out(matrix, store, chosen, recordings, progress or Silence(), shown or (lambda _: None))
+        return _carry_out(matrix, store, chosen, recordings, operator, progress or Silence(), shown or (lambda _: None))
 
 
 def _carry_out(
@@ -112,6 +119,7 @@ def _carry_out(
     store: Store,
     choice: EngineChoice,
     recordings: Path | None,
+    operator: Operator | None,
     told: Progress,
     shown: Callable[[Sequence[Row]], None],
 ) -> Outcome:
@@ -129,7 +137,7 @@ def _carry_out(
     for number, some in enumerate(rounds, 1):
         ready = partial(_import_estimators, some, choice) if inherited else None
         during = told if len(rounds) == 1 else Prefixed(told, f"replicate {number} of {len(rounds)}: ")
-        acquire_missing(material, some, book, choice, during, ready)
+        acquire_missing(material, some, book, choice, during, ready, operator)
         # A reader that nobody hears while libraries are imported would seem to take too long.
         fresh = store.blank and choice.forks(len(some)) and choice.limits.timeout_s is None
         with _read_ahead(some, material, choice) if fresh else nullcontext():

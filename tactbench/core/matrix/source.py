@@ -36,7 +36,7 @@ Of the core: the floors above the matrix, and the matrix's own keeping. In doubt
 
 _NOT_FOR: dict[Purpose, tuple[str, ...]] = {
     # Answers are made from recordings, whose bytes are in the key: how those came about is their own affair.
-    "answer": ("sensors/", "rigs/", "core/acquisition"),
+    "answer": ("sensors/", "rigs/", "links/", "devices/", "core/acquisition"),
     # Whoever records knows nothing of what is asked afterwards; the contracts of the imports hold it to that.
     "recording": ("tasks/", "estimators/", "core/evaluation/", "core/matrix/"),
 }

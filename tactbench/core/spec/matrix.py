@@ -78,6 +78,8 @@ class MatrixSpec(Frozen):
     rig: str = "twin"
     recordings: str | None = None
     """Folder of recordings for rigs that replay; relative to where tactbench is run."""
+    rig_file: str | None = None
+    """File of a rig of real or emulated devices (:class:`~tactbench.core.spec.rig_file.RigFile`); relative likewise."""
     timeout_s: float | None = Field(default=None, gt=0)
     """Seconds that one cell or one recording may take."""
     memory_mb: int | None = Field(default=None, ge=1)

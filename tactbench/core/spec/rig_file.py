@@ -81,6 +81,11 @@ class RigFile(Frozen):
     settings: dict[str, Any] = Field(default_factory=dict)
     """The rig's own, which it checks itself."""
 
+    @property
+    def emulated(self) -> bool:
+        """Whether any device is emulated."""
+        return any(entry.emulated for entry in self.entries().values())
+
     def entries(self) -> dict[str, DeviceEntry]:
         """Return every device by its name in messages: the sensor's name, ``force``, or its part in the rig."""
         found: dict[str, DeviceEntry] = dict(self.sensors)

@@ -49,7 +49,7 @@ FORMAT: Mapping[str, Held] = {
     **_each("true_score true_ci_low true_ci_high tare_s", [*_NUMBERS, _NOTHING]),
     **_each("sim_s search_s fit_s predict_s latency_ms_p50 latency_ms_p95 peak_rss_mb wall_s", [*_NUMBERS, _NOTHING]),
     **_each("latency_ms_max answer_delay_ms", [*_NUMBERS, _NOTHING]),
-    **_each("is_baseline simulated dagger", [bool]),
+    **_each("is_baseline simulated emulated dagger", [bool]),
     **_each("stamps remarks recordings digests", [list], [str]),
     **_each("n_replicates", [int, _NOTHING]),
     **_each("replicate_unit", [str, _NOTHING]),

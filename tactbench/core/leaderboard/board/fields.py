@@ -19,8 +19,8 @@ KEY_DIGITS = 8
 
 _ALWAYS = (
     "status", "reason", "sensor", "task", "estimator", "params", "is_baseline", "rig", "protocol", "split", "repeat",
-    "repeats", "seed", "simulated", "dagger", "stamps", "metric", "unit", "ci_method", "host", "made_by", "concurrency",
-    "threads", "signal", "n_recordings", "n_train", "equivalence", "reference_score",
+    "repeats", "seed", "simulated", "emulated", "dagger", "stamps", "metric", "unit", "ci_method", "host", "made_by",
+    "concurrency", "threads", "signal", "n_recordings", "n_train", "equivalence", "reference_score",
 )  # fmt: skip
 _OFTEN = (
     "traceback", "remarks", "assumptions", "plan", "chosen", "counts", "published_reference", "published_remark",

@@ -1,0 +1,13 @@
+"""The bench: real or emulated devices, pressed by hand."""
+
+from __future__ import annotations
+
+from tactbench.plugin import RigDescriptor, hookimpl
+
+TACTBENCH_API = 1
+
+
+@hookimpl
+def tactbench_rigs() -> list[RigDescriptor]:
+    """Offer the rig."""
+    return [RigDescriptor(name="bench", title="real devices, pressed by hand", where="tactbench.rigs.bench.rig:build")]

@@ -1,0 +1,268 @@
+"""The bench as a rig: a sensor and a reference force sensor are read while somebody presses, and nothing moves.
+
+Devices that the rig file calls emulated are moved by a simulated rig, which carries out the same scene; whatever they
+sense then comes through their links and drivers as from real ones.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tactbench.plugin import (
+    Acquisition,
+    Block,
+    ChannelSpec,
+    EmulatedDevices,
+    Emulation,
+    ForceEntry,
+    Operator,
+    PlanEntry,
+    Reading,
+    Rig,
+    RigContext,
+    RigError,
+    RigFile,
+    Scalar,
+    SceneSamples,
+    Scene,
+    SensorDescriptor,
+    StreamClock,
+    StreamCounts,
+    StreamSpec,
+    UsageError,
+    drivers_of,
+    emulators_of,
+    load_object,
+    load_registry,
+)
+
+FORCE = "force"
+"""Name of the force sensor's entry among the drivers."""
+_PRESSED = "normal"
+"""What the channel along which the sensor is pressed is called where it is not plain `fz`; tasks look for either."""
+
+
+@dataclass
+class BenchAcquisition:
+    """One scene at the bench: iterate it for blocks."""
+
+    streams: tuple[StreamSpec, ...]
+    reference: tuple[StreamSpec, ...]
+    plan: tuple[PlanEntry, ...]
+    assumptions: Mapping[str, Scalar]
+    drawn: Mapping[str, Scalar]
+    clocks: Mapping[str, StreamClock]
+    emulation: Emulation | None
+    reading: Reading = field(repr=False)
+    duration_s: float
+    pressed: tuple[str, int, int] | None
+    """Stream, column and sign of the force along which the sensor is pressed."""
+
+    def __iter__(self) -> Iterator[Block]:
+        """Yield blocks until the scene is over, or a device is gone."""
+        began_s = time.perf_counter()
+        for block in self.reading.blocks(self.duration_s):
+            yield self._turned(block)
+        spent_s = time.perf_counter() - began_s
+        if self.emulation is not None and spent_s > 0:
+            self.emulation = self.emulation.model_copy(update={"factor": self.duration_s / spent_s})
+
+    @property
+    def stream_counts(self) -> Mapping[str, StreamCounts]:
+        """By stream: what became of its rows."""
+        return self.reading.stream_counts
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """What the drivers counted, by device and name."""
+        return self.reading.counts
+
+    @property
+    def ended(self) -> str:
+        """Why it ended before its time; empty: it did not."""
+        return self.reading.ended
+
+    def _turned(self, block: Block) -> Block:
+        """Return the block with the force positive when pressing."""
+        if self.pressed is None or self.pressed[0] != block.stream or self.pressed[2] > 0:
+            return block
+        data = np.array(block.data)
+        data[:, self.pressed[1]] *= -1
+        return replace(block, data=data)
+
+
+class Bench:
+    """Devices of a rig file, read while a scene is pressed by hand.
+
+    Parameters
+    ----------
+    file
+        Which devices, on which links.
+    operator
+        Who presses; not needed where all devices are emulated.
+    physics
+        The simulated rig that moves emulated devices; None: there are none.
+    """
+
+    def __init__(self, file: RigFile, operator: Operator | None, physics: Rig | None) -> None:
+        self._file = file
+        self._operator = operator
+        self._physics = physics
+
+    @contextmanager
+    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[BenchAcquisition]:
+        """Open the devices and let them sample; the blocks begin when the scene does.
+
+        Raises
+        ------
+        RigError
+            If a device is not what the rig file says, or somebody has to press and nobody is there.
+        UsageError
+            If the rig file has no entry for the sensor, or says something that a driver does not know.
+        LinkError
+            If a link cannot be opened, or a device does not answer.
+        """
+        file = self._used(sensor)
+        with ExitStack() as stack:
+            simulated = stack.enter_context(self._simulated(file, sensor, scene, seed))
+            senses = None if simulated is None else SceneSamples(simulated, scene.profile.duration.to("s"))
+            emulators = {} if senses is None else emulators_of(file, load_registry(), sensor.name, senses)
+            emulated = stack.enter_context(EmulatedDevices(emulators, time=file.emulation.time)) if emulators else None
+            clock = time.monotonic_ns if emulated is None else emulated.clock
+            links = {} if emulated is None else {name: emulated.opener(name) for name in emulators}
+            drivers = drivers_of(file, load_registry(), sensor.name, links, clock)
+            for driver in drivers.values():
+                stack.callback(driver.close)
+            about = {
+                f"{name} {key}": value for name, driver in drivers.items() for key, value in driver.identify().items()
+            }
+            self._prompt(file, sensor, scene)
+            advance = emulated.advance if emulated is not None and file.emulation.time == "virtual" else None
+            reading = stack.enter_context(Reading(drivers, clock=clock, advance=advance))
+            tared = FORCE in drivers and drivers[FORCE].tare()
+            own = drivers[sensor.name].streams
+            reference, pressed = self._reference(file.force, drivers[FORCE].streams if FORCE in drivers else ())
+            if senses is not None:
+                senses.start(clock() * 1e-9)
+            yield BenchAcquisition(
+                streams=own,
+                reference=reference,
+                plan=simulated.plan if simulated is not None else (),
+                assumptions=simulated.assumptions if simulated is not None else {},
+                drawn={
+                    **(simulated.drawn if simulated is not None else {}),
+                    **about,
+                    "force sensor tared": "by itself, before the scene" if tared else "no",
+                    **self._mounting(file.force),
+                },
+                clocks=_clocks((*own, *reference), virtual=advance is not None),
+                emulation=self._emulation(file, tuple(emulators)) if emulators else None,
+                reading=reading,
+                duration_s=scene.profile.duration.to("s"),
+                pressed=pressed,
+            )
+
+    def _used(self, sensor: SensorDescriptor) -> RigFile:
+        """Return the file with the one sensor that is asked for."""
+        if sensor.name not in self._file.sensors:
+            raise UsageError(
+                f"The rig file has no entry for the sensor {sensor.name!r}; it has {', '.join(self._file.sensors)}.",
+                hint=f"Add `{sensor.name}:` with its link under `sensors:`.",
+            )
+        return self._file.model_copy(update={"sensors": {sensor.name: self._file.sensors[sensor.name]}})
+
+    @contextmanager
+    def _simulated(
+        self, file: RigFile, sensor: SensorDescriptor, scene: Scene, seed: int
+    ) -> Iterator[Acquisition | None]:
+        """Give the scene as the simulated rig carries it out; None where no device is emulated."""
+        if self._physics is None or not file.emulated:
+            yield None
+            return
+        with self._physics.open(sensor, scene, seed=seed) as acquisition:
+            yield acquisition
+
+    def _prompt(self, file: RigFile, sensor: SensorDescriptor, scene: Scene) -> None:
+        if all(entry.emulated for entry in file.entries().values()):
+            return
+        profile = scene.profile
+        text = (
+            f"{scene.name}: {sensor.spec.title}, {scene.indenter}. Touch nothing for {profile.hold_s:.0f} s, then press "
+            f"slowly to {profile.largest_n:g} N and back, within {profile.duration.to('s'):.0f} s in all."
+        )
+        if self._operator is None:
+            raise RigError(
+                f"Somebody has to press: {text}", hint="Start it at a terminal, or use a rig file with emulated devices."
+            )
+        self._operator.asked(text)
+
+    def _reference(
+        self, entry: ForceEntry | None, streams: tuple[StreamSpec, ...]
+    ) -> tuple[tuple[StreamSpec, ...], tuple[str, int, int] | None]:
+        """Return the force sensor's streams with the pressed channel named, and where it is."""
+        if entry is None:
+            return (), None
+        for stream in streams:
+            names = [channel.name for channel in stream.channels]
+            if entry.channel not in names:
+                continue
+            column = names.index(entry.channel)
+            channels = list(stream.channels)
+            plain = (entry.channel, entry.sign) == ("fz", 1)
+            update = {"sign": 1} if plain else {"sign": 1, "name": _PRESSED}
+            channels[column] = ChannelSpec.model_validate({**dict(channels[column]), **update})
+            pressed = stream.model_copy(update={"channels": tuple(channels)})
+            return tuple(pressed if one is stream else one for one in streams), (stream.name, column, entry.sign)
+        known = ", ".join(channel.name for stream in streams for channel in stream.channels)
+        raise UsageError(
+            f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {known}.",
+            hint="Correct `channel:` under `force:` in the rig file.",
+        )
+
+    def _mounting(self, entry: ForceEntry | None) -> dict[str, Scalar]:
+        if entry is None or (entry.channel, entry.sign) == ("fz", 1):
+            return {}
+        return {"normal force": f"{'-' if entry.sign < 0 else ''}{entry.channel} of {entry.device}"}
+
+    def _emulation(self, file: RigFile, names: tuple[str, ...]) -> Emulation:
+        entries = file.entries()
+        return Emulation(
+            time=file.emulation.time,
+            seed=file.emulation.seed,
+            physics=file.emulation.physics,
+            devices=names,
+            faults=tuple(f"{name}: {fault}" for name in names for fault in entries[name].faults),
+        )
+
+
+def _clocks(streams: tuple[StreamSpec, ...], *, virtual: bool) -> dict[str, StreamClock]:
+    return {stream.name: StreamClock(source="simulated" if virtual else "host") for stream in streams}
+
+
+def build(context: RigContext) -> Bench:
+    """Return the rig.
+
+    Raises
+    ------
+    UsageError
+        If there is no rig file, or it names a simulation that is none.
+    """
+    if context.rig_file is None:
+        raise UsageError(
+            "The rig 'bench' needs to know its devices.",
+            hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft --write-rig-file FILE` makes one.",
+        )
+    physics: Rig | None = None
+    if context.rig_file.emulated:
+        descriptor = load_registry().rigs[context.rig_file.emulation.physics]
+        if not descriptor.simulated:
+            raise UsageError(
+                f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."
+            )
+        physics = load_object(descriptor.where)(RigContext(effects=context.effects))
+    return Bench(context.rig_file, context.operator, physics)
