@@ -29,8 +29,8 @@ class FingertipOptions(BaseModel):
     which sends no readings."""
     period_ms: int = Field(default=20, ge=1, le=255)
     """Milliseconds between samples."""
-    no_load: int = Field(default=240, ge=0, le=255)
-    """Reading at rest, counts."""
+    no_load: int = Field(default=240, ge=1, le=254)
+    """Reading at rest, counts; at either end the board would call every taxel out of range."""
     shift: int = Field(default=0, ge=0, le=7)
     """One count is ``2**shift`` results of the converter."""
     cdc_offset: int = Field(default=0x2000, ge=0, le=0xFFFF)
