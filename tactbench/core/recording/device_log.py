@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.errors import MissingRecordingError, PluginContractError, UsageError
+from tactbench.core.errors import DataError, LinkError, MissingRecordingError, PluginContractError, UsageError
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.recording.health import Finding, examine
 from tactbench.core.recording.mapping.importing import ENDING, RIG
@@ -60,9 +60,8 @@ def import_log(
     MissingRecordingError
         If there is no such log.
     UsageError
-        If the sensor has no reader for logs, an option is not known, or `out` is no name for a recording or exists.
-    LinkError, DataError
-        If the file is no such log.
+        If the sensor has no reader for logs, the file is no such log, an option is not known, or `out` is no name for a
+        recording or exists.
     RecordingError
         If `out` cannot be written.
     """
@@ -77,7 +76,10 @@ def import_log(
         raise UsageError(f"{out} is no name for a recording.", hint=f"Give --out a file that ends in {ENDING}.")
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
-    found = load_object(sensor.log_reader)(log, options)
+    try:
+        found = load_object(sensor.log_reader)(log, options)
+    except (DataError, LinkError) as error:  # no fault of this machine: another file, or other options, are needed
+        raise UsageError(error.message, hint=error.hint) from error
     if not isinstance(found, DeviceLog):
         raise PluginContractError(
             f"{sensor.log_reader} returned {type(found).__name__}, not a DeviceLog.", hint="Correct the plugin."

@@ -77,7 +77,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     told = [command for to, command in commands if to in (board, BROADCAST)]
     counts = {
         **decoder.counts[board, triangle].named(),
-        "frames of others": frames - len(ours),
+        "frames of others": frames - len(ours) - len(commands),
         "error frames": log.error_frames,
         "remote and FD frames": log.other_frames,
         "unreadable frames": log.damaged,
