@@ -63,7 +63,7 @@ def main() -> int:
         read_version(frame)
         if number % 20 == 0:  # a board at full rate sends much more than it is sent
             for board in (bus, calm):
-                for sent in board.feed(frame, 1e-9 * t_ns):
+                for _, sent in board.feed(frame, 1e-9 * t_ns):
                     decoder.feed(sent)
         if number % 1000:
             continue
@@ -73,7 +73,7 @@ def main() -> int:
         for command in (Transmit(False), BoardSetup(), TriangleSetup(3, 3), Transmit(True)):
             calm.feed(command_frame(14, command), 1e-9 * t_ns)
         calm.poll(1e-9 * t_ns + 0.03)
-        back = [sent.data for sent in calm.poll(1e-9 * t_ns + 0.05)]
+        back = [sent.data for _, sent in calm.poll(1e-9 * t_ns + 0.05)]
         usual = [half.data for half in skin_frames(14, 3, [240] * 12)]
         if sample.taxels != bytes([77] * 12) or back[-2:] != usual:
             print(f"Not recovered after frame {number} of seed {given.seed}: {sample}, {back}", file=sys.stderr)

@@ -20,7 +20,7 @@ VERBS = {
     "choose": ("choose", "Say which sensor meets a wish, which misses it by how much, and what is unknown."),
     "record": ("record", "Carry out one scene into one recording."),
     "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
-    "import": ("import_", "Turn foreign tables into recordings, as a mapping file says."),
+    "import": ("import_", "Turn foreign tables, or a log of a sensor's own tools, into recordings."),
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),
     "cost": ("cost", "Show what accuracy costs in time."),
     "calibrate": ("calibrate", "Draw what no source states, and hold simulations against published numbers."),

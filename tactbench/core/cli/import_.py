@@ -1,28 +1,72 @@
-"""``tactbench import``: foreign tables become recordings."""
+"""``tactbench import``: foreign tables, and logs of devices, become recordings."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
 if TYPE_CHECKING:
+    from tactbench.core.recording.device_log import ImportedLog
     from tactbench.core.recording.mapping import ImportReport
+    from tactbench.core.spec.scene import Role
+
+PAIRS = "KEY=VALUE"
 
 
 @click.command(name="import")
-@click.argument("mapping", type=click.Path(path_type=Path))
+@click.argument("source", metavar="MAPPING|LOG", type=click.Path(path_type=Path))
 @click.option("--root", type=click.Path(path_type=Path), metavar="DIR",
               help="Folder of the data set; default: that of the mapping file.")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Folder of the recordings; default: recordings/<name of the mapping>.")  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR|FILE",
+              help="Folder of the recordings; default: recordings/<name of the mapping>. Of a log: the recording; "
+              "default: recordings/<name of the log>.h5.")  # fmt: skip
 @click.option("--replace", is_flag=True, help="Replace recordings of the same name that hold something else.")
-def command(mapping: Path, root: Path | None, out: Path | None, replace: bool) -> None:
-    """Turn foreign tables into recordings, as MAPPING (a YAML file) says.
+@click.option("--sensor", metavar="NAME", help="Read a log of this sensor's own tools.")
+@click.option("--option", "options", multiple=True, metavar=PAIRS,
+              help="For the reader of the log, such as board=14; may be repeated.")  # fmt: skip
+@click.option("--session", metavar="NAME", help="Of the log: recordings of one session were made without re-mounting.")
+@click.option("--role", type=click.Choice(("train", "validation", "test")), help="Of the log, in a split by roles.")
+@click.option("--label", "labels", multiple=True, metavar=PAIRS,
+              help="Of the log: what was pressed, such as cap_radius_mm=4; may be repeated.")  # fmt: skip
+def command(
+    source: Path,
+    root: Path | None,
+    out: Path | None,
+    replace: bool,
+    sensor: str | None,
+    options: tuple[str, ...],
+    session: str | None,
+    role: str | None,
+    labels: tuple[str, ...],
+) -> None:
+    """Turn foreign tables into recordings, as MAPPING (a YAML file) says, or with --sensor a LOG into one.
 
     All of them are written, or none. What was marked as "no sample" is counted. See docs/mappings.md.
     """
+    if sensor is None:
+        if options or labels or session is not None or role is not None:
+            raise click.UsageError("--option, --session, --role and --label are for logs: name the --sensor.")
+        _import_tables(source, root, out, replace)
+        return
+    if root is not None:
+        raise click.UsageError("--root is for mappings: leave it out, or --sensor.")
+    from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.recording.device_log import import_log
+
+    target = Path("recordings") / f"{source.stem}.h5" if out is None else out
+    made = import_log(
+        source, load_registry().sensors[sensor], _pairs("--option", options), out=target,
+        session="1" if session is None else session, role=cast("Role | None", role), labels=_pairs("--label", labels),
+        replace=replace,
+    )  # fmt: skip
+    for line in log_summary(made, target):
+        click.echo(line)
+    click.echo(f"See what is in it:  tactbench inspect {target}", err=True)
+
+
+def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: bool) -> None:
     from tactbench.core.cli.progress import progress
     from tactbench.core.recording.mapping import import_tables
 
@@ -40,6 +84,33 @@ def command(mapping: Path, root: Path | None, out: Path | None, replace: bool) -
         report = import_tables(mapping, root=root, out=target, progress=tell, replace=replace)
     for line in summary(report, target):
         click.echo(line)
+
+
+def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
+    """Return ``key=value`` pairs; values are read as YAML reads a number, a truth value or a text."""
+    import yaml
+
+    found: dict[str, Any] = {}
+    for text in given:
+        key, separator, value = text.partition("=")
+        if not separator or not key or key in found:
+            raise click.UsageError(f"{option} {text!r}: {PAIRS} is expected, each key once.")
+        try:
+            read = yaml.safe_load(value)
+        except yaml.YAMLError:
+            read = value
+        found[key] = read if isinstance(read, str | int | float | bool) else value
+    return found
+
+
+def log_summary(made: ImportedLog, out: Path) -> list[str]:
+    """Return what became of a log, line by line."""
+    meta = made.meta
+    rows = ", ".join(f"{number} rows of {stream}" for stream, number in made.rows.items())
+    lines = [f"{out}: {meta.sensor.name} from {meta.origin}, {rows}; clock {meta.clock}"]
+    lines += [f"  {name}: {number}" for name, number in meta.counts.items()]
+    lines += [f"  {finding.severity}: {finding.message}" for finding in made.findings]
+    return lines + [f"  remark: {remark}" for remark in meta.remarks]
 
 
 def summary(report: ImportReport, folder: Path) -> list[str]:

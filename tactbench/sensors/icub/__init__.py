@@ -11,4 +11,13 @@ TACTBENCH_API = 1
 @hookimpl
 def tactbench_sensors() -> list[SensorDescriptor]:
     """Offer the sensor."""
-    return [SensorDescriptor(spec=SPEC, transducer="tactbench.sensors.icub.transduction:build")]
+    return [
+        SensorDescriptor(
+            spec=SPEC,
+            transducer="tactbench.sensors.icub.transduction:build",
+            driver="tactbench.sensors.icub.driver:build",
+            emulator="tactbench.sensors.icub.emulator:build_emulator",
+            emulated_link="can",
+            log_reader="tactbench.sensors.icub.log:read_log",
+        )
+    ]

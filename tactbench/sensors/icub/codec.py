@@ -287,6 +287,21 @@ class Counts:
     """Samples more than 1.5 periods after the one before: both frames lost, or a late host; only a fit of the clocks
     can tell."""
 
+    def named(self) -> dict[str, int]:
+        """Return what was wrong, by the names that a recording has, without what never was."""
+        found = {
+            "heads missing": self.missing_heads,
+            "tails missing": self.missing_tails,
+            "frames doubled": self.doubled,
+            "frames of wrong length": self.malformed,
+            "samples without error word": self.without_word,
+            "samples not connected": self.not_connected,
+            "samples not acknowledged": self.no_ack,
+            "long intervals": self.long_intervals,
+        }
+        found |= {f"T{number} out of range": samples for number, samples in enumerate(self.out_of_range, 1)}
+        return {name: number for name, number in found.items() if number}
+
 
 @dataclass
 class _Triangle:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
-from tactbench.plugin import CanFrame, UsageError
+from tactbench.plugin import CanFrame, EmulatorSettings, Fault, UsageError, fault_concerns
+from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BIT_RATE,
     BROADCAST,
@@ -36,6 +38,7 @@ from tactbench.sensors.icub.codec import (
     skin_frames,
     version_frame,
 )
+from tactbench.sensors.icub.options import FingertipOptions, checked
 
 Sense: TypeAlias = Callable[[int, float], Sequence[int] | None]
 """(triangle, seconds) -> 12 results of its AD7147, 0 to 65535, rising under pressure; None: no chip there."""
@@ -64,55 +67,53 @@ _RAW_TEST = 7
 _NOT_MODELLED = 3
 """The ergoCub's hand, which numbers its triangles anew."""
 
-FAULTS = {
-    "dropped-frame": "frames are not sent",
-    "doubled-frame": "frames are sent twice",
-    "late-answer": "frames, answers included, come later by delay_s",
-    "stuck-taxel": "a taxel keeps the result it had when the fault began",
-    "not-connected": "the chip does not answer: all results are FFFF",
-    "no-ack": "a taxel is not acknowledged: its result is 0",
-    "error-word": "the tail carries the bits of `word` besides its own",
-}
-"""Faults by name."""
+_CHANNELS = tuple(channel.name for channel in STREAMS[0].channels)
 
 
 @dataclass(frozen=True)
-class Fault:
-    """Something wrong with a board, from `start_s` until before `end_s`; nothing is random.
+class BoardFault(Fault):
+    """Something wrong with a board; nothing is random.
+
+    `every` counts frames, of those that are dropped, doubled or late.
 
     Raises
     ------
     UsageError
-        For a name not in :data:`FAULTS`, or a number outside its range.
+        For an unknown name, or a number outside its range.
     """
 
-    name: str
-    start_s: float = 0.0
-    end_s: float = math.inf
+    known: ClassVar[Mapping[str, str]] = {
+        "dropped-frame": "frames are not sent",
+        "doubled-frame": "frames are sent twice",
+        "late-answer": "frames, answers included, come later by delay_s",
+        "stuck-taxel": "the taxels `channels` keep the results they had when the fault began",
+        "not-connected": "the chip does not answer: all results are FFFF",
+        "no-ack": "the taxels `channels` are not acknowledged: their results are 0",
+        "error-word": "the tail carries the bits of `word` besides its own",
+        "unplugged": "the board has no power: it does not answer, and must be set up anew afterwards",
+    }
+
     triangle: int | None = None
     """None: all."""
     half: Literal["head", "tail"] | None = None
     """Which frames are dropped, doubled or late; None: both."""
-    every: int = 1
-    """Of the frames that are dropped, doubled or late: each n-th."""
-    taxel: int = 0
-    """0 to 11."""
+    channels: frozenset[str] = frozenset({"T1"})
     word: int = NO_ACK
     """Bits of the error word."""
     delay_s: float = 0.01
 
     def __post_init__(self) -> None:
-        if self.name not in FAULTS:
-            raise UsageError(f"There is no fault called {self.name!r}.", hint=f"Known: {', '.join(FAULTS)}.")
-        if self.every < 1 or not 0 <= self.taxel < TAXELS or not 0 <= self.word <= 0xFFFF or not self.delay_s >= 0:
+        super().__post_init__()
+        good = self.half in (None, "head", "tail") and 0 <= self.word <= 0xFFFF and self.delay_s >= 0
+        if not good or not self.channels <= set(_CHANNELS):
             raise UsageError(
-                f"The fault {self.name!r} has a number outside its range.",
-                hint="every is 1 or more, taxel 0 to 11, word 0 to FFFF, delay_s not negative.",
+                f"The fault {self.name!r} has a value outside its range.",
+                hint="half is head or tail, channels are T1 to T12, word 0 to 0xFFFF, delay_s is not negative.",
             )
 
     def concerns(self, triangle: int | None, now_s: float) -> bool:
-        """Whether it is on, and on that triangle (None: on frames of no triangle)."""
-        return self.start_s <= now_s < self.end_s and self.triangle in (None, triangle)
+        """Return whether it is on, and on that triangle (None: on frames of no triangle)."""
+        return self.active(now_s) and self.triangle in (None, triangle)
 
 
 def results_of(readings: Iterable[float], rest: float = 243.0, shift: int = 2) -> tuple[int, ...]:
@@ -149,6 +150,9 @@ class Board:
         What is wrong with it; may be changed at any time.
     version
         What it answers when asked.
+    unloaded
+        What its chips measure when a set-up lets it take a baseline; None: as ever. A baseline that it takes by itself
+        is of what it measures then.
 
     Attributes
     ----------
@@ -167,8 +171,9 @@ class Board:
         self,
         address: int,
         sense: Sense,
-        faults: Iterable[Fault] = (),
+        faults: Iterable[BoardFault] = (),
         version: Version = VERSION,
+        unloaded: Sense | None = None,
     ) -> None:
         if not 0 <= address < BROADCAST:
             raise UsageError(f"A board has no address {address}.", hint="Give 0 to 14.")
@@ -179,9 +184,10 @@ class Board:
         self.next_s = math.inf
         """When it reads and sends next, seconds; infinite while it does not send."""
         self._sense = sense
+        self._unloaded = unloaded or sense
         self._version = version
-        self._seen: dict[Fault, int] = {}
-        self._stuck: dict[tuple[Fault, int], int] = {}
+        self._seen: Counter[Fault] = Counter()
+        self._stuck: dict[tuple[BoardFault, int, int], int] = {}
         self._baseline: list[Sequence[int]] = []
         self._no_acks = 0
         self._shift = [2] * 16
@@ -191,10 +197,21 @@ class Board:
         self._setup = BoardSetup(skin_type=0, period_ms=50, no_load=245)
         self._active = [True] * 16
 
+    @property
+    def no_load(self) -> int:
+        """Reading at rest, as it is set up now."""
+        return self._setup.no_load
+
+    def shift(self, triangle: int) -> int:
+        """Return how many bits of a result are dropped, as it is set up now."""
+        return self._shift[triangle]
+
     def command(self, command: Command, now_s: float, source: int = 0) -> list[CanFrame]:
         """Carry out `command` from `source` at `now_s` and return what is answered."""
+        if self._unplugged(now_s):
+            return []
         if not self._baseline:
-            self._calibrate(now_s)  # IF starts its chips with the first command
+            self._calibrate(now_s, self._unloaded)  # IF starts its chips with the first command
         match command:
             case BoardSetup(skin_type=kind) if kind != _NOT_MODELLED:
                 self._setup = command
@@ -206,7 +223,7 @@ class Board:
                     self._active[triangle] = enabled
                     self._shift[triangle] = shift
                 self.next_s = math.inf
-                self._calibrate(now_s)
+                self._calibrate(now_s, self._unloaded)
             case Transmit(on=True):
                 self._start(now_s)
             case Transmit(on=False):
@@ -214,7 +231,7 @@ class Board:
             case OldSetup():
                 self._defaults()
                 self._setup = BoardSetup(skin_type=0, period_ms=40, no_load=245)
-                self._calibrate(now_s)
+                self._calibrate(now_s, self._unloaded)
                 self._start(now_s)
             case VersionRequest(major, minor):
                 own = self._version
@@ -228,11 +245,13 @@ class Board:
     def tick(self) -> list[CanFrame]:
         """Read all chips at :attr:`next_s` and return head and tail of every enabled triangle."""
         now_s = self.next_s
+        if self._unplugged(now_s):
+            return []
         self.next_s += self._setup.period_ms * 1e-3
         self._stuck = {key: result for key, result in self._stuck.items() if key[0] in self.faults}
         if self._no_acks >= FORCED_AFTER:
             self._no_acks = 0
-            self._calibrate(now_s)
+            self._calibrate(now_s, self._sense)
         frames: list[CanFrame] = []
         for triangle in range(16):
             if self._active[triangle]:
@@ -251,19 +270,14 @@ class Board:
             half = {HEAD: "head", TAIL: "tail"}.get(frame.data[0])
             copies, delay_s = 1, 0.0
             for fault in self.faults:
-                if (
-                    fault.name not in ("dropped-frame", "doubled-frame", "late-answer")
-                    or not fault.concerns(triangle, now_s)
-                    or fault.half not in (None, half)
-                ):
+                if fault.triangle not in (None, triangle) or fault.half not in (None, half):
                     continue
-                self._seen[fault] = self._seen.get(fault, 0) + 1
-                if self._seen[fault] % fault.every:
-                    continue
-                if fault.name == "late-answer":
+                if fault_concerns([fault], "late-answer", now_s, self._seen):
                     delay_s += fault.delay_s
-                else:
-                    copies = 0 if fault.name == "dropped-frame" else 2 * copies
+                elif fault_concerns([fault], "dropped-frame", now_s, self._seen):
+                    copies = 0
+                elif fault_concerns([fault], "doubled-frame", now_s, self._seen):
+                    copies *= 2
             ready += [(now_s + delay_s, frame)] * copies
         return ready
 
@@ -272,27 +286,38 @@ class Board:
         period_s = self._setup.period_ms * 1e-3
         self.next_s = now_s + period_s if period_s else math.inf
 
-    def _results(self, triangle: int, now_s: float) -> Sequence[int]:
-        given = self._sense(triangle, now_s)
+    def _unplugged(self, now_s: float) -> bool:
+        """Return whether it is without power, after which nothing that it was told is left."""
+        if not any(fault.name == "unplugged" and fault.active(now_s) for fault in self.faults):
+            return False
+        self._defaults()
+        self._shift = [2] * 16
+        self._baseline = []
+        self.next_s = math.inf
+        return True
+
+    def _results(self, triangle: int, now_s: float, sense: Sense) -> Sequence[int]:
+        given = sense(triangle, now_s)
         if given is None:
             return ABSENT
         results = list(given)
         for fault in self.faults:
             if not fault.concerns(triangle, now_s):
                 continue
-            if fault.name == "stuck-taxel":
-                results[fault.taxel] = self._stuck.setdefault((fault, triangle), results[fault.taxel])
-            elif fault.name == "no-ack":
-                results[fault.taxel] = 0
-            elif fault.name == "not-connected":
+            for taxel in (_CHANNELS.index(name) for name in fault.channels):
+                if fault.name == "stuck-taxel":
+                    results[taxel] = self._stuck.setdefault((fault, triangle, taxel), results[taxel])
+                elif fault.name == "no-ack":
+                    results[taxel] = 0
+            if fault.name == "not-connected":
                 return ABSENT
         return results
 
-    def _calibrate(self, now_s: float) -> None:
-        self._baseline = [self._results(triangle, now_s) for triangle in range(16)]
+    def _calibrate(self, now_s: float, sense: Sense) -> None:
+        self._baseline = [self._results(triangle, now_s, sense) for triangle in range(16)]
 
     def _fill(self, triangle: int, now_s: float) -> tuple[list[int], int]:
-        results, baseline = self._results(triangle, now_s), self._baseline[triangle]
+        results, baseline = self._results(triangle, now_s, self._sense), self._baseline[triangle]
         if self._setup.skin_type == _RAW_TEST:
             return [result & 0xFF for result in results], 0
         gains = _GAINS.get(self._setup.skin_type, (0,) * TAXELS)
@@ -353,34 +378,34 @@ class Bus:
         self._free_s = -math.inf
         self._queued = dict.fromkeys(self.boards, 0)
 
-    @property
     def next_s(self) -> float:
-        """When `poll` has something to do next, seconds; infinite: not before a command."""
+        """Return when `poll` has something to do next, seconds; infinite: not before a command."""
         if self._on_wire:
             return self._on_wire[0]
         return self._begin_s()
 
-    def feed(self, frame: CanFrame, now_s: float) -> list[CanFrame]:
-        """Return what `poll(now_s)` does, after which every board that `frame` addresses carries it out."""
+    def feed(self, piece: bytes | CanFrame, now_s: float) -> list[tuple[float, CanFrame]]:
+        """Return what `poll(now_s)` does, after which every board that the frame addresses carries it out."""
         out = self.poll(now_s)
-        found = read_command(frame)
+        assert isinstance(piece, CanFrame)
+        found = read_command(piece)
         if found is None:
             return out
         destination, command = found
         for address, board in self.boards.items():
             if destination in (address, BROADCAST):
-                self._queue(board, board.command(command, now_s, source=frame.id >> 4 & 0xF), now_s)
+                self._queue(board, board.command(command, now_s, source=piece.id >> 4 & 0xF), now_s)
         return out
 
-    def poll(self, now_s: float) -> list[CanFrame]:
-        """Return the frames that ended up to `now_s`, in order, each with the time of its end."""
-        out: list[CanFrame] = []
+    def poll(self, now_s: float) -> list[tuple[float, CanFrame]]:
+        """Return the frames that ended up to `now_s`, in order, each with the second of its end and stamped with it."""
+        out: list[tuple[float, CanFrame]] = []
         while True:
             if self._on_wire:
                 end_s, frame = self._on_wire
                 if not end_s <= now_s:
                     return out
-                out.append(replace(frame, t_ns=round(1e9 * end_s)))
+                out.append((end_s, replace(frame, t_ns=round(1e9 * end_s))))
                 self._free_s, self._on_wire = end_s, None
             begin_s = self._begin_s()
             if not begin_s <= now_s:
@@ -416,3 +441,36 @@ class Bus:
                 continue
             self._queued[board.address] += 1
             heapq.heappush(self._later, (ready_s, next(self._number), board, frame))
+
+
+def build_emulator(settings: EmulatorSettings) -> Bus:
+    """Return one board with the fingertip of the options, a device on a CAN bus.
+
+    A real board sends differences from the baseline it took at its set-up. Here each set-up finds the fingertip
+    unloaded, at the reading `no_load`, and the chip's results are those behind what `senses` gives, by the board's
+    present `no_load` and shift. So the byte on the bus is the count that was sensed, rounded to a whole one and kept
+    within 0 to 255: exactly, without a fault, for skin types 1 and 2 (0 and 8 take off a share of T7's change), and
+    until the board takes a baseline by itself, after samples that were not acknowledged. Taxels that `senses` leaves
+    out read the spec's rest.
+
+    Raises
+    ------
+    UsageError
+        If an option or a fault is not known.
+    """
+    options = checked(FingertipOptions, settings.options)
+    rest = {channel.name: channel.rest.to("count") for channel in STREAMS[0].channels if channel.rest is not None}
+
+    def sense(triangle: int, now_s: float) -> Sequence[int] | None:
+        if triangle != options.triangle:
+            return None
+        sensed = {**rest, **settings.senses(now_s)}
+        readings = [min(max(round(sensed[name]), 0), 255) for name in _CHANNELS]
+        return results_of(readings, rest=board.no_load, shift=board.shift(triangle))
+
+    def unloaded(triangle: int, now_s: float) -> Sequence[int] | None:
+        return (REST_RESULT,) * TAXELS if triangle == options.triangle else None
+
+    faults = [BoardFault.parse(text) for text in settings.faults]
+    board = Board(options.board, sense, faults, unloaded=unloaded)
+    return Bus([board])

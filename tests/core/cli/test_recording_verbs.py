@@ -124,3 +124,63 @@ def test_a_folder_that_refuses_recordings_is_a_usage_error(shell, shared_data):
     done = shell("import", str(mapping), "--root", str(shared_data / "eflesh"), "--out", "taken/there", code=2)
     assert "--out" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.fixture
+def logged(shell):
+    """A log of two fingertips: 50 samples each, every 20 ms."""
+    lines = ["date Tue Nov 14 10:13:20.250 2023", "base hex  timestamps absolute", "internal events logged"]
+    for number in range(50):
+        for triangle in (0, 3):
+            for first, data in ((0x40, [number + taxel for taxel in range(7)]), (0xC0, [90, 91, 92, 93, 94, 0, 0])):
+                text = " ".join(f"{value:02X}" for value in (first, *data))
+                at_s = 0.02 * number + 0.001 * triangle + 0.0002 * (first == 0xC0)
+                lines.append(f"   {at_s:.6f} 1  4E{triangle:X}             Rx   d 8 {text}")
+    (shell.folder / "bus.asc").write_text("\n".join(lines) + "\n")
+    return shell
+
+
+def test_a_log_of_a_sensor_becomes_a_recording(logged):
+    told = ("--option", "triangle=3", "--session", "a", "--role", "test", "--label", "cap_radius_mm=4")
+    done = logged("import", "bus.asc", "--sensor", "icub", *told, "--out", "recordings/press.h5")
+    assert "recordings/press.h5: icub from bus.asc, 50 rows of taxels; clock host" in done.stdout
+    assert "  frames of others: 100" in done.stdout
+    assert "board 14, triangle 3".capitalize() in done.stdout
+    (about,) = json.loads(logged("inspect", "recordings/press.h5", "--format", "json").stdout)
+    meta = about["meta"]
+    assert (meta["name"], meta["rig"], meta["clock"], meta["session"], meta["role"]) == (
+        "press", "import", "host", "a", "test",
+    )  # fmt: skip
+    assert (meta["labels"], meta["origin"]) == ({"cap_radius_mm": 4}, "bus.asc")
+    assert meta["counts"] == {"frames of others": 100}
+    (stream,) = about["streams"]
+    assert (stream["rows"], round(stream["mean_rate_hz"], 3)) == (50, 50.0)
+    run = logged("run", "--rig", "replay", "--recordings", "recordings", "--sensor", "icub", "--task", "force")
+    assert "no recording has it" in run.stdout  # it was found, and has no reference force
+
+
+def test_a_log_that_cannot_be_read_is_one_clear_screen(logged):
+    (logged.folder / "other.txt").write_text("no log")
+    for given, said in (
+        (("bus.asc", "--sensor", "icub"), "Choose one by the options board and triangle"),
+        (("bus.asc", "--sensor", "icub", "--option", "bord=3"), "Options: board, triangle"),
+        (("bus.asc", "--sensor", "icub", "--option", "board"), "KEY=VALUE is expected"),
+        (("bus.asc", "--sensor", "icub", "--out", "recordings"), "a file that ends in .h5"),
+        (("bus.asc", "--sensor", "icub", "--root", "."), "--root is for mappings"),
+        (("bus.asc", "--sensor", "ideal"), "has no reader for logs"),
+        (("other.txt", "--sensor", "icub"), "other.txt is not a log"),
+        (("nowhere.asc", "--sensor", "icub"), "There is no log nowhere.asc"),
+        (("bus.asc", "--session", "a"), "name the --sensor"),
+    ):
+        done = logged("import", *given, code=2)
+        assert said in done.stderr
+        assert done.stdout == ""
+        assert "Traceback" not in done.stderr
+    assert not (logged.folder / "recordings").exists()
+
+
+def test_a_recording_is_not_replaced_unasked(logged):
+    told = ("bus.asc", "--sensor", "icub", "--option", "triangle=0")
+    logged("import", *told)
+    assert "exists already" in logged("import", *told, code=2).stderr
+    assert "50 rows" in logged("import", *told, "--replace").stdout

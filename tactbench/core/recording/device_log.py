@@ -1,0 +1,105 @@
+"""What a device's own tools have logged becomes a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import DataError, LinkError, MissingRecordingError, PluginContractError, UsageError
+from tactbench.core.plugins.registry import load_object
+from tactbench.core.recording.health import Finding, examine
+from tactbench.core.recording.mapping.importing import ENDING, RIG
+from tactbench.core.recording.reader import open_recording
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.spec.recording import RecordingMeta, Scalar
+from tactbench.core.spec.rig import SensorDescriptor
+from tactbench.core.spec.scene import Role
+from tactbench.devices.log import DeviceLog
+
+
+@dataclass(frozen=True)
+class ImportedLog:
+    """One log that became a recording."""
+
+    meta: RecordingMeta
+    rows: Mapping[str, int]
+    """By stream."""
+    findings: tuple[Finding, ...]
+
+
+def import_log(
+    log: Path,
+    sensor: SensorDescriptor,
+    options: Mapping[str, Any],
+    *,
+    out: Path,
+    session: str = "1",
+    role: Role | None = None,
+    labels: Mapping[str, Scalar] | None = None,
+    replace: bool = False,
+) -> ImportedLog:
+    """Turn a log of a sensor's own tools into a recording; all of it is written, or nothing.
+
+    Parameters
+    ----------
+    log
+        The file, of a format that the sensor's reader knows.
+    options
+        For the reader, by its own names.
+    out
+        The recording.
+    session, role, labels
+        As of :class:`~tactbench.core.spec.recording.RecordingMeta`.
+    replace
+        Replace what `out` holds.
+
+    Raises
+    ------
+    MissingRecordingError
+        If there is no such log.
+    UsageError
+        If the sensor has no reader for logs, the file is no such log, an option is not known, or `out` is no name for a
+        recording or exists.
+    RecordingError
+        If `out` cannot be written.
+    """
+    if sensor.log_reader is None:
+        raise UsageError(
+            f"The sensor {sensor.name!r} has no reader for logs.",
+            hint="Describe the log's tables in a mapping (docs/mappings.md), or add `log_reader` to its descriptor.",
+        )
+    if not log.is_file():
+        raise MissingRecordingError(f"There is no log {log}.", hint="Check its name.")
+    if out.suffix != ENDING:
+        raise UsageError(f"{out} is no name for a recording.", hint=f"Give --out a file that ends in {ENDING}.")
+    if out.exists() and not replace:
+        raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
+    try:
+        found = load_object(sensor.log_reader)(log, options)
+    except (DataError, LinkError) as error:  # no fault of this machine: another file, or other options, are needed
+        raise UsageError(error.message, hint=error.hint) from error
+    if not isinstance(found, DeviceLog):
+        raise PluginContractError(
+            f"{sensor.log_reader} returned {type(found).__name__}, not a DeviceLog.", hint="Correct the plugin."
+        )
+    began = (f"The log says that it began {found.started}.",) if found.started else ()
+    meta = RecordingMeta(
+        name=out.stem,
+        sensor=sensor.spec.model_copy(update={"streams": found.streams}),
+        rig=RIG,
+        clock=found.clock,
+        session=session,
+        role=role,
+        labels=dict(labels or {}),
+        remarks=(*found.remarks, *began),
+        origin=log.name,
+        counts=dict(found.counts),
+    )
+    with RecordingWriter(out, meta) as writer:
+        for block in found.blocks:
+            writer.append(block)
+    with open_recording(out) as written:
+        rows = {name: len(written.stream(name)) for name in written.stream_names}
+        return ImportedLog(written.meta, rows, tuple(examine(written)))

@@ -1,0 +1,218 @@
+"""An iCub fingertip on a CAN bus, read from its board."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import suppress
+
+from tactbench.plugin import (
+    Block,
+    CanFrame,
+    CanLink,
+    Driver,
+    DriverSettings,
+    LinkError,
+    LinkTimeout,
+    LinkUnplugged,
+    Source,
+    StreamSpec,
+    UsageError,
+)
+from tactbench.sensors.icub.channels import STREAMS
+from tactbench.sensors.icub.codec import (
+    Command,
+    Sample,
+    SkinDecoder,
+    Transmit,
+    VersionRequest,
+    command_frame,
+    read_version,
+    skin_id,
+    to_block,
+)
+from tactbench.sensors.icub.options import FingertipOptions, checked
+
+SETTLE_S = 0.5
+"""From the set-up to the start: the board takes its baseline [sourced: icub-main CanBusSkin.cpp waits as long]."""
+ANSWER_S = 0.5
+"""Until a version is missed [assumed: a frame takes 0.14 ms, a full board's queue 4.3 ms]."""
+MOST_FRAMES = 4096
+"""Taken by one call of `read`: a bus that never rests does not keep it for ever. 0.5 s of a full bus."""
+
+
+class FingertipDriver(Driver):
+    """One fingertip: one triangle of one board.
+
+    Times are the host's at receipt: the board sends no number and no time. A head whose tail does not come within half
+    a period is a sample by itself. Frames of other triangles, boards and hosts are counted and left out; its own
+    commands, which some buses give back, are left out.
+
+    Parameters
+    ----------
+    settings
+        Its link is a CanLink; its options are :class:`~tactbench.sensors.icub.options.FingertipOptions`.
+
+    Raises
+    ------
+    UsageError
+        If an option or the kind of link is not possible.
+    LinkError
+        If the link cannot be opened.
+    """
+
+    def __init__(self, settings: DriverSettings) -> None:
+        self._options = options = checked(FingertipOptions, settings.options)
+        self._clock = settings.clock
+        stream = next((one for one in settings.streams if one.name == STREAMS[0].name), STREAMS[0])
+        rate = Source(tag="derived", reference=f"the board is set up for {1e3 * options.period_s:g} ms")
+        self._stream = stream.model_copy(update={"rate_hz": 1 / options.period_s, "rate_source": rate})
+        self._ids = {skin_id(options.board, options.triangle)}
+        if options.old_setup:
+            self._ids.add(skin_id(options.board, options.triangle, old=True))
+        self._sent: set[tuple[int, bytes]] = set()
+        self._sampling = False
+        self._earlier: Counter[str] = Counter()
+        """Counts of what was read before the last start."""
+        self._others = 0
+        self._decoder = self._fresh_decoder()
+        link = settings.open_link()
+        if not isinstance(link, CanLink):
+            link.close()
+            raise UsageError(
+                f"An iCub fingertip speaks CAN; {link.address} is none.",
+                hint="Write can://socketcan/can0, for example.",
+            )
+        self._link = link
+
+    @property
+    def streams(self) -> tuple[StreamSpec, ...]:
+        """The taxels, at the rate that the board is set up for."""
+        return (self._stream,)
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """See :meth:`~tactbench.sensors.icub.codec.Counts.named`; beside them what was not ours, or no data frame."""
+        link = {
+            "frames of others": self._others,
+            "error frames": self._link.error_frames,
+            "remote and FD frames": self._link.other_frames,
+            "unreadable frames": self._link.damaged,
+        }
+        return self._earlier + self._counted() + Counter(link)
+
+    def identify(self) -> Mapping[str, str]:
+        """Return board, triangle, and the firmware's version; a board that does not answer may be of old firmware.
+
+        Raises
+        ------
+        LinkTimeout
+            If nobody on the bus acknowledges (socketcan).
+        LinkUnplugged
+            If the adapter is gone.
+        """
+        options = self._options
+        about = {"board": str(options.board), "triangle": str(options.triangle)}
+        request = VersionRequest()
+        self._send(request)
+        until_ns = self._clock() + round(1e9 * ANSWER_S)
+        while (left_s := 1e-9 * (until_ns - self._clock())) > 0:
+            try:
+                answer = read_version(self._link.receive(left_s))
+            except LinkTimeout:
+                break
+            if answer is not None and answer[0] == options.board:
+                version = answer[1]
+                protocol = "{}.{}".format(*version.protocol)
+                if not version.fits:
+                    protocol += f" (not {request.major}.{request.minor}, which was asked for)"
+                model = "MTB4" if version.board_type == 11 else f"type {version.board_type}"
+                return {**about, "model": model, "firmware": "{}.{}.{}".format(*version.firmware), "protocol": protocol}
+        return {
+            **about,
+            "firmware": f"no answer within {ANSWER_S:g} s: old firmware has none, or there is no such board",
+        }
+
+    def start(self) -> None:
+        """Set the board up, let it take its baseline (nothing may touch the skin) and let it send.
+
+        Raises
+        ------
+        LinkTimeout, LinkUnplugged
+            As of :meth:`identify`. None of these messages is acknowledged by the board.
+        """
+        self._earlier += self._counted()
+        self._decoder = self._fresh_decoder()
+        self._sampling = False
+        for command in self._options.commands:
+            self._send(command)
+        until_ns = self._clock() + round(1e9 * SETTLE_S)
+        while (left_s := 1e-9 * (until_ns - self._clock())) > 0:
+            with suppress(LinkTimeout):
+                self._link.receive(left_s)  # from before, or of the old set-up, which starts by itself
+        self._send(Transmit(on=True))
+        self._sampling = True
+
+    def read(self, timeout_s: float) -> list[Block]:  # noqa: D102  (inherited)
+        until_ns = self._clock() + round(1e9 * timeout_s)
+        samples: list[Sample] = []
+        for _ in range(MOST_FRAMES):
+            left_s = 0.0 if samples else max(0.0, 1e-9 * (until_ns - self._clock()))
+            try:
+                frame = self._link.receive(left_s)
+            except LinkTimeout:
+                samples += self._decoder.flush(self._clock() - round(5e8 * self._options.period_s))
+                break
+            except LinkUnplugged:
+                samples += self._decoder.flush()
+                if not samples:
+                    raise
+                break  # the next call raises it
+            samples += self._taken(frame)
+        return [to_block(samples)] if samples else []
+
+    def stop(self) -> None:  # noqa: D102  (inherited)
+        if self._sampling:
+            self._sampling = False
+            self._decoder.flush()
+            with suppress(LinkError):
+                self._send(Transmit(on=False))
+
+    def tare(self) -> bool:
+        """Let the board take a new baseline, which is a new start; all its triangles pause for it."""
+        if self._sampling:
+            self.start()
+        return True
+
+    def close(self) -> None:  # noqa: D102  (inherited)
+        self.stop()
+        self._link.close()
+
+    def _fresh_decoder(self) -> SkinDecoder:
+        return SkinDecoder(self._options.period_s, old_ids=self._options.old_setup)
+
+    def _counted(self) -> Counter[str]:
+        """Return what the decoder has counted; it is given frames of one triangle only."""
+        found = Counter({"frames that are no skin data": self._decoder.foreign})
+        for counts in self._decoder.counts.values():
+            found.update(counts.named())
+        return found
+
+    def _send(self, command: Command) -> None:
+        frame = command_frame(self._options.board, command)
+        self._sent.add((frame.id, frame.data))
+        self._link.send(frame)
+
+    def _taken(self, frame: CanFrame) -> list[Sample]:
+        """Return the samples that `frame` completes."""
+        if not self._sampling:
+            return []
+        if frame.id in self._ids and not frame.extended:
+            return self._decoder.feed(frame)
+        self._others += (frame.id, frame.data) not in self._sent
+        return []
+
+
+def build(settings: DriverSettings) -> FingertipDriver:
+    """Open the link to the fingertip; raises as :class:`FingertipDriver`."""
+    return FingertipDriver(settings)

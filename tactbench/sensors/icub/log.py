@@ -1,0 +1,141 @@
+"""CAN logs of a bus with a fingertip, as samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tactbench.plugin import CanFrame, CanLog, DataError, DeviceLog, LinkEnded, Source, UsageError
+from tactbench.sensors.icub.channels import STREAMS
+from tactbench.sensors.icub.codec import (
+    BROADCAST,
+    HEAD,
+    OLD_SKIN,
+    SKIN,
+    TAIL,
+    BoardSetup,
+    SkinDecoder,
+    TriangleSetup,
+    read_command,
+    to_block,
+)
+from tactbench.sensors.icub.options import LogOptions, checked
+
+
+def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
+    """Read one fingertip's samples from a log in Vector's ASC or BLF format.
+
+    Times count from the log's start. Samples are those that the driver makes of the same frames; one whose time is not
+    after that of the sample before it is kept out and counted. Buses of a log of several are not told apart.
+
+    Parameters
+    ----------
+    path
+        Ends in ``.asc`` or ``.blf``.
+    options
+        :class:`~tactbench.sensors.icub.options.LogOptions`.
+
+    Raises
+    ------
+    UsageError
+        If an option is not known, or several fingertips fit.
+    LinkError
+        If the file is no such log, or damaged.
+    DataError
+        If no frames of such a fingertip are in it.
+    """
+    wanted = checked(LogOptions, options)
+    classes = (OLD_SKIN, SKIN) if wanted.old_ids else (SKIN,)
+    halves: dict[tuple[int, int], list[CanFrame]] = {}
+    commands = []
+    frames = 0
+    with CanLog(path) as log:
+        while True:
+            try:
+                frame = log.receive(0.0)
+            except LinkEnded:
+                break
+            frames += 1
+            if not frame.extended and frame.id >> 8 in classes and frame.data[:1] in (bytes([HEAD]), bytes([TAIL])):
+                halves.setdefault((frame.id >> 4 & 0xF, frame.id & 0xF), []).append(frame)
+            elif (found := read_command(frame)) is not None:
+                commands.append(found)
+    board, triangle = _chosen(path, wanted, sorted(halves), frames)
+    ours = halves[board, triangle]
+    period_s, rate = _period(path, wanted, ours)
+    decoder = SkinDecoder(period_s, old_ids=wanted.old_ids)
+    samples = [sample for frame in ours for sample in decoder.feed(frame)] + decoder.flush()
+    if not samples:
+        raise DataError(f"{path} has no whole frame of board {board}, triangle {triangle}.", hint="Record it again.")
+    kept = samples[:1]
+    for sample in samples[1:]:
+        if sample.t_ns > kept[-1].t_ns:
+            kept.append(sample)
+    told = [command for to, command in commands if to in (board, BROADCAST)]
+    counts = {
+        **decoder.counts[board, triangle].named(),
+        "frames of others": frames - len(ours) - len(commands),
+        "error frames": log.error_frames,
+        "remote and FD frames": log.other_frames,
+        "unreadable frames": log.damaged,
+        "times that go back": log.backward,
+        "samples kept out, not after the one before": len(samples) - len(kept),
+        "baselines taken": sum(isinstance(command, TriangleSetup) for command in told),
+    }
+    setups = dict.fromkeys(command for command in told if isinstance(command, BoardSetup))
+    return DeviceLog(
+        streams=(STREAMS[0].model_copy(update={"rate_hz": 1 / period_s, "rate_source": rate}),),
+        blocks=(to_block(kept),),
+        clock="host",
+        started=log.started,
+        remarks=(
+            f"Board {board}, triangle {triangle}, {rate.reference}.",
+            *(
+                f"The log sets the board up for type {setup.skin_type}, {setup.period_ms} ms, {setup.no_load} at rest."
+                for setup in setups
+            ),
+        ),
+        counts={name: number for name, number in counts.items() if number},
+    )
+
+
+def _chosen(path: Path, wanted: LogOptions, there: list[tuple[int, int]], frames: int) -> tuple[int, int]:
+    """Return the one (board, triangle) of `there` that fits `wanted`."""
+    fitting = [
+        (board, triangle)
+        for board, triangle in there
+        if wanted.board in (None, board) and wanted.triangle in (None, triangle)
+    ]
+    listed = "; ".join(f"board {board}, triangle {triangle}" for board, triangle in there)
+    if not fitting:
+        raise DataError(
+            f"{path} has no frames of that fingertip among its {frames} frames.",
+            hint=f"There are: {listed}."
+            if there
+            else "Frames of early firmware (class 3) are taken with the option old_ids=true.",
+        )
+    if len(fitting) > 1:
+        raise UsageError(
+            f"{path} has frames of {len(fitting)} fingertips.",
+            hint=f"Choose one by the options board and triangle. There are: {listed}.",
+        )
+    return fitting[0]
+
+
+def _period(path: Path, wanted: LogOptions, frames: list[CanFrame]) -> tuple[float, Source]:
+    """Return the period in seconds, and where it is from."""
+    if wanted.period_ms is not None:
+        text = f"{wanted.period_ms} ms between samples by the option period_ms"
+        return 1e-3 * wanted.period_ms, Source(tag="assumed", reference=text)
+    steps = np.diff([frame.t_ns for frame in frames if frame.data[0] == HEAD])
+    steps = steps[steps > 0]
+    if not len(steps):
+        raise UsageError(
+            f"{path} has too few samples to tell their period.", hint="State it with the option period_ms."
+        )
+    period_s = 1e-9 * float(np.median(steps))
+    text = f"{1e3 * period_s:.4g} ms between samples, the median of {path.name}"
+    return period_s, Source(tag="measured", reference=text)

@@ -1,0 +1,485 @@
+"""The fingertip's driver against emulated boards: in virtual time, and on every bus that needs no hardware."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.plugin import (
+    Block,
+    CanFrame,
+    CanLink,
+    DriverSettings,
+    EmulatorSettings,
+    LinkError,
+    LinkUnplugged,
+    Quality,
+    UsageError,
+    load_object,
+    open_link,
+)
+from tactbench.sensors.icub import tactbench_sensors
+from tactbench.sensors.icub.channels import STREAMS
+from tactbench.sensors.icub.codec import (
+    BoardSetup,
+    OldSetup,
+    OldSetup2,
+    Transmit,
+    TriangleSetup,
+    read_command,
+    skin_frames,
+)
+from tactbench.sensors.icub.driver import SETTLE_S, FingertipDriver, build
+from tactbench.sensors.icub.emulator import BoardFault, build_emulator
+from tests.links.ends import pty
+from tests.sensors.icub.emulated import (
+    NAMES,
+    LawicelAdapter,
+    VirtualLink,
+    driver_on,
+    emulator,
+    in_virtual_time,
+    rising,
+    served,
+)
+
+GOOD, MISSING, SATURATED, SUSPECT = Quality.GOOD, Quality.MISSING, Quality.SATURATED, Quality.SUSPECT
+ROOT = Path(__file__).parents[3]
+
+
+def read_until(driver: FingertipDriver, link: VirtualLink, until_s: float) -> Block:
+    """All samples up to `until_s`, of which there must be one."""
+    blocks = []
+    while link.now_s < until_s:
+        blocks += driver.read(until_s - link.now_s)
+    return joined(blocks)
+
+
+def joined(blocks: list[Block]) -> Block:
+    return Block(
+        "taxels",
+        np.concatenate([block.t_ns for block in blocks if block.t_ns is not None]),
+        np.concatenate([block.data for block in blocks]),
+        np.concatenate([block.quality for block in blocks if block.quality is not None]),
+    )
+
+
+def marks(block: Block) -> list[set[Quality]]:
+    assert block.quality is not None
+    return [{Quality(int(mark)) for mark in row} for row in block.quality]
+
+
+def sensed(seconds: float) -> list[float]:
+    return [rising(seconds)[name] for name in NAMES]
+
+
+def test_it_reads_exactly_what_is_sensed():
+    driver, link = in_virtual_time()
+    with driver:
+        driver.start()
+        assert link.now_s == pytest.approx(SETTLE_S)
+        block = read_until(driver, link, 2.51)
+        assert driver.counts == {}
+    assert block.sequence is block.device_ns is None
+    assert len(block.data) == 100
+    taken_s = SETTLE_S + 0.02 * np.arange(1, 101)
+    # At the end of the head, 135 bits later.
+    assert block.t_ns == pytest.approx(1e9 * taken_s + 135e3, abs=2)
+    assert block.data.tolist() == [sensed(at_s) for at_s in taken_s]
+    assert marks(block) == [{GOOD}] * 100
+
+
+@given(
+    counts=st.lists(st.integers(0, 255), min_size=12, max_size=12),
+    no_load=st.integers(1, 254),
+    shift=st.integers(0, 7),
+    skin_type=st.sampled_from([1, 2]),
+)
+@settings(max_examples=60, deadline=None)
+def test_every_count_comes_through_whatever_the_set_up(counts, no_load, shift, skin_type):
+    readings = dict(zip(NAMES, map(float, counts), strict=True))
+    driver, _ = in_virtual_time(lambda _: readings, no_load=no_load, shift=shift, skin_type=skin_type)
+    with driver:
+        driver.start()
+        (block,) = driver.read(1.0)
+        assert block.data.tolist() == [counts]
+        assert block.quality.tolist() == [[SATURATED if value in (0, 255) else GOOD for value in counts]]
+
+
+def test_untouched_taxels_read_the_rest_of_the_spec():
+    driver, link = in_virtual_time(lambda now_s: {"T3": 180.4})
+    with driver:
+        driver.start()
+        assert read_until(driver, link, 0.53).data.tolist() == [[243, 243, 180] + [243] * 9]
+
+
+def test_streams_have_the_rate_of_the_set_up():
+    for options, rate_hz in (({}, 50.0), ({"period_ms": 40}, 25.0), ({"old_setup": True}, 25.0)):
+        driver, _ = in_virtual_time(**options)
+        (stream,) = driver.streams
+        assert stream.rate_hz == pytest.approx(rate_hz)
+        assert stream.channels == STREAMS[0].channels
+
+
+def told(link: VirtualLink) -> list[tuple[float, object]]:
+    """Commands on the bus: seconds and what they are."""
+    found = [(1e-9 * frame.t_ns, read_command(frame)) for frame in link.seen]
+    return [(at_s, command[1]) for at_s, command in found if command is not None]
+
+
+def test_the_set_up_in_order():
+    driver, link = in_virtual_time(board=3, triangle=2, skin_type=2, period_ms=30, no_load=245, shift=1, cdc_offset=5)
+    with driver:
+        driver.start()
+        driver.stop()
+    assert [command for _, command in told(link)] == [
+        Transmit(False), BoardSetup(2, 30, 245), TriangleSetup(2, 2, 1, True, 5), Transmit(True), Transmit(False),
+    ]  # fmt: skip
+    assert [at_s for at_s, _ in told(link)] == pytest.approx([0, 0, 0, SETTLE_S, SETTLE_S], abs=1e-9)
+    assert {frame.id & 0xF for frame in link.seen if frame.id >> 8 == 2} == {3}
+
+
+def test_the_old_set_up():
+    # MTB4 firmware takes its own defaults then: type 0, which takes off a share of T7's change, 245 at rest.
+    driver, link = in_virtual_time(lambda now_s: {**rising(now_s), "T7": 245.0}, triangle=4, old_setup=True)
+    with driver:
+        driver.start()
+        block = read_until(driver, link, 0.99)
+        assert [command for _, command in told(link)] == [
+            Transmit(False), OldSetup(1, 0x2000), OldSetup2(0, 0x22, 240), Transmit(True),
+        ]  # fmt: skip
+        # It sends all triangles, every 40 ms; what came before the start is dropped.
+        assert np.diff(block.t_ns) == pytest.approx(np.full(11, 40e6), abs=2)
+        wanted = [sensed(SETTLE_S + 0.04 * number) for number in range(1, 13)]
+        assert block.data.tolist() == [[*row[:6], 245, *row[7:]] for row in wanted]
+        assert set(driver.counts) == {"frames of others"}
+
+
+def test_frames_of_class_3_are_read_with_the_old_set_up_only():
+    for old in (False, True):
+        driver, link = in_virtual_time(**({"old_setup": True} if old else {}), faults=("dropped-frame",))
+        with driver:
+            driver.start()
+            for frame in skin_frames(14, 0, range(100, 112), old=True):
+                link.put(CanFrame(frame.id, frame.data[:6] if frame.data[0] == 0xC0 else frame.data))
+            blocks = driver.read(0.001)
+            assert [block.data.tolist() for block in blocks] == ([[list(range(100, 112))]] if old else [])
+            assert driver.counts == ({"samples without error word": 1} if old else {"frames of others": 2})
+
+
+def test_identify():
+    driver, _ = in_virtual_time()
+    assert driver.identify() == {
+        "board": "14", "triangle": "0", "model": "MTB4", "firmware": "1.0.1", "protocol": "2.0",
+    }  # fmt: skip
+
+
+def test_a_board_that_does_not_say_its_version_can_be_read():
+    driver, link = in_virtual_time(faults=("unplugged:end_s=0.4",))
+    assert driver.identify()["firmware"].startswith("no answer within 0.5 s")
+    assert link.now_s == pytest.approx(0.5)
+    driver.start()
+    assert len(driver.read(0.1)) == 1
+
+
+def test_after_the_stop_nothing_comes_and_a_start_begins_anew():
+    driver, link = in_virtual_time(faults=("dropped-frame:half=tail,start_s=0.6,end_s=0.61",))
+    with driver:
+        driver.start()
+        read_until(driver, link, 0.7)
+        driver.stop()
+        driver.stop()
+        assert driver.read(1.0) == []
+        driver.start()
+        begun_s = link.now_s
+        block = read_until(driver, link, begun_s + 0.05)
+        assert block.data.tolist() == [sensed(begun_s + 0.02), sensed(begun_s + 0.04)]
+        assert driver.counts == {"tails missing": 1}  # the pause is no long interval
+    driver.close()
+    with pytest.raises(LinkError):
+        driver.read(0.1)
+
+
+def test_a_tare_is_a_new_start():
+    driver, link = in_virtual_time()
+    with driver:
+        driver.start()
+        assert driver.tare()
+        assert link.now_s == pytest.approx(2 * SETTLE_S)
+        assert len(read_until(driver, link, 2 * SETTLE_S + 0.05).data) == 2
+
+
+def ten(*faults: str) -> tuple[Block, Mapping[str, int]]:
+    """Samples of ten periods, and what was counted; taxels fall by a count a period. The first is taken at 0.52 s."""
+    driver, link = in_virtual_time(faults=faults)
+    with driver:
+        driver.start()
+        return read_until(driver, link, 0.715), driver.counts
+
+
+HEAD_ONLY = (SUSPECT,) * 7 + (MISSING,) * 5
+TAIL_ONLY = (MISSING,) * 7 + (GOOD,) * 5
+FAULTS: dict[str, tuple[dict[int, tuple[Quality, ...]], int, dict[str, int]]] = {
+    "dropped-frame:start_s=0.55,end_s=0.57": ({}, 9, {"long intervals": 1}),
+    "dropped-frame:half=head,start_s=0.55,end_s=0.59": ({2: TAIL_ONLY, 3: TAIL_ONLY}, 10, {"heads missing": 2}),
+    "dropped-frame:half=tail,start_s=0.55,end_s=0.57": ({2: HEAD_ONLY}, 10, {"tails missing": 1}),
+    "doubled-frame:half=head,start_s=0.55,end_s=0.57": (
+        {2: (SUSPECT,) * 7 + (GOOD,) * 5}, 10, {"frames doubled": 1},
+    ),
+    "doubled-frame:half=tail,start_s=0.55,end_s=0.57": (
+        {3: (GOOD,) * 7 + (SUSPECT,) * 5}, 10, {"frames doubled": 1},
+    ),
+    "late-answer:start_s=0.55,end_s=0.57,delay_s=0.003": ({}, 10, {}),
+    "late-answer:half=tail,start_s=0.55,end_s=0.57,delay_s=0.015": (
+        {2: HEAD_ONLY, 3: TAIL_ONLY}, 11, {"heads missing": 1, "tails missing": 1},
+    ),
+    "stuck-taxel:start_s=0.55,channels=T6": ({}, 10, {}),
+    "not-connected:start_s=0.55,end_s=0.57": (
+        {2: (MISSING,) * 12}, 10, {"samples not connected": 1} | {f"{name} out of range": 1 for name in NAMES},
+    ),
+    "no-ack:start_s=0.55,end_s=0.57,channels=T2+T3": (
+        {2: (SUSPECT,) + (SUSPECT | SATURATED,) * 2 + (SUSPECT,) * 9}, 10,
+        {"samples not acknowledged": 1, "T2 out of range": 1, "T3 out of range": 1},
+    ),
+    "error-word:start_s=0.55,end_s=0.57,word=0x8001": (
+        {2: (SUSPECT,) * 11 + (SUSPECT | SATURATED,)}, 10, {"samples not acknowledged": 1, "T12 out of range": 1},
+    ),
+    "unplugged:start_s=0.55": ({}, 2, {}),
+}  # fmt: skip
+"""Fault -> marked samples, how many samples, counts."""
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_each_fault_ends_as_documented(fault):
+    marked, number, counted = FAULTS[fault]
+    block, counts = ten(fault)
+    usual, none = ten()
+    assert none == {}
+    assert counts == counted
+    assert len(block.data) == number
+    good = (GOOD,) * 12
+    assert block.quality.tolist() == [[int(mark) for mark in marked.get(row, good)] for row in range(number)]
+    if not fault.startswith("stuck"):
+        # What is not marked is as without the fault, the sample after it included.
+        periods = [[int(t_ns // 20_000_000) for t_ns in one.t_ns] for one in (block, usual)]
+        for row, period in enumerate(periods[0]):
+            is_good = block.quality[row] == GOOD
+            assert block.data[row][is_good].tolist() == usual.data[periods[1].index(period)][is_good].tolist()
+
+
+def test_every_fault_is_tried():
+    assert {text.partition(":")[0] for text in FAULTS} == set(BoardFault.known)
+
+
+def test_a_stuck_taxel_stays_where_it_was_and_is_not_marked():
+    block, _ = ten("stuck-taxel:start_s=0.55,channels=T6")
+    usual, _ = ten()
+    assert block.data[:3].tolist() == usual.data[:3].tolist()
+    assert set(block.data[2:, 5]) == {usual.data[2, 5]}
+
+
+def test_a_tail_that_never_comes_holds_nothing_back():
+    driver, link = in_virtual_time(faults=("dropped-frame:half=tail,start_s=0.51", "unplugged:start_s=0.53"))
+    with driver:
+        driver.start()
+        assert driver.read(0.0205) == []  # the head is there; its tail may still come
+        begun_s = link.now_s
+        blocks = driver.read(0.02)
+        assert link.now_s - begun_s <= 0.0201
+        assert [block.quality.tolist() for block in blocks] == [[list(map(int, HEAD_ONLY))]]
+        assert blocks[0].data.tolist()[0][:7] == sensed(0.52)[:7]
+
+
+@given(lost=st.sets(st.integers(0, 39)), read_s=st.sampled_from([0.0, 0.003, 0.05, 1.0]))
+@settings(max_examples=40, deadline=None)
+def test_whatever_is_lost_costs_only_itself(lost, read_s):
+    class Lossy(VirtualLink):
+        def _take(self, sent):
+            kept = []
+            for at_s, frame in sent:
+                if frame.id >> 8 == 4:
+                    if self.number not in lost:
+                        kept.append((at_s, frame))
+                    self.number += 1
+                else:
+                    kept.append((at_s, frame))
+            super()._take(kept)
+
+        number = 0
+
+    link = Lossy(emulator())
+    driver = build(DriverSettings(lambda: link, STREAMS, {}, link.now_ns))
+    driver.start()
+    blocks = []
+    while link.now_s < 0.95:
+        blocks += driver.read(read_s)
+        if read_s == 0.0:
+            link.now_s += 0.001
+    block = joined(blocks)
+    found = {}
+    for values, quality in zip(block.data.tolist(), block.quality.tolist(), strict=True):
+        for taxel, (value, mark) in enumerate(zip(values, quality, strict=True)):
+            if not mark & MISSING and value + taxel > 152:
+                found[200 - taxel - value, taxel // 7] = mark
+    # 22 samples, before the last two of which 40 frames: a half is there if, and only if, its frame was not lost.
+    wanted = {(26 + number // 2, number % 2) for number in set(range(44)) - lost}
+    assert set(found) == wanted
+    assert all(found[26 + number, half] == GOOD for number in (20, 21) for half in (0, 1))
+
+
+def test_frames_of_others_are_counted_and_left_out():
+    driver, link = in_virtual_time()
+    with driver:
+        driver.start()
+        for frame in (
+            *skin_frames(14, 1, [9] * 12), *skin_frames(13, 0, [9] * 12), *skin_frames(14, 0, [9] * 12, old=True),
+            CanFrame(0x4E0, b"\x40" + bytes(7), extended=True), CanFrame(0x20E, b"\x07\x00\x00"),
+        ):  # fmt: skip
+            link.put(frame)
+        block = read_until(driver, link, 0.55)
+        assert driver.counts == {"frames of others": 8}
+    assert block.data.tolist() == [sensed(0.52), sensed(0.54)]
+
+
+def test_its_own_frames_may_come_back():
+    class Echoing(VirtualLink):
+        def send(self, frame):
+            super().send(frame)
+            self.put(frame)
+
+    link = Echoing(emulator())
+    with build(DriverSettings(lambda: link, STREAMS, {}, link.now_ns)) as driver:
+        assert driver.identify()["model"] == "MTB4"
+        driver.start()
+        assert read_until(driver, link, 0.55).data.tolist() == [sensed(0.52), sensed(0.54)]
+        assert driver.counts == {}
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"bord": 3}, "board, triangle, skin_type"),
+        ({"board": 15}, "less than or equal to 14"),
+        ({"skin_type": 7}, "0, 1, 2 or 8"),
+        ({"old_setup": True, "period_ms": 20}, "old set-up has neither"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(options, said):
+    def unopened():
+        raise AssertionError("no link is opened")
+
+    with pytest.raises(UsageError, match=said):
+        build(DriverSettings(unopened, STREAMS, options))
+    with pytest.raises(UsageError, match=said):
+        build_emulator(EmulatorSettings(rising, np.random.default_rng(1), options))
+
+
+@pytest.mark.parametrize(
+    "fault",
+    ["unheard-of", "stuck-taxel:channels=T13", "dropped-frame:half=middle", "dropped-frame:evry=2", "no-ack:every=0"],
+)
+def test_faults_that_cannot_be_are_refused(fault):
+    with pytest.raises(UsageError):
+        emulator(faults=(fault,))
+
+
+def test_a_link_of_another_kind_is_refused():
+    with pytest.raises(UsageError, match="speaks CAN"):
+        build(DriverSettings(lambda: open_link("loop://")))
+
+
+def test_the_descriptor_finds_all_of_it():
+    (descriptor,) = tactbench_sensors()
+    assert load_object(descriptor.driver) is build
+    assert load_object(descriptor.emulator) is build_emulator
+    assert descriptor.emulated_link == "can"
+
+
+# In real time, on buses.
+
+
+def in_real_time(driver: FingertipDriver, samples: int = 10) -> Block:
+    """Start, and read samples that tell their own time: counts fall by one in 20 ms."""
+    with driver:
+        assert driver.identify()["model"] == "MTB4"
+        driver.start()
+        blocks: list[Block] = []
+        until_s = time.monotonic() + 10.0
+        while sum(len(block.data) for block in blocks) < samples and time.monotonic() < until_s:
+            blocks += driver.read(0.5)
+    return joined(blocks)
+
+
+def check(block: Block) -> None:
+    assert marks(block) == [{GOOD}] * len(block.data)
+    first = block.data.astype(int)[:, 0]
+    assert (block.data == first[:, None] - np.arange(12)).all()
+    assert set(np.diff(first) % 100) == {99}
+    assert (np.diff(block.t_ns) > 0).all()
+
+
+def test_on_a_virtual_bus():
+    with open_link("can://virtual/icub") as far, served(emulator(), far):
+        check(in_real_time(driver_on("can://virtual/icub")))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
+def test_on_slcan_over_a_pseudo_terminal_and_unplugged():
+    with pty() as port, served(emulator(), LawicelAdapter(port)):
+        check(in_real_time(driver_on(f"can://slcan/{port.name}?bitrate=1000000&settle_s=0")))
+    with pty() as port, driver_on(f"can://slcan/{port.name}?bitrate=1000000&settle_s=0") as driver:
+        with served(emulator(), LawicelAdapter(port)):
+            driver.start()
+            assert driver.read(1.0)
+        port.unplug()
+        with pytest.raises(LinkUnplugged):
+            read_on(driver)
+
+
+def read_on(driver: FingertipDriver) -> None:
+    """Read what had come, and further."""
+    for _ in range(100):
+        driver.read(0.1)
+
+
+CHILD = "from tests.sensors.icub.emulated import serve_forever; serve_forever({address!r})"
+
+
+def test_on_udp_multicast_across_two_processes():
+    pytest.importorskip("msgpack", reason="python-can's udp_multicast needs msgpack")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("", 0))
+        address = f"can://udp_multicast/239.74.163.2?port={free.getsockname()[1]}"
+    with subprocess.Popen(
+        [sys.executable, "-c", CHILD.format(address=address)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT
+    ) as child:
+        try:
+            if child.stdout.readline() != b"ready\n":
+                pytest.skip(f"no multicast here: {child.communicate()[1].decode().splitlines()[-1]}")
+            try:
+                check(in_real_time(driver_on(address)))
+            except LinkError as error:
+                pytest.skip(f"no multicast here: {error}")
+        finally:
+            child.kill()
+
+
+def test_on_socketcan():
+    try:
+        with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as raw:
+            raw.bind(("vcan0",))
+    except (AttributeError, OSError) as error:
+        pytest.skip(f"no socketcan network vcan0 here: {error}")
+    with open_link("can://socketcan/vcan0") as far:
+        assert isinstance(far, CanLink)
+        with served(emulator(), far):
+            check(in_real_time(driver_on("can://socketcan/vcan0")))
