@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from tactbench.core.errors import RecordingError
+from tactbench.core.errors import FormatError, RecordingError
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.recording import ClockSegment, StreamClock
 
@@ -132,12 +132,14 @@ class ClockFit:
         self._run = 0
         self._waiting: list[Columns] = []
         self._start_ns = 0
-        self.breaks = 0
+
+    @property
+    def breaks(self) -> int:
         """How often the device's times went back."""
+        return self._runs.breaks
 
     def add(self, *columns: IntArray) -> None:
         """Take further rows: (n,) times of the device and of the host, as `fit` wants them, in order."""
-        self.breaks += self._runs.backward(columns[0])
         run = self._runs.count(columns[0])
         for cut in np.split(np.arange(len(run)), np.flatnonzero(np.diff(run)) + 1):
             if len(cut):
@@ -173,20 +175,17 @@ class RunCounter:
         self._last: int | None = None
         self._run = 0
 
-    def backward(self, device_ns: IntArray) -> int:
-        """Return how often the times go back in the rows that come next."""
-        return int(np.count_nonzero(self._steps(device_ns) < 0))
+        self.breaks = 0
+        """How often the times went back."""
 
     def count(self, device_ns: IntArray) -> IntArray:
         """Return the (n,) numbers of the runs of the next rows, from 0."""
-        steps = self._steps(device_ns)
+        steps = np.diff(device_ns, prepend=device_ns[:1] if self._last is None else self._last)
+        self.breaks += int(np.count_nonzero(steps < 0))
         run = self._run + np.cumsum((steps < 0) | (steps > LEAP_NS))
         if len(device_ns):
             self._last, self._run = int(device_ns[-1]), int(run[-1])
         return np.asarray(run, dtype=np.int64)
-
-    def _steps(self, device_ns: IntArray) -> IntArray:
-        return np.diff(device_ns, prepend=device_ns[:1] if self._last is None else self._last)
 
 
 class HostTimes:
@@ -212,14 +211,17 @@ class HostTimes:
 
         Raises
         ------
-        RecordingError
+        FormatError
             If there is no line for some of them.
         """
         run = self._runs.count(device_ns)
         host = np.empty(len(device_ns), dtype=np.int64)
         for number in np.unique(run).tolist():
             if number not in self._lines:
-                raise RecordingError("The device's times have runs without a line.", hint="Were rows added by hand?")
+                raise FormatError(
+                    f"Run {number} of a device's times has no line that puts it on the host's clock.",
+                    hint="Was the meta, or the device's times, changed by hand?",
+                )
             here = run == number
             host[here] = _on_lines(device_ns[here], *self._lines[number])
         return host

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.errors import RecordingError
+from tactbench.core.errors import FormatError, RecordingError
 from tactbench.core.recording.clock_fit import ClockFit, HostTimes, one_way, two_way
 from tactbench.core.spec.recording import StreamClock
 
@@ -153,7 +153,7 @@ def test_few_points(device):
 
 
 def test_rows_without_a_line_are_refused():
-    with pytest.raises(RecordingError, match="without a line"):
+    with pytest.raises(FormatError, match="no line"):
         HostTimes(StreamClock(source="device"))(np.arange(3))
 
 
