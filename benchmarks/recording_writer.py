@@ -144,13 +144,13 @@ def complete(seconds: float, noise: float, path: Path) -> None:
             writer.append(block)
         journal = path.with_name(path.name + ".partial").stat().st_size
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        began = time.perf_counter()
-    spent = time.perf_counter() - began
+        began, began_cpu = time.perf_counter(), time.process_time()
+    spent, spent_cpu = time.perf_counter() - began, time.process_time() - began_cpu
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with open_recording(path) as recording:
         lines = len(recording.meta.clocks["taxels"].segments)
-    print(json.dumps({"journal": journal, "file": path.stat().st_size, "s": spent, "before": before * 1024,
-                      "peak": peak * 1024, "lines": lines}))  # fmt: skip
+    print(json.dumps({"journal": journal, "file": path.stat().st_size, "s": spent, "cpu": spent_cpu,
+                      "before": before * 1024, "peak": peak * 1024, "lines": lines}))  # fmt: skip
 
 
 def main() -> int:
@@ -176,7 +176,8 @@ def main() -> int:
             )  # fmt: skip
             took = json.loads(ran.stdout)
             print(f"completing {asked.seconds:g} s, noise {asked.noise:g} counts: "
-                  f"journal {took['journal'] / 1e6:.0f} MB, file {took['file'] / 1e6:.0f} MB, {took['s']:.1f} s, "
+                  f"journal {took['journal'] / 1e6:.0f} MB, file {took['file'] / 1e6:.0f} MB, {took['s']:.1f} s "
+                  f"({took['cpu']:.1f} s of the processor), "
                   f"peak {took['peak'] / 1e6:.0f} MB of memory ({took['before'] / 1e6:.0f} MB before), "
                   f"{took['lines']} clock lines")  # fmt: skip
     return 0 if good else 1

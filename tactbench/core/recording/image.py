@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import uuid
 from collections.abc import Iterable, Iterator, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +21,19 @@ COPY_ROWS = 16384
 """Rows gathered before they are compressed: one row at a time would take a tenth of a millisecond each."""
 
 
-def build(meta: RecordingMeta, text: str, blocks: Iterable[tuple[str, Columns]], annotations: Annotations) -> Any:
+def build(
+    memory: BytesIO,
+    meta: RecordingMeta,
+    text: str,
+    blocks: Iterable[tuple[str, Columns]],
+    annotations: Annotations,
+) -> Any:
     """Return an open HDF5 file in memory that holds all blocks; it is not marked as complete.
 
     Parameters
     ----------
+    memory
+        Empty; what the file is built in.
     meta, text
         What the recording says about itself, its clock fits included, and the same as text.
     blocks
@@ -39,8 +47,7 @@ def build(meta: RecordingMeta, text: str, blocks: Iterable[tuple[str, Columns]],
     import h5py
 
     # The oldest format that HDF5 still writes: every HDF5 reader in the world opens it.
-    # The name is nobody's, but must be unique in the process: HDF5 takes two open files of one name for the same.
-    file = h5py.File(f"recording-{uuid.uuid4().hex}", "w", driver="core", backing_store=False, libver="earliest")
+    file = h5py.File(memory, "w", libver="earliest")
     file.attrs["format"] = layout.FORMAT
     file.attrs["format_version"] = layout.VERSION
     file.attrs["complete"] = False
@@ -58,8 +65,8 @@ def build(meta: RecordingMeta, text: str, blocks: Iterable[tuple[str, Columns]],
     return file
 
 
-def store(file: Any, digest: str, target: Path) -> None:
-    """Mark a file in memory as complete, and put it at `target` at once: synced first, then renamed.
+def store(memory: BytesIO, file: Any, digest: str, target: Path) -> None:
+    """Mark a file built in memory as complete, and put it at `target` at once: synced first, then renamed.
 
     Raises
     ------
@@ -71,8 +78,8 @@ def store(file: Any, digest: str, target: Path) -> None:
     file.flush()
     completing = target.with_name(target.name + layout.COMPLETING)
     try:
-        with completing.open("wb") as written:
-            written.write(file.id.get_file_image())
+        with completing.open("wb") as written, memory.getbuffer() as content:
+            written.write(content)
             written.flush()
             os.fsync(written.fileno())
         completing.replace(target)

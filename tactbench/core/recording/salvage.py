@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ def salvage(path: Path) -> Recording:
     path = Path(path)
     journal = read_journal(path)
     meta, text = _fitted(journal, parse_meta(path, journal.text))
-    return Recording(path, _built(journal, meta, text), text, complete=False)
+    return Recording(path, _built(BytesIO(), journal, meta, text), text, complete=False)
 
 
 def rescue(path: Path, target: Path) -> None:
@@ -55,11 +56,12 @@ def rescue(path: Path, target: Path) -> None:
     journal = read_journal(path)
     meta = parse_meta(path, journal.text)
     meta, text = _fitted(journal, meta.model_copy(update={"remarks": (*meta.remarks, REMARK)}))
-    with _built(journal, meta, text) as file:
+    memory = BytesIO()
+    with _built(memory, journal, meta, text) as file:
         digest = Recording(path, file, text, complete=True).content_digest()
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            image.store(file, digest, target)
+            image.store(memory, file, digest, target)
         except OSError as error:
             raise cannot_write(target, error) from error
 
@@ -79,8 +81,8 @@ def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
     return fitted, layout.meta_text(fitted)
 
 
-def _built(journal: Journal, meta: RecordingMeta, text: str) -> Any:
-    return image.build(meta, text, _fitting(journal, meta), journal.annotations)
+def _built(memory: BytesIO, journal: Journal, meta: RecordingMeta, text: str) -> Any:
+    return image.build(memory, meta, text, _fitting(journal, meta), journal.annotations)
 
 
 def _fitting(journal: Journal, meta: RecordingMeta) -> Iterator[tuple[str, Columns]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -233,10 +234,10 @@ class RecordingWriter:
     def _complete(self, partial: Partial, target: Path) -> None:
         if any(timed for _, timed in self._has.values()):
             self.meta = with_clock_fits(self.meta, read_blocks(self._aside))
-        text = self._text()
-        with image.build(self.meta, text, read_blocks(self._aside), self._annotations) as file:
+        text, memory = self._text(), BytesIO()
+        with image.build(memory, self.meta, text, read_blocks(self._aside), self._annotations) as file:
             self.content_digest = self._check(Recording(self._aside, file, text, complete=True), partial)
-            image.store(file, self.content_digest, target)
+            image.store(memory, file, self.content_digest, target)
 
     def _check(self, recording: Recording, partial: Partial) -> str:
         """Return the digest of the stored bytes, after making sure that every row that came is there."""
