@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tactbench.core.errors import LinkError, RigError
 from tactbench.core.plugins.interfaces import Acquisition, Rig
 from tactbench.core.recording.writer import RecordingWriter
-from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.samples import Block
+from tactbench.core.spec.recording import Emulation, RecordingMeta, StreamClock, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Role, Scene
 
@@ -31,23 +33,33 @@ def acquire(
     path: Path,
     clock: Callable[[], float],
     provenance: Mapping[str, Any],
+    watch: Callable[[Block], None] | None = None,
+    interrupted: Path | None = None,
 ) -> Acquired:
     """Carry out `scene` and write what the rig yields to `path`.
 
     Parameters
     ----------
     rig, descriptor
-        The rig, and what it says about itself.
+        The rig, and what it says about itself. If its acquisition is one of devices (DeviceAcquisition), what it says
+        of clocks, counts and emulation is recorded too.
     role
         What the recording is for, or None.
     clock
         Seconds, monotonic; its difference over the scene becomes ``provenance["sim_s"]`` for a simulated rig and
         ``provenance["acquisition_s"]`` otherwise. Writing the file is not counted.
+    watch
+        Called with every block, once it is written.
+    interrupted
+        Where a recording that was cut short on a real rig is completed, excluded from every evaluation, before the
+        error goes on; None, or a simulated rig: nothing is left behind.
 
     Raises
     ------
-    RigError, NotApplicable
-        If the rig cannot carry out the scene; nothing is left behind.
+    RigError, NotApplicable, LinkError
+        If the rig cannot carry out the scene, or ended before its time.
+    KeyboardInterrupt
+        If it was interrupted.
     RecordingError
         If the file cannot be written.
     """
@@ -55,24 +67,74 @@ def acquire(
     with rig.open(sensor, scene, seed=seed) as acquisition:
         meta = _meta(acquisition, sensor, descriptor, scene, role, seed)
         spent = clock() - began
+        key = "sim_s" if descriptor.simulated else "acquisition_s"
         with RecordingWriter(path, meta) as writer:
-            blocks = iter(acquisition)
-            while True:
-                began = clock()
-                block = next(blocks, None)
-                spent += clock() - began
-                if block is None:
-                    break
-                writer.append(block)
-            key = "sim_s" if descriptor.simulated else "acquisition_s"
-            writer.revise(
-                plan=tuple(acquisition.plan),
-                assumptions=dict(acquisition.assumptions),
-                drawn=dict(acquisition.drawn),
-                remarks=tuple(str(text) for name, text in acquisition.drawn.items() if name.startswith("remark ")),
-                provenance={**provenance, key: spent},
-            )
+            try:
+                blocks = iter(acquisition)
+                while True:
+                    began = clock()
+                    block = next(blocks, None)
+                    spent += clock() - began
+                    if block is None:
+                        break
+                    writer.append(block)
+                    if watch is not None:
+                        watch(block)
+                ended = str(getattr(acquisition, "ended", ""))
+                if ended:
+                    raise RigError(
+                        f"The scene {scene.name!r} ended before its time: {ended}.",
+                        hint="Look at the rig, and record it again.",
+                    )
+            except (KeyboardInterrupt, LinkError, RigError) as error:
+                if interrupted is not None and not descriptor.simulated and any(writer.rows.values()):
+                    why = "stopped by hand" if isinstance(error, KeyboardInterrupt) else str(error)
+                    _conclude(writer, acquisition, descriptor, {**provenance, key: spent}, why)
+                    writer.complete_at(interrupted)
+                raise
+            _conclude(writer, acquisition, descriptor, {**provenance, key: spent})
     return Acquired(writer.meta, writer.content_digest)
+
+
+def _conclude(
+    writer: RecordingWriter,
+    acquisition: Acquisition,
+    descriptor: RigDescriptor,
+    provenance: dict[str, Any],
+    why: str = "",
+) -> None:
+    """Write down what is known at the end; `why` it was cut short, if it was."""  # fmt: skip
+    remarks = tuple(str(text) for name, text in acquisition.drawn.items() if name.startswith("remark "))
+    writer.revise(
+        plan=tuple(acquisition.plan),
+        assumptions=dict(acquisition.assumptions),
+        drawn=dict(acquisition.drawn),
+        remarks=(*remarks, f"Interrupted, and not whole: {why}") if why else remarks,
+        excluded=f"interrupted: {why}" if why else "",
+        provenance=provenance,
+        **_of_devices(acquisition, descriptor, writer.rows),
+    )
+
+
+def _of_devices(acquisition: Acquisition, descriptor: RigDescriptor, rows: Mapping[str, int]) -> dict[str, Any]:
+    """Return the fields of the meta that an acquisition of devices knows; of another one, whose clock it is."""
+    emulation: Emulation | None = getattr(acquisition, "emulation", None)
+    clocks: Mapping[str, StreamClock] = getattr(acquisition, "clocks", {})
+    counts: Mapping[str, StreamCounts] = getattr(acquisition, "stream_counts", {})
+    if emulation is not None and emulation.time == "virtual":
+        # Delays of a simulation are no jitter that a fit could take off, and its times have one clock.
+        bare = {"source": "simulated", "method": "none", "segments": ()}
+        clocks = {name: one.model_copy(update=bare) for name, one in clocks.items()}
+    sources = {one.source for one in clocks.values()}
+    simulated = descriptor.simulated or (emulation is not None and emulation.time == "virtual")
+    return {
+        "simulated": descriptor.simulated or emulation is not None,
+        "emulation": emulation,
+        "clock": "simulated" if simulated else "device" if sources == {"device"} else "host",
+        "clocks": dict(clocks),
+        "streams": {name: one.model_copy(update={"written": rows.get(name, 0)}) for name, one in counts.items()},
+        "counts": dict(getattr(acquisition, "counts", {})),
+    }
 
 
 def _meta(
@@ -91,11 +153,10 @@ def _meta(
         own_rates_hz={name: rate for name, rate in own_hz.items() if recorded_hz.get(name, rate) != rate},
         reference=tuple(acquisition.reference),
         rig=descriptor.name,
-        simulated=descriptor.simulated,
-        clock="device",
         session=scene.session,
         role=role,
         scene=scene,
         labels=dict(scene.labels),
         seed=seed,
+        **_of_devices(acquisition, descriptor, {}),
     )

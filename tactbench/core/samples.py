@@ -62,7 +62,8 @@ class Block:
     sequence: IntArray | None = None
     """(n,) the device's own number of each sample, if it has one, counted on over its wraps."""
     device_ns: IntArray | None = None
-    """(n,) nanoseconds of the device's own clock, if it has one, counted on over its wraps."""
+    """(n,) nanoseconds of the device's own clock, if it has one, counted on over its wraps. Where the count is lost, it
+    begins again with a lower number: that is how a break is told."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +72,18 @@ class StreamData:
 
     spec: StreamSpec
     t_ns: IntArray | None
-    """(n,) nanoseconds, or None when the source has no clock."""
+    """(n,) nanoseconds, or None when the source has no clock; on the host's clock where there are several."""
     data: npt.NDArray[Any]
     """(n, channels)"""
     quality: npt.NDArray[np.uint8] | None
     annotations: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
     """Row labels: name -> (n,) of str or int."""
+    sequence: IntArray | None = None
+    """(n,) the device's own numbers, if it has any."""
+    device_ns: IntArray | None = None
+    """(n,) nanoseconds of the device's own clock, if it has one."""
+    host_ns: IntArray | None = None
+    """(n,) when the host had the samples, where `t_ns` was computed from `device_ns`."""
 
 
 @dataclass(frozen=True)

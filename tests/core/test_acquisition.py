@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.errors import RigError
+from tactbench.core.errors import LinkUnplugged, RecordingError, RigError
 from tactbench.core.recording.reader import open_recording
+from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
 from tactbench.core.spec.quantity import Source, assumed
-from tactbench.core.spec.recording import PlanEntry
+from tactbench.core.spec.recording import Emulation, PlanEntry, StreamClock, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import ForceRamp, Indenter, Scene
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
@@ -62,11 +63,11 @@ class Weights:
         self.drawn = {"offset_mm": 0.25}
 
 
-def run(path, rig, *, simulated=True, clock=None):
+def run(path, rig, *, simulated=True, clock=None, **more):
     descriptor = RigDescriptor(name="weights", title="weights", where="x:y", simulated=simulated)
     ticks = itertools.count()
     return acquire(rig, SENSOR, descriptor, SCENE, role="train", seed=7, path=path,
-                   clock=clock or (lambda: float(next(ticks))), provenance={"tactbench": "1"})  # fmt: skip
+                   clock=clock or (lambda: float(next(ticks))), provenance={"tactbench": "1"}, **more)  # fmt: skip
 
 
 def test_everything_the_rig_says_is_kept(tmp_path):
@@ -85,6 +86,7 @@ def test_everything_the_rig_says_is_kept(tmp_path):
     assert (meta.rig, meta.simulated, meta.scene, meta.labels) == ("weights", True, SCENE, {"cap_radius_mm": 5.0})
     assert (meta.plan, meta.assumptions, meta.drawn) == (Weights.plan, {"weight_n": 0.5}, {"offset_mm": 0.25})
     assert meta.sensor.streams == (TAXELS,)  # only what was recorded
+    assert (meta.clock, meta.clocks, meta.streams, meta.emulation) == ("simulated", {}, {}, None)
     assert rig.closed
 
 
@@ -133,3 +135,129 @@ def test_the_same_seed_says_the_same(tmp_path):
         run(tmp_path / f"{name}.h5", Weights())
     with open_recording(tmp_path / "a.h5") as a, open_recording(tmp_path / "b.h5") as b:
         assert a.content_digest() == b.content_digest()
+
+
+class Devices(Weights):
+    """A rig of two devices: taxels with a clock of their own, half an hour behind the host's, and a polled force."""
+
+    clocks = {  # noqa: RUF012
+        "taxels": StreamClock(source="device", delay_ns=(200_000, 300_000), wraps=2),
+        "force_torque": StreamClock(source="host"),
+    }
+    counts = {"pad crc errors": 1}  # noqa: RUF012
+    emulation = None
+    ended = ""
+
+    def __init__(self, *, stops=None, emulation=None):
+        super().__init__()
+        self.stops, self.emulation = stops, emulation
+        self.stream_counts = {}
+
+    def __iter__(self):
+        for number in range(20):
+            device = (np.arange(10) + 10 * number) * 1_000_000
+            late = self.rng.integers(0, 500_000, 10)
+            yield Block("taxels", device + 1_800_000_000_000 + late, np.full((10, 1), number), device_ns=device)
+            yield Block("force_torque", device + 1_800_000_000_000, np.full((10, 1), 0.5 * number))
+            self.stream_counts = {"taxels": StreamCounts(received=10 * number + 12, dropped=2)}
+            if number == 15 and isinstance(self.stops, str):
+                self.ended = self.stops
+                return
+            if number == 15 and self.stops is not None:
+                raise self.stops
+
+
+def test_what_devices_say_is_recorded_and_times_are_the_hosts(tmp_path):
+    seen = []
+    meta, _ = run(tmp_path / "r.h5", Devices(), simulated=False, watch=seen.append)
+    assert [block.stream for block in seen] == ["taxels", "force_torque"] * 20
+    with open_recording(tmp_path / "r.h5") as recording:
+        recording.verify()
+        assert recording.meta == meta
+        taxels, force = recording.read("taxels"), recording.read("force_torque")
+    assert (meta.clock, meta.simulated, meta.emulation, meta.excluded) == ("host", False, None, "")
+    assert meta.streams == {"taxels": StreamCounts(received=202, written=200, dropped=2)}
+    assert meta.counts == {"pad crc errors": 1}
+    clock = meta.clocks["taxels"]
+    assert (clock.source, clock.method, clock.delay_ns, clock.wraps) == ("device", "hull-1way", (200_000, 300_000), 2)
+    assert clock.segments[0].points == 200
+    true = np.arange(200) * 1_000_000 + 1_800_000_000_000
+    # 200 delays up to 0.5 ms: the two lowest on either side of the middle are some microseconds.
+    assert np.abs(taxels.t_ns - true).max() < 100_000 <= np.abs(taxels.host_ns - true).max()
+    assert np.array_equal(taxels.device_ns, np.arange(200) * 1_000_000)
+    assert (force.device_ns, force.host_ns) == (None, None)
+    assert np.array_equal(force.t_ns, true)
+
+
+def test_virtual_time_is_not_fitted(tmp_path):
+    emulation = Emulation(time="virtual", seed=3, physics="twin", devices=("pad",))
+    meta, _ = run(tmp_path / "r.h5", Devices(emulation=emulation), simulated=False)
+    assert (meta.clock, meta.simulated, meta.emulation) == ("simulated", True, emulation)
+    assert meta.clocks["taxels"] == StreamClock(source="simulated", delay_ns=(200_000, 300_000), wraps=2)
+    with open_recording(tmp_path / "r.h5") as recording:
+        taxels = recording.read("taxels")
+    assert taxels.host_ns is None
+    assert len(taxels.device_ns) == 200
+
+
+def test_emulated_devices_in_real_time_have_their_clocks_fitted(tmp_path):
+    meta, _ = run(tmp_path / "r.h5", Devices(emulation=Emulation(time="real")), simulated=False)
+    assert (meta.clock, meta.simulated, meta.clocks["taxels"].method) == ("host", True, "hull-1way")
+
+
+STOPS = [
+    (KeyboardInterrupt(), KeyboardInterrupt, "stopped by hand"),
+    (LinkUnplugged("the cable is gone"), LinkUnplugged, "the cable is gone"),
+    (RigError("the driver gave up"), RigError, "the driver gave up"),
+    ("the force sensor is unplugged", RigError, "the force sensor is unplugged"),
+]
+
+
+@pytest.mark.parametrize(("stops", "raised", "says"), STOPS)
+def test_what_a_real_rig_had_recorded_is_kept_where_asked(tmp_path, stops, raised, says):
+    kept = tmp_path / "kept" / "r.h5"
+    with pytest.raises(raised, match=None if raised is KeyboardInterrupt else says):
+        run(tmp_path / "r.h5", Devices(stops=stops), simulated=False, interrupted=kept)
+    assert [path.name for path in tmp_path.iterdir()] == ["kept"]
+    with open_recording(kept) as recording:
+        recording.verify()
+        meta = recording.meta
+        assert len(recording.stream("taxels")) == 160
+    assert meta.excluded.startswith("interrupted: ")
+    assert says in meta.excluded
+    assert says in meta.remarks[-1]
+    assert meta.clocks["taxels"].segments
+    assert meta.streams["taxels"].written == 160
+    assert meta.provenance["acquisition_s"] > 0
+
+
+@pytest.mark.parametrize(("stops", "raised", "says"), STOPS)
+@pytest.mark.parametrize(("simulated", "asked"), [(True, True), (False, False)])
+def test_nothing_is_kept_of_a_simulation_or_unasked(tmp_path, stops, raised, says, simulated, asked):
+    with pytest.raises(raised, match=None if raised is KeyboardInterrupt else says):
+        run(
+            tmp_path / "r.h5", Devices(stops=stops), simulated=simulated,
+            interrupted=tmp_path / "kept.h5" if asked else None,
+        )  # fmt: skip
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_interrupted_before_the_first_row_there_is_nothing_to_keep(tmp_path):
+    with pytest.raises(RigError, match="fell off"):
+        run(tmp_path / "r.h5", Weights(fails_at=0), simulated=False, interrupted=tmp_path / "kept.h5")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_recording_that_cannot_be_completed_leaves_its_journal(tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(RecordingError, match="cannot be written"):
+        run(
+            tmp_path / "r.h5", Devices(stops=RigError("gone")), simulated=False, interrupted=tmp_path / "taken" / "r.h5"
+        )
+    rescue(tmp_path / "r.h5.partial", tmp_path / "rescued.h5")
+    with open_recording(tmp_path / "rescued.h5") as recording:
+        recording.verify()
+        meta = recording.meta
+    assert "gone" in meta.excluded
+    assert meta.streams["taxels"] == StreamCounts(received=162, written=160, dropped=2)
+    assert meta.clocks["taxels"].method == "hull-1way"

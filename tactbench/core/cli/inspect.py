@@ -98,7 +98,8 @@ def _print(about: dict[str, Any]) -> None:
     click.secho(about["file"], bold=True)
     said = [f"session {meta['session']}", f"clock {meta['clock']}"]
     said += [f"{name} {meta[name]}" for name in ("trial", "role") if meta[name]]
-    click.echo(f"  {about['sensor']} on {meta['rig']}{' (SIM)' if meta['simulated'] else ''}; {'; '.join(said)}")
+    mark = " (EMULATED)" if meta["emulation"] else " (SIM)" if meta["simulated"] else ""
+    click.echo(f"  {about['sensor']} on {meta['rig']}{mark}; {'; '.join(said)}")
     if meta["labels"]:
         click.echo("  labels: " + ", ".join(f"{name} = {value}" for name, value in meta["labels"].items()))
     for stream in about["streams"]:
@@ -110,6 +111,10 @@ def _print(about: dict[str, Any]) -> None:
         )
         notes = f"; labels {', '.join(stream['annotations'])}" if stream["annotations"] else ""
         click.echo(f"  {stream['stream']} ({stream['of']}): {stream['rows']} rows, {rate}, {channels}{notes}")
+    for name, clock in meta["clocks"].items():
+        click.echo(f"  clock of {name}: {_clock(clock)}")
+    if meta["emulation"]:
+        click.echo(f"  emulated: {_emulation(meta['emulation'])}")
     for title, taken in (("effects", True), ("left out", False)):
         names = [
             f"{one['effect']}{' (asked)' if one['asked'] else ''}" for one in meta["plan"] if one["included"] == taken
@@ -128,6 +133,33 @@ def _print(about: dict[str, Any]) -> None:
     if not about["complete"]:
         click.echo("  unfinished: this is what a crash left behind")
     click.echo(f"  content {about['content_sha256'][:16]}{' (verified)' if about['complete'] else ''}")
+
+
+def _clock(clock: dict[str, Any]) -> str:
+    """Return one line: whose it is, how it was put on the host's, and how well."""
+    said = str(clock["source"])
+    lines = clock["segments"]
+    if lines:
+        drifts = [line["drift"] * 1e6 for line in lines]
+        bounds = [line["bound_ns"] for line in lines]
+        within = "no bound" if None in bounds else f"within {max(bounds) * 1e-6:.3g} ms"
+        said += (
+            f", on the host's by {clock['method']} ({len(lines)} lines, drift {min(drifts):.3g} to {max(drifts):.3g} "
+            f"ppm, {within})"
+        )
+    if any(clock["delay_ns"]):
+        low, high = (edge * 1e-6 for edge in clock["delay_ns"])
+        said += f"; least delay {low:.3g} to {high:.3g} ms, not taken off"
+    said += "".join(f"; {name}: {clock[name]}" for name in ("wraps", "breaks") if clock[name])
+    return said
+
+
+def _emulation(emulation: dict[str, Any]) -> str:
+    factor = f" (factor {emulation['factor']:.3g})" if emulation["factor"] else ""
+    said = f"{', '.join(emulation['devices']) or 'devices'} in {emulation['time']} time{factor}"
+    if emulation["physics"]:
+        said += f", moved by {emulation['physics']}"
+    return said + f", seed {emulation['seed']}" + "".join(f"; fault {fault}" for fault in emulation["faults"])
 
 
 def _ends(names: list[str]) -> str:

@@ -53,6 +53,9 @@ def features_on(
             flagged = int(np.count_nonzero(stream.quality[:, picked] & flag))
             if flagged:
                 counts[f"{str(flag.name).lower()} samples kept"] += flagged
+        after_gap = int(np.count_nonzero((stream.quality[:, picked] & Quality.GAP).any(axis=1)))
+        if after_gap:
+            counts[f"rows of {stream.spec.name} kept, before which others were lost"] += after_gap
     if stream is clock:
         return names, readings
     rows = nearest_rows(clock, stream, meta.name)

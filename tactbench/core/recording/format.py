@@ -15,7 +15,8 @@ from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
 
 FORMAT = "tactbench-recording"
-VERSION = 1
+VERSION = 2
+"""Written; every version from 1 on is read."""
 PARTIAL = ".partial"
 """Added to the name while a recording is being made."""
 COMPLETING = ".completing"
@@ -48,22 +49,28 @@ class ContentDigest:
     ----------
     text
         The meta as it stands in the file: a model of a later version, with more fields, must not change the digest.
+    version
+        That of the file.
     """
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, version: int = VERSION) -> None:
         content = json.loads(text)
         for name in NOT_CONTENT:
             content.pop(name, None)
-        self._sha = hashlib.sha256(f"{FORMAT} {VERSION}\n{canonical(content)}\n".encode())
+        self._sha = hashlib.sha256(f"{FORMAT} {version}\n{canonical(content)}\n".encode())
 
-    def array(self, name: str, values: npt.NDArray[Any]) -> None:
-        """Add an array by name, type, shape and little-endian bytes in row order; texts as a JSON list."""
-        if values.dtype.kind == "U":
-            self._sha.update(f"{name} text {values.shape}\n{canonical(values.tolist())}\n".encode())
-            return
-        plain = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
-        self._sha.update(f"{name} {plain.dtype.str} {plain.shape}\n".encode())
-        self._sha.update(plain.data)
+    def texts(self, name: str, values: npt.NDArray[np.str_]) -> None:
+        """Add a column of texts by name and shape, as a JSON list."""
+        self._sha.update(f"{name} text {values.shape}\n{canonical(values.tolist())}\n".encode())
+
+    def numbers(
+        self, name: str, dtype: np.dtype[Any], shape: tuple[int, ...], pieces: Iterable[npt.NDArray[Any]]
+    ) -> None:
+        """Add a column by name, type, shape and little-endian bytes in row order; `pieces` are its rows in order."""
+        plain = dtype.newbyteorder("<")
+        self._sha.update(f"{name} {plain.str} {shape}\n".encode())
+        for piece in pieces:
+            self._sha.update(np.ascontiguousarray(piece, dtype=plain).data)
 
     def hexdigest(self) -> str:
         """Return the digest so far."""

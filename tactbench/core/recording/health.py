@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.recording.reader import Recording
+from tactbench.core.recording.times import recomputed_t_ns
 from tactbench.core.samples import FloatArray, Quality, StreamData
+from tactbench.core.spec.recording import StreamClock, StreamCounts
 from tactbench.core.spec.sensor import ChannelSpec
 
 Severity = Literal["error", "warning", "info"]
@@ -73,6 +75,8 @@ def examine(recording: Recording) -> list[Finding]:
         for check in _CHECKS:
             found.extend(check(name, columns))
         found.extend(_labels(name, data))
+        found.extend(_gaps(name, data))
+        found.extend(_clock_fit(name, data, recording.meta.clocks.get(name)))
         if data.t_ns is not None:
             clocks.setdefault(data.t_ns.tobytes(), ([], data))[0].append(name)
     for names, data in clocks.values():
@@ -89,9 +93,49 @@ def _whole(recording: Recording) -> Iterator[Finding]:
         yield Finding("no-clock", "info", "", (), 0, "no clock stated: rows are ordered, nothing more")
     if meta.clock == "nominal":
         yield Finding("no-clock", "info", "", (), 0, "time stamps are row number by nominal rate, not measured")
+    for name, counts in meta.streams.items():
+        yield from _counts(name, counts)
     absent = [spec.name for spec in (*meta.sensor.streams, *meta.reference) if spec.name not in recording.stream_names]
     if absent:
         yield Finding("absent", "warning", "", (), len(absent), f"declared but not recorded: {', '.join(absent)}")
+
+
+def _counts(stream: str, counts: StreamCounts) -> Iterator[Finding]:
+    lost = [f"{counts.gaps} never came"] if counts.gaps else []
+    lost += [f"{counts.dropped} were dropped because writing was behind"] if counts.dropped else []
+    if lost:
+        text = f"{stream} lost rows: {', '.join(lost)}"
+        yield Finding("lost", "warning", stream, (), counts.gaps + counts.dropped, text)
+    again = counts.duplicates + counts.late
+    if again:
+        text = f"{stream}: {again} rows came twice or late, and were kept out"
+        yield Finding("repeated", "info", stream, (), again, text)
+    open_rows = counts.received - counts.written - counts.dropped - again
+    if open_rows:
+        text = f"{stream}: {abs(open_rows)} rows {'more' if open_rows > 0 else 'fewer'} received than accounted for"
+        yield Finding("unaccounted", "warning", stream, (), abs(open_rows), text)
+
+
+def _gaps(stream: str, data: StreamData) -> Iterator[Finding]:
+    count = 0 if data.quality is None else int(((data.quality & Quality.GAP) != 0).any(axis=1).sum())
+    if count:
+        text = f"{stream}: rows were lost before {count} of {len(data.data)} rows"
+        yield Finding("rows-before-lost", "warning", stream, (), count, text)
+
+
+def _clock_fit(stream: str, data: StreamData, clock: StreamClock | None) -> Iterator[Finding]:
+    if clock is None or data.host_ns is None:
+        return
+    other = int(np.count_nonzero(recomputed_t_ns(data, clock) != data.t_ns))
+    if other:
+        text = f"{other} times of {stream} are not those of its device's clock and the stated lines"
+        yield Finding("clock-fit", "error", stream, (), other, text)
+    if any(segment.bound_ns is None for segment in clock.segments):
+        text = f"{stream}: too few rows to say how well its clock was put on the host's"
+        yield Finding("clock-bound", "info", stream, (), 0, text)
+    if clock.breaks:
+        text = f"the clock of {stream} began again (times: {clock.breaks})"
+        yield Finding("clock-lost", "warning", stream, (), clock.breaks, text)
 
 
 def _columns(data: StreamData) -> Iterator[_Column]:

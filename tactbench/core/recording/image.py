@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import uuid
 from collections.abc import Iterable, Iterator, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +12,32 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.recording import format as layout
-from tactbench.core.recording.partial import Columns
+from tactbench.core.recording.partial import Annotations, Columns
+from tactbench.core.recording.times import on_host_clock
+from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
-
-Annotations = Mapping[str, npt.NDArray[Any]]
 
 COPY_ROWS = 16384
 """Rows gathered before they are compressed: one row at a time would take a tenth of a millisecond each."""
 
 
 def build(
+    memory: BytesIO,
+    meta: RecordingMeta,
     text: str,
-    specs: Mapping[str, StreamSpec],
     blocks: Iterable[tuple[str, Columns]],
-    annotations: Mapping[str, Annotations],
+    annotations: Annotations,
 ) -> Any:
     """Return an open HDF5 file in memory that holds all blocks; it is not marked as complete.
+
+    Parameters
+    ----------
+    memory
+        Empty; what the file is built in.
+    meta, text
+        What the recording says about itself, its clock fits included, and the same as text.
+    blocks
+        As they came; their times are put on the host's clock here.
 
     Notes
     -----
@@ -37,8 +47,7 @@ def build(
     import h5py
 
     # The oldest format that HDF5 still writes: every HDF5 reader in the world opens it.
-    # The name is nobody's, but must be unique in the process: HDF5 takes two open files of one name for the same.
-    file = h5py.File(f"recording-{uuid.uuid4().hex}", "w", driver="core", backing_store=False, libver="earliest")
+    file = h5py.File(memory, "w", libver="earliest")
     file.attrs["format"] = layout.FORMAT
     file.attrs["format_version"] = layout.VERSION
     file.attrs["complete"] = False
@@ -47,7 +56,8 @@ def build(
     file.attrs.create("meta", text, dtype=h5py.string_dtype("utf-8"))
     streams = file.create_group("streams")
     streams.attrs["NX_class"] = "NXentry"
-    for name, columns in _gathered(blocks):
+    specs = layout.specs_by_name(meta)
+    for name, columns in _gathered(on_host_clock(meta, blocks)):
         _extend(streams.require_group(name), columns)
     for name in streams:
         _annotate(streams[name], annotations.get(name, {}))
@@ -55,8 +65,8 @@ def build(
     return file
 
 
-def store(file: Any, digest: str, target: Path) -> None:
-    """Mark a file in memory as complete, and put it at `target` at once: synced first, then renamed.
+def store(memory: BytesIO, file: Any, digest: str, target: Path) -> None:
+    """Mark a file built in memory as complete, and put it at `target` at once: synced first, then renamed.
 
     Raises
     ------
@@ -68,8 +78,8 @@ def store(file: Any, digest: str, target: Path) -> None:
     file.flush()
     completing = target.with_name(target.name + layout.COMPLETING)
     try:
-        with completing.open("wb") as written:
-            written.write(file.id.get_file_image())
+        with completing.open("wb") as written, memory.getbuffer() as content:
+            written.write(content)
             written.flush()
             os.fsync(written.fileno())
         completing.replace(target)
@@ -129,7 +139,7 @@ def _create(group: Any, name: str, values: npt.NDArray[Any], rows: int) -> None:
     )  # fmt: skip
 
 
-def _annotate(group: Any, annotations: Annotations) -> None:
+def _annotate(group: Any, annotations: Mapping[str, npt.NDArray[Any]]) -> None:
     import h5py
 
     for name, column in annotations.items():
@@ -149,7 +159,9 @@ def _describe(group: Any, spec: StreamSpec) -> None:
         group.attrs["rate_hz"] = spec.rate_hz
     if "t_ns" in group:
         group.attrs["axes"] = ["t_ns", "."]
-        group["t_ns"].attrs["units"] = "ns"
+    for name in ("t_ns", "device_ns", "host_ns"):
+        if name in group:
+            group[name].attrs["units"] = "ns"
     units = {channel.unit for channel in spec.channels}
     group["data"].attrs["units"] = units.pop() if len(units) == 1 else "mixed: see channel_units"
     for name, values in layout.channel_attributes(spec):

@@ -13,6 +13,8 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +22,18 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import FormatError, MissingRecordingError
+from tactbench.core.recording.format import canonical
 
-MAGIC = b"tactbench-partial 1\n"
+MAGIC = b"tactbench-partial 2\n"
+_READ = (b"tactbench-partial 1\n", MAGIC)
 _FRAME = struct.Struct("<IQI")
 """Bytes of the head, bytes of the columns, CRC-32 of both."""
 _DTYPES = {"<u1", "|u1", "<u2", "<i2", "<i4", "<i8", "<f4", "<f8"}
 
+Annotations = dict[str, dict[str, npt.NDArray[Any]]]
+"""Labels of rows by stream and name: (n,) texts or whole numbers."""
 Columns = dict[str, npt.NDArray[Any]]
-"""Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence (n,)."""
+"""Columns of a stream by name: data (n, channels), t_ns (n,), quality (n, channels), sequence, device_ns (n,)."""
 
 
 class Partial:
@@ -45,6 +51,7 @@ class Partial:
         self.path = path
         self.rows: dict[str, int] = {}
         """Rows of the streams that have had a block"""
+        self._end = 0
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
         try:
             _lock(self._file)
@@ -62,18 +69,53 @@ class Partial:
         self._write(_frame(head, b"".join(values.tobytes() for values in plain.values())))
         self.rows[stream] = self.rows.get(stream, 0) + len(columns["data"])
 
+    def revise(self, changes: Mapping[str, Any]) -> None:
+        """Add fields of the meta that replace those before, as plain data; ValueError for what JSON does not have."""
+        self._write(_frame(json.dumps({"meta": changes}, allow_nan=False).encode(), b""))
+
+    def annotate(self, stream: str, name: str, column: npt.NDArray[Any]) -> None:
+        """Add a label for every row of a stream."""
+        if column.dtype.kind == "U":
+            kind, body = "text", json.dumps(column.tolist()).encode()
+        else:
+            kind, body = "<i8", column.astype("<i8").tobytes()
+        self._write(_frame(json.dumps({"annotation": [stream, name, kind]}).encode(), body))
+
     def close(self) -> None:
         """Close the journal; it stays where it is."""
         os.close(self._file)
 
     def _write(self, frame: bytes) -> None:
         left = memoryview(frame)
-        while left:
-            left = left[os.write(self._file, left) :]
+        try:
+            while left:
+                left = left[os.write(self._file, left) :]
+            self._end += len(frame)
+        except BaseException:
+            # Whoever goes on after Ctrl-C, or a disk that was full, finds whole frames only.
+            os.ftruncate(self._file, self._end)
+            os.lseek(self._file, self._end, os.SEEK_SET)
+            raise
 
 
-def read_partial(path: Path) -> tuple[str, Iterator[tuple[str, Columns]]]:
-    """Return the meta text of a journal, and its blocks as far as they are whole.
+@dataclass(frozen=True)
+class Journal:
+    """What a journal said when it was read; it may have grown since."""
+
+    path: Path
+    text: str
+    """The meta, as it was known last."""
+    annotations: Annotations
+    end: int
+    """Bytes that were whole."""
+
+    def blocks(self) -> Iterator[tuple[str, Columns]]:
+        """Yield the blocks that had been there: stream and columns."""
+        return read_blocks(self.path, self.end)
+
+
+def read_journal(path: Path) -> Journal:
+    """Return what a journal says, as far as it is whole.
 
     Raises
     ------
@@ -84,53 +126,92 @@ def read_partial(path: Path) -> tuple[str, Iterator[tuple[str, Columns]]]:
     """
     if not path.is_file():
         raise MissingRecordingError(f"There is no recording {path}.", hint="Check the path.")
-    frames = _frames(path)
+    frames = _frames(path, path.stat().st_size)
     first = next(frames, None)
     if first is None:
         raise FormatError(
             f"{path} is not an unfinished recording, or broke off at once.",
             hint="A finished one is read without `--salvage`.",
         )
-    return first[0].decode(errors="replace"), _blocks(path, frames)
+    meta, _, end = first
+    text = meta.decode(errors="replace")
+    annotations: Annotations = {}
+    changes: dict[str, Any] = {}
+    for head, body, place in frames:
+        end = place
+        if head.startswith(b"{"):
+            with _understood(path):
+                _take(json.loads(head), body, changes, annotations)
+    if changes:
+        with _understood(path):
+            text = canonical({**json.loads(text), **changes})
+    return Journal(path, text, annotations, end)
+
+
+def read_blocks(path: Path, end: int | None = None) -> Iterator[tuple[str, Columns]]:
+    """Yield the blocks of a journal's first `end` bytes; FormatError for one that makes no sense."""
+    frames = _frames(path, path.stat().st_size if end is None else end)
+    next(frames, None)
+    for head, body, _ in frames:
+        if not head.startswith(b"{"):
+            with _understood(path):
+                block = _block(json.loads(head), body)
+            yield block
 
 
 def _frame(head: bytes, body: bytes) -> bytes:
     return _FRAME.pack(len(head), len(body), zlib.crc32(body, zlib.crc32(head))) + head + body
 
 
-def _frames(path: Path) -> Iterator[tuple[bytes, bytes]]:
-    """Yield head and body of every whole frame; the first one that is not ends it."""
-    left = path.stat().st_size - len(MAGIC)
+def _frames(path: Path, end: int) -> Iterator[tuple[bytes, bytes, int]]:
+    """Yield head and body of every whole frame, and where it ends; the first one that is not whole ends it."""
     with path.open("rb") as file:
-        if file.read(len(MAGIC)) != MAGIC:
+        if file.read(len(MAGIC)) not in _READ:
             return
-        while left >= _FRAME.size:
+        place = len(MAGIC)
+        while place + _FRAME.size <= end:
             head_bytes, body_bytes, checksum = _FRAME.unpack(file.read(_FRAME.size))
-            left -= _FRAME.size + head_bytes + body_bytes
-            if left < 0:
+            place += _FRAME.size + head_bytes + body_bytes
+            if place > end:
                 return
             head, body = file.read(head_bytes), file.read(body_bytes)
             if zlib.crc32(body, zlib.crc32(head)) != checksum:
                 return
-            yield head, body
+            yield head, body, place
 
 
-def _blocks(path: Path, frames: Iterator[tuple[bytes, bytes]]) -> Iterator[tuple[str, Columns]]:
-    for head, body in frames:
-        try:
-            stream, shapes = json.loads(head)
-            columns: Columns = {}
-            start = 0
-            for name, dtype, shape in shapes:
-                if dtype not in _DTYPES:
-                    raise ValueError(f"a column of {dtype}")
-                count = int(np.prod(shape, dtype=np.int64))
-                flat = np.frombuffer(body, dtype=dtype, count=count, offset=start)
-                columns[str(name)] = flat.reshape(shape)
-                start += flat.nbytes
-            yield str(stream), columns
-        except (ValueError, TypeError, RecursionError) as error:
-            raise FormatError(f"{path} holds a block that makes no sense: {error}.", hint="Record it again.") from error
+def _block(head: Any, body: bytes) -> tuple[str, Columns]:
+    stream, shapes = head
+    columns: Columns = {}
+    start = 0
+    for name, dtype, shape in shapes:
+        if dtype not in _DTYPES:
+            raise ValueError(f"a column of {dtype}")
+        count = int(np.prod(shape, dtype=np.int64))
+        flat = np.frombuffer(body, dtype=dtype, count=count, offset=start)
+        columns[str(name)] = flat.reshape(shape)
+        start += flat.nbytes
+    return str(stream), columns
+
+
+def _take(head: Any, body: bytes, changes: dict[str, Any], annotations: Annotations) -> None:
+    if "meta" in head:
+        changes.update(head["meta"])
+        return
+    stream, name, kind = head["annotation"]
+    if kind not in ("text", "<i8"):
+        raise ValueError(f"labels of {kind}")
+    column = np.array(json.loads(body), dtype=np.str_) if kind == "text" else np.frombuffer(body, dtype=kind)
+    annotations.setdefault(str(stream), {})[str(name)] = column
+
+
+@contextmanager
+def _understood(path: Path) -> Iterator[None]:
+    """Turn what goes wrong in reading one frame into a FormatError."""
+    try:
+        yield
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise FormatError(f"{path} holds a frame that makes no sense: {error}.", hint="Record it again.") from error
 
 
 def _lock(file: int) -> None:

@@ -23,10 +23,12 @@ from tactbench.core.spec.sensor import StreamSpec
 class LazyStream:
     """A stream in an open recording: nothing is read until it is sliced."""
 
-    def __init__(self, path: Path, spec: StreamSpec, group: Any, *, clock: str, strict: bool) -> None:
+    def __init__(
+        self, path: Path, spec: StreamSpec, group: Any, meta: RecordingMeta, *, version: int, strict: bool
+    ) -> None:
         self.spec = spec
         self._path = path
-        self._columns = _columns(path, spec, group, clock=clock, strict=strict)
+        self._columns = _columns(path, spec, group, meta, version=version, strict=strict)
         lengths = {int(dataset.shape[0]) for dataset in self._columns.values()}
         if strict and len(lengths) > 1:
             raise FormatError(f"In {path}, the columns of {spec.name!r} differ in length.", hint=trust.SEE)
@@ -49,12 +51,21 @@ class LazyStream:
             data=read["data"],
             quality=read.get("quality"),
             annotations=notes,
+            sequence=read.get("sequence"),
+            device_ns=read.get("device_ns"),
+            host_ns=read.get("host_ns"),
         )
 
-    def columns(self) -> Iterator[tuple[str, npt.NDArray[Any]]]:
-        """Yield every column whole, by its name below the stream, for the digest."""
+    def add_to(self, digest: layout.ContentDigest) -> None:
+        """Add every column to the digest, by its name below the stream."""
         for name in sorted(self._columns):
-            yield name, self._read(name, slice(0, self._rows))
+            where = f"/{self.spec.name}/{name}"
+            first = self._read(name, slice(0, 0))
+            if first.dtype.kind == "U":
+                digest.texts(where, self._read(name, slice(0, self._rows)))
+            else:
+                pieces = (self._read(name, rows) for rows in _slices(self._rows))
+                digest.numbers(where, first.dtype, (self._rows, *first.shape[1:]), pieces)
 
     def _read(self, name: str, rows: slice) -> npt.NDArray[Any]:
         dataset = self._columns[name]
@@ -76,12 +87,15 @@ class Recording:
         What the recording says about itself.
     complete
         False for what a crash left behind.
+    version
+        That of the file's format.
     """
 
     def __init__(self, path: Path, file: Any, text: str, *, complete: bool) -> None:
         self.path = path
         self.meta = parse_meta(path, text)
         self.complete = complete
+        self.version = int(file.attrs["format_version"])
         self._text = text
         self._file = file
         self._specs = layout.specs_by_name(self.meta)
@@ -124,7 +138,9 @@ class Recording:
             return self._looked_at[name]
         try:
             group = trust.subgroup(self.path, self._streams, name)
-            stream = LazyStream(self.path, self._specs[name], group, clock=self.meta.clock, strict=self.complete)
+            stream = LazyStream(
+                self.path, self._specs[name], group, self.meta, version=self.version, strict=self.complete
+            )
         except FormatError:
             raise
         except trust.READ_FAILURES as error:
@@ -138,12 +154,11 @@ class Recording:
 
     def content_digest(self) -> str:
         """Return the digest of what the recording says, computed from the data now."""
-        digest = layout.ContentDigest(self._text)
+        digest = layout.ContentDigest(self._text, self.version)
         for name in sorted(self.stream_names):
             stream = self.stream(name)
             try:
-                for column, values in stream.columns():
-                    digest.array(f"/{name}/{column}", values)
+                stream.add_to(digest)
             except trust.READ_FAILURES as error:
                 raise _damaged(self.path, error) from error
         return digest.hexdigest()
@@ -183,9 +198,18 @@ def content_digest(path: Path) -> str:
 
 
 _NOTE = "annotations/"
+_DIGEST_ROWS = 64 * layout.CHUNK_ROWS
+"""Rows that are in memory at a time for the digest; whole chunks, so that none is decompressed twice."""
 
 
-def _columns(path: Path, spec: StreamSpec, group: Any, *, clock: str, strict: bool) -> dict[str, Any]:
+def _slices(rows: int) -> Iterator[slice]:
+    for start in range(0, rows, _DIGEST_ROWS):
+        yield slice(start, min(start + _DIGEST_ROWS, rows))
+
+
+def _columns(
+    path: Path, spec: StreamSpec, group: Any, meta: RecordingMeta, *, version: int, strict: bool
+) -> dict[str, Any]:
     """Return the datasets of a stream by their name below it, each looked at but not read."""
     data = trust.numbers(path, group, "data", "iuf", 2, strict=strict)
     wanted = np.dtype(spec.dtype)
@@ -201,9 +225,20 @@ def _columns(path: Path, spec: StreamSpec, group: Any, *, clock: str, strict: bo
         "quality": trust.numbers(path, group, "quality", "u", 2, strict=strict),
         "sequence": trust.numbers(path, group, "sequence", "i", 1, strict=strict),
     }
-    if (columns["t_ns"] is None) != (clock == "none"):
+    if (columns["t_ns"] is None) != (meta.clock == "none"):
         has = "no time stamps" if columns["t_ns"] is None else "time stamps"
-        raise FormatError(f"In {path}, stream {spec.name!r} has {has}, but its clock is {clock!r}.", hint=trust.SEE)
+        raise FormatError(
+            f"In {path}, stream {spec.name!r} has {has}, but its clock is {meta.clock!r}.", hint=trust.SEE
+        )
+    if version >= 2:
+        for name in ("device_ns", "host_ns"):
+            columns[name] = trust.numbers(path, group, name, "i", 1, strict=strict)
+        fitted = spec.name in meta.clocks and bool(meta.clocks[spec.name].segments)
+        if (columns["host_ns"] is not None) != fitted or (fitted and columns["device_ns"] is None):
+            raise FormatError(
+                f"In {path}, the times of {spec.name!r} do not go with what the meta says of its clock.",
+                hint=trust.SEE,
+            )
     if columns["quality"] is not None and columns["quality"].shape[1] != len(spec.channels):
         raise FormatError(f"In {path}, the quality of {spec.name!r} has another shape than its data.", hint=trust.SEE)
     notes = trust.subgroup(path, group, "annotations")

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 from tactbench.core.errors import FormatError
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
-from tactbench.core.recording.partial import Columns, read_partial
+from tactbench.core.recording.partial import Columns, Journal, read_journal
 from tactbench.core.recording.reader import Recording, parse_meta
+from tactbench.core.recording.times import with_clock_fits
 from tactbench.core.recording.writer import cannot_write
-from tactbench.core.spec.sensor import StreamSpec
+from tactbench.core.spec.recording import RecordingMeta
 
 REMARK = "Rescued: the recording broke off and is not whole."
 
@@ -29,10 +33,9 @@ def salvage(path: Path) -> Recording:
         If it is not an unfinished recording.
     """
     path = Path(path)
-    text, blocks = read_partial(path)
-    specs = layout.specs_by_name(parse_meta(path, text))
-    file = image.build(text, specs, _fitting(path, specs, blocks), {})
-    return Recording(path, file, text, complete=False)
+    journal = read_journal(path)
+    meta, text = _fitted(journal, parse_meta(path, journal.text))
+    return Recording(path, _built(BytesIO(), journal, meta, text), text, complete=False)
 
 
 def rescue(path: Path, target: Path) -> None:
@@ -50,27 +53,51 @@ def rescue(path: Path, target: Path) -> None:
         If `target` cannot be written.
     """
     path, target = Path(path), Path(target)
-    text, blocks = read_partial(path)
-    meta = parse_meta(path, text)
-    specs = layout.specs_by_name(meta)
-    text = layout.meta_text(meta.model_copy(update={"remarks": (*meta.remarks, REMARK)}))
-    with image.build(text, specs, _fitting(path, specs, blocks), {}) as file:
+    journal = read_journal(path)
+    meta = parse_meta(path, journal.text)
+    meta, text = _fitted(journal, meta.model_copy(update={"remarks": (*meta.remarks, REMARK)}))
+    memory = BytesIO()
+    with _built(memory, journal, meta, text) as file:
         digest = Recording(path, file, text, complete=True).content_digest()
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            image.store(file, digest, target)
+            image.store(memory, file, digest, target)
         except OSError as error:
             raise cannot_write(target, error) from error
 
 
-def _fitting(
-    path: Path, specs: Mapping[str, StreamSpec], blocks: Iterable[tuple[str, Columns]]
-) -> Iterator[tuple[str, Columns]]:
+def _fitted(journal: Journal, meta: RecordingMeta) -> tuple[RecordingMeta, str]:
+    """Return the meta with what the blocks say: clock fits, and how many rows were written."""
+    rows: Counter[str] = Counter()
+
+    def counted() -> Iterator[tuple[str, Columns]]:
+        for stream, columns in _fitting(journal, meta):
+            rows[stream] += len(columns["data"])
+            yield stream, columns
+
+    fitted = with_clock_fits(meta, counted())
+    streams = {name: counts.model_copy(update={"written": rows[name]}) for name, counts in meta.streams.items()}
+    fitted = fitted.model_copy(update={"streams": streams})
+    return fitted, layout.meta_text(fitted)
+
+
+def _built(memory: BytesIO, journal: Journal, meta: RecordingMeta, text: str) -> Any:
+    return image.build(memory, meta, text, _fitting(journal, meta), journal.annotations)
+
+
+def _fitting(journal: Journal, meta: RecordingMeta) -> Iterator[tuple[str, Columns]]:
     """Yield the blocks; FormatError for one that the meta does not know."""
-    for stream, columns in blocks:
+    specs = layout.specs_by_name(meta)
+    for stream, columns in journal.blocks():
         data = columns.get("data")
         if stream not in specs or data is None or data.shape[1:] != (len(specs[stream].channels),):
             raise FormatError(
-                f"{path} holds a block of {stream!r} that its meta does not know.", hint="Was it put together by hand?"
+                f"{journal.path} holds a block of {stream!r} that its meta does not know.",
+                hint="Was it put together by hand?",
+            )
+        if "device_ns" in columns and "t_ns" not in columns:
+            raise FormatError(
+                f"{journal.path} holds a block of {stream!r} with device times alone.",
+                hint="Was it put together by hand?",
             )
         yield stream, columns

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -14,8 +15,9 @@ from pydantic import ValidationError
 from tactbench.core.errors import RecordingError, RigError, UnwritableError
 from tactbench.core.recording import format as layout
 from tactbench.core.recording import image
-from tactbench.core.recording.partial import Columns, Partial, read_partial
+from tactbench.core.recording.partial import Annotations, Columns, Partial, read_blocks
 from tactbench.core.recording.reader import Recording
+from tactbench.core.recording.times import with_clock_fits
 from tactbench.core.samples import Block
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import StreamSpec
@@ -25,9 +27,10 @@ class RecordingWriter:
     """Writes one recording; use it as a context manager.
 
     While it is open the file is called ``<path>.partial`` and holds, after every block, all blocks so far. Leaving
-    the context completes it: compressed anew, content digest, sync, rename to `path`. Leaving it by an exception
-    removes it, for the caller knows that it failed and can record again; only a crash of the process leaves the
-    ``.partial`` behind, for :func:`tactbench.core.recording.salvage.salvage`.
+    the context completes it: times of devices put on the host's clock, compressed anew, content digest, sync, rename
+    to `path`. Leaving it by an exception removes it, for the caller knows that it failed and can record again, or
+    keeps what there is with :meth:`complete_at`; only a crash of the process leaves the ``.partial`` behind, for
+    :func:`tactbench.core.recording.salvage.salvage`.
 
     Parameters
     ----------
@@ -49,9 +52,10 @@ class RecordingWriter:
         self._specs = layout.specs_by_name(meta)
         self.content_digest = ""
         """Digest of what was written, once the recording is complete."""
-        self._annotations: dict[str, dict[str, npt.NDArray[Any]]] = {}
-        self._numbered: dict[str, bool] = {}
+        self._annotations: Annotations = {}
+        self._has: dict[str, tuple[bool, bool]] = {}
         self._partial: Partial | None = None
+        self._keep_journal = False
 
     def __enter__(self) -> RecordingWriter:
         text = self._text()
@@ -67,21 +71,45 @@ class RecordingWriter:
     ) -> None:
         try:
             if kind is None:
-                self._complete(self._open)
+                self._complete(self._open, self.path)
         except OSError as failure:
             raise cannot_write(self.path, failure) from failure
         finally:
             self._clear()
 
-    def revise(self, **changes: Any) -> None:
-        """Change fields of the meta that are known only at the end (`drawn`, `counts`, `provenance` …).
+    @property
+    def rows(self) -> Mapping[str, int]:
+        """Rows of the streams that have had a block."""
+        return dict(self._open.rows)
+
+    def complete_at(self, target: Path) -> None:
+        """Complete the recording at `target` instead, before the context is left by an exception.
 
         Raises
         ------
         RecordingError
-            If a field is unknown or a value does not fit it; streams cannot change any more.
+            If the disk refuses it; the journal then stays, as after a crash.
         """
-        fixed = sorted({"sensor", "reference", "clock"} & set(changes))
+        self._keep_journal = True
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            self._complete(self._open, target)
+        except OSError as failure:
+            raise cannot_write(target, failure) from failure
+        self._keep_journal = False
+
+    def revise(self, **changes: Any) -> None:
+        """Change fields of the meta that are known only later (`drawn`, `counts`, `provenance` …).
+
+        Raises
+        ------
+        RecordingError
+            If a field is unknown or a value does not fit it, or cannot be stored; sensor and reference cannot change
+            any more, nor whether there is a clock. If the disk refuses it.
+        """
+        fixed = sorted({"sensor", "reference"} & set(changes))
+        if (changes.get("clock", self.meta.clock) == "none") != (self.meta.clock == "none"):
+            fixed.append("clock")
         if fixed:
             raise RecordingError(f"{', '.join(fixed)} cannot change once a recording is open.", hint="Open another.")
         try:
@@ -92,6 +120,12 @@ class RecordingWriter:
             raise RecordingError(
                 f"The recording {self.meta.name!r} cannot say {where}: {first['msg']}.", hint="Correct the rig."
             ) from error
+        try:
+            self._open.revise(self.meta.model_dump(mode="json", include=set(changes)))
+        except ValueError as error:
+            raise self._unsayable(error) from error
+        except OSError as error:
+            raise cannot_write(self.path, error) from error
 
     def append(self, block: Block) -> None:
         """Add `block` to its stream and flush it.
@@ -106,11 +140,16 @@ class RecordingWriter:
         """
         spec = self._checked(block)
         columns = _columns(block, spec)
-        numbered = block.sequence is not None
-        if self._numbered.setdefault(spec.name, numbered) != numbered:
+        has = (block.sequence is not None, block.device_ns is not None)
+        if self._has.setdefault(spec.name, has) != has:
             raise RigError(
-                f"Some blocks of stream {spec.name!r} have a sequence number and some have none.",
-                hint="Give it with all blocks of a stream, or with none.",
+                f"Some blocks of stream {spec.name!r} have sequence numbers or device times and some have none.",
+                hint="Give them with all blocks of a stream, or with none.",
+            )
+        if spec.name in self._annotations:
+            raise RigError(
+                f"A block of stream {spec.name!r} came after its rows were labelled.",
+                hint="Label after the last block.",
             )
         try:
             self._open.append(spec.name, columns)
@@ -139,6 +178,10 @@ class RecordingWriter:
                 f"The annotation {name!r} holds {column.dtype}; labels are text without NUL, or whole numbers.",
                 hint="Turn other labels into text.",
             )
+        try:
+            self._open.annotate(stream, name, column)
+        except OSError as error:
+            raise cannot_write(self.path, error) from error
         self._annotations.setdefault(stream, {})[name] = column
 
     @property
@@ -151,10 +194,13 @@ class RecordingWriter:
         try:
             return layout.meta_text(self.meta)
         except ValueError as error:
-            raise RecordingError(
-                f"What the recording {self.meta.name!r} says about itself cannot be stored: {error}.",
-                hint="Use text and finite numbers; leave out what is not known.",
-            ) from error
+            raise self._unsayable(error) from error
+
+    def _unsayable(self, error: ValueError) -> RecordingError:
+        return RecordingError(
+            f"What the recording {self.meta.name!r} says about itself cannot be stored: {error}.",
+            hint="Use text and finite numbers; leave out what is not known.",
+        )
 
     def _checked(self, block: Block) -> StreamSpec:
         spec = self._specs.get(block.stream)
@@ -168,7 +214,10 @@ class RecordingWriter:
                 f"A block of stream {block.stream!r} has shape {block.data.shape}, not (n, {len(spec.channels)}).",
                 hint="A block is rows by channels, in the order of the stream's spec.",
             )
-        for name, values in (("t_ns", block.t_ns), ("sequence", block.sequence), ("quality", block.quality)):
+        for name, values in (
+            ("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns),
+            ("quality", block.quality),
+        ):  # fmt: skip
             if values is not None and len(values) != len(block.data):
                 raise RigError(
                     f"A block of stream {block.stream!r} has {len(block.data)} rows but {len(values)} of {name}.",
@@ -182,17 +231,18 @@ class RecordingWriter:
             )
         return spec
 
-    def _complete(self, partial: Partial) -> None:
-        text = self._text()
-        _, blocks = read_partial(self._aside)
-        with image.build(text, self._specs, blocks, self._annotations) as file:
+    def _complete(self, partial: Partial, target: Path) -> None:
+        if any(timed for _, timed in self._has.values()):
+            self.meta = with_clock_fits(self.meta, read_blocks(self._aside))
+        text, memory = self._text(), BytesIO()
+        with image.build(memory, self.meta, text, read_blocks(self._aside), self._annotations) as file:
             self.content_digest = self._check(Recording(self._aside, file, text, complete=True), partial)
-            image.store(file, self.content_digest, self.path)
+            image.store(memory, file, self.content_digest, target)
 
     def _check(self, recording: Recording, partial: Partial) -> str:
         """Return the digest of the stored bytes, after making sure that every row that came is there."""
         rows = {name: len(recording.stream(name)) for name in recording.stream_names}
-        if rows != partial.rows:
+        if any(rows.get(name, 0) < count for name, count in partial.rows.items()):
             raise RecordingError(
                 f"The recording {self.path} lost rows while it was made: {rows} of {partial.rows} are there.",
                 hint="Did another process write to it, or did the disk fail? Record it again.",
@@ -200,11 +250,12 @@ class RecordingWriter:
         return recording.content_digest()
 
     def _clear(self) -> None:
-        """Remove everything but the recording."""
+        """Remove the journal, unless it is all that is left of the recording."""
         if self._partial is not None:
             self._partial.close()
             self._partial = None
-        self._aside.unlink(missing_ok=True)
+        if not self._keep_journal:
+            self._aside.unlink(missing_ok=True)
 
 
 def _columns(block: Block, spec: StreamSpec) -> Columns:
@@ -214,6 +265,8 @@ def _columns(block: Block, spec: StreamSpec) -> Columns:
         columns["t_ns"] = np.asarray(block.t_ns, dtype=np.int64)
     if block.sequence is not None:
         columns["sequence"] = np.asarray(block.sequence, dtype=np.int64)
+    if block.device_ns is not None:
+        columns["device_ns"] = np.asarray(block.device_ns, dtype=np.int64)
     if block.quality is not None:
         if block.quality.shape != block.data.shape:
             raise RigError(

@@ -31,17 +31,19 @@ class PlanEntry(Frozen):
 class ClockSegment(Frozen):
     """host = device + offset + drift (device - middle), all since 1970 or whatever the two clocks count from."""
 
+    run: int = 0
+    """Which of the runs in which the device's times neither go back nor leap by more than 15 s, from 0."""
     middle_ns: int
     """Where on the device's clock the line is given: the middle of the stretch it was fitted to."""
     offset_ns: int
     """Host's clock minus device's at `middle_ns`."""
     drift: float
     """By how much the host's clock runs faster than the device's [s/s]."""
-    bound_ns: int
-    """The line's error within its stretch is at most this, if delays sometimes reach their least value; the constant
-    part of the delay comes on top."""
+    bound_ns: int | None
+    """The line's error within its stretch is at most this, if delays sometimes come near their least value (two-way:
+    whatever the delays are); the constant part of the delay comes on top. None: too few points to tell."""
     points: int
-    """Pairs of stamps it was fitted to."""
+    """Pairs of stamps it was fitted to: of samples that came together, one."""
 
 
 class StreamClock(Frozen):
@@ -55,11 +57,11 @@ class StreamClock(Frozen):
     delay_ns: tuple[int, int] = (0, 0)
     """From and to: what the sample's way to the host takes at least; it cannot be seen one way and is not taken off."""
     segments: tuple[ClockSegment, ...] = ()
-    """In order; between two middles, times go over from one line to the next."""
+    """In order; between two middles of one run, times go over from one line to the next."""
     wraps: int = 0
     """How often the device's counter began anew."""
     breaks: int = 0
-    """Where it was lost and the device's time starts again."""
+    """How often it was lost, so that the device's time went back."""
 
 
 class StreamCounts(Frozen):

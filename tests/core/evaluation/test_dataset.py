@@ -91,6 +91,16 @@ def test_flagged_samples_are_kept_and_counted(tmp_path):
     assert len(data.tables[0].row) == 50
 
 
+def test_a_row_after_a_gap_is_a_good_row(tmp_path):
+    X, force = ramp(0, n=50)
+    quality = np.zeros(X.shape, dtype=np.uint8)
+    quality[10] = Quality.GAP
+    data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, quality=quality)])
+    plain = load_dataset(force_task(), [record(tmp_path / "b.h5", X, force)])
+    assert data.counts == {"rows of taxels kept, before which others were lost": 1}
+    assert np.array_equal(data.tables[0].X, plain.tables[0].X)
+
+
 def test_samples_marked_missing_are_no_labels_whatever_number_stands_there(tmp_path):
     """-1 for "no sample" must not become a force of -1 N."""
     X, _ = ramp(0, n=50)

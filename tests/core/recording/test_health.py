@@ -42,6 +42,14 @@ def test_dead_and_missing(write):
     assert findings["missing"].message == f"taxel t1 without a sample in 12 of {N} rows"
 
 
+def test_rows_before_a_gap_are_lost_and_the_row_itself_is_good(write):
+    quality = np.zeros((N, 3), dtype=np.uint8)
+    quality[[20, 90]] = Quality.GAP
+    findings = found(write(readings(), force=np.arange(N), quality=quality))
+    assert set(findings) == {"rows-before-lost"}
+    assert findings["rows-before-lost"].message == f"taxels: rows were lost before 2 of {N} rows"
+
+
 def test_nan_is_missing(write):
     data = np.random.default_rng(0).normal(size=(N, 3))
     data[5:8, 2] = np.nan

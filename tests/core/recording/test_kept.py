@@ -5,16 +5,49 @@ Never write such a file anew: if this test fails, the reader has lost the abilit
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 from tactbench.core.recording.reader import open_recording
+from tactbench.core.recording.times import recomputed_t_ns
+from tactbench.core.samples import Quality
+from tactbench.core.spec.recording import StreamClock
 
 KEPT = Path(__file__).resolve().parents[2] / "recordings"
+
+
+def test_version_2():
+    with open_recording(KEPT / "v2" / "press.h5") as recording:
+        recording.verify()
+        assert recording.version == 2
+        assert recording.content_digest() == "ec0bc4f35085db5b3da669083822bff1c8b37a39b1a4dfd6228c37f1ce7267c3"
+        meta, taxels, force = recording.meta, recording.read("taxels"), recording.read("force_torque")
+    n = np.arange(180)
+    assert (meta.clock, meta.emulation.time, meta.counts) == ("host", "real", {"pad parity errors": 1})
+    assert meta.streams["taxels"].gaps == 3
+    assert meta.clocks["force_torque"] == StreamClock(source="host")
+    clock = meta.clocks["taxels"]
+    assert (clock.method, clock.delay_ns, clock.wraps, clock.breaks) == ("hull-1way", (200_000, 300_000), 1, 1)
+    assert [(line.run, line.middle_ns, line.offset_ns, line.bound_ns) for line in clock.segments] == [
+        (0, 495_000_000, 1_000_000_203_370, 531_587), (1, 395_000_000, 1_001_000_209_127, 1_103_530),
+    ]  # fmt: skip
+    assert np.array_equal(taxels.sequence, n)
+    assert np.array_equal(taxels.device_ns, np.where(n < 100, n, n - 100) * 10_000_000)
+    assert np.array_equal(taxels.t_ns, recomputed_t_ns(taxels, clock))
+    true = 1_000_000_000_000 + n * 10_000_000
+    assert (taxels.host_ns - true >= 200_000).all()
+    assert np.abs(taxels.t_ns - true - 200_000).max() < 40_000  # the least delay is not taken off
+    assert np.argwhere(taxels.quality == Quality.GAP).tolist() == [[40, 0], [40, 1], [40, 2]]
+    assert taxels.quality[41].tolist() == [0, Quality.GAP | Quality.SUSPECT, 0]
+    assert taxels.annotations["object"].tolist() == ["ball"] * 100 + ["Bär"] * 80
+    assert (force.host_ns, force.device_ns) == (None, None)
+    assert np.array_equal(force.t_ns, true)
 
 
 def test_version_1():
     with open_recording(KEPT / "v1" / "press.h5") as recording:
         recording.verify()
+        assert recording.version == 1
         assert recording.content_digest() == "e0fe66813c781466c2ecb4453c79c0a95bfe3fb75e7b41a3bbd2aecb3db4640f"
         meta, taxels, force = recording.meta, recording.read("taxels"), recording.read("force_torque")
     assert (meta.sensor.name, meta.session, meta.role, meta.labels["cap_radius_mm"]) == ("pad", "a", "train", 5.0)
@@ -26,3 +59,14 @@ def test_version_1():
     assert taxels.annotations["object"].tolist() == ["ball", "ball", "", "Bär", "cup", "cup"]
     assert taxels.annotations["press"].tolist() == [0, 0, 0, 1, 1, 1]
     assert np.array_equal(force.data[:, 0], np.linspace(0, 2.5, 6))
+
+
+def test_columns_of_version_2_are_no_columns_of_version_1(tmp_path):
+    """What else is in a file is not read, and not part of its digest."""
+    copy = tmp_path / "press.h5"
+    copy.write_bytes((KEPT / "v1" / "press.h5").read_bytes())
+    with h5py.File(copy, "a") as file:
+        file["streams/taxels/device_ns"] = np.arange(6)
+    with open_recording(copy) as recording:
+        recording.verify()
+        assert recording.read("taxels").device_ns is None

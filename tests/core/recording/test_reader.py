@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FormatError, MissingRecordingError, RecordingError
-from tactbench.core.recording.partial import read_partial
+from tactbench.core.recording.partial import read_journal
 from tactbench.core.recording.reader import content_digest, open_recording, read_meta
 from tactbench.core.recording.salvage import salvage
 from tactbench.core.recording.writer import RecordingWriter
@@ -90,7 +90,7 @@ def test_another_programs_hdf5(tmp_path):
 
 
 def _newer(file):
-    file.attrs["format_version"] = 2
+    file.attrs["format_version"] = 3
 
 
 def _no_version(file):
@@ -311,8 +311,8 @@ def test_a_journal_cut_or_damaged_anywhere_keeps_what_was_before(tmp_path, make_
 def test_a_journal_is_read_block_by_block(tmp_path, make_meta):
     with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
         writer.append(Block("taxels", np.arange(2), np.ones((2, 3))))
-        text, blocks = read_partial(tmp_path / "x.h5.partial")
-        assert json.loads(text)["name"] == "press"
-        ((stream, columns),) = blocks
+        journal = read_journal(tmp_path / "x.h5.partial")
+        assert json.loads(journal.text)["name"] == "press"
+        ((stream, columns),) = journal.blocks()
     assert stream == "taxels"
     assert columns["data"].dtype == np.uint16

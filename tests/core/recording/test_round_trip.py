@@ -44,7 +44,7 @@ def recordings(draw):
         limits = np.iinfo(dtype)
         data = rng.integers(limits.min, limits.max, (rows, channels), dtype=dtype, endpoint=True)
     timed = draw(st.booleans())
-    flags = rng.integers(0, 8, data.shape).astype(np.uint8) if draw(st.booleans()) else None
+    flags = rng.integers(0, 16, data.shape).astype(np.uint8) if draw(st.booleans()) else None
     meta = RecordingMeta(
         name="x", sensor=sensor(channels, dtype.name), rig="test", clock="host" if timed else "none",
         session=draw(text), labels=draw(st.dictionaries(text, scalar, max_size=3)),

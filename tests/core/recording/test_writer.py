@@ -13,7 +13,8 @@ import pytest
 
 from tactbench.core.errors import FormatError, RecordingError, RigError
 from tactbench.core.recording.reader import open_recording
-from tactbench.core.recording.salvage import rescue, salvage
+from tactbench.core.recording.salvage import REMARK, rescue, salvage
+from tactbench.core.recording.times import recomputed_t_ns
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, Quality
 from tests.core.matrix.engines.patience import ending
@@ -45,10 +46,12 @@ from tactbench.core.spec.recording import RecordingMeta
 meta = RecordingMeta.model_validate_json(sys.stdin.readline())
 rows = int(sys.argv[2])
 with RecordingWriter(Path(sys.argv[1]), meta) as writer:
+    writer.revise(labels={"object": "ball"}, counts={"boards": 2})
     for number in range(10**9):
         n = np.arange(number * rows, (number + 1) * rows)
         data = (n[:, None] * 7 + np.arange(3) * 13) % 4096
-        writer.append(Block("taxels", n * 1000, data.astype(np.uint16), (data % 5 == 0).astype(np.uint8)))
+        writer.append(Block("taxels", n * 1000 + 5, data.astype(np.uint16), (data % 5 == 0).astype(np.uint8),
+                            sequence=n, device_ns=n * 1000))
         writer.append(Block("force_torque", n * 1000, np.sin(n)[:, None]))
         print(number + 1, flush=True)
 """
@@ -76,18 +79,70 @@ def test_kill_9_loses_at_most_the_block_in_flight(tmp_path, make_meta, rows, aft
     with salvage(path.with_name("press.h5.partial")) as recording:
         assert not recording.complete
         taxels, force = recording.read("taxels"), recording.read("force_torque")
+        assert (recording.meta.labels, recording.meta.counts) == ({"object": "ball"}, {"boards": 2})
     rescue(path.with_name("press.h5.partial"), path)
     with open_recording(path) as recording:
         recording.verify()
         assert "broke off" in recording.meta.remarks[-1]
-        assert np.array_equal(recording.read("taxels").data, taxels.data)
+        rescued = recording.read("taxels")
+        assert np.array_equal(rescued.data, taxels.data)
+        assert np.array_equal(rescued.t_ns, recomputed_t_ns(rescued, recording.meta.clocks["taxels"]))
+        assert (recording.meta.labels, recording.meta.counts) == ({"object": "ball"}, {"boards": 2})
     n = np.arange(len(taxels.data))
     assert len(n) >= written * rows
     assert len(force.data) >= written * rows
     assert np.array_equal(taxels.data, (n[:, None] * 7 + np.arange(3) * 13) % 4096)
     assert np.array_equal(taxels.quality, taxels.data % 5 == 0)
-    assert np.array_equal(taxels.t_ns, n * 1000)
+    assert np.array_equal(taxels.sequence, n)
+    assert np.array_equal(taxels.device_ns, n * 1000)
+    assert np.array_equal(taxels.host_ns, n * 1000 + 5)
+    assert np.array_equal(taxels.t_ns, n * 1000 + 5)
     assert np.array_equal(force.data[:, 0], np.sin(np.arange(len(force.data))))
+
+
+# A child process writes a block, labels it, and is killed before it completes the recording.
+LABELLING = """
+import os, signal, sys
+import numpy as np
+from pathlib import Path
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block
+from tactbench.core.spec.recording import RecordingMeta
+meta = RecordingMeta.model_validate_json(sys.stdin.readline())
+with RecordingWriter(Path("press.h5"), meta) as writer:
+    writer.append(Block("taxels", np.arange(4) * 1000, np.ones((4, 3))))
+    writer.annotate("taxels", "object", ["ball", "", "B\u00e4r", "cup"])
+    writer.annotate("taxels", "press", np.array([0, 0, 1, 1]))
+    writer.revise(remarks=("early",))
+    writer.revise(remarks=("late",), session="b")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_kill_9_loses_no_label_and_no_revision(tmp_path, make_meta):
+    done = subprocess.run([sys.executable, "-c", LABELLING], cwd=tmp_path, text=True, timeout=60,
+                          input=make_meta().model_dump_json() + "\n", capture_output=True)  # fmt: skip
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    rescue(tmp_path / "press.h5.partial", tmp_path / "press.h5")
+    with salvage(tmp_path / "press.h5.partial") as seen, open_recording(tmp_path / "press.h5") as rescued:
+        rescued.verify()
+        assert rescued.meta.remarks == ("late", REMARK)
+        assert seen.meta.remarks == ("late",)
+        for recording in (seen, rescued):
+            assert recording.meta.session == "b"
+            notes = recording.read("taxels").annotations
+            assert notes["object"].tolist() == ["ball", "", "Bär", "cup"]
+            assert notes["press"].tolist() == [0, 0, 1, 1]
+
+
+def test_a_journal_of_version_1_is_read(tmp_path, make_meta):
+    """Its frames are the same; it has no labels and no revisions."""
+    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
+        writer.append(block())
+        journal = (tmp_path / "x.h5.partial").read_bytes()
+    (tmp_path / "old.partial").write_bytes(journal.replace(b"tactbench-partial 2\n", b"tactbench-partial 1\n", 1))
+    with salvage(tmp_path / "old.partial") as recording:
+        assert np.array_equal(recording.read("taxels").data, block().data)
 
 
 def test_it_can_be_watched_while_it_is_made(tmp_path, make_meta):
@@ -125,6 +180,7 @@ def test_an_exception_leaves_nothing_and_the_old_file_alone(tmp_path, make_meta,
         ({"t_ns": np.arange(3)}, "t_ns"),
         ({"t_ns": None}, "clock is 'device'"),
         ({"sequence": np.arange(3)}, "sequence"),
+        ({"device_ns": np.arange(3)}, "device_ns"),
         ({"quality": np.zeros((3, 3))}, "quality"),
         ({"quality": np.ones((ROWS, 2))}, "quality"),
         ({"data": np.full((ROWS, 3), 0.5)}, "without loss"),
@@ -176,7 +232,8 @@ def test_what_is_known_only_at_the_end(tmp_path, make_meta):
 
 
 @pytest.mark.parametrize(
-    "change", [{"plan": "none"}, {"colour": "red"}, {"sensor": None}, {"drawn": {"x": float("nan")}}]
+    "change",
+    [{"plan": "none"}, {"colour": "red"}, {"sensor": None}, {"drawn": {"x": float("nan")}}, {"clock": "none"}],
 )
 def test_what_cannot_be_said_is_refused(tmp_path, make_meta, change):
     with pytest.raises(RecordingError):

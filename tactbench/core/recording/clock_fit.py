@@ -1,0 +1,292 @@
+"""A device's clock on the host's, from the stamps that its samples got when they came.
+
+A sample comes later than it was taken, by at least the least delay of its way and by a varying time on top. So the line
+that takes device times to host times lies below all stamps and touches those that came soonest: an edge of their lower
+convex hull, while a least-squares line follows the delays. Moon, Skelly and Towsley 1999 and Zhang, Liu and Xia 2002
+[sourced: abstracts]; that the edge over the middle is the line below all points with the least sum of distances is the
+dual of their linear program [derived].
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from tactbench.core.errors import FormatError, RecordingError
+from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.spec.recording import ClockSegment, StreamClock
+
+STRETCH_NS = 30_000_000_000
+"""Length of what one line is fitted to. Clocks wander: at 1 ppm with a period of 600 s one line over 600 s errs by
+190 us, lines over 30 s by some us [measured: benchmarks/clock_fit.py]. Shorter ones see fewer least delays."""
+LEAP_NS = STRETCH_NS // 2
+"""A longer step of the device's times begins a new run of lines: two stretches would no longer overlap."""
+WINDOWS = 6
+"""Parts of a stretch in which residuals are looked at for the bound."""
+LOWEST = 10
+"""Least residuals of a window that say how near they come to the least delay."""
+_SLACK_NS = 1e-3
+"""A residual below minus this is below the line; float64 holds residuals of a stretch to 1e-5 ns [derived]."""
+
+Columns = tuple[IntArray, ...]
+Fit = Callable[[int, Columns], ClockSegment]
+"""Number of the run, and (n,) columns of a stretch, the device's times first and in order, to a line."""
+
+
+def one_way(run: int, columns: Columns) -> ClockSegment:
+    """Return the line below all of (device_ns, host_ns), n >= 1.
+
+    Notes
+    -----
+    The bound: in each of six windows of equal numbers of points, the ten lowest residuals r1 <= ... <= r10 put the
+    error of a linear clock into [-r1, r10 - 2 r1]; the bound is the largest magnitude in any window, and for the
+    clock's wander the largest step of r1 between neighbouring windows on top [derived]. It is statistical: it assumes
+    that delays sometimes come near their least value in each window. Below sixty points there is none.
+    """
+    device, host = columns
+    x, middle = _centred(device)
+    y, first = _from_first(host - device)
+    value, slope = _edge_below(x, y)
+    bound = None
+    if len(x) >= WINDOWS * LOWEST:
+        residuals = y - (value + slope * x)
+        lowest = [np.sort(np.partition(part, LOWEST - 1)[:LOWEST]) for part in np.array_split(residuals, WINDOWS)]
+        least = [float(some[0]) for some in lowest]
+        reach = max(max(abs(some[0]), abs(some[-1] - 2 * some[0])) for some in lowest)
+        bound = int(np.ceil(reach + max(abs(b - a) for a, b in itertools.pairwise(least))))
+    return ClockSegment(
+        run=run, middle_ns=middle, offset_ns=first + round(value), drift=slope, bound_ns=bound, points=len(x)
+    )
+
+
+def two_way(run: int, columns: Columns) -> ClockSegment:
+    """Return the line between requests and replies: (device_ns, sent_ns, received_ns), n >= 1.
+
+    The device's time was read after the request was sent and before the reply was there, so that the line lies above
+    all sent - device and below all received - device. The bound holds for every such line, whatever the delays are;
+    that the clock is linear over the stretch remains assumed.
+
+    Raises
+    ------
+    RecordingError
+        If no line lies between them: a time is wrong, or the clock is not linear.
+
+    Notes
+    -----
+    Of all such lines, the highest and lowest value at either end are taken; the line through their middles errs by at
+    most half their distance at the worse end, since the distance is convex between the ends [derived].
+    """
+    device, sent, received = columns
+    x, middle = _centred(device)
+    below, first = _from_first(sent - device)
+    above = (received - device - first).astype(np.float64)
+    low, high = _hull(x, -below), _hull(x, above)
+    px, py = np.concatenate([x[low], x[high]]), np.concatenate([below[low], above[high]])
+    if x[0] == x[-1]:
+        value, slope = float(below.max() + above.min()) / 2, 0.0
+        half = float(above.min() - below.max()) / 2
+    else:
+        i, j = np.nonzero(px[:, None] < px[None, :])
+        slopes = (py[j] - py[i]) / (px[j] - px[i])
+        starts = py[i] - slopes * px[i]
+        values = starts[:, None] + slopes[:, None] * px
+        fits = (values[:, : len(low)] >= py[: len(low)] - _SLACK_NS).all(axis=1)
+        fits &= (values[:, len(low) :] <= py[len(low) :] + _SLACK_NS).all(axis=1)
+        ends = [starts[fits] + slopes[fits] * end for end in (x[0], x[-1])]
+        half = max((float(np.ptp(end)) / 2 for end in ends), default=-1.0) if fits.any() else -1.0
+        left, right = ((float(end.max() + end.min()) / 2 if fits.any() else 0.0) for end in ends)
+        slope = (right - left) / float(x[-1] - x[0])
+        value = left - slope * float(x[0])
+    if half < 0:
+        raise RecordingError(
+            f"No linear clock lies between {len(x)} requests and their replies.",
+            hint="Were the stamps taken before sending and after receiving, by one clock?",
+        )
+    return ClockSegment(
+        run=run, middle_ns=middle, offset_ns=first + round(value), drift=slope, bound_ns=int(np.ceil(half)) + 1,
+        points=len(x),
+    )  # fmt: skip
+
+
+class ClockFit:
+    """Lines from stamps, given piece by piece; it keeps at most 37.5 s of them.
+
+    Each line is fitted to 30 s, every 15 s; the last one of a run to what is left, 22.5 to 37.5 s. Within a run the
+    device's times do not go back, and leap by 15 s at most; where they do, a new run of lines begins.
+
+    Parameters
+    ----------
+    fit
+        :func:`one_way` or :func:`two_way`.
+    stretch_ns
+        What one line is fitted to.
+    """
+
+    def __init__(self, fit: Fit = one_way, stretch_ns: int = STRETCH_NS) -> None:
+        self._fit = fit
+        self._stretch_ns = stretch_ns
+        self._runs = RunCounter()
+        self._done: list[ClockSegment] = []
+        self._run = 0
+        self._waiting: list[Columns] = []
+        self._start_ns = 0
+
+    @property
+    def breaks(self) -> int:
+        """How often the device's times went back."""
+        return self._runs.breaks
+
+    def add(self, *columns: IntArray) -> None:
+        """Take further rows: (n,) times of the device and of the host, as `fit` wants them, in order."""
+        run = self._runs.count(columns[0])
+        for cut in np.split(np.arange(len(run)), np.flatnonzero(np.diff(run)) + 1):
+            if len(cut):
+                self._extend(int(run[cut[0]]), tuple(column[cut[0] : cut[-1] + 1] for column in columns))
+
+    def segments(self) -> tuple[ClockSegment, ...]:
+        """Return the lines of all rows so far."""
+        return (*self._done, *self._last())
+
+    def _last(self) -> list[ClockSegment]:
+        return [self._fit(self._run, _joined(self._waiting))] if self._waiting else []
+
+    def _extend(self, run: int, columns: Columns) -> None:
+        if run != self._run or not self._waiting:
+            self._done += self._last()
+            self._run, self._waiting, self._start_ns = run, [], int(columns[0][0])
+        # Of rows that came together, the last one waited least.
+        last = np.append(columns[-1][1:] != columns[-1][:-1], True)
+        self._waiting.append(tuple(column[last] for column in columns))
+        while int(columns[0][-1]) - self._start_ns >= self._stretch_ns * 5 // 4:
+            waiting = _joined(self._waiting)
+            end = int(np.searchsorted(waiting[0], self._start_ns + self._stretch_ns))
+            self._done.append(self._fit(self._run, tuple(column[:end] for column in waiting)))
+            self._start_ns += self._stretch_ns // 2
+            half = int(np.searchsorted(waiting[0], self._start_ns))
+            self._waiting = [tuple(column[half:] for column in waiting)]
+
+
+class RunCounter:
+    """Numbers the runs in which a device's times neither go back nor leap, block by block."""
+
+    def __init__(self) -> None:
+        self._last: int | None = None
+        self._run = 0
+
+        self.breaks = 0
+        """How often the times went back."""
+
+    def count(self, device_ns: IntArray) -> IntArray:
+        """Return the (n,) numbers of the runs of the next rows, from 0."""
+        steps = np.diff(device_ns, prepend=device_ns[:1] if self._last is None else self._last)
+        self.breaks += int(np.count_nonzero(steps < 0))
+        run = self._run + np.cumsum((steps < 0) | (steps > LEAP_NS))
+        if len(device_ns):
+            self._last, self._run = int(device_ns[-1]), int(run[-1])
+        return np.asarray(run, dtype=np.int64)
+
+
+class HostTimes:
+    """A device's times on the host's clock, block by block, by the lines of `clock`.
+
+    Between the middles of two lines the one goes over into the other linearly, so that times do not jump; they keep
+    their order as long as two neighbouring lines differ by less than the 15 s between their middles.
+    """
+
+    def __init__(self, clock: StreamClock) -> None:
+        self._runs = RunCounter()
+        self._lines: dict[int, tuple[IntArray, IntArray, FloatArray]] = {}
+        for run, some in itertools.groupby(clock.segments, key=lambda segment: segment.run):
+            lines = list(some)
+            self._lines[run] = (
+                np.array([line.middle_ns for line in lines], dtype=np.int64),
+                np.array([line.offset_ns for line in lines], dtype=np.int64),
+                np.array([line.drift for line in lines], dtype=np.float64),
+            )
+
+    def __call__(self, device_ns: IntArray) -> IntArray:
+        """Return the (n,) host's times of the next rows [ns].
+
+        Raises
+        ------
+        FormatError
+            If there is no line for some of them.
+        """
+        run = self._runs.count(device_ns)
+        host = np.empty(len(device_ns), dtype=np.int64)
+        for number in np.unique(run).tolist():
+            if number not in self._lines:
+                raise FormatError(
+                    f"Run {number} of a device's times has no line that puts it on the host's clock.",
+                    hint="Was the meta, or the device's times, changed by hand?",
+                )
+            here = run == number
+            host[here] = _on_lines(device_ns[here], *self._lines[number])
+        return host
+
+
+def _on_lines(device: IntArray, middle: IntArray, offset: IntArray, drift: FloatArray) -> IntArray:
+    this = np.clip(np.searchsorted(middle, device, side="right") - 1, 0, len(middle) - 1)
+    then = np.minimum(this + 1, len(middle) - 1)
+    since = (device - middle[this]).astype(np.float64)
+    apart = np.maximum(middle[then] - middle[this], 1).astype(np.float64)
+    share = np.where((then > this) & (since > 0), since / apart, 0.0)
+    one = drift[this] * since
+    other = (offset[then] - offset[this]) + drift[then] * (device - middle[then])
+    return np.asarray(device + offset[this] + np.rint((1 - share) * one + share * other).astype(np.int64))
+
+
+def _joined(pieces: Sequence[Columns]) -> Columns:
+    return tuple(np.concatenate(column) for column in zip(*pieces, strict=True))
+
+
+def _centred(device: IntArray) -> tuple[FloatArray, int]:
+    """Return times about the middle of the stretch, and the middle."""
+    middle = (int(device[0]) + int(device[-1])) // 2
+    return (device - middle).astype(np.float64), middle
+
+
+def _from_first(values: IntArray) -> tuple[FloatArray, int]:
+    return (values - values[0]).astype(np.float64), int(values[0])
+
+
+def _edge_below(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Return value at 0 and slope of the edge of the lower convex hull over x = 0; x in order, about 0.
+
+    A line through a point on either side is turned about one of them down to the lowest point below it, until there is
+    none: a step is one pass over arrays, where a chain would go from point to point.
+    """
+    right_of = int(np.searchsorted(x, 0.0, side="right"))
+    if x[0] == x[-1]:
+        return float(y.min()), 0.0
+    i, j = int(np.argmin(y[:right_of])), right_of + int(np.argmin(y[right_of:]))
+    while True:
+        slope = float((y[j] - y[i]) / (x[j] - x[i]))
+        residuals = y - (y[i] + slope * (x - x[i]))
+        lowest = int(np.argmin(residuals))
+        if residuals[lowest] >= -_SLACK_NS:
+            return float(y[i] - slope * x[i]), slope
+        if lowest < right_of:
+            i = lowest
+        else:
+            j = lowest
+
+
+def _hull(x: Iterable[float], y: Iterable[float]) -> IntArray:
+    """Return the places of the lower convex hull's corners (Andrew's monotone chain); x in order."""
+    chain: list[tuple[float, float, int]] = []
+    for place, (px, py) in enumerate(zip(x, y, strict=True)):
+        while chain and chain[-1][0] == px and chain[-1][1] >= py:
+            chain.pop()
+        if chain and chain[-1][0] == px:
+            continue
+        while len(chain) > 1 and _turns_down(chain[-2], chain[-1], (px, py)):
+            chain.pop()
+        chain.append((px, py, place))
+    return np.array([place for *_, place in chain], dtype=np.int64)
+
+
+def _turns_down(a: tuple[float, float, int], b: tuple[float, float, int], c: tuple[float, float]) -> bool:
+    return (b[0] - a[0]) * (c[1] - a[1]) <= (b[1] - a[1]) * (c[0] - a[0])

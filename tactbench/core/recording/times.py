@@ -1,0 +1,58 @@
+"""Which times a recording stores: the host's, put there by a clock fit where the device has a clock of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from tactbench.core.errors import FormatError
+from tactbench.core.recording.clock_fit import ClockFit, HostTimes
+from tactbench.core.recording.partial import Columns
+from tactbench.core.samples import IntArray, StreamData
+from tactbench.core.spec.recording import RecordingMeta, StreamClock
+
+Blocks = Iterable[tuple[str, Columns]]
+
+
+def with_clock_fits(meta: RecordingMeta, blocks: Blocks) -> RecordingMeta:
+    """Return `meta` with the lines of every stream in `blocks` that has a device clock.
+
+    A stream with times of its device has one unless `meta` says that its times are the host's, or simulated.
+    """
+    otherwise = StreamClock(source="simulated" if meta.clock == "simulated" else "device")
+    fits: dict[str, ClockFit] = {}
+    for stream, columns in blocks:
+        if "device_ns" in columns and meta.clocks.get(stream, otherwise).source == "device":
+            fits.setdefault(stream, ClockFit()).add(columns["device_ns"], columns["t_ns"])
+    clocks = dict(meta.clocks)
+    for stream, fit in fits.items():
+        clocks[stream] = clocks.get(stream, otherwise).model_copy(
+            update={"method": "hull-1way", "segments": fit.segments(), "breaks": fit.breaks}
+        )
+    return meta.model_copy(update={"clocks": clocks})
+
+
+def on_host_clock(meta: RecordingMeta, blocks: Blocks) -> Iterator[tuple[str, Columns]]:
+    """Yield `blocks` as they are stored: by the lines in `meta`, with the stamps as they came in ``host_ns``."""
+    times: dict[str, HostTimes] = {}
+    for stream, columns in blocks:
+        clock = meta.clocks.get(stream)
+        if clock is not None and clock.segments and "device_ns" in columns:
+            of_host = times.setdefault(stream, HostTimes(clock))
+            columns = {**columns, "host_ns": columns["t_ns"], "t_ns": of_host(columns["device_ns"])}
+        yield stream, columns
+
+
+def recomputed_t_ns(data: StreamData, clock: StreamClock) -> IntArray:
+    """Return the times of a whole stream from its raw columns: what is stored as ``t_ns`` is exactly this.
+
+    Raises
+    ------
+    FormatError
+        If it has no raw columns, or `clock` no line for some row.
+    """
+    if data.device_ns is None or data.host_ns is None:
+        raise FormatError(
+            f"The times of {data.spec.name!r} are as they came: there is nothing to compute them from.",
+            hint="Only streams with `device_ns` and `host_ns` were put on the host's clock.",
+        )
+    return HostTimes(clock)(data.device_ns)

@@ -1,0 +1,136 @@
+"""Raw times are kept as they came, and the stored times are exactly what the lines make of them."""
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.core.errors import FormatError, RigError
+from tactbench.core.recording.health import examine
+from tactbench.core.recording.reader import open_recording
+from tactbench.core.recording.times import recomputed_t_ns
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block
+from tactbench.core.spec.quantity import Source
+from tactbench.core.spec.recording import RecordingMeta, StreamClock, StreamCounts
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
+
+START = 1_700_000_000_000_000_000
+
+
+def _meta(**fields):
+    channels = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(3))
+    sensor = SensorSpec(
+        name="pad", title="a pad", principle="capacitive", principle_source=Source(tag="assumed", reference="test"),
+        streams=(StreamSpec(name="taxels", dtype="uint16", channels=channels),),
+    )  # fmt: skip
+    return RecordingMeta(name="x", rig="test", sensor=sensor, **fields)
+
+
+def record(path, meta, device, host, blocks=7):
+    """Write taxels with a device clock, in `blocks` blocks."""
+    with RecordingWriter(path, meta) as writer:
+        for rows in np.array_split(np.arange(len(device)), blocks):
+            data = np.full((len(rows), 3), 9, dtype=np.uint16)
+            writer.append(Block("taxels", host[rows], data, device_ns=device[rows]))
+    return path
+
+
+def clocked(seed, rows=4000):
+    rng = np.random.default_rng(seed)
+    device = np.arange(rows, dtype=np.int64) * 10_000_000 + int(rng.integers(0, 2**40))
+    true = device + START + np.rint((device - device[0]) * 37e-6).astype(np.int64)
+    return device, true, true + rng.exponential(500_000, rows).astype(np.int64)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**32), st.integers(1, 50), st.integers(0, 4000))
+def test_stored_times_are_exactly_recomputed(tmp_path_factory, seed, blocks, lost):
+    """Over 40 s, with a counter that begins again at some row."""
+    device, _, host = clocked(seed)
+    device[lost:] -= device[lost] if lost < 4000 else 0
+    folder = tmp_path_factory.mktemp("times")
+    path = record(folder / "x.h5", _meta(), device, host, blocks)
+    with open_recording(path) as recording:
+        recording.verify()
+        read, clock = recording.read("taxels"), recording.meta.clocks["taxels"]
+    assert np.array_equal(read.device_ns, device)
+    assert np.array_equal(read.host_ns, host)
+    assert np.array_equal(read.t_ns, recomputed_t_ns(read, clock))
+    assert clock.breaks == (0 < lost < 4000)
+
+
+def test_stored_times_are_the_hosts_within_the_bound(tmp_path, make_meta):
+    device, true, host = clocked(1)
+    with open_recording(record(tmp_path / "x.h5", make_meta(), device, host)) as recording:
+        read, clock = recording.read("taxels"), recording.meta.clocks["taxels"]
+    assert clock.method == "hull-1way"
+    assert [round(one.drift * 1e6) for one in clock.segments] == [37, 37]  # 37 ppm; 40 s are two stretches
+    assert np.abs(read.t_ns - true).max() <= max(one.bound_ns for one in clock.segments)
+    assert np.abs(host - true).max() > 3_000_000
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{"clock": "simulated"}, {"clocks": {"taxels": StreamClock(source="host")}},
+     {"clocks": {"taxels": StreamClock(source="simulated")}}],
+)  # fmt: skip
+def test_where_the_device_is_not_the_clock_times_are_as_they_came(tmp_path, make_meta, fields):
+    device, _, host = clocked(2)
+    with open_recording(record(tmp_path / "x.h5", make_meta(**fields), device, host)) as recording:
+        read = recording.read("taxels")
+        assert recording.meta.clocks == fields.get("clocks", {})
+    assert np.array_equal(read.t_ns, host)
+    assert np.array_equal(read.device_ns, device)
+    assert read.host_ns is None
+    with pytest.raises(FormatError, match="as they came"):
+        recomputed_t_ns(read, StreamClock(source="device"))
+
+
+def test_device_times_in_some_blocks_only_are_refused(tmp_path, make_meta):
+    n = np.arange(5)
+    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
+        writer.append(Block("taxels", n, np.ones((5, 3)), device_ns=n))
+        with pytest.raises(RigError, match="device times"):
+            writer.append(Block("taxels", n + 5, np.ones((5, 3))))
+
+
+def test_a_block_after_the_labels_is_refused(tmp_path, make_meta):
+    n = np.arange(5)
+    with RecordingWriter(tmp_path / "x.h5", make_meta()) as writer:
+        writer.append(Block("taxels", n, np.ones((5, 3))))
+        writer.annotate("taxels", "press", n)
+        with pytest.raises(RigError, match="labelled"):
+            writer.append(Block("taxels", n + 5, np.ones((5, 3))))
+
+
+@pytest.mark.parametrize("name", ["host_ns", "device_ns"])
+def test_a_file_without_its_raw_times_is_refused(tmp_path, make_meta, name):
+    path = record(tmp_path / "x.h5", make_meta(), *clocked(3)[::2])
+    with h5py.File(path, "a") as file:
+        del file[f"streams/taxels/{name}"]
+    with open_recording(path) as recording, pytest.raises(FormatError, match="do not go with"):
+        recording.read("taxels")
+
+
+def test_times_changed_behind_the_raw_ones_are_told(tmp_path, make_meta):
+    path = record(tmp_path / "x.h5", make_meta(), *clocked(3)[::2])
+    with open_recording(path) as recording:
+        assert "clock-fit" not in {finding.check for finding in examine(recording)}
+    with h5py.File(path, "a") as file:
+        file["streams/taxels/t_ns"][100] += 1
+    with open_recording(path) as recording:
+        (finding,) = [finding for finding in examine(recording) if finding.check == "clock-fit"]
+    assert (finding.severity, finding.count) == ("error", 1)
+
+
+def test_lost_rows_are_told(tmp_path, make_meta):
+    counts = StreamCounts(received=4010, written=4000, dropped=7, duplicates=2, gaps=5)
+    path = record(tmp_path / "x.h5", make_meta(streams={"taxels": counts}), *clocked(3)[::2])
+    with open_recording(path) as recording:
+        found = {finding.check: finding for finding in examine(recording)}
+    assert found["lost"].severity == "warning"
+    assert found["lost"].message == "taxels lost rows: 5 never came, 7 were dropped because writing was behind"
+    assert found["repeated"].message == "taxels: 2 rows came twice or late, and were kept out"
+    assert found["unaccounted"].count == 1  # 4010 received, 4009 of them written, dropped or kept out
