@@ -91,6 +91,7 @@ if TYPE_CHECKING:
         SpiDeviceEmulator,
     )
     from tactbench.devices.fault import Fault, fault_concerns
+    from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
     from tactbench.links.byte_link import ByteLink
@@ -213,6 +214,7 @@ __all__ = [
     "TaskSpec",
     "Transducer",
     "TransducerFactory",
+    "Unwrap",
     "UsageError",
     "Verdict",
     "assumed",
@@ -256,6 +258,7 @@ _ON_DEMAND = {
     "SpiReply": "tactbench.links.spi_link",
     "SpiStep": "tactbench.links.spi_link",
     "SpidevLink": "tactbench.links.spidev",
+    "Unwrap": "tactbench.devices.sequence",
     "fault_concerns": "tactbench.devices.fault",
     "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",
