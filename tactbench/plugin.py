@@ -91,6 +91,7 @@ if TYPE_CHECKING:
         SpiDeviceEmulator,
     )
     from tactbench.devices.fault import Fault, fault_concerns
+    from tactbench.devices.reading import Reading
     from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
@@ -172,6 +173,7 @@ __all__ = [
     "Published",
     "Quality",
     "Quantity",
+    "Reading",
     "RealFigure",
     "Reason",
     "Received",
@@ -248,6 +250,7 @@ _ON_DEMAND = {
     "FloatArray": "tactbench.core.samples",
     "Link": "tactbench.links.link",
     "LinkAddress": "tactbench.links.address",
+    "Reading": "tactbench.devices.reading",
     "Received": "tactbench.links.link",
     "Recording": "tactbench.core.recording.reader",
     "Senses": "tactbench.devices.emulator",
