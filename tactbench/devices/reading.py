@@ -138,7 +138,7 @@ class Reading:
 
     @property
     def ended(self) -> str:
-        """Which device ended the reading, and why, in one sentence; empty: none did."""
+        """Which device ended the reading, and why, without a full stop; empty: none did."""
         return self._ended
 
     @property
@@ -188,13 +188,15 @@ class Reading:
         duration_s
             Seconds of the clock from the first block asked for; may be infinite.
         """
-        end_ns = self._clock() + (math.inf if duration_s == math.inf else round(1e9 * duration_s))
-        while not self._over.is_set() and (now_ns := self._clock()) < end_ns:
+        now_ns = self._clock()
+        end_ns = now_ns + (math.inf if duration_s == math.inf else round(1e9 * duration_s))
+        while not self._over.is_set() and now_ns < end_ns:
             until_ns = int(min(now_ns + round(1e9 * self._block_s), end_ns))
             if self._advance is None:
                 self._over.wait((until_ns - now_ns) / 1e9)
+                now_ns = self._clock()
             else:
-                self._carry(self._advance, until_ns)
+                now_ns = self._carry(self._advance, now_ns, until_ns)
             yield from self._waiting()
         self._finish()
         yield from self._waiting()
@@ -215,17 +217,18 @@ class Reading:
             self._streams[block.stream].put(block)
         return bool(blocks)
 
-    def _carry(self, advance: Callable[[int], None], until_ns: int) -> None:
-        """Carry virtual time forward, and read what the devices send meanwhile."""
-        while not self._over.is_set() and (now_ns := self._clock()) < until_ns:
-            target_ns = min(now_ns + round(1e9 * STEP_S), until_ns)
-            advance(target_ns)
+    def _carry(self, advance: Callable[[int], None], now_ns: int, until_ns: int) -> int:
+        """Carry virtual time forward, and read what the devices send meanwhile; return the time then."""
+        while not self._over.is_set() and now_ns < until_ns:
+            now_ns = min(now_ns + round(1e9 * STEP_S), until_ns)
+            advance(now_ns)
             for name, driver in self._drivers.items():
                 try:
-                    self._exhaust(name, driver, target_ns)
+                    self._exhaust(name, driver, now_ns)
                 except Exception as error:
                     self._fail(name, error)
-                    return
+            now_ns = max(now_ns, self._clock())
+        return now_ns
 
     def _exhaust(self, name: str, driver: Driver, until_ns: int) -> None:
         """Read until nothing comes, or until the clock is past: a driver that asks its device takes time itself."""
@@ -265,7 +268,7 @@ class Reading:
             if self._error is None:
                 self._error = error
                 why = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-                self._ended = f"{name} ended the reading: {why}"
+                self._ended = f"{name}: {why.rstrip('.')}"
         self._over.set()
 
     def _finish(self) -> None:

@@ -172,7 +172,7 @@ def test_a_device_that_is_gone_ends_the_reading(clock):
             blocks = list(reading.blocks(60.0))
         assert clock.now_ns == 0, "it ended before its time"
         assert not wide.sampling
-    assert reading.ended.startswith("force ended the reading: The other end of udp://127.0.0.1:")
+    assert reading.ended.startswith("force: The other end of udp://127.0.0.1:")
     assert isinstance(reading.error, LinkUnplugged)
     assert joined(blocks, "force")[0] == list(range(100))
     assert joined(blocks, "wide")[0] == list(range(500))
@@ -188,7 +188,7 @@ def test_any_error_of_a_driver_is_carried_over(clock):
         with Reading({"wide": driver}, clock=clock) as reading:
             assert list(reading.blocks(60.0)) == []
         assert driver.stops == 1
-    assert reading.ended == "wide ended the reading: ZeroDivisionError: seven by nothing"
+    assert reading.ended == "wide: ZeroDivisionError: seven by nothing"
     assert reading.error.__traceback__ is not None
 
 
