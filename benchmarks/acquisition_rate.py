@@ -234,11 +234,6 @@ def memory_mb(what: str) -> float:
     raise SystemExit(f"the system does not say {what}")
 
 
-def reset_peak() -> None:
-    """Let VmHWM begin at VmRSS again."""
-    Path("/proc/self/clear_refs").write_text("5")
-
-
 def cpu_s() -> float:
     """Return the processor time of this process so far, seconds."""
     used = resource.getrusage(resource.RUSAGE_SELF)
@@ -265,14 +260,13 @@ def record(
     )
     with RecordingWriter(path, meta) as writer:
         blocks = longest = 0
+        before = memory_mb("VmRSS")
+        Path("/proc/self/clear_refs").write_text("5")  # VmHWM begins at VmRSS again
         with Reading(drivers, clock=clock) as reading:
             at_first, cpu_at_first = time.monotonic(), cpu_s()
-            at_rest = after_stall = 0.0
+            after_stall = 0.0
             for block in reading.blocks(seconds):
                 since = time.monotonic() - at_first
-                if not at_rest and since > min(5.0, seconds / 6):
-                    at_rest = memory_mb("VmRSS")
-                    reset_peak()
                 if stall_s and not after_stall and since > seconds / 3:
                     time.sleep(stall_s)
                     after_stall = memory_mb("VmRSS")
@@ -284,7 +278,7 @@ def record(
         print(f"recorded for {took:.2f} s, {used:.2f} s of CPU: {100 * used / took:.1f} % of one core")
         print(f"{blocks} blocks appended, the longest of {longest} rows")
         stalled = f", {after_stall:.1f} MB after the writer stood for {stall_s:g} s" if stall_s else ""
-        print(f"memory {at_rest:.1f} MB early on{stalled}, at most {peak:.1f} MB: {peak - at_rest:+.1f} MB")
+        print(f"memory {before:.1f} MB before{stalled}, at most {peak:.1f} MB: {peak - before:+.1f} MB")
         began = time.monotonic()
     return reading, time.monotonic() - began
 
