@@ -355,3 +355,11 @@ def test_a_driver_that_takes_time_to_ask_does_not_hold_up_the_others(clock):
 def test_queues_and_blocks_of_no_length_are_refused(queue_s, block_s, clock):
     with pytest.raises(UsageError):
         Reading({}, clock=clock, queue_s=queue_s, block_s=block_s)
+
+
+def test_virtual_time_that_does_not_go_on_is_no_endless_wait(clock):
+    with (
+        numbered(WIDE, clock) as (_, driver),
+        Reading({"wide": driver}, clock=clock, advance=lambda to_ns: None) as reading,
+    ):
+        assert list(reading.blocks(1.0)) == []
