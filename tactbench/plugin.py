@@ -92,6 +92,8 @@ if TYPE_CHECKING:
     )
     from tactbench.devices.fault import Fault, fault_concerns
     from tactbench.devices.log import DeviceLog, LogReader
+    from tactbench.devices.reading import Reading
+    from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
     from tactbench.links.byte_link import ByteLink
@@ -174,6 +176,7 @@ __all__ = [
     "Published",
     "Quality",
     "Quantity",
+    "Reading",
     "RealFigure",
     "Reason",
     "Received",
@@ -216,6 +219,7 @@ __all__ = [
     "TaskSpec",
     "Transducer",
     "TransducerFactory",
+    "Unwrap",
     "UsageError",
     "Verdict",
     "assumed",
@@ -251,6 +255,7 @@ _ON_DEMAND = {
     "Link": "tactbench.links.link",
     "LinkAddress": "tactbench.links.address",
     "LogReader": "tactbench.devices.log",
+    "Reading": "tactbench.devices.reading",
     "Received": "tactbench.links.link",
     "Recording": "tactbench.core.recording.reader",
     "Senses": "tactbench.devices.emulator",
@@ -261,6 +266,7 @@ _ON_DEMAND = {
     "SpiReply": "tactbench.links.spi_link",
     "SpiStep": "tactbench.links.spi_link",
     "SpidevLink": "tactbench.links.spidev",
+    "Unwrap": "tactbench.devices.sequence",
     "fault_concerns": "tactbench.devices.fault",
     "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",

@@ -137,6 +137,10 @@ def _create(group: Any, name: str, values: npt.NDArray[Any], rows: int) -> None:
         name, shape=(rows, *rest), maxshape=(None, *rest), dtype=values.dtype, chunks=(layout.CHUNK_ROWS, *rest),
         compression="gzip", compression_opts=4, shuffle=True, fillvalue=0,
     )  # fmt: skip
+    # Written, although they are the fill value: a dataset that claims more than it can hold is taken for one cut short.
+    for start in range(0, rows, COPY_ROWS):
+        stop = min(start + COPY_ROWS, rows)
+        group[name][start:stop] = np.zeros((stop - start, *rest), dtype=values.dtype)
 
 
 def _annotate(group: Any, annotations: Mapping[str, npt.NDArray[Any]]) -> None:

@@ -76,7 +76,7 @@ class StreamCounts(Frozen):
     late: int = 0
     """Kept out: they came after rows that follow them."""
     gaps: int = 0
-    """Rows that never came, by the device's own numbers."""
+    """Rows missing where they were due, by the device's own numbers; those that came late are among them."""
 
 
 class Emulation(Frozen):

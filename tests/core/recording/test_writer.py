@@ -201,6 +201,20 @@ def test_sequence_numbers_come_with_all_blocks_or_with_none(tmp_path, make_meta)
         record(tmp_path / "x.h5", make_meta(), *(lambda writer, one=one: writer.append(one) for one in blocks))
 
 
+def test_one_mark_after_many_good_rows_of_many_channels(tmp_path, make_meta):
+    """Zeros that only the mark makes necessary are no sign of a file cut short: 3 MB of them here, for one number."""
+    good = np.zeros((16_000, 64), dtype=np.uint16)
+    marks = np.zeros((1, 64), dtype=np.uint8)
+    marks[0, 5] = 8
+    path = tmp_path / "late.h5"
+    with RecordingWriter(path, make_meta(64, name="late", clock="none")) as writer:
+        for _ in range(3):
+            writer.append(Block("taxels", None, good))
+        writer.append(Block("taxels", None, good[:1], marks))
+    with open_recording(path) as recording:
+        assert np.argwhere(recording.read("taxels").quality).tolist() == [[48_000, 5]]
+
+
 @pytest.mark.parametrize("rows", [ROWS, 20_000])  # fewer, and more, than are compressed at once
 def test_quality_that_comes_late_leaves_the_rows_before_and_after_it_good(tmp_path, make_meta, rows):
     bad = np.zeros((ROWS, 3), dtype=np.uint8)

@@ -1,0 +1,288 @@
+"""Several devices read at once: a thread a driver in real time, one after the other in virtual time."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+from tactbench.core.errors import LinkError, RigError, TactbenchError, UsageError
+from tactbench.core.samples import Block
+from tactbench.core.spec.recording import StreamCounts
+from tactbench.core.spec.sensor import StreamSpec
+from tactbench.devices.driver import Driver
+from tactbench.devices.queue import BlockQueue, Loss
+from tactbench.devices.sequence import SequenceCheck
+from tactbench.links.link import Clock
+
+READ_S = 0.05
+"""Longest wait of one read: after this time at the latest a reader sees that it is to stop."""
+STEP_S = 0.02
+"""Virtual time between two reads of a device, so that the buffers of its link do not overflow (derived: the usual 256
+datagrams of a UDP socket are 37 ms at 7 kHz, the fastest stream of a Net F/T)."""
+STOP_S = 5.0
+"""How long readers are waited for (assumed: a read, a stop and what they send, each within a link's time-outs)."""
+COUNTS_S = 0.25
+"""How old `counts` may be while devices are read."""
+UNRATED_ROWS = 4096
+"""The most rows of a block of a stream whose rate nobody states."""
+
+
+class _Stream:
+    """One stream on its way from driver to caller."""
+
+    def __init__(self, spec: StreamSpec, queue_s: float, block_s: float) -> None:
+        self.check = SequenceCheck()
+        self.queue = BlockQueue(spec, queue_s)
+        self.written = 0
+        self.most_rows = UNRATED_ROWS if spec.rate_hz is None else math.ceil(2 * block_s * spec.rate_hz)
+
+    def put(self, block: Block) -> None:
+        kept = self.check(block)
+        if kept is not None:
+            self.queue.put(kept)
+
+    def take(self) -> Iterator[Block]:
+        """Yield what is in the queue now; what comes meanwhile is left for the next call."""
+        for _ in range(-(-self.queue.rows // self.most_rows)):
+            block = self.queue.take(self.most_rows)
+            if block is not None:
+                self.written += len(block.data)
+                yield block
+
+
+class Reading:
+    """Reads devices from the ``with`` that it stands in: starts them, yields their blocks, stops them. Used once.
+
+    In real time a thread reads each driver and puts its rows into a bounded queue a stream; a caller who takes them too
+    slowly loses the newest, which is counted and marked (:class:`~tactbench.devices.queue.BlockQueue`). In virtual time
+    there are no threads, and the caller cannot be too slow. The same data of the devices make the same rows in both;
+    where blocks begin differs. Rows are passed on as they come: none is trimmed to the duration.
+
+    Drivers are neither opened nor closed here.
+
+    Parameters
+    ----------
+    drivers
+        By the device's name in messages. Their streams have different names.
+    clock
+        The host's, the same as the drivers'.
+    advance
+        For virtual time: carries `clock` forward to the given nanosecond, and emulated devices with it. None: real
+        time.
+    queue_s
+        Seconds of data that a caller may be behind.
+    block_s
+        Seconds of data in a block, about: never more than twice as much.
+    """
+
+    def __init__(
+        self,
+        drivers: Mapping[str, Driver],
+        *,
+        clock: Clock,
+        advance: Callable[[int], None] | None = None,
+        queue_s: float = 5.0,
+        block_s: float = 0.05,
+    ) -> None:
+        if not (0 < block_s < queue_s < math.inf):
+            raise UsageError(
+                f"Blocks of {block_s} s and queues of {queue_s} s were given.",
+                hint="Both are finite, above 0, and a queue holds more than a block.",
+            )
+        self._drivers = dict(drivers)
+        self._clock = clock
+        self._advance = advance
+        self._queue_s = queue_s
+        self._block_s = block_s
+        self._streams: dict[str, _Stream] = {}
+        self._counts: dict[str, Mapping[str, int]] = {name: {} for name in self._drivers}
+        self._to_stop: list[str] = []
+        self._readers: dict[str, threading.Thread] = {}
+        self._over = threading.Event()
+        self._lock = threading.Lock()
+        self._ended = ""
+        self._error: Exception | None = None
+
+    def __enter__(self) -> Self:
+        try:
+            for name, driver in self._drivers.items():
+                self._to_stop.append(name)
+                driver.start()
+                for spec in driver.streams:
+                    if spec.name in self._streams:
+                        raise UsageError(
+                            f"The stream {spec.name!r} of {name} is there already, of another device.",
+                            hint="Streams of one recording have different names.",
+                        )
+                    self._streams[spec.name] = _Stream(spec, self._queue_s, self._block_s)
+                if self._advance is None:
+                    # It is read at once: the next device may take longer to start than the link's buffers last.
+                    threading.Thread(
+                        target=self._read, args=(name, driver), name=f"reading {name}", daemon=True
+                    ).start()
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._finish()
+        for stream in self._streams.values():
+            stream.queue.discard()
+
+    @property
+    def ended(self) -> str:
+        """Which device ended the reading, and why, without a full stop; empty: none did."""
+        return self._ended
+
+    @property
+    def error(self) -> Exception | None:
+        """What was raised there, with its traceback."""
+        return self._error
+
+    @property
+    def stream_counts(self) -> Mapping[str, StreamCounts]:
+        """By stream: what became of its rows.
+
+        After the ``with`` block received = written + dropped + duplicates + late. `written` are those that were
+        yielded. `gaps` are rows missing where they were due, late ones among them; a stream without numbers has none.
+        """
+        return {
+            name: StreamCounts(
+                received=stream.check.received,
+                written=stream.written,
+                dropped=stream.queue.loss.rows,
+                duplicates=stream.check.duplicates,
+                late=stream.check.late,
+                gaps=stream.check.gaps,
+            )
+            for name, stream in self._streams.items()
+        }
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """What the drivers counted, as ``device: name``; at most 0.25 s old, and whole once the reading is over."""
+        return {f"{name}: {what}": n for name, counts in self._counts.items() for what, n in counts.items()}
+
+    @property
+    def high_water(self) -> Mapping[str, int]:
+        """By stream: the most rows that waited to be taken."""
+        return {name: stream.queue.high_water for name, stream in self._streams.items()}
+
+    @property
+    def losses(self) -> Mapping[str, Loss]:
+        """By stream: what was dropped because the caller was behind."""
+        return {name: stream.queue.loss for name, stream in self._streams.items()}
+
+    def blocks(self, duration_s: float) -> Iterator[Block]:
+        """Yield blocks of all streams until the time is over or a device has ended the reading; then stop the devices.
+
+        Parameters
+        ----------
+        duration_s
+            Seconds of the clock from the first block asked for; may be infinite.
+        """
+        now_ns = self._clock()
+        end_ns = now_ns + (math.inf if duration_s == math.inf else round(1e9 * duration_s))
+        while not self._over.is_set() and now_ns < end_ns:
+            until_ns = int(min(now_ns + round(1e9 * self._block_s), end_ns))
+            if self._advance is None:
+                self._over.wait((until_ns - now_ns) / 1e9)
+                now_ns = self._clock()
+            else:
+                now_ns = self._carry(self._advance, now_ns, until_ns)
+            yield from self._waiting()
+        self._finish()
+        yield from self._waiting()
+
+    def _waiting(self) -> Iterator[Block]:
+        for stream in self._streams.values():
+            yield from stream.take()
+
+    def _take_over(self, name: str, driver: Driver, timeout_s: float) -> bool:
+        """Read a driver once; return whether anything came."""
+        blocks = driver.read(timeout_s)
+        for block in blocks:
+            if block.stream not in self._streams:
+                raise RigError(
+                    f"A block of stream {block.stream!r} came, which {name} did not announce.",
+                    hint="Correct the driver: its streams are fixed once it is started.",
+                )
+            self._streams[block.stream].put(block)
+        return bool(blocks)
+
+    def _carry(self, advance: Callable[[int], None], now_ns: int, until_ns: int) -> int:
+        """Carry virtual time forward, and read what the devices send meanwhile; return the time then."""
+        while not self._over.is_set() and now_ns < until_ns:
+            now_ns = min(now_ns + round(1e9 * STEP_S), until_ns)
+            advance(now_ns)
+            for name, driver in self._drivers.items():
+                try:
+                    self._exhaust(name, driver, now_ns)
+                except Exception as error:
+                    self._fail(name, error)
+            now_ns = max(now_ns, self._clock())
+        return now_ns
+
+    def _exhaust(self, name: str, driver: Driver, until_ns: int) -> None:
+        """Read until nothing comes, or until the clock is past: a driver that asks its device takes time itself."""
+        while self._take_over(name, driver, 0.0) and self._clock() <= until_ns:
+            pass
+
+    def _read(self, name: str, driver: Driver) -> None:
+        """Read one driver until the reading is over, then stop it: one thread does both."""
+        with self._lock:
+            if self._over.is_set():
+                return
+            self._to_stop.remove(name)
+            self._readers[name] = threading.current_thread()
+        counted_ns = self._clock()
+        try:
+            while not self._over.is_set():
+                self._take_over(name, driver, READ_S)
+                if self._clock() - counted_ns > 1e9 * COUNTS_S:
+                    counted_ns = self._clock()
+                    self._counts[name] = dict(driver.counts)
+            self._exhaust(name, driver, self._clock() + round(1e9 * READ_S))
+        except Exception as error:
+            self._fail(name, error)
+        self._stop(name, driver)
+
+    def _stop(self, name: str, driver: Driver) -> None:
+        try:
+            with suppress(LinkError):
+                driver.stop()
+            self._counts[name] = dict(driver.counts)
+        except Exception as error:
+            self._fail(name, error)
+
+    def _fail(self, name: str, error: Exception) -> None:
+        """End the reading for `error`, unless another one has."""
+        with self._lock:
+            if self._error is None:
+                self._error = error
+                why = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+                self._ended = f"{name}: {why.rstrip('.')}"
+        self._over.set()
+
+    def _finish(self) -> None:
+        """Let every device stop that was started, or was being started.
+
+        A reader that does not come back is left alone, and its device too, since one thread uses a driver; it ends when
+        the link is closed.
+        """
+        with self._lock:  # a thread that Ctrl-C has overtaken while it was started leaves the driver alone from now on
+            self._over.set()
+        while self._to_stop:
+            self._stop(self._to_stop[-1], self._drivers[self._to_stop[-1]])
+            self._to_stop.pop()
+        for name, reader in self._readers.items():
+            reader.join(STOP_S)
+            if reader.is_alive():
+                self._fail(name, RigError(f"It did not stop within {STOP_S:g} s."))

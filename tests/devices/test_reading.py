@@ -1,0 +1,365 @@
+"""Several devices at once: what came is there, what is missing is counted, and nothing is left running."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+import tracemalloc
+from collections.abc import Callable, Iterable
+
+import numpy as np
+import pytest
+
+from tactbench.core.samples import Block, Quality
+from tactbench.devices import reading as module
+from tactbench.plugin import LinkTimeout, LinkUnplugged, Reading, StreamCounts, UsageError
+from tests.devices.numbered import Far, NumberedDriver, numbered, stream_of
+
+WIDE = stream_of("wide", 5000.0, 64)
+FORCE = stream_of("force", 1000.0, 6, "float64")
+
+
+class HandClock:
+    """Stands until it is set."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+
+    def __call__(self) -> int:
+        return self.now_ns
+
+
+@pytest.fixture
+def clock() -> HandClock:
+    return HandClock()
+
+
+@pytest.fixture(autouse=True)
+def _no_thread_is_left():
+    yield
+    readers = [thread for thread in threading.enumerate() if thread.name.startswith("reading")]
+    for thread in readers:  # one that was to stop before it had read anything may not have noticed yet
+        thread.join(1.0)
+    assert not [thread.name for thread in readers if thread.is_alive()]
+
+
+def joined(blocks: Iterable[Block], stream: str) -> tuple[list[int], list[int]]:
+    """Numbers of all rows of a stream, and of those marked with a gap; the readings are checked."""
+    numbers, marked = [], []
+    for block in blocks:
+        if block.stream == stream:
+            assert (block.data == block.sequence[:, None].astype(block.data.dtype)).all()
+            numbers += block.sequence.tolist()
+            if block.quality is not None:
+                marked += block.sequence[(block.quality & Quality.GAP).all(axis=1)].tolist()
+    return numbers, marked
+
+
+# Rows of a device that loses two and doubles one: first row and length of its datagrams.
+PIECES = [(65_000, 500), (65_500, 100), (65_600, 1), (65_600, 1), (65_603, 400), (66_003, 50)]
+NUMBERS = [*range(65_000, 65_601), *range(65_603, 66_053)]
+
+
+def in_virtual_time(clock: HandClock) -> tuple[list[Block], Reading]:
+    with numbered(WIDE, clock) as (far, driver):
+        due = [(7_000_000 * k, piece) for k, piece in enumerate(PIECES, 1)]
+
+        def advance(to_ns: int) -> None:
+            while due and due[0][0] <= to_ns:
+                clock.now_ns, piece = due.pop(0)
+                far.send(*piece)
+            clock.now_ns = to_ns
+
+        with Reading({"device": driver}, clock=clock, advance=advance) as reading:
+            blocks = list(reading.blocks(0.3))
+        assert clock.now_ns == 300_000_000
+        assert (driver.sampling, driver.stops) == (False, 1)
+    return blocks, reading
+
+
+def in_real_time(clock: HandClock) -> tuple[list[Block], Reading]:
+    with numbered(WIDE, clock) as (far, driver):
+        with Reading({"device": driver}, clock=clock) as reading:
+            for piece in PIECES:
+                far.send(*piece)
+                far.taken()
+            clock.now_ns += 1
+            blocks = list(reading.blocks(0.0))
+        assert (driver.sampling, driver.stops) == (False, 1)
+    return blocks, reading
+
+
+@pytest.mark.parametrize("read", [in_virtual_time, in_real_time])
+def test_the_same_rows_in_virtual_and_in_real_time(read, clock):
+    blocks, reading = read(clock)
+    assert joined(blocks, "wide") == (NUMBERS, [65_603])
+    counts = reading.stream_counts["wide"]
+    assert counts == StreamCounts(received=1052, written=1051, duplicates=1, gaps=2)
+    assert reading.counts == {"device: datagrams": 6}
+    assert reading.ended == ""
+    assert 0 < reading.high_water["wide"] <= 25_000
+    assert max(len(block.data) for block in blocks) <= 500, "at most twice 50 ms of data"
+
+
+def test_a_caller_that_stops_for_three_seconds_loses_nothing(clock):
+    with (
+        numbered(WIDE, clock) as (far, wide),
+        numbered(FORCE, clock) as (far_force, force),
+        Reading({"wide": wide, "force": force}, clock=clock) as reading,
+    ):
+        send(far, far_force, 0, 1)
+        blocks = reading.blocks(60.0)
+        first = next(blocks)
+        send(far, far_force, 1, 30)
+        clock.now_ns += 61_000_000_000
+        every = [first, *blocks]
+    assert joined(every, "wide") == (list(range(31 * 500)), [])
+    assert joined(every, "force") == (list(range(31 * 100)), [])
+    assert {c.dropped for c in reading.stream_counts.values()} == {0}
+
+
+def send(far: Far, far_force: Far, first: int, tenths: int) -> None:
+    """Tenths of a second of both devices, as fast as they are read."""
+    for k in range(first, first + tenths):
+        far.send(500 * k, 500)
+        far_force.send(100 * k, 100)
+        far.taken()
+        far_force.taken()
+
+
+def test_a_caller_that_stops_for_ten_seconds_loses_what_is_counted(clock):
+    with numbered(WIDE, clock) as (far, wide), numbered(FORCE, clock) as (far_force, force):
+        tracemalloc.start()
+        try:
+            with Reading({"wide": wide, "force": force}, clock=clock) as reading:
+                send(far, far_force, 0, 1)
+                blocks = reading.blocks(60.0)
+                came = [next(blocks) for _ in range(2)]
+                assert [block.stream for block in came] == ["wide", "force"]
+                send(far, far_force, 1, 100)
+                grown = tracemalloc.get_traced_memory()[1]
+                came += [next(blocks) for _ in range(50 + 50)]
+                send(far, far_force, 101, 1)
+                clock.now_ns += 61_000_000_000
+                came += blocks
+        finally:
+            tracemalloc.stop()
+    assert grown < 10e6
+    kept = [*range(51 * 500), *range(101 * 500, 102 * 500)]
+    assert joined(came, "wide") == (kept, [101 * 500])
+    assert joined(came, "force") == ([*range(51 * 100), *range(101 * 100, 102 * 100)], [101 * 100])
+    assert reading.stream_counts["wide"] == StreamCounts(received=51_000, written=26_000, dropped=25_000)
+    assert reading.stream_counts["force"].dropped == 5000
+    assert reading.losses["wide"].first_sequence == 51 * 500
+    assert reading.losses["wide"].last_sequence == 101 * 500 - 1
+    assert reading.high_water == {"wide": 25_000, "force": 5000}
+
+
+def test_a_device_that_is_gone_ends_the_reading(clock):
+    """What came before is there, and the other device is stopped."""
+    with (
+        numbered(WIDE, clock) as (far, wide),
+        numbered(FORCE, clock) as (far_force, force),
+    ):
+        with Reading({"wide": wide, "force": force}, clock=clock) as reading:
+            far.send(0, 500)
+            far_force.send(0, 100)
+            far_force.taken()
+            far_force.socket.close()
+            force.link.send(b"is anybody there?")
+            blocks = list(reading.blocks(60.0))
+        assert clock.now_ns == 0, "it ended before its time"
+        assert not wide.sampling
+    assert reading.ended.startswith("force: The other end of udp://127.0.0.1:")
+    assert isinstance(reading.error, LinkUnplugged)
+    assert joined(blocks, "force")[0] == list(range(100))
+    assert joined(blocks, "wide")[0] == list(range(500))
+
+
+class Broken(NumberedDriver):
+    def read(self, timeout_s):
+        raise ZeroDivisionError("seven by nothing")
+
+
+def test_any_error_of_a_driver_is_carried_over(clock):
+    with numbered(WIDE, clock, Broken) as (_, driver):
+        with Reading({"wide": driver}, clock=clock) as reading:
+            assert list(reading.blocks(60.0)) == []
+        assert driver.stops == 1
+    assert reading.ended == "wide: ZeroDivisionError: seven by nothing"
+    assert reading.error.__traceback__ is not None
+
+
+def test_any_error_of_a_driver_is_carried_over_in_virtual_time(clock):
+    def advance(to_ns: int) -> None:
+        clock.now_ns = to_ns
+
+    with numbered(WIDE, clock, Broken) as (_, driver):
+        with Reading({"wide": driver}, clock=clock, advance=advance) as reading:
+            assert list(reading.blocks(60.0)) == []
+        assert driver.stops == 1
+    assert "ZeroDivisionError" in reading.ended
+    assert clock.now_ns < 1_000_000_000
+
+
+class Unannounced(NumberedDriver):
+    def read(self, timeout_s):
+        return [Block("other", None, np.zeros((1, 1)))]
+
+
+def test_a_stream_that_was_not_announced_ends_the_reading(clock):
+    with numbered(WIDE, clock, Unannounced) as (_, driver), Reading({"wide": driver}, clock=clock) as reading:
+        list(reading.blocks(60.0))
+    assert "'other'" in reading.ended
+
+
+class Unstoppable(NumberedDriver):
+    def stop(self):
+        super().stop()
+        raise LinkUnplugged("It is gone.")
+
+
+def test_a_device_that_is_gone_when_it_is_to_stop_is_no_error(clock):
+    with numbered(WIDE, clock, Unstoppable) as (_, driver):
+        with Reading({"wide": driver}, clock=clock) as reading:
+            list(reading.blocks(0.0))
+        assert driver.stops == 1
+    assert (reading.ended, reading.error) == ("", None)
+
+
+def consume(
+    reading: Reading, *, begun: Callable[[], None] = lambda: None, error: Exception | None = None, after: int = 0
+) -> None:
+    """Take blocks, once `begun` has been called; with `error`, raise it at the first one, once so many rows came."""
+    with reading:
+        begun()
+        for block in reading.blocks(60.0):
+            if error is not None:
+                while reading.stream_counts[block.stream].received < after:
+                    pass
+                raise error
+
+
+@pytest.mark.parametrize("when", ["starting", "waiting"])
+def test_ctrl_c(when, clock):
+    """The wait ends, devices stop, rows that nobody takes are counted."""
+
+    class Interrupting(NumberedDriver):
+        def read(self, timeout_s):
+            blocks = super().read(timeout_s)
+            if blocks:
+                os.kill(os.getpid(), signal.SIGINT)
+            return blocks
+
+    with numbered(WIDE, clock, Interrupting) as (far, driver):
+        reading = Reading({"wide": driver}, clock=clock, block_s=1.0)
+        if when == "starting":
+            far.send(0, 100)
+        with pytest.raises(KeyboardInterrupt):
+            consume(reading, begun=lambda: far.send(0, 100) if when == "waiting" else None)
+        assert (driver.sampling, driver.stops) == (False, 1)
+    counts = reading.stream_counts["wide"]
+    assert counts.received == 100 == counts.written + counts.dropped
+    assert reading.ended == ""
+
+
+def test_an_error_of_the_caller_stops_the_devices(clock):
+    with numbered(WIDE, clock) as (far, driver):
+        reading = Reading({"wide": driver}, clock=clock)
+        for first in range(0, 2000, 500):
+            far.send(first, 500)
+        with pytest.raises(OSError, match="disk"):
+            consume(reading, error=OSError("the disk is full"), after=2000)
+        assert driver.stops == 1
+    counts = reading.stream_counts["wide"]
+    assert (counts.received, counts.written, counts.dropped) == (2000, 500, 1500)
+
+
+class Deaf(NumberedDriver):
+    def start(self):
+        raise LinkTimeout("It does not answer.")
+
+
+@pytest.mark.parametrize("virtual", [True, False])
+def test_a_device_that_does_not_start_stops_those_before(virtual, clock):
+    with numbered(WIDE, clock) as (_, first), numbered(FORCE, clock, Deaf) as (_, second):
+        reading = Reading(
+            {"wide": first, "force": second}, clock=clock, advance=(lambda to_ns: None) if virtual else None
+        )
+        with pytest.raises(LinkTimeout), reading:
+            pass
+        assert (first.sampling, first.stops, second.stops) == (False, 1, 1)
+
+
+def test_two_streams_of_one_name_are_refused(clock):
+    with numbered(WIDE, clock) as (_, first), numbered(WIDE, clock) as (_, second):
+        with pytest.raises(UsageError, match="'wide'"), Reading({"a": first, "b": second}, clock=clock):
+            pass
+        assert (first.stops, second.stops) == (1, 1)
+
+
+def test_a_reader_that_does_not_come_back_is_waited_for_with_a_bound(clock, monkeypatch):
+    monkeypatch.setattr(module, "STOP_S", 0.05)
+    away, back = threading.Event(), threading.Event()
+
+    class Stuck(NumberedDriver):
+        def read(self, timeout_s):
+            away.set()
+            back.wait(60.0)
+            return []
+
+    with numbered(WIDE, clock, Stuck) as (_, driver):
+        with Reading({"wide": driver}, clock=clock) as reading:
+            away.wait(60.0)
+            list(reading.blocks(0.0))
+        assert "did not stop" in reading.ended
+        assert driver.stops == 0, "one thread uses a driver"
+        back.set()
+        for thread in threading.enumerate():
+            if thread.name == "reading wide":
+                thread.join()
+        assert driver.stops == 1
+
+
+def test_a_duration_is_real_time_on_a_real_clock():
+    began = time.monotonic()
+    with numbered(WIDE, time.monotonic_ns) as (_, driver), Reading({"w": driver}, clock=time.monotonic_ns) as reading:
+        assert list(reading.blocks(0.12)) == []
+    assert time.monotonic() - began >= 0.12
+
+
+def test_a_driver_that_takes_time_to_ask_does_not_hold_up_the_others(clock):
+    """Each of its reads gives rows and takes 3 ms of the virtual clock."""
+
+    class Asking(NumberedDriver):
+        def read(self, timeout_s):
+            clock.now_ns += 3_000_000
+            far.send(self._datagrams, 1)
+            return super().read(timeout_s)
+
+    def advance(to_ns: int) -> None:
+        clock.now_ns = max(clock.now_ns, to_ns)
+
+    with numbered(WIDE, clock, Asking) as (far, first), numbered(FORCE, clock) as (far_force, second):
+        with Reading({"asking": first, "force": second}, clock=clock, advance=advance) as reading:
+            far_force.send(0, 10)
+            blocks = list(reading.blocks(1.0))
+        assert 1_000_000_000 <= clock.now_ns < 1_030_000_000
+    assert joined(blocks, "force")[0] == list(range(10))
+    assert reading.stream_counts["wide"].written > 10
+
+
+@pytest.mark.parametrize(("queue_s", "block_s"), [(0.0, 0.05), (5.0, 0.0), (0.1, 0.2), (float("inf"), 1.0)])
+def test_queues_and_blocks_of_no_length_are_refused(queue_s, block_s, clock):
+    with pytest.raises(UsageError):
+        Reading({}, clock=clock, queue_s=queue_s, block_s=block_s)
+
+
+def test_virtual_time_that_does_not_go_on_is_no_endless_wait(clock):
+    with (
+        numbered(WIDE, clock) as (_, driver),
+        Reading({"wide": driver}, clock=clock, advance=lambda to_ns: None) as reading,
+    ):
+        assert list(reading.blocks(1.0)) == []

@@ -1,0 +1,166 @@
+"""Counters over their wraps, and rows lost, doubled and late: counts are exact."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.core.samples import Block, Quality
+from tactbench.devices.sequence import SequenceCheck
+from tactbench.plugin import Unwrap, UsageError
+
+BITS = (8, 16, 32)
+
+
+@st.composite
+def arrivals(draw: st.DrawFn) -> tuple[int, list[int], dict[str, int]]:
+    """Bits of a counter, the true numbers of the rows in the order in which they come, and what was done to them."""
+    bits = draw(st.sampled_from(BITS))
+    half = 1 << (bits - 1)
+    number = draw(st.integers(0, 2 * half - 1))
+    came, done = [number], {"duplicates": 0, "late": 0, "gaps": 0}
+    kinds = st.sampled_from(["next"] * 6 + ["duplicate", "late", "gap", "run"])
+    for kind in draw(st.lists(kinds, max_size=80)):
+        if kind == "next":
+            number += 1
+            came.append(number)
+        elif kind == "run":
+            came.extend(range(number + 1, number + 301))
+            number += 300
+        elif kind == "duplicate":
+            done["duplicates"] += 1
+            came.append(number)
+        elif kind == "late":
+            done["late"] += 1
+            came.append(number - draw(st.integers(1, half)))
+        else:
+            step = draw(st.integers(2, half - 1))
+            done["gaps"] += step - 1
+            number += step
+            came.append(number)
+    return bits, came, done
+
+
+def parts(length: int, cuts: list[int]) -> list[slice]:
+    """Blocks of random lengths, empty ones among them."""
+    return [slice(a, b) for a, b in pairwise(sorted([0, length, *(cut % (length + 1) for cut in cuts)]))]
+
+
+@settings(max_examples=150)
+@given(arrivals(), st.lists(st.integers(0, 10**6), max_size=12))
+def test_counts_are_exact_over_wraps_gaps_duplicates_and_late_rows(case, cuts):
+    bits, came, done = case
+    unwrap, check = Unwrap(bits), SequenceCheck()
+    raw = np.array(came) % (1 << bits)
+    kept: list[Block] = []
+    for part in parts(len(came), cuts):
+        numbers = unwrap(raw[part].astype(np.uint32))
+        assert numbers.tolist() == came[part]
+        block = check(Block("s", None, np.array(came[part], dtype=np.float64)[:, None], sequence=numbers))
+        kept += [] if block is None else [block]
+    found = {"duplicates": check.duplicates, "late": check.late, "gaps": check.gaps}
+    rows = [row for block in kept for row in block.sequence.tolist()]
+    assert found == done
+    assert rows == sorted(set(rows))
+    assert check.received == len(came) == len(rows) + check.duplicates + check.late
+    assert unwrap.wraps == max(came) >> bits
+    marked = [
+        number
+        for block in kept
+        if block.quality is not None
+        for number, marks in zip(block.sequence.tolist(), block.quality, strict=True)
+        if marks[0] & Quality.GAP
+    ]
+    assert marked == [after for before, after in pairwise(rows) if after > before + 1]
+    assert all(np.array_equal(block.data[:, 0], block.sequence) for block in kept)
+
+
+@pytest.mark.parametrize(
+    ("previous", "current", "number"),
+    [
+        (1, 2, 2),
+        (2, 2, 2),
+        (2, 5, 5),
+        (5, 4, 4),
+        (0xFFFFFFFF, 0, 0x100000000),
+        (0xFFFFFFFF, 3, 0x100000003),
+        (0, 0xFFFFFFFF, -1),
+        (0, 0x7FFFFFFF, 0x7FFFFFFF),
+        (0, 0x80000000, -0x80000000),
+    ],
+)
+def test_one_step_of_a_32_bit_counter(previous, current, number):
+    """The steps of pyNetFT's tests."""
+    assert Unwrap(32)(np.array([previous, current], dtype=np.uint32)).tolist() == [previous, number]
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_a_pause_longer_than_half_a_wrap_is_a_break(at_once):
+    """8 bits at 100 Hz wrap in 2.56 s: after more than 1.28 s without a count nothing is late or a duplicate."""
+    unwrap = Unwrap(8, rate_hz=100.0)
+    counts = [10, 11, 11, 200, 200, 200, 199]
+    seconds = [0.0, 0.01, 0.02, 1.301, 1.302, 2.59, 2.60]
+    times = [round(1e9 * t) for t in seconds]
+    if at_once:
+        numbers = unwrap(counts, times).tolist()
+    else:
+        numbers = [int(unwrap([c], [t])[0]) for c, t in zip(counts, times, strict=True)]
+    assert numbers == [10, 11, 11, 200, 200, 456, 455]
+    assert unwrap.breaks == 2
+    assert unwrap.wraps == 1
+
+
+def test_just_half_a_wrap_is_no_break():
+    unwrap = Unwrap(8, rate_hz=100.0)
+    assert unwrap([0, 128], [0, 1_280_000_000]).tolist() == [0, -128]
+    assert unwrap.breaks == 0
+
+
+def test_a_restarted_device_goes_on_counting():
+    unwrap, check = Unwrap(32), SequenceCheck()
+    unwrap.restart()
+    first = unwrap([7, 8])
+    unwrap.restart()
+    second = unwrap([1, 0, 2])
+    assert unwrap.breaks == 1
+    assert (second - second[0]).tolist() == [0, -1, 1]
+    assert second[0] > first[-1]
+    check(Block("s", None, np.zeros((2, 3)), sequence=first))
+    block = check(Block("s", None, np.zeros((3, 3)), sequence=second))
+    assert block.quality.tolist() == [[Quality.GAP] * 3, [0] * 3]
+    assert check.late == 1
+
+
+def test_marks_are_added_to_those_that_are_there():
+    check = SequenceCheck()
+    quality = np.array([[0, Quality.SUSPECT], [Quality.SATURATED, 0], [0, 0]], dtype=np.uint8)
+    block = Block("s", np.arange(3), np.zeros((3, 2)), quality, np.array([4, 6, 6]), np.arange(10, 13))
+    kept = check(block)
+    assert kept.quality.tolist() == [[0, Quality.SUSPECT], [Quality.SATURATED | Quality.GAP, Quality.GAP]]
+    assert kept.t_ns.tolist() == [0, 1]
+    assert kept.device_ns.tolist() == [10, 11]
+    assert quality[1, 1] == 0, "the driver's own array is left as it is"
+
+
+def test_rows_without_numbers_and_rows_in_order_pass_as_they_are():
+    check = SequenceCheck()
+    bare = Block("s", None, np.zeros((2, 1)))
+    assert check(bare) is bare
+    numbered = Block("s", None, np.zeros((2, 1)), sequence=np.array([5, 6]))
+    assert SequenceCheck()(numbered) is numbered
+    assert check.received == 2
+
+
+@pytest.mark.parametrize(("bits", "rate_hz"), [(1, None), (63, None), (8, 0.0), (8, float("nan"))])
+def test_what_is_no_counter_is_refused(bits, rate_hz):
+    with pytest.raises(UsageError):
+        Unwrap(bits, rate_hz)
+
+
+def test_a_rate_needs_times():
+    with pytest.raises(UsageError, match="time"):
+        Unwrap(8, 100.0)([1])
