@@ -93,10 +93,10 @@ if TYPE_CHECKING:
     from tactbench.devices.fault import Fault, fault_concerns
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
-    from tactbench.links.byte_link import ByteLink
+    from tactbench.links.byte_link import ByteLink, SerialLink
     from tactbench.links.can_link import CanBus, CanFrame, CanLink
     from tactbench.links.can_log import CanLog
-    from tactbench.links.datagram_link import DatagramLink
+    from tactbench.links.datagram_link import DatagramLink, UdpLink
     from tactbench.links.link import Clock, Link, Received
     from tactbench.links.spi_bridge import SpiBridge
     from tactbench.links.spi_link import SpiLink, SpiReply, SpiStep
@@ -188,6 +188,7 @@ __all__ = [
     "SensorDescriptor",
     "SensorSpec",
     "Sent",
+    "SerialLink",
     "SheetTable",
     "Shelf",
     "Simulation",
@@ -213,6 +214,7 @@ __all__ = [
     "TaskSpec",
     "Transducer",
     "TransducerFactory",
+    "UdpLink",
     "UsageError",
     "Verdict",
     "assumed",
@@ -250,12 +252,14 @@ _ON_DEMAND = {
     "Recording": "tactbench.core.recording.reader",
     "Senses": "tactbench.devices.emulator",
     "Sent": "tactbench.devices.emulator",
+    "SerialLink": "tactbench.links.byte_link",
     "SpiBridge": "tactbench.links.spi_bridge",
     "SpiDeviceEmulator": "tactbench.devices.emulator",
     "SpiLink": "tactbench.links.spi_link",
     "SpiReply": "tactbench.links.spi_link",
     "SpiStep": "tactbench.links.spi_link",
     "SpidevLink": "tactbench.links.spidev",
+    "UdpLink": "tactbench.links.datagram_link",
     "fault_concerns": "tactbench.devices.fault",
     "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",
