@@ -79,9 +79,12 @@ from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPa
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
 
 if TYPE_CHECKING:
+    from tactbench.core.plugins.rig_devices import drivers_of, emulators_of
     from tactbench.core.recording.reader import Recording, open_recording
     from tactbench.core.samples import FloatArray
     from tactbench.devices.driver import Driver, DriverFactory, DriverSettings
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
+    from tactbench.devices.emulation.scene_samples import SceneSamples
     from tactbench.devices.emulator import (
         DeviceEmulator,
         EmulatorFactory,
@@ -134,6 +137,8 @@ __all__ = [
     "DriverFactory",
     "DriverSettings",
     "EffectDescriptor",
+    "EmulatedDevice",
+    "EmulatedDevices",
     "Emulation",
     "EmulationSettings",
     "EmulatorFactory",
@@ -184,6 +189,7 @@ __all__ = [
     "Scalar",
     "Scenario",
     "Scene",
+    "SceneSamples",
     "Senses",
     "SensorDescriptor",
     "SensorSpec",
@@ -219,6 +225,8 @@ __all__ = [
     "Verdict",
     "assumed",
     "derived",
+    "drivers_of",
+    "emulators_of",
     "fault_concerns",
     "hookimpl",
     "load_object",
@@ -242,6 +250,8 @@ _ON_DEMAND = {
     "Driver": "tactbench.devices.driver",
     "DriverFactory": "tactbench.devices.driver",
     "DriverSettings": "tactbench.devices.driver",
+    "EmulatedDevice": "tactbench.devices.emulation.emulated_devices",
+    "EmulatedDevices": "tactbench.devices.emulation.emulated_devices",
     "EmulatorFactory": "tactbench.devices.emulator",
     "EmulatorSettings": "tactbench.devices.emulator",
     "Fault": "tactbench.devices.fault",
@@ -250,6 +260,7 @@ _ON_DEMAND = {
     "LinkAddress": "tactbench.links.address",
     "Received": "tactbench.links.link",
     "Recording": "tactbench.core.recording.reader",
+    "SceneSamples": "tactbench.devices.emulation.scene_samples",
     "Senses": "tactbench.devices.emulator",
     "Sent": "tactbench.devices.emulator",
     "SerialLink": "tactbench.links.byte_link",
@@ -260,6 +271,8 @@ _ON_DEMAND = {
     "SpiStep": "tactbench.links.spi_link",
     "SpidevLink": "tactbench.links.spidev",
     "UdpLink": "tactbench.links.datagram_link",
+    "drivers_of": "tactbench.core.plugins.rig_devices",
+    "emulators_of": "tactbench.core.plugins.rig_devices",
     "fault_concerns": "tactbench.devices.fault",
     "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",

@@ -105,13 +105,13 @@ def emulate(
     if out is not None and out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(HEAD):
         raise UsageError(f"{out} is there already, and not from `tactbench emulate`.", hint="Give another name.")
     devices: dict[str, EmulatedDevice] = {}
-    presser.draw(1)
     for name, entry in entries.items():
         if entry.emulated:
             descriptor = descriptor_of(registry, name, entry)
             devices[name] = emulated_device(descriptor, name, entry, presser.senses(name), presser.seed)
     if not devices:
         raise UsageError("No device in the rig file is emulated.", hint="Write `link: emulated` for one.")
+    presser.draw(1)
     with EmulatedDevices(devices, time="real", can=can) as emulated:
         _say_where(emulated, entries, file, out)
         for number in count(1) if presses is None else range(1, presses + 1):
@@ -181,7 +181,7 @@ class Presser:
 
         def sensed(t_s: float) -> Mapping[str, float]:
             drawn = self._drawn
-            return drawn[name if name in drawn else next(iter(drawn))](t_s)
+            return drawn[name if name in drawn else next(iter(drawn))](t_s) if drawn else {}
 
         return sensed
 

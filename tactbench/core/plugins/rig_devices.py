@@ -46,11 +46,12 @@ def emulators_of(file: RigFile, registry: Registry, sensor: str, senses: Senses)
     UsageError
         If the file has no entry for the sensor, a device has no emulator, or an option or fault is not known.
     """
-    return {
-        name: emulated_device(descriptor, name, entry, senses, file.emulation.seed)
-        for name, (entry, descriptor) in _used(file, registry, sensor).items()
-        if entry.emulated
-    }
+    devices = {}
+    for name, (entry, descriptor) in _used(file, registry, sensor).items():
+        if entry.emulated:
+            with _entry(name):
+                devices[name] = emulated_device(descriptor, name, entry, senses, file.emulation.seed)
+    return devices
 
 
 def emulated_device(
@@ -64,29 +65,28 @@ def emulated_device(
     from tactbench.devices.emulation.scene_samples import PRESSING_FORCE
     from tactbench.devices.emulator import EmulatorSettings
 
-    with _entry(name):
-        if descriptor.emulator is None:
-            raise UsageError(
-                f"{descriptor.name} has no emulator.",
-                hint="Give the address of a real one under `link:`, or leave it out.",
-            )
-        if descriptor.emulated_link is None:
-            raise PluginContractError(
-                f"{descriptor.name} has an emulator, but does not say on which kind of link.",
-                hint="Its plugin's descriptor needs emulated_link.",
-            )
-        own = senses
-        if isinstance(entry, ForceEntry):
-            channel, sign = entry.channel, entry.sign
+    if descriptor.emulator is None:
+        raise UsageError(
+            f"{descriptor.name} has no emulator.",
+            hint="Give the address of a real one under `link:`, or leave it out.",
+        )
+    if descriptor.emulated_link is None:
+        raise PluginContractError(
+            f"{descriptor.name} has an emulator, but does not say on which kind of link.",
+            hint="Its plugin's descriptor needs emulated_link.",
+        )
+    own = senses
+    if isinstance(entry, ForceEntry):
+        channel, sign = entry.channel, entry.sign
 
-            def own(t_s: float) -> Mapping[str, float]:
-                return {channel: sign * senses(t_s).get(PRESSING_FORCE, 0.0)}
+        def own(t_s: float) -> Mapping[str, float]:
+            return {channel: sign * senses(t_s).get(PRESSING_FORCE, 0.0)}
 
-        of_link, of_device = split_faults(entry.faults)
-        rng = np.random.default_rng([seed, *name.encode()])
-        emulator = load_object(descriptor.emulator)(EmulatorSettings(own, rng, entry.options, of_device))
-        baud = entry.options.get("baud")
-        return EmulatedDevice(descriptor.emulated_link, emulator, of_link, baud if isinstance(baud, int) else None)
+    of_link, of_device = split_faults(entry.faults)
+    rng = np.random.default_rng([seed, *name.encode()])
+    emulator = load_object(descriptor.emulator)(EmulatorSettings(own, rng, entry.options, of_device))
+    baud = entry.options.get("baud")
+    return EmulatedDevice(descriptor.emulated_link, emulator, of_link, baud if isinstance(baud, int) else None)
 
 
 def drivers_of(
@@ -158,7 +158,8 @@ def _used(
     used: dict[str, tuple[DeviceEntry, SensorDescriptor | DeviceDescriptor]] = {}
     for name, entry in file.entries().items():
         if name == sensor or isinstance(entry, ForceEntry | NamedDevice):
-            used[name] = entry, descriptor_of(registry, name, entry)
+            with _entry(name):
+                used[name] = entry, descriptor_of(registry, name, entry)
     return used
 
 
@@ -172,16 +173,13 @@ def descriptor_of(registry: Registry, name: str, entry: DeviceEntry) -> SensorDe
     UsageError
         If the force sensor is none.
     """
-    with _entry(name):
-        if not isinstance(entry, ForceEntry | NamedDevice):
-            return registry.sensors[name]
-        descriptor = registry.devices[entry.device]
-        if isinstance(entry, ForceEntry) and descriptor.kind != "force":
-            known = ", ".join(device.name for device in registry.devices if device.kind == "force") or "none"
-            raise UsageError(
-                f"{entry.device} is a {descriptor.kind}, no force sensor.", hint=f"Installed are: {known}."
-            )
-        return descriptor
+    if not isinstance(entry, ForceEntry | NamedDevice):
+        return registry.sensors[name]
+    descriptor = registry.devices[entry.device]
+    if isinstance(entry, ForceEntry) and descriptor.kind != "force":
+        known = ", ".join(device.name for device in registry.devices if device.kind == "force") or "none"
+        raise UsageError(f"{entry.device} is a {descriptor.kind}, no force sensor.", hint=f"Installed are: {known}.")
+    return descriptor
 
 
 @contextmanager

@@ -51,7 +51,7 @@ class SceneSamples:
 
     def __init__(self, scene: SimulatedScene, duration_s: float, *, rest_s: float = 0.0) -> None:
         self.duration_s = duration_s
-        self._rest_s = min(rest_s, duration_s)
+        self._rest_ns = round(1e9 * min(rest_s, duration_s))
         self._start_s: float | None = None
         self._tracks = _tracks((*scene.streams, *scene.reference), scene)
         self._last: tuple[tuple[int, ...], Mapping[str, float]] = (), {}
@@ -67,10 +67,9 @@ class SceneSamples:
 
     def __call__(self, t_s: float) -> Mapping[str, float]:
         """Return the value of every channel at `t_s`, seconds of the devices' clock, in the channels' units."""
-        since_s = t_s - (self._start_s or 0.0)
-        if self._start_s is None or not 0.0 <= since_s < self.duration_s:
-            since_s = since_s % self._rest_s if self._rest_s > 0.0 else 0.0
-        since_ns = round(since_s * 1e9)
+        since_ns = round(1e9 * (t_s - (self._start_s or 0.0)))
+        if self._start_s is None or not 0 <= since_ns < round(1e9 * self.duration_s):
+            since_ns = since_ns % self._rest_ns if self._rest_ns else 0
         rows = tuple(max(bisect_right(times, since_ns) - 1, 0) for times, _, _ in self._tracks)
         last_rows, values = self._last
         if rows != last_rows:
