@@ -79,9 +79,12 @@ from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPa
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
 
 if TYPE_CHECKING:
+    from tactbench.core.plugins.rig_devices import drivers_of, emulators_of
     from tactbench.core.recording.reader import Recording, open_recording
     from tactbench.core.samples import FloatArray
     from tactbench.devices.driver import Driver, DriverFactory, DriverSettings
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
+    from tactbench.devices.emulation.scene_samples import SceneSamples
     from tactbench.devices.emulator import (
         DeviceEmulator,
         EmulatorFactory,
@@ -96,10 +99,10 @@ if TYPE_CHECKING:
     from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
-    from tactbench.links.byte_link import ByteLink
+    from tactbench.links.byte_link import ByteLink, SerialLink
     from tactbench.links.can_link import CanBus, CanFrame, CanLink
     from tactbench.links.can_log import CanLog
-    from tactbench.links.datagram_link import DatagramLink
+    from tactbench.links.datagram_link import DatagramLink, UdpLink
     from tactbench.links.link import Clock, Link, Received
     from tactbench.links.spi_bridge import SpiBridge
     from tactbench.links.spi_link import SpiLink, SpiReply, SpiStep
@@ -138,6 +141,8 @@ __all__ = [
     "DriverFactory",
     "DriverSettings",
     "EffectDescriptor",
+    "EmulatedDevice",
+    "EmulatedDevices",
     "Emulation",
     "EmulationSettings",
     "EmulatorFactory",
@@ -190,10 +195,12 @@ __all__ = [
     "Scalar",
     "Scenario",
     "Scene",
+    "SceneSamples",
     "Senses",
     "SensorDescriptor",
     "SensorSpec",
     "Sent",
+    "SerialLink",
     "SheetTable",
     "Shelf",
     "Simulation",
@@ -219,11 +226,14 @@ __all__ = [
     "TaskSpec",
     "Transducer",
     "TransducerFactory",
+    "UdpLink",
     "Unwrap",
     "UsageError",
     "Verdict",
     "assumed",
     "derived",
+    "drivers_of",
+    "emulators_of",
     "fault_concerns",
     "hookimpl",
     "load_object",
@@ -248,6 +258,8 @@ _ON_DEMAND = {
     "Driver": "tactbench.devices.driver",
     "DriverFactory": "tactbench.devices.driver",
     "DriverSettings": "tactbench.devices.driver",
+    "EmulatedDevice": "tactbench.devices.emulation.emulated_devices",
+    "EmulatedDevices": "tactbench.devices.emulation.emulated_devices",
     "EmulatorFactory": "tactbench.devices.emulator",
     "EmulatorSettings": "tactbench.devices.emulator",
     "Fault": "tactbench.devices.fault",
@@ -258,15 +270,20 @@ _ON_DEMAND = {
     "Reading": "tactbench.devices.reading",
     "Received": "tactbench.links.link",
     "Recording": "tactbench.core.recording.reader",
+    "SceneSamples": "tactbench.devices.emulation.scene_samples",
     "Senses": "tactbench.devices.emulator",
     "Sent": "tactbench.devices.emulator",
+    "SerialLink": "tactbench.links.byte_link",
     "SpiBridge": "tactbench.links.spi_bridge",
     "SpiDeviceEmulator": "tactbench.devices.emulator",
     "SpiLink": "tactbench.links.spi_link",
     "SpiReply": "tactbench.links.spi_link",
     "SpiStep": "tactbench.links.spi_link",
     "SpidevLink": "tactbench.links.spidev",
+    "UdpLink": "tactbench.links.datagram_link",
     "Unwrap": "tactbench.devices.sequence",
+    "drivers_of": "tactbench.core.plugins.rig_devices",
+    "emulators_of": "tactbench.core.plugins.rig_devices",
     "fault_concerns": "tactbench.devices.fault",
     "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",

@@ -166,10 +166,10 @@ class LinkAddress:
         """
         match self.kind.split("/"):
             case ["udp"]:
-                from tactbench.links.datagram_link import DatagramLink
+                from tactbench.links.datagram_link import UdpLink
 
                 host, port = _host_and_port(self.text, self.kind, self.target)
-                return DatagramLink(host, port, clock=clock, **self.options)
+                return UdpLink(host, port, clock=clock, **self.options)
             case ["can", "log"]:
                 from tactbench.links.can_log import CanLog
 
@@ -179,17 +179,20 @@ class LinkAddress:
 
                 return CanBus(interface, self.target, clock=clock, **self.options)  # type: ignore[arg-type]
             case ["spi", "bridge"]:
+                from tactbench.links.byte_link import SerialLink
                 from tactbench.links.spi_bridge import SpiBridge
 
-                return SpiBridge(self.target, clock=clock, **self.options)
+                line = {key: value for key, value in self.options.items() if key not in _SPI}
+                bus = {key: value for key, value in self.options.items() if key in _SPI}
+                return SpiBridge(SerialLink(self.target, clock=clock, **line), **bus)
             case ["spi", _]:
                 from tactbench.links.spidev import SpidevLink
 
                 return SpidevLink(self.target, clock=clock, **self.options)
-        from tactbench.links.byte_link import ByteLink
+        from tactbench.links.byte_link import SerialLink
 
         url = self.target if self.kind == "serial" else f"{self.kind}://{self.target}"
-        return ByteLink(url, clock=clock, **self.options)
+        return SerialLink(url, clock=clock, **self.options)
 
 
 def open_link(address: str, clock: Clock = time.monotonic_ns) -> Link:

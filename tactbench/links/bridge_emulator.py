@@ -1,10 +1,11 @@
-"""The SPI bridge as a model: bytes in, bytes out, on a clock that is passed in.
+"""The SPI bridge as a model, fed and polled like an emulated device: bytes in, bytes out, on a clock passed in.
 
 Also the reference for its firmware: what it answers to what, ``docs/links.md`` says in words.
 """
 
 from __future__ import annotations
 
+import math
 import struct
 from collections import deque
 from collections.abc import Callable
@@ -70,23 +71,24 @@ class BridgeEmulator:
         """How many frames came damaged so far."""
         return self._decoder.damaged
 
-    def feed(self, data: bytes, now_s: float) -> bytes:
-        """Take bytes from the host and return what is sent by now."""
+    def feed(self, data: bytes, now_s: float) -> list[tuple[float, bytes]]:
+        """Take bytes from the host and return what is sent by now, each piece with its second."""
         out = self.poll(now_s)
-        for frame in self._decoder.feed(data):
-            out += self._answered(frame, now_s)
+        out += [(now_s, answer) for frame in self._decoder.feed(data) if (answer := self._answered(frame, now_s))]
         return out + self.poll(now_s)
 
-    def poll(self, now_s: float) -> bytes:
-        """Return the replies to batches that are over by `now_s`."""
-        out = b""
+    def poll(self, now_s: float) -> list[tuple[float, bytes]]:
+        """Return the replies to batches that are over by `now_s`, each with the second at which its batch was over."""
+        out = []
         while self._due and self._due[0][0] <= now_s:
-            out += self._due.popleft()[1]
+            t_s, reply = self._due.popleft()
+            if reply:
+                out.append((t_s, reply))
         return out
 
-    def next_s(self) -> float | None:
-        """Return when the next reply is due; None: none is."""
-        return self._due[0][0] if self._due else None
+    def next_s(self) -> float:
+        """Return when the next reply is due; infinite: none is."""
+        return self._due[0][0] if self._due else math.inf
 
     def _answered(self, frame: Frame, now_s: float) -> bytes:
         if frame.version != VERSION:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import selectors
 import time
+from abc import abstractmethod
 from typing import Literal
 
 from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
@@ -14,7 +15,44 @@ _PARITY = {"none": "N", "even": "E", "odd": "O"}
 
 
 class ByteLink(Link):
-    """A byte stream in both directions.
+    """A byte stream in both directions: a :class:`SerialLink`, or an emulated device's."""
+
+    @abstractmethod
+    def read(self, timeout_s: float, *, size: int = 65536) -> Received:
+        """Return what has come, as soon as that is at least one byte.
+
+        Parameters
+        ----------
+        timeout_s
+            Seconds to wait; 0 asks without waiting.
+        size
+            The most bytes to return.
+
+        Raises
+        ------
+        LinkTimeout
+            If nothing came.
+        LinkUnplugged
+            If the device is gone, or the other end of a socket or pseudo-terminal.
+        LinkClosed
+            If the link was closed.
+        """
+
+    @abstractmethod
+    def write(self, data: bytes) -> None:
+        """Hand `data` over to be sent.
+
+        Raises
+        ------
+        LinkTimeout
+            If the other end does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`.
+        LinkUnplugged, LinkClosed
+            As of :meth:`read`.
+        """
+
+
+class SerialLink(ByteLink):
+    """A byte stream of the system, by pyserial.
 
     Parameters
     ----------
@@ -68,25 +106,7 @@ class ByteLink(Link):
         self._ready = selectors.DefaultSelector()
         self._ready.register(descriptor, selectors.EVENT_READ)
 
-    def read(self, timeout_s: float, *, size: int = 65536) -> Received:
-        """Return what has come, as soon as that is at least one byte.
-
-        Parameters
-        ----------
-        timeout_s
-            Seconds to wait; 0 asks without waiting.
-        size
-            The most bytes to return.
-
-        Raises
-        ------
-        LinkTimeout
-            If nothing came.
-        LinkUnplugged
-            If the device is gone, or the other end of a socket or pseudo-terminal.
-        LinkClosed
-            If the link was closed.
-        """
+    def read(self, timeout_s: float, *, size: int = 65536) -> Received:  # noqa: D102  (inherited)
         deadline = self._usable(timeout_s)
         left_s = timeout_s
         try:
@@ -103,22 +123,13 @@ class ByteLink(Link):
                     data = self._port.read(size)
                 if data:
                     return Received(data, t_ns)
-                left_s = deadline - time.monotonic()
+                left_s = deadline - self.timer()
                 if left_s <= 0:
                     raise self._nothing_came(timeout_s)
         except OSError as error:
             raise self._unplugged(error) from error
 
-    def write(self, data: bytes) -> None:
-        """Hand `data` to the system, which sends it.
-
-        Raises
-        ------
-        LinkTimeout
-            If the other end does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`.
-        LinkUnplugged, LinkClosed
-            As of :meth:`read`.
-        """
+    def write(self, data: bytes) -> None:  # noqa: D102  (inherited)
         from serial import SerialTimeoutException
 
         self._usable()

@@ -76,6 +76,15 @@ class CanLink(Link):
             As of :meth:`receive`.
         """
 
+    def _sendable(self, frame: CanFrame) -> None:
+        """Raise what `send` raises of a link that is closed or unplugged, and of what is no CAN frame."""
+        self._usable()
+        if not 0 <= frame.id < 1 << (29 if frame.extended else 11) or len(frame.data) > 8:
+            raise LinkError(
+                f"{self.address}: {frame} is not a CAN frame.",
+                hint="An identifier has 11 bits (29 if extended), the data at most 8 bytes.",
+            )
+
     def _data_frame(self, message: Any, t_ns: int) -> CanFrame | None:
         """Return python-can's `message` as a frame, or count it and return None."""
         if message.is_error_frame:
@@ -160,7 +169,7 @@ class CanBus(CanLink):
                 message = frame = None
             if frame is not None:
                 return frame
-            left_s = deadline - time.monotonic()
+            left_s = deadline - self.timer()
             if left_s <= 0:
                 if message is None:
                     raise self._nothing_came(timeout_s)
@@ -170,16 +179,10 @@ class CanBus(CanLink):
         import can
         from serial import SerialTimeoutException
 
-        self._usable()
-        try:
-            message = can.Message(
-                arbitration_id=frame.id, data=frame.data, is_extended_id=frame.extended, is_rx=False, check=True
-            )
-        except ValueError as error:
-            raise LinkError(
-                f"{self.address}: {frame} is not a CAN frame: {error}.",
-                hint="An identifier has 11 bits (29 if extended), the data at most 8 bytes.",
-            ) from error
+        self._sendable(frame)
+        message = can.Message(
+            arbitration_id=frame.id, data=frame.data, is_extended_id=frame.extended, is_rx=False, check=True
+        )
         try:
             self._bus.send(message, WRITE_TIMEOUT_S)
         except can.CanTimeoutError as error:

@@ -1,9 +1,10 @@
-"""Datagrams over UDP."""
+"""Datagrams, over UDP or to an emulated device."""
 
 from __future__ import annotations
 
 import socket
 import time
+from abc import abstractmethod
 
 from tactbench.core.errors import LinkError
 from tactbench.links.link import WRITE_TIMEOUT_S, Clock, Link, Received, cannot_open
@@ -13,7 +14,53 @@ LARGEST_DATAGRAM = 65507
 
 
 class DatagramLink(Link):
-    """Datagrams to and from one peer; those of others are not seen.
+    """Datagrams to and from one peer: a :class:`UdpLink`, or an emulated device's."""
+
+    @abstractmethod
+    def receive(self, timeout_s: float) -> Received:
+        """Return the next datagram, whole.
+
+        Parameters
+        ----------
+        timeout_s
+            Seconds to wait; 0 asks without waiting.
+
+        Raises
+        ------
+        LinkTimeout
+            If none came.
+        LinkUnplugged
+            If the peer's host says that nobody listens there, or the network is gone.
+        LinkClosed
+            If the link was closed.
+        """
+
+    @abstractmethod
+    def send(self, data: bytes) -> None:
+        """Send one datagram.
+
+        Raises
+        ------
+        LinkError
+            If it is longer than UDP carries.
+        LinkTimeout
+            If the system does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`.
+        LinkUnplugged, LinkClosed
+            As of :meth:`receive`.
+        """
+
+    def _sendable(self, data: bytes) -> None:
+        """Raise what `send` raises of a link that is closed or unplugged, and of data that is too long."""
+        self._usable()
+        if len(data) > LARGEST_DATAGRAM:
+            raise LinkError(
+                f"{self.address}: a datagram of {len(data)} bytes was given, at most {LARGEST_DATAGRAM} go out.",
+                hint="Send it in parts.",
+            )
+
+
+class UdpLink(DatagramLink):
+    """Datagrams to and from one peer over UDP; those of others are not seen.
 
     Parameters
     ----------
@@ -68,23 +115,7 @@ class DatagramLink(Link):
         """Port of this end."""
         return int(self._socket.getsockname()[1])
 
-    def receive(self, timeout_s: float) -> Received:
-        """Return the next datagram, whole.
-
-        Parameters
-        ----------
-        timeout_s
-            Seconds to wait; 0 asks without waiting.
-
-        Raises
-        ------
-        LinkTimeout
-            If none came.
-        LinkUnplugged
-            If the peer's host says that nobody listens there, or the network is gone.
-        LinkClosed
-            If the link was closed.
-        """
+    def receive(self, timeout_s: float) -> Received:  # noqa: D102  (inherited)
         self._usable(timeout_s)
         try:
             self._socket.settimeout(timeout_s)
@@ -95,24 +126,8 @@ class DatagramLink(Link):
         except OSError as error:
             raise self._unplugged(error) from error
 
-    def send(self, data: bytes) -> None:
-        """Send one datagram.
-
-        Raises
-        ------
-        LinkError
-            If it is longer than UDP carries.
-        LinkTimeout
-            If the system does not take it within :data:`~tactbench.links.link.WRITE_TIMEOUT_S`.
-        LinkUnplugged, LinkClosed
-            As of :meth:`receive`.
-        """
-        self._usable()
-        if len(data) > LARGEST_DATAGRAM:
-            raise LinkError(
-                f"{self.address}: a datagram of {len(data)} bytes was given, at most {LARGEST_DATAGRAM} go out.",
-                hint="Send it in parts.",
-            )
+    def send(self, data: bytes) -> None:  # noqa: D102  (inherited)
+        self._sendable(data)
         try:
             self._socket.settimeout(WRITE_TIMEOUT_S)
             self._socket.send(data)

@@ -32,7 +32,7 @@ class Received:
 class Link(ABC):
     """A connection to a device: open when it is made, until :meth:`close` or the end of its ``with`` block.
 
-    One thread uses a link. Time-outs are waits in real time, whatever the clock.
+    One thread uses a link. Time-outs are waits by :meth:`timer`, whatever the clock.
 
     Parameters
     ----------
@@ -62,12 +62,16 @@ class Link(ABC):
             self._closed = True
             self._release()
 
+    def timer(self) -> float:
+        """Return the seconds by which its waits are counted: real ones, or virtual ones where time is virtual."""
+        return time.monotonic()
+
     @abstractmethod
     def _release(self) -> None:
         """Give back what the link holds; called once, also after the other end is gone, and raises nothing."""
 
     def _usable(self, timeout_s: float = 0.0) -> float:
-        """Return when a wait of `timeout_s` ends, in seconds of :func:`time.monotonic`.
+        """Return when a wait of `timeout_s` ends, in seconds of :meth:`timer`.
 
         Raises
         ------
@@ -85,7 +89,7 @@ class Link(ABC):
                 f"{self.address}: a time-out of {timeout_s} s was given, a finite one of 0 or more was expected.",
                 hint="Use 0 to ask without waiting.",
             )
-        return time.monotonic() + timeout_s
+        return self.timer() + timeout_s
 
     def _unplugged(self, cause: BaseException) -> LinkUnplugged:
         self._gone = cause

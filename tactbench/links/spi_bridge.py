@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import struct
-import time
 from collections import deque
 from collections.abc import Sequence
 
 from tactbench.core.errors import LinkError, LinkTimeout
 from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode
 from tactbench.links.byte_link import ByteLink
-from tactbench.links.link import Clock
 from tactbench.links.spi_link import SpiLink, SpiReply, SpiStep
 
 HELLO = struct.Struct("<HHBB")
@@ -32,17 +30,14 @@ class SpiBridge(SpiLink):
     Parameters
     ----------
     port
-        The bridge's port, as :class:`ByteLink` takes it.
+        The bridge's port, open; it is closed with this link, or if this link cannot be made. Its clock stamps what is
+        received, its waits count time-outs.
     speed_hz
         Clock of the SPI bus, at most, hertz.
     mode
         SPI mode, 0 to 3.
-    baud
-        Of the port, bits per second; a bridge with USB of its own takes any.
     wake_s
         Seconds within which the bridge must answer: many microcontrollers start anew when their port is opened.
-    clock
-        Stamps what is received.
 
     Attributes
     ----------
@@ -58,27 +53,25 @@ class SpiBridge(SpiLink):
     Raises
     ------
     LinkError
-        If the port cannot be opened, nothing answers, or the bridge speaks another version or cannot do `mode`.
+        If nothing answers, or the bridge speaks another version or cannot do `mode`.
     """
 
     def __init__(
         self,
-        port: str,
+        port: ByteLink,
         *,
         speed_hz: int,
         mode: int = 0,
-        baud: int = 115200,
         wake_s: float = 3.0,
-        clock: Clock = time.monotonic_ns,
     ) -> None:
-        super().__init__(f"spi://bridge/{port}", clock)
+        super().__init__(f"spi://bridge/{port.address}")
         self.lost = 0
         self.unexpected = 0
         self._decoder = FrameDecoder()
         self._frames: deque[tuple[Frame, int]] = deque()
         self._began_ns = 0
         self._waiting: dict[int, tuple[int, ...]] = {}
-        self._bytes = ByteLink(port, baud=baud, clock=clock)
+        self._bytes = port
         try:
             self._greet(wake_s)
             self._set_up(speed_hz, mode)
@@ -91,15 +84,19 @@ class SpiBridge(SpiLink):
         """How many frames came damaged so far."""
         return self._decoder.damaged
 
+    def timer(self) -> float:
+        """Return the seconds by which the port's waits are counted."""
+        return self._bytes.timer()
+
     def _greet(self, wake_s: float) -> None:
-        deadline = time.monotonic() + wake_s
+        deadline = self.timer() + wake_s
         while True:
             self._bytes.write(b"\0" + encode(Frame(Kind.HELLO, 0)))
             try:
                 hello = self._answer(Kind.HELLO, min(_ASK_S, wake_s))
                 break
             except LinkTimeout as error:
-                if time.monotonic() >= deadline:
+                if self.timer() >= deadline:
                     raise LinkError(
                         f"{self.address}: nothing there answered as an SPI bridge within {wake_s:g} s.",
                         hint="Is it the bridge's port, and does the bridge run the firmware of docs/links.md?",
@@ -120,7 +117,7 @@ class SpiBridge(SpiLink):
 
     def _answer(self, kind: Kind, timeout_s: float) -> Frame:
         """Return the reply to a request that is no batch; what else comes is not looked at."""
-        deadline = time.monotonic() + timeout_s
+        deadline = self.timer() + timeout_s
         while True:
             frame, _ = self._next(timeout_s, deadline)
             if frame.version != VERSION:
@@ -136,7 +133,7 @@ class SpiBridge(SpiLink):
     def _next(self, timeout_s: float, deadline: float) -> tuple[Frame, int]:
         """Return the next frame and when its first byte was in the host."""
         while not self._frames:
-            left_s = deadline - time.monotonic()
+            left_s = deadline - self.timer()
             try:
                 received = self._bytes.read(max(0.0, left_s))
             except LinkTimeout:

@@ -56,7 +56,7 @@ class SpiLink(Link):
 
     @abstractmethod
     def _collect(self, timeout_s: float, deadline: float) -> SpiReply:
-        """Return the next reply; `deadline` is when `timeout_s` ends, in seconds of :func:`time.monotonic`."""
+        """Return the next reply; `deadline` is when `timeout_s` ends, in seconds of :meth:`timer`."""
 
     def send(self, steps: Sequence[SpiStep]) -> int:
         """Hand over a batch and return its number: 0, 1, 2, …, after 65535 again 0.
@@ -106,8 +106,8 @@ class SpiLink(Link):
             As of :meth:`receive`.
         """
         number = self.send([SpiStep(data, select, pause_us)])
-        deadline = time.monotonic() + timeout_s
+        deadline = self.timer() + timeout_s
         while True:
-            reply = self.receive(max(0.0, deadline - time.monotonic()))
+            reply = self.receive(max(0.0, deadline - self.timer()))
             if reply.number == number:
                 return reply.data[0]

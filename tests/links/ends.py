@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import select
 import socket
@@ -82,13 +83,14 @@ def serving(emulator: BridgeEmulator) -> Iterator[Pty]:
         def serve() -> None:
             while True:
                 due = emulator.next_s()
-                wait_s = None if due is None else max(0.0, due - time.monotonic())
+                wait_s = None if due == math.inf else max(0.0, due - time.monotonic())
                 ready, _, _ = select.select([end.master, stop], [], [], wait_s)
                 if stop in ready:
                     return
                 try:
                     data = os.read(end.master, 65536) if ready else b""
-                    os.write(end.master, emulator.feed(data, time.monotonic()))
+                    for _, reply in emulator.feed(data, time.monotonic()):
+                        os.write(end.master, reply)
                 except OSError:
                     return
 

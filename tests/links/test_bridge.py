@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode
 from tactbench.links.spi_bridge import HELLO, SETUP
-from tactbench.plugin import BridgeEmulator, LinkError, LinkTimeout, SpiBridge, SpiStep
+from tactbench.plugin import BridgeEmulator, LinkError, LinkTimeout, SerialLink, SpiBridge, SpiStep
 from tests.links.ends import loopback, pty, serving
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,7 +62,7 @@ def test_vectors_of_the_document():
     for (_, request), (_, reply) in zip(lines[::2], lines[1::2], strict=True):
         (frame,) = FrameDecoder().feed(request)
         assert encode(frame) == request
-        assert emulator.feed(request, 1.0) + emulator.poll(2.0) == reply
+        assert sent(emulator.feed(request, 1.0) + emulator.poll(2.0)) == reply
 
 
 @settings(max_examples=100)
@@ -115,8 +116,12 @@ class Told:
         return bytes(255 - byte for byte in data)
 
 
-def replies(data):
-    return FrameDecoder().feed(data)
+def sent(pieces):
+    return b"".join(piece for _, piece in pieces)
+
+
+def replies(pieces):
+    return FrameDecoder().feed(sent(pieces))
 
 
 def batch(*steps):
@@ -135,12 +140,15 @@ def test_a_batch_runs_by_the_bus_clock_and_its_pauses():
     """At 1 MHz two bytes take 16 us: the second transfer begins after 16 + 50 us, the reply is due after 92 us."""
     emulator, bus = ready()
     request = encode(Frame(Kind.BATCH, 5, batch(SpiStep(b"\x81\x00", 3, 50), SpiStep(b"\0\0", 1, 10))))
-    assert emulator.feed(request, 2.0) == b""
+    assert emulator.feed(request, 2.0) == []
     assert [(select, data) for select, data, _ in bus.told] == [(3, b"\x81\x00"), (1, b"\0\0")]
     assert [t_s for *_, t_s in bus.told] == pytest.approx([2.0, 2.000066], abs=1e-12)
     assert emulator.next_s() == pytest.approx(2.000092, abs=1e-12)
-    assert emulator.poll(2.00009) == b""
-    (reply,) = replies(emulator.poll(2.0001))
+    assert emulator.poll(2.00009) == []
+    ((over_s, data),) = emulator.poll(2.0001)
+    assert over_s == pytest.approx(2.000092, abs=1e-12)
+    assert emulator.next_s() == math.inf
+    (reply,) = FrameDecoder().feed(data)
     assert reply == Frame(0x83, 5, (2_000_000).to_bytes(4, "little") + b"\x7e\xff\xff\xff")
 
 
@@ -200,7 +208,7 @@ def emulator():
 
 @pytest.fixture
 def link(emulator):
-    with serving(emulator) as far, SpiBridge(far.name, speed_hz=4_400_000) as link:
+    with serving(emulator) as far, SpiBridge(SerialLink(far.name), speed_hz=4_400_000) as link:
         yield link
 
 
@@ -288,7 +296,7 @@ def test_a_doubled_reply_is_counted_once(link, emulator):
 @needs_pty
 def test_what_is_no_bridge_is_said(tmp_path):
     with pty() as far, pytest.raises(LinkError, match="answered as an SPI bridge within"):
-        SpiBridge(far.name, speed_hz=1000, wake_s=0.05)
+        SpiBridge(SerialLink(far.name), speed_hz=1000, wake_s=0.05)
 
 
 @needs_pty
@@ -296,16 +304,16 @@ def test_a_bridge_of_another_version_is_refused():
     class Newer(BridgeEmulator):
         def feed(self, data, now_s):
             about = HELLO.pack(2, 10, 1, 1)
-            return encode(Frame(Kind.HELLO.reply, 0, about, version=2)) if data else b""
+            return [(now_s, encode(Frame(Kind.HELLO.reply, 0, about, version=2)))] if data else []
 
     with serving(Newer(loopback)) as far, pytest.raises(LinkError, match="speaks version 2"):
-        SpiBridge(far.name, speed_hz=1000)
+        SpiBridge(SerialLink(far.name), speed_hz=1000)
 
 
 @needs_pty
 def test_a_mode_that_the_bridge_cannot_do_is_refused():
     with serving(BridgeEmulator(loopback)) as far, pytest.raises(LinkError, match="clock or mode"):
-        SpiBridge(far.name, speed_hz=1000, mode=7)
+        SpiBridge(SerialLink(far.name), speed_hz=1000, mode=7)
 
 
 @needs_pty
@@ -327,7 +335,10 @@ def test_stamp_of_a_reply_is_that_of_its_first_byte():
     if os.name != "posix":
         pytest.skip("pseudo-terminals are POSIX")
     ticks = [0]
-    with serving(BridgeEmulator(loopback)) as far, SpiBridge(far.name, speed_hz=1000, clock=lambda: ticks[0]) as link:
+    with (
+        serving(BridgeEmulator(loopback)) as far,
+        SpiBridge(SerialLink(far.name, clock=lambda: ticks[0]), speed_hz=1000) as link,
+    ):
         reply = encode(Frame(0x83, 0, bytes(4) + b"ab"))
         link._waiting[0] = (2,)
         for t_ns, part in ((1, reply[:5]), (2, reply[5:])):

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from tactbench.plugin import ByteLink, LinkError, LinkTimeout, open_link
+from tactbench.plugin import LinkError, LinkTimeout, SerialLink, open_link
 from tests.links.ends import pty
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
@@ -22,7 +22,7 @@ def far():
 
 
 def test_every_byte_passes_unchanged_both_ways(far):
-    with ByteLink(far.name) as link:
+    with SerialLink(far.name) as link:
         link.write(ALL_BYTES)
         assert far.read_until(b"\xff") == ALL_BYTES
         far.write(ALL_BYTES)
@@ -33,7 +33,7 @@ def test_every_byte_passes_unchanged_both_ways(far):
 
 
 def test_what_has_come_is_returned_at_once_and_no_more_than_asked(far):
-    with ByteLink(far.name) as link:
+    with SerialLink(far.name) as link:
         far.write(b"abcdef")
         assert link.read(2.0, size=4).data == b"abcd"
         assert link.read(0).data == b"ef"
@@ -42,7 +42,7 @@ def test_what_has_come_is_returned_at_once_and_no_more_than_asked(far):
 def test_stamp_is_taken_when_the_first_byte_is_there(far):
     """Not when the wait began: the clock stands at 1 until the far end writes, and at 2 from then on."""
     now = [1]
-    with ByteLink(far.name, clock=lambda: now[0]) as link:
+    with SerialLink(far.name, clock=lambda: now[0]) as link:
 
         def write() -> None:
             now[0] = 2
@@ -55,12 +55,12 @@ def test_stamp_is_taken_when_the_first_byte_is_there(far):
 
 
 def test_a_port_is_opened_by_one_only(far):
-    with ByteLink(far.name), pytest.raises(LinkError, match="Another program has it open"):
-        ByteLink(far.name)
+    with SerialLink(far.name), pytest.raises(LinkError, match="Another program has it open"):
+        SerialLink(far.name)
 
 
 def test_a_far_end_that_does_not_read_is_a_timeout(far):
-    with ByteLink(far.name) as link, pytest.raises(LinkTimeout, match="did not take"):
+    with SerialLink(far.name) as link, pytest.raises(LinkTimeout, match="did not take"):
         link.write(bytes(1 << 20))  # a pseudo-terminal holds some ten thousand
 
 

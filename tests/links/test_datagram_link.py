@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from tactbench.plugin import DatagramLink, LinkError, LinkTimeout, open_link
+from tactbench.plugin import LinkError, LinkTimeout, UdpLink, open_link
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def far():
 
 
 def test_datagrams_stay_whole_and_apart(far):
-    with DatagramLink("127.0.0.1", far.getsockname()[1]) as link:
+    with UdpLink("127.0.0.1", far.getsockname()[1]) as link:
         link.send(b"request")
         data, sender = far.recvfrom(100)
         assert data == b"request"
@@ -28,7 +28,7 @@ def test_datagrams_stay_whole_and_apart(far):
 
 
 def test_only_the_peer_is_heard(far):
-    with DatagramLink("127.0.0.1", far.getsockname()[1]) as link:
+    with UdpLink("127.0.0.1", far.getsockname()[1]) as link:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             stranger.sendto(b"stranger", ("127.0.0.1", link.local_port))
         far.sendto(b"peer", ("127.0.0.1", link.local_port))
@@ -39,7 +39,7 @@ def test_only_the_peer_is_heard(far):
 
 def test_the_buffer_holds_a_second_of_force_at_1_khz(far):
     """36 bytes a datagram: the usual buffer holds 256 of them."""
-    with DatagramLink("127.0.0.1", far.getsockname()[1]) as link:
+    with UdpLink("127.0.0.1", far.getsockname()[1]) as link:
         if link.granted_bytes < 1 << 20:
             pytest.skip(f"this system gives a buffer of {link.granted_bytes} bytes at most")
         for number in range(1000):
@@ -68,7 +68,7 @@ def test_ipv6(far):
 
 
 def test_what_is_too_long_is_refused_and_the_link_lives_on(far):
-    with DatagramLink("127.0.0.1", far.getsockname()[1]) as link:
+    with UdpLink("127.0.0.1", far.getsockname()[1]) as link:
         with pytest.raises(LinkError, match="65507"):
             link.send(bytes(65508))
         link.send(b"x")

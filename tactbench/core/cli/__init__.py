@@ -19,6 +19,7 @@ VERBS = {
     "show": ("show", "Show sensors side by side, or a task, rig or estimator."),
     "choose": ("choose", "Say which sensor meets a wish, which misses it by how much, and what is unknown."),
     "record": ("record", "Carry out one scene into one recording."),
+    "emulate": ("emulate", "Start emulated sensors and devices on links of this machine, pressed by a simulated rig."),
     "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
     "import": ("import_", "Turn foreign tables, or a log of a sensor's own tools, into recordings."),
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),
@@ -107,6 +108,8 @@ def _interrupted(arguments: list[str] | None) -> int:
         kept = "What was finished is kept; the same command goes on from there."
     elif words[:1] == ["cost"] and "--twin" not in words:
         kept = "Recordings and scores are kept, times are not: the same command measures them anew."
+    elif words[:1] == ["emulate"]:
+        kept = "The emulated devices and their links are gone."
     click.echo(f"Interrupted. {kept}", err=True)
     return 130
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.cli.scenes import press_options, scene_of
 from tactbench.core.cli.simulation import simulation_of, simulation_options
 
 if TYPE_CHECKING:
@@ -19,13 +20,7 @@ if TYPE_CHECKING:
 @click.command(name="record")
 @click.option("--sensor", required=True, metavar="NAME", help="What is pressed on.")
 @click.option("--rig", default="twin", show_default=True, metavar="NAME", help="What presses.")
-@click.option("--cap-mm", type=click.FloatRange(min=0, min_open=True), metavar="R",
-              help="Radius of a spherical cap; without it the indenter is flat.")  # fmt: skip
-@click.option(
-    "--force-n", type=click.FloatRange(min=0, min_open=True), metavar="F", help="Force at the end; default 5."
-)
-@click.option("--seconds", type=click.FloatRange(min=0, min_open=True), metavar="T",
-              help="Duration; the ramp keeps its shape. Default 60.")  # fmt: skip
+@press_options
 @click.option("--slide-mm-s", type=click.FloatRange(min=0, min_open=True), metavar="V",
               help="Slide towards the tip at this speed, from the middle on; vibration is recorded too.")  # fmt: skip
 @simulation_options
@@ -59,7 +54,7 @@ def command(
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
-    scene = _scene(out.stem, cap_mm, force_n, seconds, descriptor)
+    scene = scene_of(out.stem, cap_mm, force_n, seconds, descriptor)
     if slide_mm_s is not None:
         scene = _sliding(scene, slide_mm_s, descriptor)
     simulation = simulation_of(registry, rig, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario)
@@ -79,30 +74,6 @@ def command(
     for name, value in meta.assumptions.items():
         click.echo(f"  assumed: {name} = {value}", err=True)
     click.echo(f"See what is in it:  tactbench inspect {out}", err=True)
-
-
-def _scene(
-    name: str, cap_mm: float | None, force_n: float | None, seconds: float | None, sensor: SensorDescriptor
-) -> Scene:
-    """Return the scene the options describe; what they leave open is that of the paper."""
-    from tactbench.core.spec.quantity import sourced
-    from tactbench.core.spec.scene import ForceRamp, Indenter, Scene
-
-    said = "the command line"
-    ramp = ForceRamp()
-    change: dict[str, Any] = {}
-    if force_n is not None:
-        change["end"] = sourced(force_n, "N", said)
-    if seconds is not None:
-        share = seconds / ramp.duration.to("s")
-        change["duration"] = sourced(seconds, "s", said)
-        change["hold"] = sourced(ramp.hold.to("s") * share, "s", f"{said}: the same share of the duration")
-        change["samples"] = max(1, round(ramp.samples * share))
-    indenter = Indenter() if cap_mm is None else Indenter(radius=sourced(cap_mm, "mm", said))
-    kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
-    labels: dict[str, str | float | int] = {} if cap_mm is None else {"cap_radius_mm": cap_mm}
-    observe = ("taxel",) if "taxel" in kinds else kinds
-    return Scene(name=name, indenter=indenter, profile=ramp.model_copy(update=change), observe=observe, labels=labels)
 
 
 def _sliding(scene: Scene, speed_mm_s: float, sensor: SensorDescriptor) -> Scene:

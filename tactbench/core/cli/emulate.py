@@ -1,0 +1,305 @@
+"""``tactbench emulate``: emulated sensors and devices on links of this machine, pressed by a simulated rig."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tactbench.core.cli.scenes import press_options, scene_of
+from tactbench.core.cli.screen import remark
+
+if TYPE_CHECKING:
+    from tactbench.core.plugins.registry import Registry
+    from tactbench.core.samples import Block
+    from tactbench.core.spec.rig import SensorDescriptor
+    from tactbench.core.spec.rig_file import DeviceEntry, RigFile
+    from tactbench.core.spec.scene import ForceRamp, Scene
+    from tactbench.core.spec.sensor import StreamSpec
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
+    from tactbench.devices.emulation.scene_samples import SceneSamples
+
+HEAD = "# Written by `tactbench emulate`; its links are gone when that ends."
+STATUS_S = 5.0
+"""How often it is said how many bytes have passed."""
+
+
+@click.command(name="emulate")
+@click.argument("names", nargs=-1, metavar="[DEVICE]...")
+@click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
+              help="Start every device of this rig file whose link is `emulated`.")  # fmt: skip
+@press_options
+@click.option("--presses", type=click.IntRange(min=1), metavar="N", help="End after so many; default: with Ctrl-C.")
+@click.option("--fault", "faults", multiple=True, metavar="DEVICE:FAULT",
+              help="Something wrong with a device: biotac:parity:every=100, net-ft:unplug:start_s=20.")  # fmt: skip
+@click.option("--physics", metavar="RIG", help="The simulated rig that presses; default twin, or the rig file's.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), metavar="N", help="Of all that is drawn; default 1, or the rig file's."
+)
+@click.option("--can", type=click.Choice(["slcan", "udp_multicast"]), default="slcan", show_default=True,
+              help="How CAN devices are reached from other programs.")  # fmt: skip
+@click.option("--write-rig-file", type=click.Path(path_type=Path), metavar="FILE",
+              help="Write the rig file with the devices' links there, too.")  # fmt: skip
+def command(
+    names: tuple[str, ...],
+    rig_file: Path | None,
+    cap_mm: float | None,
+    force_n: float | None,
+    seconds: float | None,
+    presses: int | None,
+    faults: tuple[str, ...],
+    physics: str | None,
+    seed: int | None,
+    can: Any,
+    write_rig_file: Path | None,
+) -> None:
+    """Start emulated sensors and devices on links of this machine, pressed by a simulated rig.
+
+    DEVICE is a sensor or device by name, for example: tactbench emulate biotac net-ft. What another program needs to
+    open them is printed as a rig file.
+    """
+    from tactbench.core.errors import UsageError
+    from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.spec.rig_file import RigFile
+    from tactbench.core.spec.yaml_file import load_yaml
+
+    if bool(names) == (rig_file is not None):
+        raise UsageError(
+            "Either devices or a rig file say what to emulate.",
+            hint="For example: tactbench emulate biotac net-ft; `tactbench list devices` names more.",
+        )
+    registry = load_registry()
+    file = load_yaml(rig_file, RigFile) if rig_file is not None else None
+    entries = _named(registry, names) if file is None else file.entries()
+    settings = {} if file is None else dict(file.emulation)
+    presser = Presser(
+        registry,
+        settings.get("physics", "twin") if physics is None else physics,
+        {name: scene_of("press", cap_mm, force_n, seconds, registry.sensors[name]) for name in _sensors(entries)},
+        scene_of("press", cap_mm, force_n, seconds, None),
+        settings.get("seed", 1) if seed is None else seed,
+    )
+    emulate(registry, with_faults(entries, faults), presser, file, can=can, presses=presses, out=write_rig_file)
+
+
+def emulate(
+    registry: Registry,
+    entries: Mapping[str, DeviceEntry],
+    presser: Presser,
+    file: RigFile | None,
+    *,
+    can: Any,
+    presses: int | None,
+    out: Path | None,
+) -> None:
+    """Start what is emulated in `entries`, say where it is, and press until it is enough."""
+    from itertools import count
+
+    from tactbench.core.errors import UsageError
+    from tactbench.core.plugins.rig_devices import descriptor_of, emulated_device
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+
+    if out is not None and out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(HEAD):
+        raise UsageError(f"{out} is there already, and not from `tactbench emulate`.", hint="Give another name.")
+    devices: dict[str, EmulatedDevice] = {}
+    for name, entry in entries.items():
+        if entry.emulated:
+            descriptor = descriptor_of(registry, name, entry)
+            devices[name] = emulated_device(descriptor, name, entry, presser.senses(name), presser.seed)
+    if not devices:
+        raise UsageError("No device in the rig file is emulated.", hint="Write `link: emulated` for one.")
+    presser.draw(1)
+    with EmulatedDevices(devices, time="real", can=can) as emulated:
+        _say_where(emulated, entries, file, out)
+        for number in count(1) if presses is None else range(1, presses + 1):
+            if number > 1:
+                presser.draw(number)
+            _press(emulated, presser, number, presses)
+
+
+@dataclass
+class Presser:
+    """Presses the sensors, one scene each, time and again.
+
+    Parameters
+    ----------
+    physics
+        Name of the simulated rig.
+    scenes
+        By sensor.
+    alone
+        Scene of the force where there is no sensor.
+    seed
+        Of the first press; the next ones count on from it.
+    """
+
+    registry: Registry
+    physics: str
+    scenes: Mapping[str, Scene]
+    alone: Scene
+    seed: int
+
+    def __post_init__(self) -> None:
+        from tactbench.core.errors import UsageError
+        from tactbench.core.plugins.interfaces import RigContext
+        from tactbench.core.plugins.registry import load_object
+
+        descriptor = self.registry.rigs[self.physics]
+        if not descriptor.simulated:
+            raise UsageError(f"The rig {self.physics!r} is not simulated.", hint="Use twin.")
+        self._rig = load_object(descriptor.where)(RigContext(effects=tuple(self.registry.effects)))
+        self._drawn: dict[str, SceneSamples] = {}
+
+    def draw(self, number: int) -> None:
+        """Compute press `number`, 1 being the first; nothing is pressed until it is started."""
+        from tactbench.devices.emulation.scene_samples import SceneSamples
+
+        drawn = {}
+        for name, scene in self.scenes.items():
+            sensor: SensorDescriptor = self.registry.sensors[name]
+            kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
+            observed = scene.model_copy(update={"observe": kinds})
+            with self._rig.open(sensor, observed, seed=self.seed + number - 1) as acquisition:
+                profile = scene.profile
+                drawn[name] = SceneSamples(acquisition, profile.duration.to("s"), rest_s=profile.hold_s)
+        if not drawn:
+            profile = self.alone.profile
+            drawn[""] = SceneSamples(_ForceAlone(profile), profile.duration.to("s"), rest_s=profile.hold_s)
+        self._drawn = drawn
+
+    def start(self, at_s: float) -> float:
+        """Begin to press at `at_s` on the devices' clock; return when it is over."""
+        for samples in self._drawn.values():
+            samples.start(at_s)
+        return max(samples.over_s for samples in self._drawn.values())
+
+    def senses(self, name: str) -> Any:
+        """Return what a device senses: a sensor its own press, any other device that of the first sensor."""
+
+        def sensed(t_s: float) -> Mapping[str, float]:
+            drawn = self._drawn
+            return drawn[name if name in drawn else next(iter(drawn))](t_s) if drawn else {}
+
+        return sensed
+
+
+class _ForceAlone:
+    """The force of a profile without anything pressed."""
+
+    def __init__(self, profile: ForceRamp) -> None:
+        from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
+
+        self._profile = profile
+        self.streams: tuple[StreamSpec, ...] = ()
+        self.reference: tuple[StreamSpec, ...] = (
+            StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),)),
+        )
+
+    def __iter__(self) -> Iterator[Block]:
+        import numpy as np
+
+        from tactbench.core.samples import Block
+
+        t_s = np.arange(self._profile.samples) * self._profile.duration.to("s") / self._profile.samples
+        force_n = np.interp(t_s, *self._profile.corners)
+        yield Block("force_torque", np.round(t_s * 1e9).astype(np.int64), force_n[:, None])
+
+
+def with_faults(entries: Mapping[str, DeviceEntry], faults: Sequence[str]) -> dict[str, DeviceEntry]:
+    """Return the entries with faults given as ``DEVICE:FAULT``; raises UsageError for a device that is not emulated."""
+    from tactbench.core.errors import UnknownNameError
+
+    changed = dict(entries)
+    for text in faults:
+        given, _, fault = text.partition(":")
+        emulated = {name: name for name, entry in entries.items() if entry.emulated}
+        emulated |= {getattr(entries[name], "device", name): name for name in emulated}
+        if given not in emulated:
+            raise UnknownNameError("emulated device", given, emulated)
+        entry = changed[emulated[given]]
+        changed[emulated[given]] = entry.model_copy(update={"faults": (*entry.faults, fault)})
+    return changed
+
+
+def _named(registry: Registry, names: Sequence[str]) -> dict[str, DeviceEntry]:
+    """Return an entry for every sensor and device named, by the names that they have in a rig file."""
+    from tactbench.core.errors import UnknownNameError, UsageError
+    from tactbench.core.spec.rig_file import EMULATED, DeviceEntry, ForceEntry, NamedDevice
+
+    entries: dict[str, DeviceEntry] = {}
+    for name in names:
+        if name in registry.sensors:
+            part, entry = name, DeviceEntry(link=EMULATED)
+        elif name in registry.devices and registry.devices[name].kind == "force":
+            part, entry = "force", ForceEntry(link=EMULATED, device=name)
+        elif name in registry.devices:
+            part, entry = registry.devices[name].kind, NamedDevice(link=EMULATED, device=name)
+        else:
+            raise UnknownNameError("sensor or device", name, [*registry.sensors.names(), *registry.devices.names()])
+        if part in entries:
+            raise UsageError(f"A rig has one {part}, {name} would be another one.", hint="Name one of them.")
+        entries[part] = entry
+    return entries
+
+
+def _sensors(entries: Mapping[str, DeviceEntry]) -> list[str]:
+    """Return the names of the emulated sensors."""
+    return [name for name, entry in entries.items() if entry.emulated and not hasattr(entry, "device")]
+
+
+def _say_where(
+    emulated: EmulatedDevices, entries: Mapping[str, DeviceEntry], file: RigFile | None, out: Path | None
+) -> None:
+    import yaml
+
+    from tactbench.core.leaderboard.text import command_line
+
+    found: dict[str, Any] = {
+        name: entry.model_copy(update={"link": emulated.addresses.get(name, entry.link), "faults": ()})
+        for name, entry in entries.items()
+    }
+    sensors = [name for name, entry in found.items() if not hasattr(entry, "device")]
+    if not sensors:
+        for name, address in emulated.addresses.items():
+            click.echo(f"{name}: {address}")
+        remark("A rig file needs a sensor beside them: name one, too, to have one written.")
+        return
+    text: dict[str, Any] = {"version": 1, "rig": "bench" if file is None else file.rig}
+    if file is not None and file.title:
+        text["title"] = file.title
+    plain = {name: entry.model_dump(mode="json", exclude_defaults=True) for name, entry in found.items()}
+    text["sensors"] = {name: plain.pop(name) for name in sensors}
+    if "force" in plain:
+        text["force"] = plain.pop("force")
+    if plain:
+        text["devices"] = plain
+    if file is not None and file.settings:
+        text["settings"] = file.settings
+    written = f"{HEAD}\n{yaml.safe_dump(text, sort_keys=False)}"
+    click.echo(written, nl=False)
+    if out is not None:
+        out.write_text(written, encoding="utf-8")
+    else:
+        remark("Save the above as rig.yaml, or have it written with --write-rig-file.")
+    name = "rig.yaml" if out is None else str(out)
+    words = ("--rig", text["rig"], "--rig-file", name, "--sensor", sensors[0], "--live", "--out", "press.h5")
+    remark(f"Record in another terminal:  {command_line('tactbench', 'record', *words)}")
+    remark("Ctrl-C ends the devices.")
+
+
+def _press(emulated: EmulatedDevices, presser: Presser, number: int, presses: int | None) -> None:
+    """Press once, and say how it goes."""
+    profile = presser.alone.profile
+    over_s = presser.start(emulated.clock() * 1e-9)
+    of = "" if presses is None else f" of {presses}"
+    remark(f"Press {number}{of}: {profile.largest_n:g} N after {profile.duration.to('s'):g} s")
+    while (now_s := emulated.clock() * 1e-9) < over_s:
+        emulated.advance(round(1e9 * min(now_s + STATUS_S, over_s)))
+        passed = "; ".join(
+            f"{name} {from_host} bytes in, {to_host} out"
+            for name, (from_host, to_host) in emulated.passed_bytes.items()
+        )
+        remark(f"  {profile.duration.to('s') - max(0.0, over_s - emulated.clock() * 1e-9):.0f} s: {passed}")

@@ -1,0 +1,1 @@
+"""Emulated devices behind links: in virtual time within one thread, or in real time on links of the system."""

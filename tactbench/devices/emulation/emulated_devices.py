@@ -1,0 +1,212 @@
+"""Emulated devices on one clock: in virtual time, or in real time on links of the system."""
+
+from __future__ import annotations
+
+import time as wall
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from types import TracebackType
+from typing import Any, Literal, Self
+
+from tactbench.core.errors import UnknownNameError
+from tactbench.core.spec.rig import EmulatedLink
+from tactbench.devices.emulation.lawicel_adapter import LawicelAdapter
+from tactbench.devices.emulation.line import Line, LinkFault, Passed
+from tactbench.devices.emulation.real_time import BusEnd, CanTransport, End, PseudoTerminal, RealTimeServer, UdpEnd
+from tactbench.devices.emulation.virtual_links import VirtualByteLink, VirtualCanLink, VirtualDatagramLink
+from tactbench.devices.emulation.virtual_time import VirtualTime
+from tactbench.devices.emulator import DeviceEmulator, SpiDeviceEmulator
+from tactbench.links.address import open_link
+from tactbench.links.bridge_emulator import BridgeEmulator
+from tactbench.links.link import Clock, Link
+from tactbench.links.spi_bridge import SpiBridge
+
+SPI_HZ = 4_400_000
+"""Clock of an emulated SPI bus: what the BioTac's maker's tools use [sourced: docs/links.md]; the bus takes any up to
+10 MHz."""
+ANY_BAUD = 115200
+"""Stands in an address where the line has no pace of its own."""
+
+
+@dataclass(frozen=True)
+class EmulatedDevice:
+    """A device as a model, and the link it is behind."""
+
+    link: EmulatedLink
+    emulator: DeviceEmulator | SpiDeviceEmulator
+    """SpiDeviceEmulator on `spi`, DeviceEmulator on the others."""
+    faults: tuple[LinkFault, ...] = ()
+    """Of the link; the device's own are in its emulator."""
+    baud: int | None = None
+    """Of a serial line that has a pace, bits per second; None: what is sent is there at once."""
+
+
+class EmulatedDevices:
+    """Devices that run from now until :meth:`close` or the end of the ``with`` block.
+
+    Parameters
+    ----------
+    devices
+        By name.
+    time
+        `virtual`: time stands until a link's wait or :meth:`advance` lets it go on; one thread, no link of the system,
+        and the same bytes each time. `real`: by the wall clock, in a thread of its own, on links of the system that
+        other processes may open, too.
+    can
+        How CAN devices are reached in real time.
+    keep_log
+        Whether :meth:`log_of` has what passed.
+
+    Attributes
+    ----------
+    clock
+        Nanoseconds since the devices began: what drivers and links are to use. Emulators, faults and senses see the
+        same time in seconds.
+
+    Raises
+    ------
+    UsageError
+        If this system has no links of that kind.
+    """
+
+    def __init__(
+        self,
+        devices: Mapping[str, EmulatedDevice],
+        *,
+        time: Literal["virtual", "real"] = "virtual",
+        can: CanTransport = "slcan",
+        keep_log: bool = False,
+    ) -> None:
+        self._devices = dict(devices)
+        self._virtual = VirtualTime() if time == "virtual" else None
+        self.clock: Clock = self._virtual if self._virtual is not None else _since_now()
+        serial_can = self._virtual is None and can == "slcan"
+        self._lines = {
+            name: Line(
+                _on_its_line(device, serial_can), faults=device.faults, baud=device.baud, keep_log=keep_log
+            )
+            for name, device in self._devices.items()
+        }  # fmt: skip
+        self._addresses: dict[str, str] = {}
+        self._server: RealTimeServer | None = None
+        if self._virtual is not None:
+            for line in self._lines.values():
+                self._virtual.add(line)
+            return
+        with ExitStack() as opened:
+            ends: dict[str, tuple[Line, End]] = {}
+            for name, device in self._devices.items():
+                end = _end_of(device, can)
+                opened.callback(end.close)
+                ends[name] = self._lines[name], end
+                self._addresses[name] = end.address
+            self._server = RealTimeServer(ends, self.clock)
+            opened.pop_all()
+        self._server.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+        if error is None:
+            self._whole()
+
+    def close(self) -> None:
+        """End the devices and give back the links of the system; once closed, this does nothing."""
+        if self._server is not None:
+            self._server.close()
+
+    @property
+    def addresses(self) -> Mapping[str, str]:
+        """By device: what a rig file says to open its link, also from another process; empty in virtual time."""
+        return self._addresses
+
+    def advance(self, until_ns: int) -> None:
+        """Let time go on until `clock` says so much: computed in virtual time, waited for in real time.
+
+        Raises
+        ------
+        Exception
+            What an emulator raised, in real time also since the last call.
+        """
+        if self._virtual is not None:
+            self._virtual.advance(until_ns)
+            return
+        self._whole()
+        wall.sleep(max(0.0, (until_ns - self.clock()) * 1e-9))
+        self._whole()
+
+    def open_link(self, name: str) -> Link:
+        """Open the host's end of a device's link.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such device.
+        LinkError
+            If it cannot be opened, or is open.
+        """
+        if name not in self._devices:
+            raise UnknownNameError("emulated device", name, self._devices)
+        if self._virtual is None:
+            return open_link(self._addresses[name], self.clock)
+        line = self._lines[name]
+        match self._devices[name].link:
+            case "bytes":
+                return VirtualByteLink(name, self._virtual, line)
+            case "can":
+                return VirtualCanLink(name, self._virtual, line)
+            case "datagram":
+                return VirtualDatagramLink(name, self._virtual, line)
+        return SpiBridge(VirtualByteLink(name, self._virtual, line), speed_hz=SPI_HZ)
+
+    def opener(self, name: str) -> Callable[[], Link]:
+        """Return what opens the host's end of a device's link, as drivers are given it."""
+        return partial(self.open_link, name)
+
+    def log_of(self, name: str) -> Sequence[Passed]:
+        """Return what passed on a device's line so far, in both directions; empty without `keep_log`."""
+        return self._lines[name].log
+
+    @property
+    def passed_bytes(self) -> Mapping[str, tuple[int, int]]:
+        """By device: bytes so far from the host and to it; of CAN frames their data."""
+        return {name: (line.bytes_from_host, line.bytes_to_host) for name, line in self._lines.items()}
+
+    def _whole(self) -> None:
+        if self._server is not None and self._server.error is not None:
+            raise self._server.error
+
+
+def _since_now() -> Clock:
+    began_ns = wall.monotonic_ns()
+    return lambda: wall.monotonic_ns() - began_ns
+
+
+def _on_its_line(device: EmulatedDevice, serial_can: bool) -> DeviceEmulator:
+    """Return the device as its line sees it: an SPI bus behind a bridge, a CAN bus perhaps behind an adapter."""
+    emulator: Any = device.emulator  # which of the two protocols it has, the kind of link says
+    if device.link == "spi":
+        emulator = BridgeEmulator(emulator.exchange)
+    elif device.link == "can" and serial_can:
+        emulator = LawicelAdapter(emulator)
+    return emulator  # type: ignore[no-any-return]
+
+
+def _end_of(device: EmulatedDevice, can: CanTransport) -> End:
+    match device.link:
+        case "bytes":
+            return PseudoTerminal(f"serial://{{}}?baud={device.baud or ANY_BAUD}")
+        case "spi":
+            return PseudoTerminal(f"spi://bridge/{{}}?speed_hz={SPI_HZ}")
+        case "datagram":
+            return UdpEnd()
+    if can == "slcan":
+        # The bit rate is a statement; nothing here starts anew when its port is opened.
+        return PseudoTerminal("can://slcan/{}?bitrate=1000000&settle_s=0")
+    return BusEnd(can)

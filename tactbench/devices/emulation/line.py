@@ -1,0 +1,178 @@
+"""The far end of one emulated link: the device as a model, the pace of its line, and what is wrong with the link."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal, NamedTuple, TypeAlias
+
+from tactbench.devices.emulator import DeviceEmulator, Sent
+from tactbench.devices.fault import Fault, fault_concerns
+from tactbench.links.can_link import CanFrame
+
+Piece: TypeAlias = bytes | CanFrame
+"""Bytes of a stream, a CAN frame, a datagram."""
+
+BITS_PER_BYTE = 10
+"""On a serial line: a start bit, eight data bits, a stop bit."""
+
+_AGAIN_S = 1e-6
+"""Assumed: no emulated device does two things within this time that could not be one. An emulator that has something to
+do at the moment at which it was just polled, by rounding or by mistake, is polled again this much later: time goes on
+whatever it answers."""
+
+
+@dataclass(frozen=True)
+class LinkFault(Fault):
+    """A fault of the link itself, which every emulated device can have."""
+
+    known: ClassVar[Mapping[str, str]] = {
+        "unplug": "the link is gone from start_s on",
+        "late": "what the device sends comes later by delay_s, in the same order",
+    }
+    delay_s: float = 0.05
+    """Five times the period of 100 Hz."""
+
+
+def split_faults(faults: Iterable[str]) -> tuple[tuple[LinkFault, ...], tuple[str, ...]]:
+    """Return the faults of the link, and those that are the device's own business, as text.
+
+    Raises
+    ------
+    UsageError
+        If a fault of the link has an unknown key or a wrong value.
+    """
+    given = tuple(faults)
+    of_link = tuple(fault.partition(":")[0] in LinkFault.known for fault in given)
+    return (
+        tuple(LinkFault.parse(fault) for fault, own in zip(given, of_link, strict=True) if own),
+        tuple(fault for fault, own in zip(given, of_link, strict=True) if not own),
+    )
+
+
+class Passed(NamedTuple):
+    """One piece that passed a line."""
+
+    t_s: float
+    """When the host sent it, or when it came out at the host's end; seconds of the emulators' clock."""
+    sender: Literal["host", "device"]
+    piece: Piece
+
+
+class Line:
+    """An emulated device and its end of the link; who carries pieces to the host sets :attr:`deliver`.
+
+    Parameters
+    ----------
+    emulator
+        The device.
+    faults
+        Of the link.
+    baud
+        Bits per second of a serial line: byte n of what is sent in one piece passes n * 10 / `baud` seconds after it
+        was sent, in each direction, and never before the byte ahead of it. A device that keeps this pace itself is not
+        delayed. None: pieces pass at once.
+    keep_log
+        Whether :attr:`log` holds what passed.
+
+    Attributes
+    ----------
+    deliver
+        Called with the second and the piece, in order of time, for what comes out at the host's end; None: nobody has
+        that open, and it is dropped.
+    gone
+        Whether the link was unplugged by a fault.
+    bytes_from_host, bytes_to_host
+        How many passed; of a CAN frame its data.
+    log
+        What passed in both directions, in order.
+    """
+
+    def __init__(
+        self,
+        emulator: DeviceEmulator,
+        *,
+        faults: Sequence[LinkFault] = (),
+        baud: int | None = None,
+        keep_log: bool = False,
+    ) -> None:
+        self.deliver: Callable[[float, Piece], None] | None = None
+        self.gone = False
+        self.bytes_from_host = self.bytes_to_host = 0
+        self.log: list[Passed] = []
+        self._emulator = emulator
+        self._faults = tuple(faults)
+        self._seen: Counter[Fault] = Counter()
+        self._byte_s = BITS_PER_BYTE / baud if baud else 0.0
+        self._keep_log = keep_log
+        self._gone_s = min((fault.start_s for fault in faults if fault.name == "unplug"), default=math.inf)
+        self._polled_s = -math.inf
+        self._in: deque[tuple[float, Piece]] = deque()
+        self._out: deque[tuple[float, Piece]] = deque()
+        self._in_free_s = self._out_free_s = -math.inf
+
+    def feed(self, piece: Piece, now_s: float) -> None:
+        """Take what the host sends at `now_s`; deliver what is due by then."""
+        self.poll(now_s)
+        if self.gone:
+            return
+        self.bytes_from_host += _size(piece)
+        if self._keep_log:
+            self.log.append(Passed(now_s, "host", piece))
+        self._in_free_s = self._paced(self._in, piece, now_s, self._in_free_s)
+        self.poll(now_s)
+
+    def poll(self, now_s: float) -> None:
+        """Let the device go on to `now_s`, and deliver what is due by then."""
+        if self.gone:
+            return
+        until_s = min(now_s, self._gone_s)
+        while self._in and self._in[0][0] <= until_s:
+            t_s, piece = self._in.popleft()
+            self._send(self._emulator.feed(piece, t_s))
+        self._send(self._emulator.poll(until_s))
+        self._polled_s = until_s
+        while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._gone_s:
+            t_s, piece = self._out.popleft()
+            self.bytes_to_host += _size(piece)
+            if self._keep_log:
+                self.log.append(Passed(t_s, "device", piece))
+            if self.deliver is not None:
+                self.deliver(t_s, piece)
+        self.gone = now_s >= self._gone_s
+
+    def next_s(self) -> float:
+        """Return when :meth:`poll` has something to do next; infinite: not before something comes."""
+        if self.gone:
+            return math.inf
+        due_s = min(
+            self._emulator.next_s(),
+            self._in[0][0] if self._in else math.inf,
+            self._out[0][0] if self._out else math.inf,
+            self._gone_s,
+        )
+        return due_s if due_s > self._polled_s else self._polled_s + _AGAIN_S
+
+    def _send(self, sent: Sequence[Sent]) -> None:
+        for left_s, piece in sent:
+            due_s = left_s
+            for fault in self._faults:
+                if fault_concerns((fault,), "late", left_s, self._seen):
+                    due_s += fault.delay_s
+            self._out_free_s = self._paced(self._out, piece, due_s, self._out_free_s)
+
+    def _paced(self, queue: deque[tuple[float, Piece]], piece: Piece, t_s: float, free_s: float) -> float:
+        """Queue a piece that is sent at `t_s` on a line that is free from `free_s` on; return when it is free again."""
+        t_s = max(t_s, free_s)
+        if not self._byte_s or not isinstance(piece, bytes):
+            queue.append((t_s, piece))
+            return t_s
+        for number in range(len(piece)):
+            queue.append((t_s + number * self._byte_s, piece[number : number + 1]))
+        return t_s + len(piece) * self._byte_s
+
+
+def _size(piece: Piece) -> int:
+    return len(piece if isinstance(piece, bytes) else piece.data)

@@ -1,0 +1,130 @@
+"""`tactbench emulate` in this process: what it prints is what opens the devices."""
+
+from __future__ import annotations
+
+import threading
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from tactbench.core.cli import VERBS, _exit_code
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.spec.yaml_file import load_yaml
+from tactbench.plugin import RigFile, drivers_of
+from tests.core.plugins import talking
+
+POINTS = [
+    EntryPoint("talking", talking.HERE, "tactbench"),
+    EntryPoint("twin", "tactbench.rigs.twin", "tactbench"),
+]
+
+
+@pytest.fixture
+def emulate(monkeypatch, tmp_path, capsys):
+    """The verb with these plugins, in a folder of its own: its exit code, stdout and stderr."""
+    monkeypatch.setattr("tactbench.core.plugins.registry.entry_points", lambda group: POINTS)
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        code = _exit_code(["emulate", *words])
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return call
+
+
+SHORT = ("--seconds", "0.5", "--presses", "2")
+
+
+def test_the_rig_file_printed_is_the_one_written_and_opens_the_devices(emulate, tmp_path):
+    """While it runs, drivers of the written file read the pad and the scale from another thread."""
+    read, not_yet = {}, threading.Event()
+
+    def record():
+        registry = load_registry(POINTS)
+        while not ((tmp_path / "rig.yaml").is_file() and (tmp_path / "rig.yaml").read_text()):
+            not_yet.wait(0.02)
+        drivers = drivers_of(load_yaml(tmp_path / "rig.yaml", RigFile), registry, "pad", {}, lambda: 0)
+        for name, driver in drivers.items():
+            with driver:
+                driver.start()
+                read[name] = [driver.read(5.0)[0].data for _ in range(40)]
+
+    thread = threading.Thread(target=record)
+    thread.start()
+    code, out, err = emulate("pad", "scale", "screw", *SHORT, "--write-rig-file", "rig.yaml")
+    thread.join()
+    assert code == 0
+    assert out == (tmp_path / "rig.yaml").read_text()
+    file = load_yaml(tmp_path / "rig.yaml", RigFile)
+    assert (file.rig, list(file.entries())) == ("bench", ["pad", "force", "motor"])
+    assert all(entry.link.startswith("udp://127.0.0.1:") for entry in file.entries().values())
+    assert "tactbench record --rig bench --rig-file rig.yaml --sensor pad --live --out press.h5" in err
+    assert "Press 1 of 2: 5 N after 0.5 s" in err
+    assert "Press 2 of 2" in err
+    assert max(abs(data).max() for data in read["pad"]) > 100  # 1000 counts a newton
+    assert all(data.shape == (1, 1) for data in read["force"])
+
+
+def test_a_force_sensor_alone_feels_the_force_alone(emulate):
+    code, out, err = emulate("scale", "--seconds", "0.1", "--presses", "1")
+    assert code == 0
+    assert out.startswith("force: udp://127.0.0.1:")
+    assert "A rig file needs a sensor" in err
+
+
+def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
+    (tmp_path / "mine.yaml").write_text(
+        "rig: bench\ntitle: here\nsensors: {pad: {link: emulated, faults: [late]}}\n"
+        "force: {device: scale, link: 'udp://127.0.0.1:9', channel: fx, sign: -1}\nsettings: {colour: red}\n"
+    )
+    code, out, err = emulate("--rig-file", "mine.yaml", *SHORT, "--fault", "pad:unplug:start_s=0.2")
+    assert code == 0
+    (tmp_path / "out.yaml").write_text(out)
+    file = load_yaml(tmp_path / "out.yaml", RigFile)
+    assert file.sensors["pad"].link.startswith("udp://127.0.0.1:")
+    assert file.sensors["pad"].faults == ()
+    assert (file.force.link, file.force.channel, file.force.sign) == ("udp://127.0.0.1:9", "fx", -1)
+    assert (file.title, file.settings) == ("here", {"colour": "red"})
+    assert "pad" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "Either devices or a rig file"),
+        (("pad", "--rig-file", "x.yaml"), "Either devices or a rig file"),
+        (("pda",), "Did you mean 'pad'"),
+        (("scale", "bare-scale"), "A rig has one force"),
+        (("bare-scale",), "bare-scale has no emulator"),
+        (("mute",), "mute has no emulator"),
+        (("pad", "--fault", "scale:late"), "no emulated device called 'scale'"),
+        (("pad", "--fault", "pad:late:delay=1"), "'delay_s'"),
+        (("pad", "--fault", "pad:parity"), "no fault 'parity'"),
+        (("pad", "--physics", "bench"), "no rig called 'bench'"),
+        (("pad", "--write-rig-file", "mine.yaml"), "mine.yaml is there already"),
+    ],
+)
+def test_what_cannot_be_is_said_with_the_next_step(emulate, tmp_path, words, said):
+    (tmp_path / "mine.yaml").write_text("rig: bench\n")
+    code, out, err = emulate(*words)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+def test_ctrl_c_ends_it_with_130(emulate, monkeypatch):
+    from tactbench.plugin import EmulatedDevices
+
+    def interrupted(self, until_ns):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(EmulatedDevices, "advance", interrupted)
+    before = threading.active_count()
+    code, _, err = emulate("pad")
+    assert code == 130
+    assert "The emulated devices and their links are gone" in err
+    assert threading.active_count() == before
+
+
+def test_it_is_among_the_verbs():
+    assert "emulate" in VERBS

@@ -1,0 +1,157 @@
+"""From a rig file to emulators and drivers."""
+
+from __future__ import annotations
+
+import json
+from importlib.metadata import EntryPoint
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import LinkError, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.plugins.registry import load_registry
+from tactbench.plugin import DatagramLink, EmulatedDevices, RigFile, drivers_of, emulators_of
+from tests.core.plugins import talking
+
+REGISTRY = load_registry([EntryPoint("talking", talking.HERE, "tactbench")])
+
+
+def rig_file(**changed):
+    said = {
+        "rig": "bench",
+        "sensors": {"pad": {"link": "emulated"}, "mute": {"link": "emulated"}},
+        "force": {"device": "scale", "link": "emulated"},
+        "devices": {"motor": {"device": "screw", "link": "emulated", "options": {"silent": True}}},
+    }
+    return RigFile.model_validate({**said, **changed})
+
+
+def sense(t_s):
+    return {"T1": 100 * t_s, "fz": 10 * t_s}
+
+
+def drawn(file):
+    """Return what each emulated device says first."""
+    with EmulatedDevices(emulators_of(file, REGISTRY, "pad", sense)) as devices:
+        said = {}
+        for name in ("pad", "force"):
+            with devices.open_link(name) as link:
+                assert isinstance(link, DatagramLink)
+                said[name] = json.loads(link.receive(1.0).data)
+        return said
+
+
+def test_one_sensor_and_every_other_device_have_emulators():
+    assert list(emulators_of(rig_file(), REGISTRY, "pad", sense)) == ["pad", "force", "motor"]
+
+
+def test_real_devices_have_none():
+    file = rig_file(force={"device": "scale", "link": "udp://127.0.0.1:9"})
+    assert list(emulators_of(file, REGISTRY, "pad", sense)) == ["pad", "motor"]
+
+
+@pytest.mark.parametrize(("channel", "sign", "value"), [("fz", 1, 0.1), ("fx", -1, -0.1)])
+def test_the_force_sensor_feels_the_pressing_force_where_its_entry_says(channel, sign, value):
+    file = rig_file(force={"device": "scale", "link": "emulated", "channel": channel, "sign": sign})
+    said = drawn(file)
+    assert said["pad"]["senses"] == pytest.approx({"T1": 1.0, "fz": 0.1})
+    assert said["force"]["senses"] == pytest.approx({channel: value})
+
+
+def test_devices_draw_from_generators_of_their_own():
+    """Another device, or none, changes nothing for this one; another seed does."""
+    here = drawn(rig_file())
+    assert here["pad"]["drawn"] != here["force"]["drawn"]
+    assert drawn(rig_file(devices={})) == here
+    assert drawn(rig_file(emulation={"seed": 2}))["pad"]["drawn"] != here["pad"]["drawn"]
+
+
+def test_faults_of_the_link_do_not_reach_the_device_and_those_of_the_device_do():
+    file = rig_file(sensors={"pad": {"link": "emulated", "faults": ["late:delay_s=0.2", "unplug:start_s=3"]}})
+    device = emulators_of(file, REGISTRY, "pad", sense)["pad"]
+    assert [(fault.name, fault.delay_s, fault.start_s) for fault in device.faults] == [
+        ("late", 0.2, -np.inf),
+        ("unplug", 0.05, 3.0),
+    ]
+    file = rig_file(sensors={"pad": {"link": "emulated", "faults": ["parity"]}})
+    with pytest.raises(UsageError, match="entry 'pad': It has no fault 'parity'"):
+        emulators_of(file, REGISTRY, "pad", sense)
+
+
+def test_a_baud_rate_among_the_options_is_the_pace_of_the_line():
+    file = rig_file(sensors={"pad": {"link": "emulated", "options": {"baud": 9600}}})
+    assert emulators_of(file, REGISTRY, "pad", sense)["pad"].baud == 9600
+
+
+def test_drivers_read_what_the_emulators_sense():
+    file = rig_file()
+    with EmulatedDevices(emulators_of(file, REGISTRY, "pad", sense)) as devices:
+        links = {name: devices.opener(name) for name in ("pad", "force")}
+        drivers = drivers_of(file, REGISTRY, "pad", links, devices.clock)
+        assert list(drivers) == ["pad", "force"]
+        with drivers["pad"] as pad, drivers["force"] as force:
+            assert pad.streams == REGISTRY.sensors["pad"].spec.streams
+            assert [stream.name for stream in force.streams] == ["scale"]
+            (block,) = pad.read(1.0)
+            assert (block.t_ns.tolist(), block.data[0, 0]) == ([10_000_000], pytest.approx(1.0))
+            (block,) = force.read(0.0)
+            assert block.data[0, 0] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("changed", "sensor", "error", "said"),
+    [
+        ({}, "biotac", UsageError, "no entry for the sensor 'biotac'; it has pad, mute"),
+        ({"sensors": {"pda": {"link": "emulated"}}}, "pda", UnknownNameError, "entry 'pda'.*'pad'"),
+        ({"force": {"device": "scael", "link": "emulated"}}, "pad", UnknownNameError, "entry 'force'.*'scale'"),
+        ({"force": {"device": "screw", "link": "emulated"}}, "pad", UsageError, "no force sensor.*bare-scale, scale"),
+        ({}, "mute", UsageError, "mute has no driver"),
+        (
+            {"sensors": {"pad": {"link": "emulated", "options": {"board": 1}}}},
+            "pad",
+            UsageError,
+            "entry 'pad'.*'board'",
+        ),
+        ({"sensors": {"pad": {"link": "udp:/1"}}}, "pad", UsageError, "entry 'pad'.*not the address"),
+    ],
+)
+def test_errors_of_drivers_name_the_entry_and_the_next_step(changed, sensor, error, said):
+    file = rig_file(**changed)
+    with EmulatedDevices({}) as devices, pytest.raises(error, match=said):
+        drivers_of(file, REGISTRY, sensor, dict.fromkeys(("pad", "force"), lambda: None), devices.clock)
+
+
+def test_an_emulated_device_that_nothing_emulates_is_said():
+    with pytest.raises(UsageError, match=r"nothing emulates it here.*tactbench emulate"):
+        drivers_of(rig_file(), REGISTRY, "pad", {}, lambda: 0)
+
+
+@pytest.mark.parametrize(
+    ("changed", "sensor", "said"),
+    [
+        ({}, "mute", "mute has no emulator"),
+        ({"force": {"device": "bare-scale", "link": "emulated"}}, "pad", "entry 'force': bare-scale has no emulator"),
+    ],
+)
+def test_devices_without_an_emulator_are_said(changed, sensor, said):
+    with pytest.raises(TactbenchError, match=said):
+        emulators_of(rig_file(**changed), REGISTRY, sensor, sense)
+
+
+def test_what_was_opened_is_closed_when_a_later_device_fails():
+    file = rig_file()
+    opened = []
+
+    def fails():
+        raise LinkError("no cable")
+
+    with EmulatedDevices(emulators_of(file, REGISTRY, "pad", sense)) as devices:
+
+        def opens():
+            opened.append(devices.open_link("pad"))
+            return opened[-1]
+
+        with pytest.raises(LinkError, match="entry 'force': no cable"):
+            drivers_of(file, REGISTRY, "pad", {"pad": opens, "force": fails}, devices.clock)
+        with devices.open_link("pad"):  # it can be opened only if it was closed
+            assert len(opened) == 1

@@ -1,0 +1,254 @@
+"""Devices in real time on links of this machine: by due times without a clock, and a short while by the wall clock."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+from pathlib import Path
+
+import can
+import pytest
+import serial
+
+from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged
+from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
+from tactbench.devices.emulation.lawicel_adapter import LawicelAdapter
+from tactbench.devices.emulation.line import Line, LinkFault
+from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer, UdpEnd
+from tactbench.plugin import CanFrame, open_link
+from tests.devices.emulation.models import Answerer, Complement, Recorder
+
+needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
+
+
+def on(kind, emulator, *faults, baud=None):
+    return EmulatedDevice(kind, emulator, tuple(LinkFault.parse(fault) for fault in faults), baud)
+
+
+@needs_pty
+def test_bytes_are_released_when_they_are_due_and_not_before():
+    """Served at chosen moments: a byte takes 10/9600 s, and what is overdue is sent at once, not spread anew."""
+    end = PseudoTerminal("serial://{}?baud=9600")
+    line = Line(Recorder(period_s=0.01), baud=9600)
+    server = RealTimeServer({"a": (line, end)}, lambda: 0)
+    try:
+        with open_link(end.address) as link:
+            assert server.serve(0.0099) == pytest.approx(0.01)
+            with pytest.raises(LinkTimeout):
+                link.read(0.0)
+            assert server.serve(0.01) == pytest.approx(0.01 + 10 / 9600)
+            assert link.read(1.0).data == b"\0"
+            assert server.serve(0.0115) == pytest.approx(0.01 + 20 / 9600)
+            assert link.read(1.0).data == b"\0"
+            server.serve(0.0303)
+            assert link.read(1.0).data == bytes([0, 1, 0, 0, 2])
+    finally:
+        server.close()
+
+
+@needs_pty
+def test_the_host_is_heard_at_the_pace_of_the_line():
+    end = PseudoTerminal("serial://{}?baud=9600")
+    device = Answerer()
+    server = RealTimeServer({"a": (Line(device, baud=9600), end)}, lambda: 0)
+    try:
+        with open_link(end.address) as link:
+            link.write(b"abc")
+            server.serve(1.0)
+            assert device.told == [(1.0, b"a")]
+            server.serve(2.0)
+            assert [t_s for t_s, _ in device.told] == pytest.approx([1.0, 1.0 + 10 / 9600, 1.0 + 20 / 9600])
+    finally:
+        server.close()
+
+
+@needs_pty
+@pytest.mark.parametrize("kind", ["bytes", "can", "datagram", "spi"])
+def test_requests_are_answered_by_the_wall_clock(kind):
+    emulator = Complement() if kind == "spi" else Answerer(after_s=0.05)
+    with EmulatedDevices({"a": on(kind, emulator)}, time="real") as devices, devices.open_link("a") as link:
+        if kind == "spi":
+            assert link.transfer(b"\x01\x02", pause_us=1000) == b"\xfe\xfd"
+            return
+        before_ns = devices.clock()
+        if kind == "can":
+            link.send(CanFrame(0x123, b"ab"))
+            came = link.receive(5.0)
+            assert (came.id, came.data) == (0x123, b"ab")
+        elif kind == "bytes":
+            link.write(b"a")
+            came = link.read(5.0)
+            assert came.data == b"a"
+        else:
+            link.send(b"ab")
+            came = link.receive(5.0)
+            assert came.data == b"ab"
+        # Never early; how late is the machine's.
+        assert came.t_ns - before_ns >= 50e6 - 1
+
+
+@needs_pty
+def test_an_unplugged_terminal_is_gone():
+    end = PseudoTerminal("serial://{}?baud=9600")
+    server = RealTimeServer(
+        {"a": (Line(Recorder(1.0), faults=[LinkFault.parse("unplug:start_s=1.5")]), end)}, lambda: 0
+    )
+    try:
+        with open_link(end.address) as link:
+            assert server.serve(1.0) == 1.5
+            assert link.read(1.0).data == b"\0\0\0"
+            assert server.serve(1.5) == math.inf
+            with pytest.raises(LinkUnplugged):
+                link.read(1.0)
+        with pytest.raises(LinkError, match="cannot be opened"):
+            open_link(end.address)
+    finally:
+        server.close()
+
+
+def test_an_unplugged_udp_port_is_nobody_who_listens():
+    end = UdpEnd()
+    server = RealTimeServer(
+        {"a": (Line(Answerer(0.0), faults=[LinkFault.parse("unplug:start_s=1.5")]), end)}, lambda: 0
+    )
+    try:
+        with open_link(end.address) as link:
+            link.send(b"a")
+            server.serve(1.0)
+            assert link.receive(1.0).data == b"a"
+            server.serve(1.5)
+            link.send(b"b")  # the refusal comes with the next call
+            with pytest.raises(LinkUnplugged):
+                link.receive(1.0)
+    finally:
+        server.close()
+
+
+def test_virtual_and_real_time_give_the_same_device_data():
+    """A device that samples by itself senses the same at its own times, whatever the host does."""
+
+    def recorded(time):
+        device = on("datagram", Recorder(0.01, lambda t_s: {"a": 1000 * t_s}))
+        with EmulatedDevices({"a": device}, time=time, keep_log=True) as devices:
+            with devices.open_link("a") as link:
+                link.send(b"I am here")
+                while devices.clock() < 300_000_000:
+                    with contextlib.suppress(LinkTimeout):
+                        link.receive(0.05)
+            return [(t_s, piece) for t_s, sender, piece in devices.log_of("a") if sender == "device"]
+
+    virtual, real = recorded("virtual"), recorded("real")
+    assert len(virtual) == 30
+    assert real[:30] == virtual
+
+
+def test_a_can_bus_of_this_process():
+    devices = EmulatedDevices({"a": on("can", Answerer(0.0))}, time="real", can="virtual")
+    with devices, devices.open_link("a") as link:
+        link.send(CanFrame(0x12345, b"ab", extended=True))
+        came = link.receive(5.0)
+        assert (came.id, came.data, came.extended) == (0x12345, b"ab", True)
+
+
+def test_a_can_bus_between_processes():
+    try:
+        devices = EmulatedDevices({"a": on("can", Answerer(0.01))}, time="real", can="udp_multicast")
+    except LinkError as error:
+        pytest.skip(f"no multicast here: {error}")
+    with devices, devices.open_link("a") as link:
+        link.send(CanFrame(0x123, b"ab"))
+        frames = [link.receive(5.0) for _ in range(2)]  # its own comes back, and then the answer
+        assert [(frame.id, frame.data) for frame in frames] == [(0x123, b"ab")] * 2
+        with pytest.raises(LinkTimeout):
+            link.receive(0.05)  # the device does not answer its own answer
+
+
+@needs_pty
+def test_a_slcan_bus_opened_by_python_can_itself_carries_frames_both_ways():
+    with EmulatedDevices({"a": on("can", Answerer(0.0))}, time="real") as devices:
+        port = devices.addresses["a"].removeprefix("can://slcan/").partition("?")[0]
+        with can.Bus(port, "slcan", bitrate=500_000, sleep_after_open=0.0, ignore_config=True) as bus:
+            assert bus.get_version(2.0) == (10, 13)
+            for number, extended in ((0x7FF, False), (0x1FFFFFFF, True)):
+                for length in (0, 1, 8):
+                    sent = can.Message(arbitration_id=number, data=range(length), is_extended_id=extended)
+                    bus.send(sent)
+                    came = bus.recv(5.0)
+                    assert came is not None
+                    assert came.equals(sent, timestamp_delta=None, check_channel=False, check_direction=False)
+
+
+@pytest.mark.parametrize(
+    ("told", "answer"),
+    [
+        (b"t1230\r", b"\a"),  # not open
+        (b"O\rt1232AABB\r", b"\r\rt1232AABB\r"),
+        (b"O\rT1FFFFFFF11f\r", b"\r\rT1FFFFFFF11F\r"),
+        (b"O\rt8000\r", b"\r\a"),  # twelve bits
+        (b"O\rt1239\r", b"\r\a"),
+        (b"O\rt1232AA\r", b"\r\a"),
+        (b"O\rr1232\r", b"\r\r"),  # a remote frame, which the device does not see
+        (b"L\rt1230\r", b"\r\a"),
+        (b"O\rC\rt1230\r", b"\r\r\a"),
+        (b"S8\rs031C\r\rZ0\rV\rN\rF\r", b"\r\r\r\rV1013\rNEMUL\rF00\r"),
+        (b"S\rZ1\rhello\r\xff\r", b"\a\a\a\a"),
+    ],
+)
+def test_commands_of_the_adapter(told, answer):
+    adapter = LawicelAdapter(Answerer(0.0))
+    assert b"".join(piece for _, piece in adapter.feed(told, 1.0)) == answer
+
+
+def test_a_closed_adapter_passes_nothing_on_and_an_endless_line_does_not_fill_the_memory():
+    adapter = LawicelAdapter(Recorder(0.1, can=True))
+    assert adapter.poll(1.0) == []
+    adapter.feed(b"x" * 100_000, 1.0)
+    assert adapter.feed(b"\rO\r", 1.0) == [(1.0, b"\a"), (1.0, b"\r")]
+    assert len(adapter._line) < 100
+    assert adapter.poll(1.1) == [(pytest.approx(1.1), b"t12330A0000\r")]
+
+
+@needs_pty
+def test_a_terminal_does_not_echo_and_stays_for_the_next_host():
+    with EmulatedDevices({"a": on("bytes", Recorder(0.01))}, time="real") as devices:
+        port = devices.addresses["a"].removeprefix("serial://").partition("?")[0]
+        devices.advance(100_000_000)
+        for _ in range(2):
+            with serial.Serial(port, 115200, timeout=5.0) as host:
+                assert len(host.read(6)) == 6
+        assert devices.passed_bytes["a"][0] == 0
+
+
+@needs_pty
+def test_what_an_emulator_raises_unplugs_the_devices_and_is_raised():
+    class Broken(Answerer):
+        def feed(self, piece, now_s):
+            raise ZeroDivisionError("a model that is wrong")
+
+    devices = EmulatedDevices({"a": on("bytes", Broken())}, time="real")
+    with devices.open_link("a") as link:
+        link.write(b"x")
+        with pytest.raises(LinkUnplugged):
+            link.read(5.0)
+    with pytest.raises(ZeroDivisionError):
+        devices.advance(0)
+    devices.close()
+    devices.close()
+
+
+def test_ending_gives_everything_back():
+    descriptors = Path("/proc/self/fd")
+    if not descriptors.is_dir():
+        pytest.skip("this system does not list a process's open files")
+
+    def use():
+        models = {kind: on(kind, Complement() if kind == "spi" else Answerer()) for kind in ("bytes", "can", "spi")}
+        with EmulatedDevices({"udp": on("datagram", Answerer()), **models}, time="real") as devices:
+            for name in devices.addresses:
+                devices.open_link(name).close()
+
+    use()  # what libraries open once
+    before = len(list(descriptors.iterdir()))
+    use()
+    assert len(list(descriptors.iterdir())) == before

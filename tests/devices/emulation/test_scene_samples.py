@@ -1,0 +1,84 @@
+"""What moves emulated devices: the latest sample of a scene, and nothing pressed outside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import Block, ChannelSpec, SceneSamples, StreamSpec
+
+MS = 1_000_000
+"""Nanoseconds."""
+
+
+def stream(name, *channels):
+    return StreamSpec(name=name, channels=tuple(ChannelSpec(name=channel, kind="other") for channel in channels))
+
+
+@dataclass
+class Scene:
+    """Two channels every 100 ms for a second, pressed from 300 ms on; the force ten times as often."""
+
+    streams: tuple = (stream("taxels", "a", "b"),)
+    reference: tuple = (stream("force_torque", "fz"),)
+    blocks: list = field(default_factory=list)
+
+    def __post_init__(self):
+        rows = np.arange(10)
+        data = np.column_stack([rows, 10 * rows]).astype(np.uint16)
+        for part in (slice(0, 4), slice(4, 10)):  # blocks end where they like
+            self.blocks.append(Block("taxels", rows[part] * 100 * MS, data[part]))
+        rows = np.arange(100)
+        self.blocks.append(Block("force_torque", rows * 10 * MS, np.maximum(0.0, rows - 30.0)[:, None]))
+
+    def __iter__(self):
+        return iter(self.blocks)
+
+
+@pytest.fixture
+def samples():
+    return SceneSamples(Scene(), 1.0, rest_s=0.3)
+
+
+@pytest.mark.parametrize(
+    ("since_s", "a", "fz"),
+    [(0.0, 0, 0), (0.0999, 0, 0), (0.1, 1, 0), (0.55, 5, 25), (0.5599, 5, 25), (0.56, 5, 26), (0.99, 9, 69)],
+)
+def test_every_channel_has_its_latest_sample(samples, since_s, a, fz):
+    samples.start(7.0)
+    assert samples(7.0 + since_s + 1e-9) == {"a": a, "b": 10 * a, "fz": fz}
+
+
+@pytest.mark.parametrize("t_s", [0.0, 6.69, 8.0, 8.05, 8.25, 100.0])
+def test_outside_the_scene_nothing_is_pressed_and_the_noise_goes_on(samples, t_s):
+    samples.start(7.0)
+    found = [samples(t_s + later_s) for later_s in np.arange(0.0, 0.3, 0.01)]
+    assert {one["fz"] for one in found} == {0}
+    assert {one["a"] for one in found} == {0, 1, 2}
+
+
+def test_until_it_is_started_nothing_is_pressed(samples):
+    assert {samples(t_s)["fz"] for t_s in np.linspace(0.0, 2.0, 200)} == {0}
+    assert samples.over_s == -np.inf
+    samples.start(3.0)
+    assert samples.over_s == 4.0
+
+
+def test_it_may_begin_again(samples):
+    for start_s in (1.0, 5.0):
+        samples.start(start_s)
+        assert samples(start_s + 0.95)["a"] == 9
+
+
+def test_without_an_unloaded_stretch_the_first_sample_is_held():
+    samples = SceneSamples(Scene(), 1.0)
+    samples.start(1.0)
+    assert {samples(t_s)["a"] for t_s in (0.0, 0.99, 2.0, 2.15, 9.0)} == {0}
+
+
+def test_a_scene_shorter_than_its_unloaded_stretch_is_all_of_it():
+    samples = SceneSamples(Scene(), 1.0, rest_s=7.2)
+    samples.start(0.0)
+    assert samples(1.95)["a"] == 9

@@ -1,0 +1,215 @@
+"""Devices in virtual time: who waits lets time go on, deadlines are virtual, and the same run gives the same bytes."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged, UnknownNameError
+from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
+from tactbench.devices.emulation.line import LinkFault
+from tactbench.plugin import ByteLink, CanFrame, CanLink, DatagramLink, SpiLink, SpiStep
+from tests.devices.emulation.models import Answerer, Complement, Recorder
+
+MS = 1_000_000
+"""Nanoseconds."""
+
+
+def on(kind, emulator, *faults):
+    return EmulatedDevice(kind, emulator, tuple(LinkFault.parse(fault) for fault in faults))
+
+
+@pytest.fixture(params=["bytes", "can", "datagram", "spi"])
+def kind(request):
+    return request.param
+
+
+def answering(kind, *faults):
+    """A device that gives back what it is told 200 ms later; on SPI one that answers at once."""
+    return on(kind, Complement() if kind == "spi" else Answerer(), *faults)
+
+
+def say(link):
+    if isinstance(link, ByteLink):
+        link.write(b"ab")
+    elif isinstance(link, CanLink):
+        link.send(CanFrame(0x123, b"ab"))
+    elif isinstance(link, SpiLink):
+        link.send([SpiStep(b"ab", pause_us=60_000), SpiStep(b"", pause_us=60_000), SpiStep(b"", pause_us=60_000)])
+    else:
+        link.send(b"ab")
+
+
+def hear(link, timeout_s):
+    return link.read(timeout_s) if isinstance(link, ByteLink) else link.receive(timeout_s)
+
+
+def test_an_answer_comes_with_its_own_time_and_waits_are_virtual(kind):
+    with EmulatedDevices({"a": answering(kind)}) as devices, devices.open_link("a") as link:
+        say(link)
+        with pytest.raises(LinkTimeout, match=r"within 0\.1 s"):
+            hear(link, 0.1)
+        assert devices.clock() == 100 * MS
+        came = hear(link, 5.0)
+        # On SPI: 180 ms of pauses and 16 bits at 4.4 MHz.
+        due_ns = 180 * MS + round(16e9 / 4.4e6) if kind == "spi" else 200 * MS
+        assert came.t_ns == devices.clock() == due_ns
+        with pytest.raises(LinkTimeout):
+            hear(link, 0.0)
+        assert devices.clock() == due_ns
+
+
+def test_what_has_come_is_there_at_once_with_the_time_it_came(kind):
+    with EmulatedDevices({"a": answering(kind)}) as devices, devices.open_link("a") as link:
+        say(link)
+        devices.advance(1000 * MS)
+        came = hear(link, 5.0)
+        assert (came.t_ns < 201 * MS, devices.clock()) == (True, 1000 * MS)
+
+
+@pytest.mark.parametrize("timeout_s", [-1, math.inf, math.nan])
+def test_a_timeout_that_is_none_is_refused(kind, timeout_s):
+    devices = EmulatedDevices({"a": answering(kind)})
+    with devices.open_link("a") as link, pytest.raises(LinkError, match="0 or more"):
+        hear(link, timeout_s)
+
+
+def test_a_closed_link_is_closed_and_may_be_opened_again(kind):
+    with EmulatedDevices({"a": answering(kind)}) as devices:
+        link = devices.open_link("a")
+        with pytest.raises(LinkError, match="open already"):
+            devices.open_link("a")
+        link.close()
+        link.close()
+        for call in (lambda: hear(link, 0.0), lambda: say(link)):
+            with pytest.raises(LinkClosed):
+                call()
+        with devices.open_link("a") as again:
+            say(again)
+            assert hear(again, 1.0).data
+
+
+def test_an_unplugged_link_says_so_at_its_time_and_from_then_on(kind):
+    with EmulatedDevices({"a": answering(kind, "unplug:start_s=1")}) as devices, devices.open_link("a") as link:
+        say(link)
+        assert hear(link, 0.5).data
+        with pytest.raises(LinkUnplugged, match="is gone"):
+            hear(link, 60.0)
+        assert devices.clock() == 1000 * MS
+        for call in (lambda: hear(link, 0.0), lambda: say(link)):
+            with pytest.raises(LinkUnplugged):
+                call()
+        link.close()
+        with pytest.raises(LinkClosed):
+            hear(link, 0.0)
+
+
+def test_a_late_link_is_late(kind):
+    with EmulatedDevices({"a": answering(kind, "late:delay_s=0.03")}) as devices, devices.open_link("a") as link:
+        begin_ns = devices.clock()
+        say(link)
+        device_s = 0.18 + 16 / 4.4e6 if kind == "spi" else 0.2
+        assert hear(link, 1.0).t_ns - begin_ns == pytest.approx(1e9 * (device_s + 0.03), abs=1)
+
+
+def test_a_bridge_that_does_not_answer_costs_no_real_time():
+    """Asked for three seconds, that pass in virtual time only."""
+    with EmulatedDevices({"a": on("spi", Complement(), "late:delay_s=1000")}) as devices:
+        with pytest.raises(LinkError, match="within 3 s"):
+            devices.open_link("a")
+        assert devices.clock() * 1e-9 == pytest.approx(3.0, abs=0.3)
+
+
+def test_everything_happens_in_order_of_time_whoever_is_waited_for():
+    """While one device is waited for, the others go on: at each moment nobody is behind."""
+    seen = []
+
+    def sensing(name):
+        def senses(t_s):
+            seen.append((t_s, name))
+            return {}
+
+        return senses
+
+    models = {"a": on("bytes", Recorder(0.01, sensing("a"))), "b": on("datagram", Recorder(0.003, sensing("b")))}
+    with EmulatedDevices(models) as devices, devices.open_link("a") as a, devices.open_link("b") as b:
+        assert a.read(1.0).t_ns == 10 * MS
+        assert [b.receive(0.0).t_ns for _ in range(3)] == [3 * MS, 6 * MS, 9 * MS]
+        devices.advance(100 * MS)
+    assert seen == sorted(seen)
+    assert len(seen) == 10 + 33
+
+
+def test_a_datagram_stays_whole_and_a_read_takes_all_that_has_come_or_what_it_was_asked_for():
+    models = {"a": on("bytes", Recorder(0.01)), "b": on("datagram", Recorder(0.01))}
+    with EmulatedDevices(models) as devices, devices.open_link("a") as a, devices.open_link("b") as b:
+        devices.advance(30 * MS)
+        assert (a.read(0.0, size=4).data, a.read(0.0).data) == (bytes([0, 0, 0, 1]), bytes([0, 0, 2, 0, 0]))
+        assert isinstance(b, DatagramLink)
+        assert [b.receive(0.0).data[0] for _ in range(3)] == [0, 1, 2]
+
+
+def test_what_was_sent_before_the_link_was_opened_is_not_seen():
+    with EmulatedDevices({"a": on("datagram", Recorder(0.01))}) as devices:
+        devices.advance(95 * MS)
+        with devices.open_link("a") as link:
+            assert link.receive(1.0).data[0] == 9
+
+
+@pytest.mark.parametrize("frame", [CanFrame(0x800, b""), CanFrame(-1, b""), CanFrame(1, bytes(9))])
+def test_what_is_no_can_frame_is_refused(frame):
+    devices = EmulatedDevices({"a": on("can", Answerer())})
+    with devices.open_link("a") as link, pytest.raises(LinkError, match="not a CAN frame"):
+        link.send(frame)
+
+
+def test_devices_are_asked_for_by_name():
+    with EmulatedDevices({"biotac": on("bytes", Answerer())}) as devices:
+        with pytest.raises(UnknownNameError, match="biotac"):
+            devices.open_link("biotack")
+        assert devices.addresses == {}
+
+
+def test_time_does_not_go_back():
+    with EmulatedDevices({}) as devices:
+        devices.advance(5 * MS)
+        devices.advance(3 * MS)
+        assert devices.clock() == 5 * MS
+
+
+def run(seed):
+    """Read four devices for three seconds, and return what passed on every line."""
+
+    def sensing(t_s):
+        return {"a": 100 * math.sin(t_s)}
+
+    rngs = [np.random.default_rng([seed, number]) for number in range(4)]
+    models = {
+        "stream": EmulatedDevice("bytes", Recorder(0.02, sensing, rngs[0]), baud=9600),
+        "bus": on("can", Recorder(0.005, sensing, rngs[1], can=True), "late:every=7,delay_s=0.02"),
+        "datagrams": on("datagram", Recorder(0.001, sensing, rngs[2]), "unplug:start_s=2.5"),
+        "spi": on("spi", Complement()),
+    }
+    with EmulatedDevices(models, keep_log=True) as devices:
+        links = {name: devices.open_link(name) for name in models}
+        for number in itertools.count():
+            for name, link in links.items():
+                if name == "spi":
+                    link.transfer(bytes([number & 0xFF]))
+                    continue
+                with contextlib.suppress(LinkTimeout, LinkUnplugged):
+                    hear(link, 0.004)
+            if devices.clock() > 3000 * MS:
+                break
+        return {name: list(devices.log_of(name)) for name in models}
+
+
+def test_the_same_seed_gives_the_same_bytes_on_every_link_at_the_same_times():
+    first = run(1)
+    assert first == run(1)
+    assert all(len(log) > 100 for log in first.values())
+    assert first["datagrams"] != run(2)["datagrams"]
