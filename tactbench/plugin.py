@@ -91,6 +91,7 @@ if TYPE_CHECKING:
         SpiDeviceEmulator,
     )
     from tactbench.devices.fault import Fault, fault_concerns
+    from tactbench.devices.log import DeviceLog, LogReader
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
     from tactbench.links.byte_link import ByteLink
@@ -129,6 +130,7 @@ __all__ = [
     "DeviceDescriptor",
     "DeviceEmulator",
     "DeviceEntry",
+    "DeviceLog",
     "Dome",
     "Driver",
     "DriverFactory",
@@ -158,6 +160,7 @@ __all__ = [
     "LinkError",
     "LinkTimeout",
     "LinkUnplugged",
+    "LogReader",
     "MissingRecordingError",
     "NamedDevice",
     "NotApplicable",
@@ -237,6 +240,7 @@ _ON_DEMAND = {
     "Clock": "tactbench.links.link",
     "DatagramLink": "tactbench.links.datagram_link",
     "DeviceEmulator": "tactbench.devices.emulator",
+    "DeviceLog": "tactbench.devices.log",
     "Driver": "tactbench.devices.driver",
     "DriverFactory": "tactbench.devices.driver",
     "DriverSettings": "tactbench.devices.driver",
@@ -246,6 +250,7 @@ _ON_DEMAND = {
     "FloatArray": "tactbench.core.samples",
     "Link": "tactbench.links.link",
     "LinkAddress": "tactbench.links.address",
+    "LogReader": "tactbench.devices.log",
     "Received": "tactbench.links.link",
     "Recording": "tactbench.core.recording.reader",
     "Senses": "tactbench.devices.emulator",

@@ -27,6 +27,8 @@ class SensorDescriptor(Frozen):
     """``module:callable`` -> the device as a model at the far end of `emulated_link`, called with EmulatorSettings."""
     emulated_link: EmulatedLink | None = None
     """What the driver speaks through; needed where there is an emulator."""
+    log_reader: str | None = Field(default=None, pattern=_WHERE)
+    """``module:callable``, called with (Path, options): a DeviceLog; for logs of the device's own tools."""
 
     @property
     def name(self) -> str:

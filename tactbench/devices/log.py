@@ -1,0 +1,36 @@
+"""What a device's own tools have logged, read as blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from tactbench.core.samples import Block
+from tactbench.core.spec.sensor import StreamSpec
+
+
+@dataclass(frozen=True)
+class DeviceLog:
+    """The contents of one log."""
+
+    streams: tuple[StreamSpec, ...]
+    """What `blocks` are of: the streams of the sensor's spec that the log has, perhaps with fewer channels."""
+    blocks: Sequence[Block]
+    """In time order within each stream."""
+    clock: Literal["device", "host", "nominal", "none"]
+    """Who made the times: the device, the host that wrote the log, row number by rate, or nobody."""
+    started: str = ""
+    """When the log was begun, as the file states it; empty if it does not."""
+    remarks: tuple[str, ...] = ()
+    """What a reader of a score from it must know."""
+    counts: Mapping[str, int] = field(default_factory=dict)
+    """What was counted on the way in, by name."""
+
+
+class LogReader(Protocol):
+    """What ``SensorDescriptor.log_reader`` names."""
+
+    def __call__(self, path: Path, options: Mapping[str, Any]) -> DeviceLog:
+        """Read it; UsageError for options that are not known, another TactbenchError for a file that is no such log."""
