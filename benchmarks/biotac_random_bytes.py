@@ -1,8 +1,7 @@
-"""Random bytes against the BioTac's codec, scheduler and emulator, and what a word costs.
+"""Random bytes against the BioTac's codec, frames and emulator, and what a word costs.
 
 Nothing may raise; a word passes as a datum only if it is one; after the bytes one frame is whole again. The last two
-lines are seconds of computing for a second of the sensor's 4400 words, emulator and scheduler together, and scheduler
-alone.
+lines are seconds of computing for a second of the sensor's 4400 words, emulator and frames together, and frames alone.
 
 Usage: python benchmarks/biotac_random_bytes.py [BYTES] [SEED]
 """
@@ -15,9 +14,9 @@ import time
 import numpy as np
 
 from tactbench.plugin import DataError
-from tactbench.sensors.biotac.codec import PROPERTIES, RESEND, decoded, encoded, property_text
+from tactbench.sensors.biotac.codec import PROPERTIES, decoded, encoded, property_text
 from tactbench.sensors.biotac.emulator import Emulator
-from tactbench.sensors.biotac.frames import FrameScheduler
+from tactbench.sensors.biotac.frames import FrameBatches
 from tactbench.sensors.biotac.text_log import read_text_log
 
 
@@ -28,19 +27,13 @@ def chunks(data: bytes, rng: np.random.Generator) -> list[bytes]:
     return [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
 
 
-def whole_frame(scheduler: FrameScheduler, sent: int) -> bool:
-    """Finish the frame that is begun, run one more, and return whether all of it came."""
-    while scheduler.resend_due or sent % 44:
-        sent += scheduler.word(sent) != RESEND
-        scheduler.take(encoded(1))
-    scheduler.blocks()
-    for n in range(44):
-        scheduler.word(sent + n)
-        scheduler.take(encoded(1000 + n))
-    scheduler.finish()
-    blocks = {block.stream: block for block in scheduler.blocks()}
-    slow, fast = blocks["electrodes"], blocks["vibration"]
-    return not slow.quality[-1].any() and not fast.quality[-22:].any() and slow.data[-1, 1] == 1002
+def whole_frame(batches: FrameBatches) -> bool:
+    """Take one more frame and return whether all of it came."""
+    batches.blocks()
+    first, steps = batches.next()
+    batches.take(first, [encoded(1000 + k // 2) for k in range(len(steps))], t_ns=0)
+    slow, fast = batches.blocks()
+    return not slow.quality.any() and not fast.quality.any() and slow.data[0, 1] == 1002
 
 
 def main(count: int, seed: int) -> None:
@@ -57,20 +50,19 @@ def main(count: int, seed: int) -> None:
             assert encoded(reply.value) == word
     print(f"codec: {words} words, {passed} of them data, each its own encoding")
 
-    scheduler, sent, parts = FrameScheduler(), 0, chunks(data, rng)
-    for part in parts:
-        sent += scheduler.word(sent) != RESEND
-        scheduler.take(part)
-    rows = sum(len(block.data) for block in scheduler.blocks())
-    assert whole_frame(scheduler, sent)
-    print(f"scheduler: {len(parts)} replies of 0 to 5 bytes, {rows} rows; the next frame is whole")
+    batches, parts = FrameBatches(speed_hz=4_400_000), chunks(data, rng)
+    for n in range(0, len(parts) - 87, 88):
+        batches.take(batches.next()[0], parts[n : n + 88], t_ns=0)
+    rows = sum(len(block.data) for block in batches.blocks())
+    assert whole_frame(batches)
+    print(f"frames: {len(parts)} replies of 0 to 5 bytes, {rows} rows; the next frame is whole")
 
     sensor, now_s = Emulator(), 0.0
     for part in parts:
         now_s += float(rng.choice([5e-6, 60e-6]))
-        assert len(sensor.feed(part, now_s)) == len(part)
-    sensor.feed(b"\x80\x00", now_s + 1.0)
-    assert sensor.feed(b"\x00\x00", now_s + 1.001) == encoded(2043)
+        assert len(sensor.exchange(1, part, now_s)) == len(part)
+    sensor.exchange(1, b"\x80\x00", now_s + 1.0)
+    assert sensor.exchange(1, b"\x00\x00", now_s + 1.001) == encoded(2043)
     print(f"emulator: {len(parts)} periods of the select; the next exchange is whole")
 
     names = [name for name in PROPERTIES if name != "sampling frequency"]
@@ -83,17 +75,17 @@ def main(count: int, seed: int) -> None:
     except DataError as error:
         print(f"text log: {error}")
 
-    sensor, scheduler = Emulator(), FrameScheduler()
-    for name, alone in (("emulator and scheduler", False), ("scheduler alone", True)):
+    sensor, batches = Emulator(), FrameBatches(speed_hz=4_400_000)
+    for name, alone in (("emulator and frames", False), ("frames alone", True)):
         begin = time.perf_counter()
-        for n in range(4400):
-            word = scheduler.word(n)
-            if alone:
-                scheduler.take(b"\x6d\x58")
-            else:
-                sensor.feed(word, 1e-3 * n)
-                scheduler.take(sensor.feed(b"\x00\x00", 1e-3 * n + 60e-6))
-        scheduler.blocks()
+        for n in range(100):
+            first, steps = batches.next()
+            replies = [b"\x6d\x58"] * len(steps)
+            if not alone:
+                times = [1e-2 * n + 1e-4 * k for k in range(len(steps))]
+                replies = [sensor.exchange(1, step.data, t_s) for step, t_s in zip(steps, times, strict=True)]
+            batches.take(first, replies, t_ns=0, device_ns=0)
+            batches.blocks()
         print(f"{name}: {time.perf_counter() - begin:.3f} s for 4400 words")
 
 

@@ -47,8 +47,11 @@ class SpiBridge(SpiLink):
         Mask of the select lines it has.
     speed_hz
         The SPI clock it runs, hertz.
+    holds
+        Batches it holds, the running one included.
     lost, unexpected
-        Replies that never came though later ones did; and replies to no batch that waits for one: doubled or late.
+        Replies that never came though later ones did, or until they were abandoned; and replies to no batch that waits
+        for one: doubled or late.
 
     Raises
     ------
@@ -102,7 +105,7 @@ class SpiBridge(SpiLink):
                         hint="Is it the bridge's port, and does the bridge run the firmware of docs/links.md?",
                     ) from error
         try:
-            self.firmware, self._largest, self._holds, self.select_lines = HELLO.unpack_from(hello.payload)
+            self.firmware, self._largest, self.holds, self.select_lines = HELLO.unpack_from(hello.payload)
         except struct.error as error:
             raise self._nonsense(hello) from error
         self.name = hello.payload[HELLO.size :].decode("ascii", "replace")
@@ -160,10 +163,10 @@ class SpiBridge(SpiLink):
                 f"{self.address}: a batch of {len(payload)} bytes was given, the bridge takes {self._largest}.",
                 hint="Send it in parts.",
             )
-        if len(self._waiting) >= self._holds:
+        if len(self._waiting) >= self.holds:
             raise LinkError(
-                f"{self.address}: the bridge holds {self._holds} batches, and that many wait for their replies.",
-                hint="Receive a reply first; where none comes, close the link and open it again.",
+                f"{self.address}: the bridge holds {self.holds} batches, and that many wait for their replies.",
+                hint="Receive a reply first; where none comes, abandon them.",
             )
         self._bytes.write(encode(Frame(Kind.BATCH, number, payload)))
         self._waiting[number] = tuple(len(step.data) for step in steps)
@@ -190,6 +193,10 @@ class SpiBridge(SpiLink):
                 data.append(frame.payload[place : place + length])
                 place += length
             return SpiReply(frame.number, tuple(data), t_ns, BEGIN.unpack_from(frame.payload)[0])
+
+    def abandon(self) -> None:  # noqa: D102
+        self.lost += len(self._waiting)
+        self._waiting.clear()
 
     def transfer(self, data: bytes, *, select: int = 1, pause_us: int = 0, timeout_s: float = 1.0) -> bytes:  # noqa: D102
         try:

@@ -43,8 +43,18 @@ class SpiLink(Link):
 
     A batch is carried out without the host, so that pauses of some ten microseconds hold whatever the host does; and
     the next may be sent before the reply to the last one is here. An adapter of another kind is a subclass with
-    :meth:`_submit`, :meth:`_collect` and :meth:`_release`.
+    :meth:`_submit`, :meth:`_collect`, :meth:`_release` and, where replies can get lost, :meth:`abandon`.
+
+    Attributes
+    ----------
+    speed_hz
+        The SPI clock it runs, hertz.
+    holds
+        Batches that may be sent before the first of them is answered; 1 where :meth:`send` itself carries them out.
     """
+
+    speed_hz: int
+    holds: int = 2
 
     def __init__(self, address: str, clock: Clock = time.monotonic_ns) -> None:
         super().__init__(address, clock)
@@ -96,6 +106,9 @@ class SpiLink(Link):
             As of every link.
         """
         return self._collect(timeout_s, self._usable(timeout_s))
+
+    def abandon(self) -> None:
+        """Wait no longer for replies to what was sent; those that come late are dropped. Raises nothing."""
 
     def transfer(self, data: bytes, *, select: int = 1, pause_us: int = 0, timeout_s: float = 1.0) -> bytes:
         """Exchange `data` at once and return what came in; replies to earlier batches are dropped.

@@ -36,6 +36,8 @@ class SpidevLink(SpiLink):
 
     def __init__(self, device: str, *, speed_hz: int, mode: int = 0, clock: Clock = time.monotonic_ns) -> None:
         super().__init__(f"spi://spidev/{device}", clock)
+        self.speed_hz = speed_hz
+        self.holds = 1
         bus, _, line = device.partition(".")
         if not (bus.isdigit() and line.isdigit()):
             raise LinkError(f"{self.address} does not name a bus and a line.", hint="Write spi://spidev/0.0.")
@@ -75,6 +77,9 @@ class SpidevLink(SpiLink):
         if not self._replies:
             raise self._nothing_came(timeout_s)
         return self._replies.popleft()
+
+    def abandon(self) -> None:  # noqa: D102
+        self._replies.clear()
 
     def _release(self) -> None:
         self._device.close()

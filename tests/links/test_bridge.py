@@ -285,6 +285,22 @@ def test_a_transfer_given_up_leaves_room(link, emulator):
 
 
 @needs_pty
+def test_batches_that_are_abandoned_leave_room_and_count_as_lost(link, emulator):
+    emulator.faults.add("dropped")
+    assert link.holds == 3
+    for _ in range(3):
+        link.send([SpiStep(b"a")])
+    with pytest.raises(LinkError, match="abandon"):
+        link.send([SpiStep(b"a")])
+    with pytest.raises(LinkTimeout):
+        link.receive(0.1)
+    link.abandon()
+    emulator.faults.clear()
+    assert link.transfer(b"\xff") == b"\x00"
+    assert link.lost == 3
+
+
+@needs_pty
 def test_a_doubled_reply_is_counted_once(link, emulator):
     emulator.faults.add("doubled")
     assert [link.transfer(bytes([n])) for n in range(3)] == [b"\xff", b"\xfe", b"\xfd"]

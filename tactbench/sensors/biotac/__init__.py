@@ -11,4 +11,13 @@ TACTBENCH_API = 1
 @hookimpl
 def tactbench_sensors() -> list[SensorDescriptor]:
     """Offer the sensor."""
-    return [SensorDescriptor(spec=SPEC, transducer="tactbench.sensors.biotac.transduction:build")]
+    return [
+        SensorDescriptor(
+            spec=SPEC,
+            transducer="tactbench.sensors.biotac.transduction:build",
+            driver="tactbench.sensors.biotac.driver:build",
+            emulator="tactbench.sensors.biotac.emulator:build_emulator",
+            emulated_link="spi",
+            log_reader="tactbench.sensors.biotac.text_log:read_log",
+        )
+    ]

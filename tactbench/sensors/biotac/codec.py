@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
 _DRIVER = "kth-ros-pkg/biotac_driver biotac.h"
 
-CLOCK: Quantity = sourced(4400.0, "kHz", f"{_DRIVER}: BT_SPI_BITRATE_KHZ_DEFAULT; the manual allows 0.5-10 MHz")
+CLOCK: Quantity = sourced(4400.0, "kHz", f"{_DRIVER}: BT_SPI_BITRATE_KHZ_DEFAULT")
+SLOWEST_CLOCK: Quantity = sourced(500.0, "kHz", f"{_DRIVER} and the manual: 0.5-10 MHz")
+FASTEST_CLOCK: Quantity = sourced(10_000.0, "kHz", f"{_DRIVER} and the manual: 0.5-10 MHz")
 COMMAND_RATE: Quantity = sourced(4400.0, "Hz", f"{_DRIVER}: BT_SAMPLE_RATE_HZ_DEFAULT")
 SAMPLING_PAUSE: Quantity = sourced(
     50.0, "us", f"{_DRIVER}: BT_AFTERSAMPLE_DELAY_DEFAULT; the manual, 8.3.1: at least, every select inactive"
@@ -94,7 +96,7 @@ a length of 44 and never reads it].
 class Fault(StrEnum):
     """What can be wrong with one reply."""
 
-    PARITY = "bad parity"
+    PARITY = "parity"
     RESERVED = "reserved bits"
     """Parity holds, but a bit that is always 0 is not."""
     ERROR = "error reply"
@@ -102,8 +104,6 @@ class Fault(StrEnum):
     """The line was held low or high throughout: 00 00 or FF FF, both of bad parity."""
     NO_REPLY = "no reply"
     """Fewer than two bytes came."""
-    DUPLICATE = "duplicate"
-    """More than one reply came to one command."""
 
 
 class Reply(NamedTuple):

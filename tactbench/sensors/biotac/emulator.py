@@ -8,14 +8,17 @@ follows a property's last byte, nor which commands but sampling need a pause: th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
 
+from tactbench.plugin import Fault, UsageError, fault_concerns
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
 from tactbench.sensors.biotac.codec import (
     CLOCK,
     ERROR,
+    FASTEST_CLOCK,
     INDEX,
     PROPERTIES,
     READ,
@@ -26,11 +29,10 @@ from tactbench.sensors.biotac.codec import (
     with_parity,
 )
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME
+from tactbench.sensors.biotac.options import Options
 
-State = Callable[[float], Mapping[str, float]]
-"""Counts of each channel at a time in seconds."""
-
-FaultName = Literal["parity", "dropped-reply", "doubled-reply", "stuck-channel", "not-connected", "error-reply"]
+if TYPE_CHECKING:
+    from tactbench.plugin import EmulatorSettings, Senses
 
 _ROUNDING_S = 1e-9
 """Seconds as float64 are 0.1 ns apart after eleven days, and a host's sum of pauses rounds more than once."""
@@ -42,54 +44,40 @@ _FILLERS = (0x00, 0x01)
 bridge for a PIC32]."""
 
 
-@dataclass
-class EmulatedFault:
-    """A fault that the emulator shows; times in seconds of the clock passed in.
-
-    ``parity`` turns one bit of a word on its way, another one each time; ``dropped-reply`` and ``doubled-reply`` stand
-    for a bridge between host and bus that loses or repeats an answer, since on the bus itself the host clocks every
-    byte; ``stuck-channel`` holds what the channel read when the fault began; ``not-connected`` leaves the line idle and
-    loses all state, as without power; ``error-reply`` answers A5 and `error`.
+@dataclass(frozen=True)
+class BioTacFault(Fault):
+    """A fault that the emulator shows.
 
     Raises
     ------
-    ValueError
-        For a name that is none of these, or `every` below 1.
+    UsageError
+        As of every fault, for a channel that no BioTac has, or an `error` that is no byte.
     """
 
-    name: FaultName
-    start_s: float = -math.inf
-    end_s: float = math.inf
-    every: int = 1
-    """It concerns every so-many-eth of the words it could concern."""
+    known: ClassVar[Mapping[str, str]] = {
+        "parity": "one bit of a word is turned on its way, another one each time",
+        "dropped-reply": "the line stays idle while a word is read",
+        "doubled-reply": "the word before comes once more in place of this one",
+        "stuck-channel": "a channel stays at what it read when the fault began",
+        "not-connected": "the line stays idle throughout, and the sensor forgets all, as without power",
+        "error-reply": "a word is A5 and `error`",
+    }
+
     channels: frozenset[str] = frozenset()
     """Of these channels only; empty: of all."""
     error: int = 0x2E
     """Second byte of an error reply."""
-    _seen: int = field(default=0, init=False, repr=False)
-    _held: dict[str, int] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.name not in get_args(FaultName):
-            raise ValueError(f"no fault is called {self.name!r}; there are {', '.join(get_args(FaultName))}")
-        if self.every < 1:
-            raise ValueError(f"every {self.every} words is none: 1 or more")
-
-    def active(self, now_s: float) -> bool:
-        """Return whether it is shown at `now_s`."""
-        return self.start_s <= now_s < self.end_s
-
-    def turn(self, now_s: float, channel: str) -> int | None:
-        """Return how many words of `channel` it concerned before this one, or None if it does not concern this one."""
-        if not self.active(now_s) or (self.channels and channel not in self.channels):
-            return None
-        self._seen += 1
-        turns, left = divmod(self._seen, self.every)
-        return None if left else turns - 1
-
-    def held(self, channel: str, count: int) -> int:
-        """Return what `channel` read when this was asked for the first time."""
-        return self._held.setdefault(channel, count)
+        super().__post_init__()
+        unknown = sorted(self.channels - set(INDEX))
+        if unknown:
+            raise UsageError(
+                f"The fault {self.name!r} is of {', '.join(unknown)}, which no BioTac has.",
+                hint=f"Channels are {', '.join(INDEX)}.",
+            )
+        if not 0 <= self.error <= 0xFF:
+            raise UsageError(f"The fault {self.name!r} has the error {self.error}.", hint="It is a byte, 0 to 255.")
 
 
 @dataclass
@@ -102,19 +90,13 @@ class _Answer:
     early: int | None = None
     """Second byte of the error that is sent instead before `ready_s`."""
     ready_s: float = -math.inf
-    dropped: bool = False
-    doubled: bool = False
     sent: int = 0
 
 
-def rest_state(_t_s: float) -> Mapping[str, float]:
-    """Return the counts of the spec's channels at rest, whatever the time."""
-    return _REST
-
-
-_REST = {
+REST: Mapping[str, float] = {
     channel.name: channel.rest.value for stream in STREAMS for channel in stream.channels if channel.rest is not None
 }
+"""Counts of the spec's channels at rest."""
 
 DEFAULT_PROPERTIES: Mapping[str, bytes] = {
     "flex version": b"BD",
@@ -139,13 +121,15 @@ class Emulator:
 
     Parameters
     ----------
-    state
-        Counts of each channel at a time in seconds; rounded, and clipped to 0-4095. Its channels are those that the
-        sensor has: E1 to E19, PDC, TDC, TAC and PAC, or E20 to E24, too, on an SP. None: the spec's rest levels.
+    senses
+        Second -> counts of the channels, rounded, and clipped to 0-4095; those left out are at rest. The sensor has E1
+        to E19, PDC, TDC, TAC and PAC, and what else is given: E20 to E24 on an SP. None: all at rest.
     properties
         Bytes of each property; one that is left out is unknown to the sensor.
     faults
         What goes wrong; the list may be changed at any time.
+    select
+        Mask of its select lines: it hears what is sent with all of them active.
     clock_hz
         Of the bus: how long bytes take.
     idle
@@ -157,28 +141,35 @@ class Emulator:
 
     def __init__(
         self,
-        state: State | None = None,
+        senses: Senses | None = None,
         *,
         properties: Mapping[str, bytes] = DEFAULT_PROPERTIES,
-        faults: Iterable[EmulatedFault] = (),
+        faults: Iterable[BioTacFault] = (),
+        select: int = 1,
         clock_hz: float | None = None,
         idle: int = 0xFF,
         early_resend: Literal["error", "ignored"] = "error",
     ) -> None:
-        self._state = rest_state if state is None else state
+        self._senses = senses or (lambda _: {})
         self._properties = {PROPERTIES[name].code: data for name, data in properties.items()}
         self.faults = list(faults)
+        self._select = select
         self._byte_s = 8.0 / (CLOCK.to("Hz") if clock_hz is None else clock_hz)
         self._idle = bytes([idle])
         self._early_resend = early_resend
         self._answer: _Answer | None = None
         self._last: _Answer | None = None
+        self._seen: Counter[Fault] = Counter()
+        self._turned = 0
+        self._held: dict[tuple[BioTacFault, str], int] = {}
 
-    def feed(self, data: bytes, now_s: float) -> bytes:
-        """Return what is on the line while the host clocks `data` in.
+    def exchange(self, select: int, data: bytes, now_s: float) -> bytes:
+        """Return what is on the line while the host clocks `data` in: as many bytes.
 
         Parameters
         ----------
+        select
+            Mask of the lines that are active meanwhile.
         data
             One period of the select: two bytes of a command, or fillers (first byte 00 or 01) while a reply is read.
             Bytes after a command in the same period are read at once, without the pause.
@@ -188,10 +179,12 @@ class Emulator:
         Returns
         -------
         bytes
-            As many as went in, unless a fault drops or doubles a reply. During a command the line is idle [assumed].
+            During a command, and while it is not selected, the line is idle [assumed].
         """
         if any(fault.name == "not-connected" and fault.active(now_s) for fault in self.faults):
             self._answer, self._last = None, None
+            return self._idle * len(data)
+        if select & self._select != self._select:
             return self._idle * len(data)
         if self._answer is not None and data[:1] and data[0] in _FILLERS:
             return self._read(len(data), now_s)
@@ -201,9 +194,13 @@ class Emulator:
         self._answer = self._command(data[0], data[1], end_s)
         return self._idle * 2 + self._read(len(data) - 2, end_s)
 
-    def poll(self, now_s: float) -> bytes:
-        """Return what the sensor sends by itself: nothing, the host clocks every byte."""
-        return b""
+    def _shown(self, name: str, channel: str, now_s: float) -> list[BioTacFault]:
+        """Return the faults called `name` that concern the next word of `channel`."""
+        return [
+            fault
+            for fault in self.faults
+            if (not fault.channels or channel in fault.channels) and fault_concerns([fault], name, now_s, self._seen)
+        ]
 
     def _read(self, n: int, now_s: float) -> bytes:
         answer = self._answer
@@ -215,15 +212,10 @@ class Emulator:
             self._last = answer
         out = answer.data[answer.sent : answer.sent + n]
         answer.sent += n
-        # What follows a property's last byte is assumed: the driver reads texts up to a 00 or FF.
-        out += self._idle * (n - len(out))
-        if answer.dropped:
-            out = b""
         if answer.word and answer.sent >= len(answer.data):
             self._answer = None
-            if answer.doubled:
-                out += answer.data
-        return out
+        # What follows a property's last byte is assumed: the driver reads texts up to a 00 or FF.
+        return out + self._idle * (n - len(out))
 
     def _command(self, first: int, second: int, now_s: float) -> _Answer | None:
         """Return the answer to a command; parity is checked first, then the command, then its channel [assumed]."""
@@ -242,17 +234,16 @@ class Emulator:
         return self._error(0x3F)
 
     def _sample(self, index: int, now_s: float) -> _Answer:
-        counts, channel = self._state(now_s), _NAMES.get(index, "")
-        if channel not in counts:
+        channel = _NAMES.get(index, "")
+        sensed = self._senses(now_s).get(channel, REST.get(channel))
+        if sensed is None:
             return self._error(0x58)
-        count = min(max(round(counts[channel]), 0), int(CONVERTER_TOP))
-        for fault in self.faults:
-            if fault.name == "stuck-channel" and fault.turn(now_s, channel) is not None:
-                count = fault.held(channel, count)
+        count = min(max(round(sensed), 0), int(CONVERTER_TOP))
+        for fault in self._shown("stuck-channel", channel, now_s):
+            count = self._held.setdefault((fault, channel), count)
         word = encoded(count)
-        for fault in self.faults:
-            if fault.name == "error-reply" and fault.turn(now_s, channel) is not None:
-                word = bytes([ERROR, fault.error])
+        for fault in self._shown("error-reply", channel, now_s):
+            word = bytes([ERROR, fault.error])
         answer = self._word(word, channel, now_s)
         answer.early, answer.ready_s = 0x2D, now_s + SAMPLING_PAUSE.to("s")
         return answer
@@ -266,18 +257,31 @@ class Emulator:
     def _word(self, word: bytes, channel: str, now_s: float) -> _Answer:
         """Return a word as it comes over the line; what may be asked for again is the word itself."""
         answer = _Answer(word, word, channel)
-        for fault in self.faults:
-            if fault.name not in ("parity", "dropped-reply", "doubled-reply"):
-                continue
-            turn = fault.turn(now_s, channel)
-            if turn is None:
-                continue
-            if fault.name == "parity":
-                answer.data = (int.from_bytes(answer.data, "big") ^ 1 << turn % 16).to_bytes(2, "big")
-            answer.dropped |= fault.name == "dropped-reply"
-            answer.doubled |= fault.name == "doubled-reply"
+        if self._shown("doubled-reply", channel, now_s) and self._last is not None:
+            answer.data = self._last.word
+        for _ in self._shown("parity", channel, now_s):
+            answer.data = (int.from_bytes(answer.data, "big") ^ 1 << self._turned % 16).to_bytes(2, "big")
+            self._turned += 1
+        if self._shown("dropped-reply", channel, now_s):
+            answer.data = self._idle * 2
         return answer
 
     def _error(self, second: int) -> _Answer:
         word = bytes([ERROR, second])
         return _Answer(word, word)
+
+
+def build_emulator(settings: EmulatorSettings) -> Emulator:
+    """Return a sensor with what is sensed, as ``SensorDescriptor.emulator`` promises; it draws nothing.
+
+    It is not told the bus's clock and takes the fastest that a sensor allows, so that no pause of 50 us is too short;
+    at 4.4 MHz it samples 2 us early and lets a pause pass that is 2 us too short.
+
+    Raises
+    ------
+    UsageError
+        For options or faults that are not known.
+    """
+    options = Options.checked(settings.options)
+    faults = [BioTacFault.parse(text) for text in settings.faults]
+    return Emulator(settings.senses, faults=faults, select=options.select, clock_hz=FASTEST_CLOCK.to("Hz"))

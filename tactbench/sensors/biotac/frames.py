@@ -1,20 +1,32 @@
-"""Frames of the BioTac: which word to send next, and replies to samples of the spec's two streams.
+"""Frames of the BioTac: which words to send, when, and replies to samples of the spec's two streams.
 
-No input or output, no clock of its own: whoever drives the bus asks for the next word, sends it, and hands back what
+No input or output, no clock of its own: whoever drives the bus asks for the next batch, sends it, and hands back what
 was clocked out. Nothing is interpolated: a sample that did not come is marked missing.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality
+from tactbench.plugin import Block, Quality, Source, SpiStep, StreamSpec
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
-from tactbench.sensors.biotac.codec import CHANNELS, INDEX, RESEND, Fault, Reply, decoded, sampling_command
+from tactbench.sensors.biotac.codec import (
+    CHANNELS,
+    COMMAND_RATE,
+    INDEX,
+    RESEND,
+    SAMPLING_PAUSE,
+    WORD_PAUSE,
+    Fault,
+    Reply,
+    decoded,
+    sampling_command,
+)
 from tactbench.sensors.biotac.electrodes import NAMES
 
 if TYPE_CHECKING:
@@ -24,6 +36,9 @@ DEFAULT_FRAME: tuple[str, ...] = tuple(
     name for slow in (*NAMES, "PDC", "TAC", "TDC") for name in (slow, "PAC")
 )  # fmt: skip
 """44 commands, every second one PAC [sourced: kth-ros-pkg/biotac_driver, BT_FRAME_STRUCTURE_DEFAULT]."""
+
+FILLER = b"\x00\x00"
+"""Sent while a word is read [sourced: driver]."""
 
 
 def quality_of(reply: Reply) -> Quality:
@@ -39,17 +54,48 @@ def quality_of(reply: Reply) -> Quality:
     return Quality.SATURATED if reply.value in (0, int(CONVERTER_TOP)) else Quality.GOOD
 
 
+def counted(faults: Mapping[str, Counter[Fault]]) -> dict[str, int]:
+    """Return counts by fault and channel, such as ``parity E7``."""
+    return {f"{fault} {name}": n for name, counts in faults.items() for fault, n in counts.items()}
+
+
+def streams_of(frame: Sequence[str], rate_hz: float | None, source: Source | None = None) -> tuple[StreamSpec, ...]:
+    """Return the spec's streams as a frame fills them: with its channels only, at its rates.
+
+    Parameters
+    ----------
+    frame
+        Names of channels in the order of their commands.
+    rate_hz
+        Commands a second; None: nobody states it.
+    source
+        Where the rates are from, if they are not the spec's.
+    """
+    found = []
+    for stream in STREAMS:
+        channels = tuple(channel for channel in stream.channels if channel.name in frame)
+        if not channels:
+            continue
+        most = max(frame.count(channel.name) for channel in channels)
+        own = None if rate_hz is None else rate_hz * most / len(frame)
+        if channels != stream.channels or own != stream.rate_hz:
+            stream = stream.model_copy(update={"channels": channels, "rate_hz": own, "rate_source": source})
+        found.append(stream)
+    return tuple(found)
+
+
 @dataclass
 class _Row:
     sequence: int
     t_ns: int | None
+    device_ns: int | None
     data: npt.NDArray[np.uint16]
     quality: npt.NDArray[np.uint8]
     to_come: int
 
 
 class FrameRows:
-    """Gathers words, in the order of a frame, into rows of the spec's streams.
+    """Gathers words, in the order of a frame, into rows of its streams.
 
     The k-th word of a channel within a frame belongs to the k-th of that stream's rows. A row ends when all of its
     words are there or a word of another row comes; words that did not come are MISSING. A row of which no word came is
@@ -70,36 +116,40 @@ class FrameRows:
         unknown = [name for name in frame if name not in CHANNELS]
         if unknown or not frame:
             raise ValueError(f"a frame is of one or more of {', '.join(CHANNELS)}; got {', '.join(unknown) or 'none'}")
+        self.frame = frame
+        self._streams = streams_of(frame, None)
         columns = {
             channel.name: (k, column)
-            for k, stream in enumerate(STREAMS)
+            for k, stream in enumerate(self._streams)
             for column, channel in enumerate(stream.channels)
         }
         times = Counter(frame)
-        self.frame = frame
-        self._rows_per_frame = [max(times[channel.name] for channel in stream.channels) for stream in STREAMS]
+        self._rows_per_frame = [max(times[channel.name] for channel in stream.channels) for stream in self._streams]
         seen: Counter[str] = Counter()
         self._places: list[tuple[int, int, int]] = []
         for name in frame:
             self._places.append((*columns[name], seen[name]))
             seen[name] += 1
         self._expected: Counter[tuple[int, int]] = Counter((k, nth) for k, _, nth in self._places)
-        self._open: list[_Row | None] = [None] * len(STREAMS)
-        self._done: list[list[_Row]] = [[] for _ in STREAMS]
+        self._open: list[_Row | None] = [None] * len(self._streams)
+        self._done: list[list[_Row]] = [[] for _ in self._streams]
 
-    def put(self, position: int, t_ns: int | None, count: int, quality: Quality) -> None:
+    def put(
+        self, position: int, count: int, quality: Quality, t_ns: int | None = None, device_ns: int | None = None
+    ) -> None:
         """Add one word.
 
         Parameters
         ----------
         position
             Number of its command since the first of all, frame after frame.
-        t_ns
-            When it was sampled, in nanoseconds, if that is known. A row has the time of its first word.
         count
             The datum; of no meaning if MISSING.
         quality
             What is wrong with it.
+        t_ns, device_ns
+            Its times, nanoseconds of the host's clock and of the adapter's, if they are known. A row has the times of
+            its first word.
         """
         frame, place = divmod(position, len(self.frame))
         k, column, nth = self._places[place]
@@ -107,11 +157,12 @@ class FrameRows:
         row = self._open[k]
         if row is None or row.sequence != sequence:
             self._close(k)
-            width = len(STREAMS[k].channels)
+            width = len(self._streams[k].channels)
             row = _Row(
                 sequence,
                 t_ns,
-                np.zeros(width, dtype=STREAMS[k].dtype),
+                device_ns,
+                np.zeros(width, dtype=self._streams[k].dtype),
                 np.full(width, Quality.MISSING, dtype=np.uint8),
                 self._expected[k, nth],
             )
@@ -129,151 +180,199 @@ class FrameRows:
 
     def close(self) -> None:
         """End every row that is begun."""
-        for k in range(len(STREAMS)):
+        for k in range(len(self._streams)):
             self._close(k)
 
     def blocks(self) -> list[Block]:
-        """Return the rows that ended since the last call, a block a stream that has any."""
+        """Return the rows that ended since the last call, a block a stream that has any.
+
+        A row of ``electrodes`` is one frame. Its times are those of the frame's first command but PAC; in the default
+        frame the others follow every 454.5 us, TDC 9.5 ms later. A row of ``vibration`` is one word with its own times.
+        """
         found = []
-        for stream, rows in zip(STREAMS, self._done, strict=True):
+        for stream, rows in zip(self._streams, self._done, strict=True):
             if rows:
-                times = [row.t_ns for row in rows if row.t_ns is not None]
                 found.append(
                     Block(
                         stream=stream.name,
-                        t_ns=np.array(times, dtype=np.int64) if len(times) == len(rows) else None,
+                        t_ns=_times([row.t_ns for row in rows]),
                         data=np.stack([row.data for row in rows]),
                         quality=np.stack([row.quality for row in rows]),
                         sequence=np.array([row.sequence for row in rows], dtype=np.int64),
+                        device_ns=_times([row.device_ns for row in rows]),
                     )
                 )
                 rows.clear()
         return found
 
 
-@dataclass
-class _Asked:
-    """The command that was sent last."""
-
-    position: int
-    channel: str
-    t_ns: int
-    resends: int
-    reply: Reply | None = None
-    surplus: int = 0
-    waiting: bool = True
+def _times(times: list[int | None]) -> npt.NDArray[np.int64] | None:
+    return None if None in times else np.array(times, dtype=np.int64)
 
 
-class FrameScheduler:
-    """Says which word to send next and turns replies into samples, for one sensor.
+class Timing(NamedTuple):
+    """When the words of a batch are sampled and when the batch is over, nanoseconds from its beginning."""
 
-    For each command: send :meth:`word`, pause, clock two bytes out, :meth:`take` them; while :attr:`resend_due`, do so
-    once more. A command that could not be sent in its time is passed over with :meth:`skip`, so that sequence numbers
-    stay with the time. Several sensors on one bus have a scheduler each, of equal frames: their next words are equal
-    and are sent to all at once, resends to one alone.
+    sampled_ns: tuple[int, ...]
+    """A word is sampled at the last bit of its command [assumed]."""
+    end_ns: int
 
-    The device counts nothing itself: the sequence number of a row is the host's own count of commands. A reply that
+
+class FrameBatches:
+    """Batches of SPI steps for one sensor, and samples from their replies.
+
+    A word is a sampling command, the pause, two bytes read, and a pause that fills its time. SPI adapters take whole
+    microseconds, so the pauses differ by one: the time of n words is n / 4400 s to 1 us, whatever the SPI clock.
+
+    A resend repeats the last two bytes, so it must come before the next command; and what a batch does cannot depend on
+    what it reads. So a resend is no repair on demand: with `resends` above 0 *every* word is asked for so many times
+    more, and the first that came good is taken. By default there is none: a word of bad parity is SUSPECT and counted.
+    It would double the bytes and the batch's size for words that are hardly ever bad, and no source states which pause
+    a resend needs; 50 us as after a sampling command is assumed, and there is time for one at 4400 words a second.
+
+    The sensor counts nothing itself: the sequence number of a row is the host's own count of commands. A reply that
     repeats the word before it cannot be told by its bytes.
 
     Parameters
     ----------
     frame
         Names of channels in the order of their commands.
+    speed_hz
+        Clock of the SPI bus, hertz.
+    select
+        Mask of the sensor's select lines.
     resends
-        How often a word of bad parity is asked for again. What never came is not: if the command was lost, the last
-        two bytes would be another channel's.
+        How often each word is asked for again.
+    words
+        Words in a batch; None: a frame of them.
 
     Attributes
     ----------
     faults
-        For each channel, how often which :class:`~tactbench.sensors.biotac.codec.Fault` was seen, resends included.
+        For each channel, how often which :class:`~tactbench.sensors.biotac.codec.Fault` was seen in the first reply to
+        its command.
     resent
         For each channel, how many words came good only when asked for again.
-    resend_due
-        Whether the next word repeats the last one, to be sent at once.
 
     Raises
     ------
     ValueError
-        For a frame that is none, as :class:`FrameRows`.
+        For a frame that is none, as :class:`FrameRows`, or if `speed_hz` leaves no time for the words.
     """
 
-    def __init__(self, frame: tuple[str, ...] = DEFAULT_FRAME, *, resends: int = 1) -> None:
+    def __init__(
+        self,
+        frame: tuple[str, ...] = DEFAULT_FRAME,
+        *,
+        speed_hz: int,
+        select: int = 1,
+        resends: int = 0,
+        words: int | None = None,
+    ) -> None:
         self._rows = FrameRows(frame)
-        self._resends = resends
+        self._select = select
+        self._asked = 1 + resends
+        self._words = len(frame) if words is None else words
+        self._speed_hz = speed_hz
         self._position = 0
-        self._asked: _Asked | None = None
-        self.resend_due = False
+        rate_hz, bits = round(COMMAND_RATE.to("Hz")), 32 * self._asked
+        # Pauses of one word, in us: a quotient of whole numbers, 1e6 (1/rate - bits/speed).
+        self._pauses_us = (1_000_000 * (speed_hz - bits * rate_hz), rate_hz * speed_hz)
+        self._command_us, self._word_us = round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us"))
+        self._within_us = self._asked * self._command_us + resends * self._word_us
+        if self._paused_us(1) < self._within_us + self._word_us:
+            raise ValueError(
+                f"{self._asked} x {self._command_us} us, the pauses between and {bits} bits at {speed_hz} Hz do not "
+                f"fit into a word's 1/{rate_hz} s"
+            )
         self.faults: dict[str, Counter[Fault]] = {name: Counter() for name in dict.fromkeys(frame)}
         self.resent: Counter[str] = Counter()
 
-    def word(self, t_ns: int) -> bytes:
-        """Return the two bytes to send now, at `t_ns` nanoseconds of the host's clock."""
-        if self.resend_due and self._asked is not None:
-            self.resend_due = False
-            self._asked.resends -= 1
-            self._asked.waiting = True
-            return RESEND
-        self._settle()
-        channel = self._rows.frame[self._position % len(self._rows.frame)]
-        self._asked = _Asked(self._position, channel, t_ns, self._resends)
-        self._position += 1
-        return sampling_command(INDEX[channel])
+    def _paused_us(self, words: int) -> int:
+        """Return the sum of pauses in the first `words` words, rounded down."""
+        over, under = self._pauses_us
+        return words * over // under
 
-    def take(self, reply: bytes) -> None:
-        """Take what was clocked out after the last word; empty if nothing came.
+    @property
+    def frame_words(self) -> int:
+        """Words in a frame."""
+        return len(self._rows.frame)
 
-        Of more than two bytes the first two are the reply and each further word is a duplicate, as is a reply when none
-        is waited for; the sample is then SUSPECT. What comes before the first word or after :meth:`finish` is ignored.
+    def next(self) -> tuple[int, list[SpiStep]]:
+        """Return the position of the next batch's first word, counted over all frames, and the batch."""
+        first, steps = self._position, []
+        self._position += self._words
+        for n in range(first, self._position):
+            command = sampling_command(INDEX[self._rows.frame[n % len(self._rows.frame)]])
+            for k in range(self._asked):
+                steps.append(SpiStep(RESEND if k else command, self._select, self._command_us))
+                steps.append(SpiStep(FILLER, self._select, self._word_us))
+            rest_us = self._paused_us(n + 1) - self._paused_us(n) - self._within_us
+            steps[-1] = SpiStep(FILLER, self._select, rest_us)
+        return first, steps
+
+    def timing(self, first: int) -> Timing:
+        """Return the times within the batch whose first word has position `first`."""
+        over, under = 16 * 1_000_000_000, self._speed_hz
+        begins = [
+            1000 * (self._paused_us(first + n) - self._paused_us(first)) + 2 * self._asked * n * over // under
+            for n in range(self._words + 1)
+        ]
+        return Timing(tuple(begin + over // under for begin in begins[:-1]), begins[-1])
+
+    def take(
+        self, first: int, data: Sequence[bytes], *, t_ns: int, device_ns: int | None = None, skipped: int = 0
+    ) -> None:
+        """Take the reply to a batch.
+
+        Parameters
+        ----------
+        first
+            What :meth:`next` returned with the batch.
+        data
+            What came in during each of its steps.
+        t_ns
+            When it was in the host.
+        device_ns
+            When the batch began by the adapter's own counter. With it, rows have this clock's times beside `t_ns`;
+            without it, `t_ns` is taken for the batch's end and rows have the times before it at which they were sampled
+            if no pause was longer than asked for.
+        skipped
+            Words that were not asked for in their time so far, as whole frames: sequence numbers stay with the time.
         """
-        asked = self._asked
-        if asked is None:
-            return
-        if asked.waiting:
-            asked.waiting = False
-            self._answer(asked, reply[:2])
-            reply = reply[2:]
-        more = (len(reply) + 1) // 2
-        if more:
-            asked.surplus += more
-            self.faults[asked.channel][Fault.DUPLICATE] += more
+        sampled_ns, end_ns = self.timing(first)
+        stride = 2 * self._asked
+        for n, after_ns in enumerate(sampled_ns):
+            words = data[stride * n + 1 : stride * (n + 1) : 2]
+            reply = self._reply(self._rows.frame[(first + n) % len(self._rows.frame)], words)
+            self._rows.put(
+                first + n + skipped,
+                reply.value or 0,
+                quality_of(reply),
+                t_ns - end_ns + after_ns if device_ns is None else t_ns,
+                None if device_ns is None else device_ns + after_ns,
+            )
 
-    def _answer(self, asked: _Asked, word: bytes) -> None:
-        found = decoded(word)
-        if found.fault is not None:
-            self.faults[asked.channel][found.fault] += 1
-        if asked.reply is None:
-            asked.reply = found
-        elif found.fault is None:
-            asked.reply = found
-            self.resent[asked.channel] += 1
-        self.resend_due = found.fault in (Fault.PARITY, Fault.RESERVED) and asked.resends > 0
+    def _reply(self, channel: str, words: Sequence[bytes]) -> Reply:
+        """Return the first reply, or the first good one of the others if its parity was bad.
 
-    def skip(self, words: int) -> None:
-        """Pass over the next `words` commands, which are not sent: their samples are missing."""
-        self._settle()
-        self._position += words
-
-    def finish(self) -> None:
-        """End the rows that are begun: nothing more is sent."""
-        self._settle()
-        self._rows.close()
+        What never came is not taken from a resend: if the command was lost, the last two bytes are another channel's.
+        """
+        reply = decoded(words[0])
+        if reply.fault is not None:
+            self.faults[channel][reply.fault] += 1
+        if reply.fault in (Fault.PARITY, Fault.RESERVED):
+            for word in words[1:]:
+                again = decoded(word)
+                if again.fault is None:
+                    self.resent[channel] += 1
+                    return again
+        return reply
 
     def blocks(self) -> list[Block]:
-        """Return the samples of rows that ended since the last call, raw counts with their quality.
-
-        A row of ``electrodes`` is one frame. Its time is that of the frame's first command but PAC; in the default
-        frame the others follow every 454.5 us, TDC 9.5 ms later. A row of ``vibration`` is one word with its own time.
-        """
+        """Return the samples of rows that ended since the last call: raw counts with their quality."""
         return self._rows.blocks()
 
-    def _settle(self) -> None:
-        """Make the last command's reply a sample."""
-        asked, self._asked, self.resend_due = self._asked, None, False
-        if asked is None:
-            return
-        if asked.reply is None:
-            asked.reply = Reply(None, Fault.NO_REPLY)
-            self.faults[asked.channel][Fault.NO_REPLY] += 1
-        quality = quality_of(asked.reply) | (Quality.SUSPECT if asked.surplus else Quality.GOOD)
-        self._rows.put(asked.position, asked.t_ns, asked.reply.value or 0, quality)
+    def close(self) -> None:
+        """End the rows that are begun."""
+        self._rows.close()

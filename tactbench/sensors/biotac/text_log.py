@@ -4,20 +4,28 @@ A line is ``time batch frame channel value parity [value parity ...]``, separate
 time in seconds with six decimals, 0.000000 throughout where the host's clock was not read; channel the number of the
 sampling command; parity 1 means bad [sourced: kth-ros-pkg/biotac_driver, ``bt_save_buffer_data`` in ``biotac.c``].
 Newer tools write a header that ends with ``Begin File`` [sourced: SynTouch QuickStart Guide]; its layout is not
-certain, so it is handed on as it stands and nothing is read from it. Written from these documents; no real log has been
-read.
+certain: only a number after ``SampRate:`` and lines that begin with ``Date:`` or ``Time:`` are read from it. Written
+from these documents; no real log has been read.
 """
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from tactbench.plugin import Block, DataError
+import numpy as np
+
+from tactbench.plugin import Block, DataError, DeviceLog, Source
 from tactbench.sensors.biotac.codec import CHANNELS, INDEX, Fault, Reply
-from tactbench.sensors.biotac.frames import FrameRows, quality_of
+from tactbench.sensors.biotac.frames import FrameRows, counted, quality_of, streams_of
+from tactbench.sensors.biotac.options import LogOptions
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 _LONGEST_S = 9e9
 """So long a time in nanoseconds fits in 64 bits."""
@@ -36,12 +44,83 @@ class TextLog:
 
     header: tuple[str, ...]
     """The lines before ``Begin File``, as they stand; empty without such a line."""
+    frame: tuple[str, ...]
+    """Channels in the order in which most frames of the log have them."""
     blocks: list[Block]
     """A block a stream; sequence numbers count from the log's own frame numbers. No times if the log has none."""
     faults: dict[str, Counter[Fault]]
     """For each channel, how often which fault was seen."""
     left_out: Counter[str]
     """Lines that are no sample, by reason."""
+    rate_hz: float | None
+    """Commands a second from the first sample to the last, by the log's times; None: it has none, or they go back."""
+
+
+def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
+    """Read a log as ``SensorDescriptor.log_reader`` promises.
+
+    Times are the log's own; a log without times has row number by rate, if the option `rate_hz` or the header states
+    one. A timed log's rate is measured from its first and last row.
+
+    Parameters
+    ----------
+    path
+        The file.
+    options
+        As :class:`~tactbench.sensors.biotac.options.LogOptions`.
+
+    Raises
+    ------
+    UsageError
+        For options that are not known.
+    DataError
+        If the file cannot be read, or has no sample of the sensor.
+    """
+    wanted = LogOptions.checked(options)
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise DataError(f"{path} cannot be read: {error.strerror}.", hint="Give a text log.") from error
+    log = read_text_log(lines, wanted.sensor)
+    header = "\n".join(log.header)
+    stated = re.search(r"SampRate:\s*([1-9]\d*)", header)
+    source = None
+    if wanted.rate_hz is not None:
+        rate_hz, source = wanted.rate_hz, Source(tag="sourced", reference="option rate_hz of the import")
+    elif stated is not None:
+        rate_hz, source = float(stated[1]), Source(tag="sourced", reference="SampRate in the log's header")
+    elif log.rate_hz is not None:
+        rate_hz, source = log.rate_hz, Source(tag="measured", reference="the log's times")
+    else:
+        rate_hz = None
+    streams, blocks = streams_of(log.frame, rate_hz, source), log.blocks
+    timed = blocks[0].t_ns is not None
+    if not timed and rate_hz is not None:
+        rates_hz = {stream.name: stream.rate_hz for stream in streams}
+        blocks = [replace(block, t_ns=_nominal_ns(block, rates_hz[block.stream])) for block in blocks]
+    return DeviceLog(
+        streams=streams,
+        blocks=blocks,
+        clock="host" if timed else "nominal" if rate_hz is not None else "none",
+        started=" ".join(re.findall(r"^\s*(?:Date|Time):\s*(.*\S)", header, re.MULTILINE)),
+        remarks=(
+            "read by the documents of the maker's text log; an error reply looks like bad parity there",
+            *(() if timed else ("the log has no times",)),
+        ),
+        counts=counted(log.faults) | {f"lines: {reason}": n for reason, n in log.left_out.items()},
+    )
+
+
+def _nominal_ns(block: Block, rate_hz: float | None) -> npt.NDArray[np.int64]:
+    assert rate_hz is not None
+    assert block.sequence is not None
+    if block.sequence.max() / rate_hz > _LONGEST_S:
+        raise DataError(
+            f"The log's frames go up to {block.sequence.max()}, which at {rate_hz:g} a second is longer than "
+            f"{_LONGEST_S:g} s.",
+            hint="Check the log's third column, or give the option rate_hz.",
+        )
+    return np.round(block.sequence * (1e9 / rate_hz)).astype(np.int64)
 
 
 def read_text_log(lines: Iterable[str], sensor: int = 0) -> TextLog:
@@ -87,6 +166,7 @@ def read_text_log(lines: Iterable[str], sensor: int = 0) -> TextLog:
     order = Counter(tuple(line.channel for line in frame) for frame in frames).most_common(1)[0][0]
     timed = any(line.time_s != 0.0 for frame in frames for line in frame)
     rows = FrameRows(order)
+    samples: list[tuple[int, float]] = []
     for frame in frames:
         place = 0
         for line in frame:
@@ -98,10 +178,13 @@ def read_text_log(lines: Iterable[str], sensor: int = 0) -> TextLog:
             if line.reply.fault is not None:
                 faults[line.channel][line.reply.fault] += 1
             t_ns = round(line.time_s * 1e9) if timed else None
-            rows.put(line.frame * len(order) + place, t_ns, line.reply.value or 0, quality_of(line.reply))
+            rows.put(line.frame * len(order) + place, line.reply.value or 0, quality_of(line.reply), t_ns)
+            samples.append((line.frame * len(order) + place, line.time_s))
             place += 1
     rows.close()
-    return TextLog(tuple(text[: max(begin, 0)]), rows.blocks(), faults, left_out)
+    (first, first_s), (last, last_s) = samples[0], samples[-1]
+    rate_hz = (last - first) / (last_s - first_s) if last_s > first_s and last > first else None
+    return TextLog(tuple(text[: max(begin, 0)]), order, rows.blocks(), faults, left_out, rate_hz)
 
 
 _NAMES = {index: name for name, index in INDEX.items()}

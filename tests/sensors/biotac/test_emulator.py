@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tactbench.plugin import EmulatorSettings, UsageError
 from tactbench.sensors.biotac.codec import (
     INDEX,
     PROPERTIES,
@@ -16,18 +18,18 @@ from tactbench.sensors.biotac.codec import (
     property_text,
     sampling_command,
 )
-from tactbench.sensors.biotac.emulator import DEFAULT_PROPERTIES, EmulatedFault, Emulator, rest_state
+from tactbench.sensors.biotac.emulator import DEFAULT_PROPERTIES, REST, BioTacFault, Emulator, build_emulator
 from tactbench.sensors.biotac.frames import DEFAULT_FRAME
 from tactbench.sensors.biotac.spec import SPEC
 
-COUNTS = {**rest_state(0.0), "E1": 1739.0, "PAC": 2021.0, "PDC": 2000.0, "TDC": 1500.0}
+COUNTS = {**REST, "E1": 1739.0, "PAC": 2021.0, "PDC": 2000.0, "TDC": 1500.0}
 WORD_S = 2 * 8 / 4.4e6
 READ_S = WORD_S + 50e-6
 
 
 def exchange(sensor: Emulator, command: bytes, n: int = 2, at_s: float = 0.0, pause_s: float = 50e-6) -> bytes:
-    sensor.feed(command, at_s)
-    return sensor.feed(bytes(n), at_s + WORD_S + pause_s)
+    sensor.exchange(1, command, at_s)
+    return sensor.exchange(1, bytes(n), at_s + WORD_S + pause_s)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +59,7 @@ def test_bt_4_too_short_a_pause():
     assert exchange(sensor, b"\xa2\x00", pause_s=49.9e-6) == b"\xa5\x2d"
     assert exchange(sensor, b"\xa2\x00", at_s=1.0) == b"\x6d\x58"
     # Reading on without a pause, within one period of the select, is as early.
-    assert sensor.feed(b"\xa2\x00\x00\x00", 2.0) == b"\xff\xff\xa5\x2d"
+    assert sensor.exchange(1, b"\xa2\x00\x00\x00", 2.0) == b"\xff\xff\xa5\x2d"
 
 
 def test_bt_4_an_sp_has_more_electrodes():
@@ -67,8 +69,8 @@ def test_bt_4_an_sp_has_more_electrodes():
 @pytest.mark.parametrize("filler", [b"\x00\x01", b"\x00\x00", b"\x01\x00"])
 def test_every_filler_in_use_reads(filler):
     sensor = Emulator(lambda t_s: COUNTS)
-    sensor.feed(b"\xa2\x00", 0.0)
-    assert sensor.feed(filler, READ_S) == b"\x6d\x58"
+    sensor.exchange(1, b"\xa2\x00", 0.0)
+    assert sensor.exchange(1, filler, READ_S) == b"\x6d\x58"
 
 
 @pytest.mark.parametrize(
@@ -88,13 +90,13 @@ def test_properties(command, properties, answer):
     sensor = Emulator(properties=properties)
     assert exchange(sensor, bytes.fromhex(command), len(golden)) == golden
     # Byte by byte, as the maker's library reads texts, up to the first FF.
-    sensor.feed(bytes.fromhex(command), 1.0)
-    one_by_one = b"".join(sensor.feed(b"\x00", 1.0 + READ_S + n * 1e-5) for n in range(len(golden) + 1))
+    sensor.exchange(1, bytes.fromhex(command), 1.0)
+    one_by_one = b"".join(sensor.exchange(1, b"\x00", 1.0 + READ_S + n * 1e-5) for n in range(len(golden) + 1))
     assert one_by_one == golden + b"\xff"
 
 
 def test_bt_4_no_sensor():
-    sensor = Emulator(faults=[EmulatedFault("not-connected")])
+    sensor = Emulator(faults=[BioTacFault("not-connected")])
     assert exchange(sensor, b"\x61\x15", 1) == b"\xff"
 
 
@@ -124,7 +126,7 @@ def test_property_commands_that_are_refused(command, pause_s, answer):
     assert exchange(Emulator(), bytes.fromhex(command), pause_s=pause_s) == bytes.fromhex(answer)
 
 
-def test_the_default_state_is_the_rest_of_the_spec():
+def test_what_is_left_out_is_at_rest():
     sensor = Emulator()
     for n, channel in enumerate(SPEC.channels()):
         reply = decoded(exchange(sensor, sampling_command(INDEX[channel.name]), at_s=float(n)))
@@ -149,27 +151,29 @@ def test_it_samples_at_the_commands_last_bit():
 def test_sensors_selected_together_sample_together_and_are_read_one_by_one():
     sensors = [Emulator(lambda t_s, k=k: {"PAC": 1000.0 * (k + 1) + 1e6 * t_s}) for k in range(3)]
     for sensor in sensors:
-        sensor.feed(b"\x80\x00", 1e-4)
-    read = [decoded(sensor.feed(b"\x00\x00", 1e-4 + READ_S + k * 2e-5)).value for k, sensor in enumerate(sensors)]
+        sensor.exchange(1, b"\x80\x00", 1e-4)
+    read = [
+        decoded(sensor.exchange(1, b"\x00\x00", 1e-4 + READ_S + k * 2e-5)).value for k, sensor in enumerate(sensors)
+    ]
     assert read == [1104, 2104, 3104]
 
 
 def test_a_word_that_was_not_read_is_gone_with_the_next_command():
     sensor = Emulator(lambda t_s: COUNTS)
-    sensor.feed(b"\xa2\x00", 0.0)
+    sensor.exchange(1, b"\xa2\x00", 0.0)
     assert exchange(sensor, b"\x80\x00", at_s=1e-3) == b"\x7f\x29"
-    assert sensor.feed(b"\x00", 2e-3) == b"\xff"
+    assert sensor.exchange(1, b"\x00", 2e-3) == b"\xff"
 
 
 def test_parity_turns_every_bit_in_turn():
-    sensor = Emulator(lambda t_s: COUNTS, faults=[EmulatedFault("parity")])
+    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("parity")])
     words = [exchange(sensor, b"\xa2\x00", at_s=float(n)) for n in range(16)]
     assert {decoded(word).fault for word in words} == {Fault.PARITY}
     assert {int.from_bytes(word, "big") ^ 0x6D58 for word in words} == {1 << bit for bit in range(16)}
 
 
 def test_a_resend_of_a_turned_word_is_the_word():
-    sensor = Emulator(lambda t_s: COUNTS, faults=[EmulatedFault("parity", every=2)])
+    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("parity", every=2)])
     assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58"
     assert decoded(exchange(sensor, b"\xa2\x00", at_s=1.0)).fault is Fault.PARITY
     assert exchange(sensor, RESEND, at_s=2.0) == b"\x6d\x58"
@@ -178,23 +182,25 @@ def test_a_resend_of_a_turned_word_is_the_word():
 def test_faults_concern_their_channels_and_times_only():
     sensor = Emulator(
         lambda t_s: COUNTS,
-        faults=[EmulatedFault("dropped-reply", start_s=1.0, end_s=2.0, channels=frozenset({"PAC"}))],
+        faults=[BioTacFault("dropped-reply", start_s=1.0, end_s=2.0, channels=frozenset({"PAC"}))],
     )
     assert exchange(sensor, b"\x80\x00", at_s=0.5) == b"\x7f\x29"
-    assert exchange(sensor, b"\x80\x00", at_s=1.5) == b""
+    assert exchange(sensor, b"\x80\x00", at_s=1.5) == b"\xff\xff"
     assert exchange(sensor, b"\xa2\x00", at_s=1.6) == b"\x6d\x58"
     assert exchange(sensor, b"\x80\x00", at_s=2.0) == b"\x7f\x29"
 
 
-def test_a_doubled_reply_comes_twice():
-    sensor = Emulator(lambda t_s: COUNTS, faults=[EmulatedFault("doubled-reply")])
-    assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58\x6d\x58"
+def test_a_doubled_reply_is_the_word_before():
+    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("doubled-reply", channels=frozenset({"PDC"}))])
+    assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58"
+    assert exchange(sensor, b"\x83\x01", at_s=1.0) == b"\x6d\x58"
+    assert exchange(sensor, b"\x80\x00", at_s=2.0) == b"\x7f\x29"
 
 
 def test_a_stuck_channel_holds_what_it_read_and_lets_go():
     sensor = Emulator(
         lambda t_s: {"E1": 1000.0 + 100.0 * t_s, "E2": 1000.0 + 100.0 * t_s},
-        faults=[EmulatedFault("stuck-channel", start_s=1.0, end_s=5.0, channels=frozenset({"E1"}))],
+        faults=[BioTacFault("stuck-channel", start_s=1.0, end_s=5.0, channels=frozenset({"E1"}))],
     )
     read = [
         [decoded(exchange(sensor, sampling_command(INDEX[name]), at_s=float(t))).value for t in range(7)]
@@ -205,7 +211,7 @@ def test_a_stuck_channel_holds_what_it_read_and_lets_go():
 
 @pytest.mark.parametrize("idle", [0x00, 0xFF])
 def test_a_sensor_that_is_not_connected_leaves_the_line_and_forgets(idle):
-    sensor = Emulator(lambda t_s: COUNTS, faults=[EmulatedFault("not-connected", start_s=1.0, end_s=2.0)], idle=idle)
+    sensor = Emulator(lambda t_s: COUNTS, faults=[BioTacFault("not-connected", start_s=1.0, end_s=2.0)], idle=idle)
     assert exchange(sensor, b"\xa2\x00") == b"\x6d\x58"
     assert decoded(exchange(sensor, b"\xa2\x00", at_s=1.0)).fault is Fault.NOT_CONNECTED
     assert exchange(sensor, RESEND, at_s=2.0) == b"\xa5\x5f"
@@ -213,22 +219,61 @@ def test_a_sensor_that_is_not_connected_leaves_the_line_and_forgets(idle):
 
 
 def test_an_error_reply_is_that_which_is_asked_for():
-    sensor = Emulator(faults=[EmulatedFault("error-reply", error=0x57)])
+    sensor = Emulator(faults=[BioTacFault("error-reply", error=0x57)])
     assert exchange(sensor, b"\xa2\x00") == b"\xa5\x57"
 
 
-def test_faults_that_are_none_are_refused():
-    with pytest.raises(ValueError, match="no fault is called 'gremlin'"):
-        EmulatedFault("gremlin")
-    with pytest.raises(ValueError, match="every 0"):
-        EmulatedFault("parity", every=0)
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("gremlin", "fault called 'gremlin'"),
+        ("parity:every=0", "every 0"),
+        ("parity:channels=E5+E99", "E99, which no BioTac has"),
+        ("error-reply:error=256", "the error 256"),
+        ("parity:colour=red", "colour"),
+    ],
+)
+def test_faults_that_are_none_are_refused(text, said):
+    with pytest.raises(UsageError, match=said):
+        BioTacFault.parse(text)
+
+
+def test_faults_as_a_rig_file_writes_them():
+    fault = BioTacFault.parse("error-reply:channels=E5+PAC,start_s=1.5,every=3,error=0x57")
+    assert fault == BioTacFault("error-reply", start_s=1.5, every=3, channels=frozenset({"E5", "PAC"}), error=0x57)
+
+
+def test_a_sensor_hears_its_own_lines_only():
+    sensor = Emulator(lambda t_s: COUNTS, select=0b110)
+    sensor.exchange(0b011, b"\xa2\x00", 0.0)
+    assert sensor.exchange(0b111, bytes(2), 1.0) == b"\xff\xff"
+    sensor.exchange(0b111, b"\xa2\x00", 2.0)
+    assert sensor.exchange(0b001, bytes(2), 2.1) == b"\xff\xff"
+    assert sensor.exchange(0b110, bytes(2), 2.2) == b"\x6d\x58"
+
+
+@pytest.mark.parametrize("clock_hz", [500_000, 4_400_000, 10_000_000])
+def test_a_built_emulator_keeps_the_pause_at_every_clock(clock_hz):
+    rng = np.random.default_rng(1)
+    sensor = build_emulator(EmulatorSettings(lambda t_s: COUNTS, rng, {"select": 2}, ("error-reply:start_s=1",)))
+    sensor.exchange(2, b"\xa2\x00", 0.0)
+    assert sensor.exchange(2, bytes(2), 16 / clock_hz + 50e-6) == b"\x6d\x58"
+    sensor.exchange(2, b"\xa2\x00", 0.5)
+    assert sensor.exchange(2, bytes(2), 0.5 + 16 / clock_hz + 1e-6) == b"\xa5\x2d"
+    sensor.exchange(2, b"\xa2\x00", 1.0)
+    assert sensor.exchange(2, bytes(2), 1.1) == b"\xa5\x2e"
+
+
+@pytest.mark.parametrize(("options", "faults"), [({"colour": 1}, ()), ({}, ("gremlin",))])
+def test_what_an_emulator_does_not_know_is_refused(options, faults):
+    with pytest.raises(UsageError, match=r"colour|gremlin"):
+        build_emulator(EmulatorSettings(lambda t_s: {}, np.random.default_rng(1), options, faults))
 
 
 @given(periods=st.lists(st.binary(max_size=5), max_size=20), pause_us=st.sampled_from([0, 60]))
 def test_any_bytes_are_answered_by_as_many_and_the_next_exchange_is_whole(periods, pause_us):
     sensor, now_s = Emulator(lambda t_s: COUNTS), 0.0
     for data in periods:
-        assert len(sensor.feed(data, now_s)) == len(data)
+        assert len(sensor.exchange(1, data, now_s)) == len(data)
         now_s += 1e-5 + 1e-6 * pause_us
     assert exchange(sensor, b"\xa2\x00", at_s=now_s) == b"\x6d\x58"
-    assert sensor.poll(now_s) == b""

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import Quality
 from tactbench.sensors.biotac.codec import CHANNELS, INDEX, RESEND, Fault, encoded, sampling_command
-from tactbench.sensors.biotac.emulator import EmulatedFault, Emulator
-from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameRows, FrameScheduler
+from tactbench.sensors.biotac.emulator import BioTacFault, Emulator
+from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameBatches, FrameRows, streams_of
 from tactbench.sensors.biotac.spec import SPEC
 
+SPEED_HZ = 4_400_000
 PERIOD_S = 1 / 4400
-READ_S = 2 * 8 / 4.4e6 + 50e-6
 GOOD, MISSING, SUSPECT, SATURATED = (
     int(flag) for flag in (Quality.GOOD, Quality.MISSING, Quality.SUSPECT, Quality.SATURATED)
 )
@@ -28,31 +28,37 @@ def wave(t_s: float) -> dict[str, float]:
     return {name: 300.0 + 100.0 * k + 1000.0 * t_s for k, name in enumerate(CHANNELS)}
 
 
-def run(scheduler: FrameScheduler, sensor: Emulator, commands: int, first: int = 0) -> dict:
-    """Send commands at the default rate, finish, and return the streams' blocks by name."""
-    for n in range(first, first + commands):
-        start_s = n * PERIOD_S
-        scheduler.take(_exchange(scheduler, sensor, n, start_s))
-        while scheduler.resend_due:
-            start_s += 1e-4
-            scheduler.take(_exchange(scheduler, sensor, n, start_s))
-    scheduler.finish()
-    return {block.stream: block for block in scheduler.blocks()}
+def carried_out(steps, sensor: Emulator, begin_s: float, speed_hz: int = SPEED_HZ):
+    """What comes in during a batch, and when it is over."""
+    data, now_s = [], begin_s
+    for step in steps:
+        data.append(sensor.exchange(step.select, step.data, now_s))
+        now_s += 8 * len(step.data) / speed_hz + 1e-6 * step.pause_us
+    return data, now_s
 
 
-def _exchange(scheduler: FrameScheduler, sensor: Emulator, n: int, start_s: float) -> bytes:
-    sensor.feed(scheduler.word(round(n * PERIOD_S * 1e9)), start_s)
-    return sensor.feed(b"\x00\x00", start_s + READ_S)
+def run(batches: FrameBatches, sensor: Emulator, n: int) -> dict:
+    """Carry out batches one after the other from 0 s, and return the streams' blocks by name."""
+    now_s = 0.0
+    for _ in range(n):
+        first, steps = batches.next()
+        begin_ns = round(now_s * 1e9)
+        data, now_s = carried_out(steps, sensor, now_s)
+        batches.take(first, data, t_ns=round(now_s * 1e9), device_ns=begin_ns)
+    batches.close()
+    return {block.stream: block for block in batches.blocks()}
 
 
 def expected(name: str, n: int) -> int:
-    return round(wave(n * PERIOD_S + 2 * 8 / 4.4e6)[name])
+    """What word n reads: pauses are whole microseconds, and the slope is 0.001 count in one."""
+    return round(wave(n * PERIOD_S + 2 * 8 / SPEED_HZ)[name])
 
 
 def test_every_word_comes_back_as_a_sample_of_its_stream():
     frames = 4
-    scheduler = FrameScheduler()
-    blocks = run(scheduler, Emulator(wave), frames * 44)
+    batches = FrameBatches(speed_hz=SPEED_HZ)
+    sensed = []
+    blocks = run(batches, Emulator(lambda t_s: sensed.append(wave(t_s)) or sensed[-1]), frames)
     slow, fast = blocks["electrodes"], blocks["vibration"]
     assert slow.data.shape == (frames, 22)
     assert fast.data.shape == (frames * 22, 1)
@@ -60,223 +66,252 @@ def test_every_word_comes_back_as_a_sample_of_its_stream():
         for place, name in enumerate(DEFAULT_FRAME):
             n = frame * 44 + place
             got = fast.data[n // 2, 0] if name == "PAC" else slow.data[frame, COLUMN[name]]
-            assert got == expected(name, n), (frame, name)
+            assert got == round(sensed[n][name]), (frame, name)
     assert slow.sequence.tolist() == list(range(frames))
     assert fast.sequence.tolist() == list(range(22 * frames))
-    assert slow.t_ns.tolist() == [round(frame * 0.01 * 1e9) for frame in range(frames)]
-    assert np.diff(fast.t_ns) == pytest.approx(1e9 / 2200, abs=1.0)
     assert not slow.quality.any()
     assert not fast.quality.any()
-    assert not any(scheduler.faults.values())
+    assert not any(batches.faults.values())
+
+
+@pytest.mark.parametrize("speed_hz", [500_000, 3_300_001, 4_000_000, 4_400_000, 10_000_000])
+@pytest.mark.parametrize("words", [None, 1, 17])
+def test_words_come_at_their_rate_whatever_the_clock(speed_hz, words):
+    batches = FrameBatches(speed_hz=speed_hz, words=words)
+    sent, now_s = 0, 0.0
+    while sent < 4400:
+        first, steps = batches.next()
+        # Whole microseconds, rounded down.
+        assert first / 4400 - 1e-6 - 1e-9 <= now_s <= first / 4400 + 1e-9
+        length_s = sum(8 * len(step.data) / speed_hz + 1e-6 * step.pause_us for step in steps)
+        timing = batches.timing(first)
+        assert timing.end_ns == pytest.approx(1e9 * length_s, abs=2.0)
+        assert len(timing.sampled_ns) * 2 == len(steps)
+        assert timing.sampled_ns[0] == pytest.approx(16e9 / speed_hz, abs=1.0)
+        assert all(step.pause_us == 50 for step in steps[::2])
+        assert all(step.pause_us >= 10 for step in steps[1::2])
+        sent, now_s = sent + len(steps) // 2, now_s + length_s
+
+
+def test_times_of_rows_are_those_at_which_words_were_sampled():
+    asked = []
+    sensor = Emulator(lambda t_s: asked.append(t_s) or wave(t_s))
+    blocks = run(FrameBatches(speed_hz=SPEED_HZ), sensor, 3)
+    # The batch's beginning and the word's place are whole nanoseconds each.
+    assert blocks["vibration"].device_ns == pytest.approx(1e9 * np.array(asked[1::2]), abs=2.0)
+    assert blocks["electrodes"].device_ns == pytest.approx(1e9 * np.array(asked[::44]), abs=2.0)
+    assert set(np.diff(blocks["electrodes"].t_ns)) == {10_000_000}
+
+
+def test_without_a_counter_times_are_counted_back_from_the_end():
+    batches = FrameBatches(speed_hz=SPEED_HZ)
+    first, steps = batches.next()
+    asked = []
+    data, end_s = carried_out(steps, Emulator(lambda t_s: asked.append(t_s) or {}), 5.0)
+    batches.take(first, data, t_ns=round(end_s * 1e9))
+    slow, fast = batches.blocks()
+    assert slow.device_ns is None
+    assert slow.t_ns == pytest.approx(1e9 * np.array(asked[:1]), abs=3.0)
+    assert fast.t_ns == pytest.approx(1e9 * np.array(asked[1::2]), abs=3.0)
 
 
 def test_the_streams_keep_the_specs_order_and_type():
-    blocks = run(FrameScheduler(), Emulator(wave), 44)
+    blocks = run(FrameBatches(speed_hz=SPEED_HZ), Emulator(wave), 1)
     assert list(blocks) == [stream.name for stream in SPEC.streams]
     for stream in SPEC.streams:
         assert blocks[stream.name].data.dtype == stream.dtype
+    assert streams_of(DEFAULT_FRAME, 4400.0) == SPEC.streams
     # TDC comes before TAC in the stream and after it in the frame.
     assert DEFAULT_FRAME.index("TAC") < DEFAULT_FRAME.index("TDC")
     assert COLUMN["TDC"] < COLUMN["TAC"]
 
 
 def test_blocks_are_handed_out_once_and_as_soon_as_they_are_whole():
-    scheduler, sensor, seen = FrameScheduler(), Emulator(wave), Counter()
+    batches, sensor, seen = FrameBatches(speed_hz=SPEED_HZ, words=1), Emulator(wave), Counter()
     for n in range(3 * 44):
-        scheduler.take(_exchange(scheduler, sensor, n, n * PERIOD_S))
-        for block in scheduler.blocks():
+        first, steps = batches.next()
+        assert first == n
+        batches.take(first, carried_out(steps, sensor, n * PERIOD_S)[0], t_ns=0)
+        for block in batches.blocks():
             seen[block.stream] += len(block.data)
-        # A word is a sample when the next one is asked for.
-        assert seen["vibration"] == n // 2
-        assert seen["electrodes"] == (n - 43) // 44 + 1 if n >= 43 else seen["electrodes"] == 0
-    scheduler.finish()
-    (last,) = scheduler.blocks()
-    assert last.sequence.tolist() == [65]
-    assert scheduler.blocks() == []
+        assert seen["vibration"] == (n + 1) // 2
+        assert seen["electrodes"] == (n + 1 + 1) // 44 if n >= 42 else seen["electrodes"] == 0
+    batches.close()
+    assert batches.blocks() == []
 
 
-def test_a_resend_mends_a_word_of_bad_parity():
-    scheduler = FrameScheduler()
-    sensor = Emulator(wave, faults=[EmulatedFault("parity", every=7)])
-    blocks = run(scheduler, sensor, 10 * 44)
-    clean = run(FrameScheduler(), Emulator(wave), 10 * 44)
+def test_with_a_resend_words_of_bad_parity_are_replaced():
+    batches = FrameBatches(speed_hz=SPEED_HZ, resends=1)
+    blocks = run(batches, Emulator(wave, faults=[BioTacFault("parity", every=7)]), 10)
+    clean = run(FrameBatches(speed_hz=SPEED_HZ, resends=1), Emulator(wave), 10)
     for name, block in blocks.items():
         assert np.array_equal(block.data, clean[name].data)
         assert not block.quality.any()
-    bad = sum(counts[Fault.PARITY] for counts in scheduler.faults.values())
-    # Every seventh word, resends among them.
-    assert bad == (440 + bad) // 7
-    assert scheduler.resent.total() == bad
+    # Every seventh of 880 words, one half of them resends: 125, and every second of those in a first reply.
+    assert sum(counts[Fault.PARITY] for counts in batches.faults.values()) == batches.resent.total() == 63
 
 
-def test_bad_parity_without_a_resend_is_marked_with_the_number_that_came():
-    scheduler = FrameScheduler(resends=0)
-    faults = [EmulatedFault("parity", channels=frozenset({"E5"}))]
-    block = run(scheduler, Emulator(lambda t_s: {**wave(t_s), "E5": 1739.0}, faults=faults), 16 * 44)["electrodes"]
+def test_a_resend_that_is_bad_too_leaves_the_first_word_marked():
+    batches = FrameBatches(speed_hz=SPEED_HZ, resends=1)
+    faults = [BioTacFault("parity", channels=frozenset({"E5"}))]
+    block = run(batches, Emulator(wave, faults=faults), 2)["electrodes"]
+    assert set(block.quality[:, COLUMN["E5"]]) == {SUSPECT}
+    assert batches.faults["E5"] == {Fault.PARITY: 2}
+    assert batches.resent.total() == 0
+
+
+def test_each_resend_follows_its_own_word():
+    first, steps = FrameBatches(("E1", "PAC"), speed_hz=SPEED_HZ, resends=1, select=4).next()
+    assert [step.data for step in steps[::2]] == [b"\xa2\x00", RESEND, b"\x80\x00", RESEND]
+    assert {step.select for step in steps} == {4}
+    assert (first, len(steps)) == (0, 8)
+    assert sum(8 * len(step.data) / SPEED_HZ + 1e-6 * step.pause_us for step in steps) == pytest.approx(
+        2 / 4400, abs=1e-6
+    )
+
+
+def test_a_clock_that_leaves_no_time_is_refused():
+    with pytest.raises(ValueError, match="64 bits at 500000 Hz"):
+        FrameBatches(speed_hz=500_000, resends=1)
+
+
+def test_bad_parity_is_marked_with_the_number_that_came():
+    batches = FrameBatches(speed_hz=SPEED_HZ)
+    faults = [BioTacFault("parity", channels=frozenset({"E5"}))]
+    block = run(batches, Emulator(lambda t_s: {**wave(t_s), "E5": 1739.0}, faults=faults), 16)["electrodes"]
     column = COLUMN["E5"]
     assert set(block.quality[:, column]) == {SUSPECT}
     # One bit in turn, from the last: two parity bits and two reserved ones leave the number as it is.
     off = block.data[:, column].astype(int) ^ 1739
     assert sorted(off) == [0, 0, 0, 0] + [1 << bit for bit in range(12)]
-    assert scheduler.faults["E5"] == {Fault.PARITY: 16}
+    assert batches.faults["E5"] == {Fault.PARITY: 16}
     assert not np.delete(block.quality, column, axis=1).any()
-    assert {name for name, counts in scheduler.faults.items() if counts} == {"E5"}
-
-
-def test_resends_end_and_what_stays_bad_is_marked():
-    scheduler = FrameScheduler(resends=2)
-    faults = [EmulatedFault("parity", channels=frozenset({"E5"}))]
-    block = run(scheduler, Emulator(wave, faults=faults), 2 * 44)["electrodes"]
-    assert set(block.quality[:, COLUMN["E5"]]) == {SUSPECT}
-    assert scheduler.faults["E5"] == {Fault.PARITY: 6}
-    assert scheduler.resent.total() == 0
+    assert {name for name, counts in batches.faults.items() if counts} == {"E5"}
 
 
 @pytest.mark.parametrize(
     ("fault", "seen"),
     [
-        (EmulatedFault("dropped-reply", channels=frozenset({"E5", "PAC"}), every=3), Fault.NO_REPLY),
-        (EmulatedFault("error-reply", channels=frozenset({"E5", "PAC"}), every=3), Fault.ERROR),
+        (BioTacFault("dropped-reply", channels=frozenset({"E5", "PAC"}), every=3), Fault.NOT_CONNECTED),
+        (BioTacFault("error-reply", channels=frozenset({"E5", "PAC"}), every=3), Fault.ERROR),
     ],
-    ids=lambda value: value.name if isinstance(value, EmulatedFault) else None,
+    ids=lambda value: value.name if isinstance(value, BioTacFault) else None,
 )
 def test_what_did_not_come_is_missing_and_nothing_else(fault, seen):
-    scheduler = FrameScheduler()
-    blocks = run(scheduler, Emulator(wave, faults=[fault]), 9 * 44)
+    batches = FrameBatches(speed_hz=SPEED_HZ, resends=1)
+    # A resend is another word of its channel that the fault could concern: it takes every third of both.
+    blocks = run(FrameBatches(speed_hz=SPEED_HZ), Emulator(wave, faults=[fault]), 9)
     words = [name for name in DEFAULT_FRAME * 9 if name in ("E5", "PAC")]
     lost = Counter(name for place, name in enumerate(words, start=1) if place % 3 == 0)
     slow, fast = blocks["electrodes"], blocks["vibration"]
     assert np.count_nonzero(slow.quality) == lost["E5"]
     assert np.count_nonzero(slow.quality[:, COLUMN["E5"]] == MISSING) == lost["E5"]
     assert np.count_nonzero(fast.quality == MISSING) == np.count_nonzero(fast.quality) == lost["PAC"]
-    assert {name: counts[seen] for name, counts in scheduler.faults.items() if counts} == lost
     assert len(slow.data) == 9
     assert len(fast.data) == 9 * 22
+    run(batches, Emulator(wave, faults=[fault]), 9)
+    assert batches.resent.total() == 0
+    assert {fault for counts in batches.faults.values() for fault in counts} == {seen}
 
 
-def test_a_doubled_reply_is_kept_out_counted_and_marked():
-    scheduler = FrameScheduler()
-    faults = [EmulatedFault("doubled-reply", channels=frozenset({"E5"}))]
-    block = run(scheduler, Emulator(wave, faults=faults), 3 * 44)["electrodes"]
-    clean = run(FrameScheduler(), Emulator(wave), 3 * 44)["electrodes"]
-    assert np.array_equal(block.data, clean.data)
-    assert set(block.quality[:, COLUMN["E5"]]) == {SUSPECT}
-    assert np.count_nonzero(block.quality) == 3
-    assert scheduler.faults["E5"] == {Fault.DUPLICATE: 3}
-
-
-def test_a_second_reply_before_the_next_word_is_a_duplicate():
-    scheduler = FrameScheduler()
-    scheduler.take(b"\x01\x01")
-    scheduler.word(0)
-    scheduler.take(encoded(1739))
-    scheduler.take(encoded(1739))
-    scheduler.finish()
-    scheduler.take(encoded(1739))
-    (block,) = scheduler.blocks()
-    assert block.data[0, 0] == 1739
-    assert block.quality[0, 0] == SUSPECT
-    assert scheduler.faults["E1"] == {Fault.DUPLICATE: 1}
+def test_a_doubled_reply_is_taken_for_the_next_channel():
+    faults = [BioTacFault("doubled-reply", channels=frozenset({"E5"}))]
+    batches = FrameBatches(speed_hz=SPEED_HZ)
+    blocks = run(batches, Emulator(wave, faults=faults), 3)
+    slow, fast = blocks["electrodes"], blocks["vibration"]
+    # The word before E5 is the fourth PAC of the frame.
+    assert slow.data[:, COLUMN["E5"]].tolist() == fast.data[3::22, 0].tolist()
+    assert not slow.quality.any()
+    assert not any(batches.faults.values())
 
 
 def test_a_sensor_that_is_not_connected_has_rows_of_missing_samples():
-    scheduler = FrameScheduler()
-    faults = [EmulatedFault("not-connected", start_s=0.01, end_s=0.02)]
-    block = run(scheduler, Emulator(wave, faults=faults), 3 * 44)["electrodes"]
+    batches = FrameBatches(speed_hz=SPEED_HZ)
+    faults = [BioTacFault("not-connected", start_s=0.0099, end_s=0.0199)]  # after the last word of each
+    block = run(batches, Emulator(wave, faults=faults), 3)["electrodes"]
     assert (block.quality == MISSING).all(axis=1).tolist() == [False, True, False]
     assert not block.quality[[0, 2]].any()
-    assert sum(counts[Fault.NOT_CONNECTED] for counts in scheduler.faults.values()) == 44
-
-
-def test_a_reply_that_is_never_taken_is_missing():
-    scheduler = FrameScheduler()
-    for n in range(44):
-        scheduler.word(n)
-    scheduler.finish()
-    slow, fast = scheduler.blocks()
-    assert (slow.quality == MISSING).all()
-    assert (fast.quality == MISSING).all()
-    assert all(counts[Fault.NO_REPLY] for counts in scheduler.faults.values())
+    assert sum(counts[Fault.NOT_CONNECTED] for counts in batches.faults.values()) == 44
 
 
 def test_the_ends_of_the_converter_are_marked_saturated():
     state = {**wave(0.0), "E1": -5.0, "E2": 0.6, "E3": 4094.4, "E4": 4095.0}
-    (row,) = run(FrameScheduler(), Emulator(lambda t_s: state), 44)["electrodes"].quality
+    (row,) = run(FrameBatches(speed_hz=SPEED_HZ), Emulator(lambda t_s: state), 1)["electrodes"].quality
     assert row[:4].tolist() == [SATURATED, GOOD, GOOD, SATURATED]
 
 
-def test_commands_that_were_not_sent_leave_gaps_in_the_sequence():
-    scheduler, sensor = FrameScheduler(), Emulator(wave)
-    for n in range(10):
-        scheduler.take(_exchange(scheduler, sensor, n, n * PERIOD_S))
-    scheduler.skip(2 * 44)
-    blocks = run(scheduler, sensor, 3 * 44 - 98, first=98)
+def test_batches_without_a_reply_and_words_that_were_not_asked_for_are_gaps():
+    batches, sensor = FrameBatches(speed_hz=SPEED_HZ, words=10), Emulator(wave)
+    for n in range(20):
+        first, steps = batches.next()
+        if not 4 <= n < 9:
+            data, _ = carried_out(steps, sensor, first * PERIOD_S)
+            batches.take(first, data, t_ns=0, skipped=0 if n < 15 else 88)
+    batches.close()
+    blocks = {block.stream: block for block in batches.blocks()}
     slow, fast = blocks["electrodes"], blocks["vibration"]
-    assert slow.sequence.tolist() == [0, 2]
-    assert fast.sequence.tolist() == [*range(5), *range(49, 66)]
-    # E1 to E5 of the first frame and, at the same place of the third, the rest.
-    assert (slow.quality[0] == MISSING).tolist() == [False] * 5 + [True] * 17
-    assert (slow.quality[1] == MISSING).tolist() == [True] * 5 + [False] * 17
-    assert slow.data[1, COLUMN["E6"]] == expected("E6", 98)
+    # Words 0-39, 90-149, and 150-199 as words 238-287.
+    assert fast.sequence.tolist() == [*range(20), *range(45, 75), *range(119, 144)]
+    assert slow.sequence.tolist() == [0, 2, 3, 5, 6]
+    missing = slow.quality == MISSING
+    # By place in the frame, PDC, TAC and TDC the last: 20 slow words, 21 from the second on, 9, 13 left of the fourth.
+    assert np.count_nonzero(~missing, axis=1).tolist() == [20, 21, 9, 13, 12]
+    assert slow.data[1, COLUMN["E2"]] == expected("E2", 90)
 
 
-def test_sensors_on_one_bus_are_asked_the_same_word():
-    first, second = FrameScheduler(), FrameScheduler()
-    for n in range(44):
-        word = first.word(n)
-        assert second.word(n) == word
-        first.take(b"\x6d\x59" if n == 3 else b"\x6d\x58")
-        second.take(b"\x6d\x58")
-        if first.resend_due:
-            assert n == 3
-            assert first.word(n) == RESEND
-            first.take(b"\x6d\x58")
-        assert not second.resend_due
-
-
-def test_another_frame_has_rows_of_its_own():
-    scheduler = FrameScheduler(("PAC", "PDC"))
-    blocks = run(scheduler, Emulator(wave), 20)
+def test_another_frame_has_streams_of_its_own():
+    frame = ("PAC", "PDC")
+    blocks = run(FrameBatches(frame, speed_hz=SPEED_HZ), Emulator(wave), 10)
     assert blocks["vibration"].sequence.tolist() == list(range(10))
     assert blocks["electrodes"].sequence.tolist() == list(range(10))
-    quality = blocks["electrodes"].quality
-    assert not quality[:, COLUMN["PDC"]].any()
-    assert (np.delete(quality, COLUMN["PDC"], axis=1) == MISSING).all()
+    assert blocks["electrodes"].data[:, 0].tolist() == [expected("PDC", 2 * n + 1) for n in range(10)]
+    slow, fast = streams_of(frame, 4400.0)
+    assert [channel.name for channel in slow.channels] == ["PDC"]
+    assert (slow.rate_hz, fast.rate_hz) == (2200.0, 2200.0)
+    (only,) = streams_of(("E1", "E2"), None)
+    assert (only.name, only.rate_hz) == ("electrodes", None)
 
 
 def test_frames_that_are_none_are_refused():
     with pytest.raises(ValueError, match="got E20"):
-        FrameScheduler(("E1", "E20"))
+        FrameBatches(("E1", "E20"), speed_hz=SPEED_HZ)
     with pytest.raises(ValueError, match="got none"):
         FrameRows(())
 
 
 @settings(max_examples=30)
 @given(
-    replies=st.lists(st.one_of(st.binary(max_size=7), st.integers(0, 4095).map(encoded)), max_size=60),
-    resends=st.integers(0, 2),
+    replies=st.lists(
+        st.lists(st.one_of(st.binary(max_size=3), st.integers(0, 4095).map(encoded)), min_size=20, max_size=20),
+        max_size=6,
+    ),
+    resends=st.integers(0, 1),
 )
 def test_any_replies_are_survived_and_the_next_frame_is_whole(replies, resends):
-    scheduler = FrameScheduler(resends=resends)
-    sent = 0
+    batches = FrameBatches(speed_hz=SPEED_HZ, resends=resends, words=10 // (1 + resends))
     for reply in replies:
-        word = scheduler.word(sent)
-        sent += word != RESEND
-        scheduler.take(reply)
-    # To the next frame's beginning with what a sensor answers, then one frame more.
-    while scheduler.resend_due or sent % 44:
-        word = scheduler.word(sent)
-        sent += word != RESEND
-        scheduler.take(encoded(1000))
-    scheduler.blocks()
-    for place, name in enumerate(DEFAULT_FRAME):
-        assert scheduler.word(sent + place) == sampling_command(INDEX[name])
-        scheduler.take(encoded(1000 + place))
-    scheduler.finish()
-    blocks = {block.stream: block for block in scheduler.blocks()}
-    last = blocks["electrodes"]
-    assert last.sequence[-1] == sent // 44
-    assert not last.quality[-1].any()
-    assert last.data[-1, COLUMN["E2"]] == 1002
-    assert blocks["vibration"].data[-22:, 0].tolist() == [1001 + 2 * n for n in range(22)]
-    assert not blocks["vibration"].quality[-22:].any()
+        first, steps = batches.next()
+        batches.take(first, reply, t_ns=0)
+        assert len(reply) == len(steps)
+    batches.blocks()
+    # What a sensor answers: the frame that was begun, one whole frame, and the beginning of the next.
+    sent = first + len(steps) // (2 + 2 * resends) if replies else 0
+    begun, whole = sent // 44, -(-sent // 44)
+    while sent < 44 * (whole + 1):
+        first, steps = batches.next()
+        data = [b""] * len(steps)
+        for k in range(len(steps) // 2):
+            n = first + k // (1 + resends)
+            assert k % (1 + resends) or steps[2 * k].data == sampling_command(INDEX[DEFAULT_FRAME[n % 44]])
+            data[2 * k + 1] = encoded(1000 + n % 44)
+        batches.take(first, data, t_ns=0)
+        sent = first + len(steps) // (2 + 2 * resends)
+    batches.close()
+    blocks = {block.stream: block for block in batches.blocks()}
+    assert begun <= whole
+    (row,) = np.flatnonzero(blocks["electrodes"].sequence == whole)
+    assert not blocks["electrodes"].quality[row].any()
+    assert blocks["electrodes"].data[row, COLUMN["E2"]] == 1002
+    fast = np.isin(blocks["vibration"].sequence, np.arange(22 * whole, 22 * whole + 22))
+    assert blocks["vibration"].data[fast, 0].tolist() == [1001 + 2 * n for n in range(22)]
+    assert not blocks["vibration"].quality[fast].any()

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import DataError, Quality
+from tactbench.plugin import DataError, Quality, UsageError
 from tactbench.sensors.biotac.codec import INDEX, Fault, encoded, parity_holds
-from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameScheduler
-from tactbench.sensors.biotac.text_log import read_text_log
+from tactbench.sensors.biotac.frames import DEFAULT_FRAME, FrameBatches
+from tactbench.sensors.biotac.spec import SPEC
+from tactbench.sensors.biotac.text_log import read_log, read_text_log
 
 ROTATED = tuple(name for pair in zip(DEFAULT_FRAME[1::2], DEFAULT_FRAME[::2], strict=True) for name in pair)
 """PAC first, as in the QuickStart Guide's log."""
@@ -32,13 +35,12 @@ def printed(sensors: list[list[bytes]], frame: tuple[str, ...] = DEFAULT_FRAME, 
     return lines
 
 
-def scheduled(replies: list[bytes], frame: tuple[str, ...] = DEFAULT_FRAME):
-    scheduler = FrameScheduler(frame, resends=0)
-    for n, reply in enumerate(replies):
-        scheduler.word(n)
-        scheduler.take(reply)
-    scheduler.finish()
-    return scheduler.blocks(), scheduler.faults
+def on_the_wire(replies: list[bytes], frame: tuple[str, ...] = DEFAULT_FRAME):
+    batches = FrameBatches(frame, speed_hz=4_400_000, words=len(replies))
+    first, _ = batches.next()
+    batches.take(first, [part for reply in replies for part in (b"", reply)], t_ns=0)
+    batches.close()
+    return batches.blocks(), batches.faults
 
 
 @pytest.mark.parametrize("frame", [DEFAULT_FRAME, ROTATED], ids=["default", "rotated"])
@@ -48,7 +50,7 @@ def test_a_log_gives_what_the_wire_gave(frame, sensor):
     for n in (3, 50, 91):
         replies[sensor][n] = bytes([replies[sensor][n][0] ^ 1, replies[sensor][n][1]])
     log = read_text_log(printed(replies, frame), sensor)
-    blocks, faults = scheduled(replies[sensor], frame)
+    blocks, faults = on_the_wire(replies[sensor], frame)
     assert [block.stream for block in log.blocks] == ["electrodes", "vibration"]
     for ours, wire in zip(log.blocks, blocks, strict=True):
         assert np.array_equal(ours.data, wire.data)
@@ -113,6 +115,74 @@ def test_a_log_without_samples_is_refused():
         read_text_log([])
 
 
+HEADER = ["DataStructure: 2.0", "Date: 3/4/2012", "Time: 12:30:01", "SampRate: 4400", "Begin File"]
+
+
+def test_a_log_is_a_source_of_blocks(tmp_path):
+    path = tmp_path / "log.txt"
+    lines = printed([words(3), words(3, 1)], step_s=1 / 4400)
+    lines[50] = "rubbish\n"
+    path.write_text("\n".join(HEADER) + "\n" + "".join(lines), encoding="utf-8")
+    log = read_log(path, {"sensor": 1})
+    assert log.streams == SPEC.streams
+    assert (log.clock, log.started) == ("host", "3/4/2012 12:30:01")
+    assert log.counts == {"lines: unreadable": 1}
+    for ours, theirs in zip(log.blocks, read_text_log(lines, 1).blocks, strict=True):
+        assert np.array_equal(ours.data, theirs.data)
+        assert np.array_equal(ours.t_ns, theirs.t_ns)
+
+
+def test_a_timed_log_without_a_rate_has_that_of_its_times(tmp_path):
+    path = tmp_path / "log.txt"
+    path.write_text("".join(printed([words(20)], step_s=1 / 3100)), encoding="utf-8")
+    slow, fast = read_log(path, {}).streams
+    # Times are printed to 1 us in 284 ms.
+    assert (slow.rate_hz, fast.rate_hz) == pytest.approx((3100 / 44, 3100 / 2), rel=1e-5)
+    assert slow.rate_source.tag == "measured"
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "clock", "rate_hz"),
+    [
+        ([], {}, "none", None),
+        (HEADER, {}, "nominal", 100.0),
+        ([], {"rate_hz": 2200.0}, "nominal", 50.0),
+        (HEADER, {"rate_hz": 2200.0}, "nominal", 50.0),
+    ],
+)
+def test_a_log_without_times_has_row_by_rate_or_nothing(tmp_path, header, options, clock, rate_hz):
+    path = tmp_path / "log.txt"
+    path.write_text("".join(f"{line}\n" for line in header) + "".join(printed([words(3)])), encoding="utf-8")
+    log = read_log(path, options)
+    slow, fast = log.blocks
+    assert log.clock == clock
+    assert log.streams[0].rate_hz == rate_hz
+    if rate_hz is None:
+        assert slow.t_ns is None
+    else:
+        assert np.diff(slow.t_ns).tolist() == [round(1e9 / rate_hz)] * 2
+        assert fast.t_ns[0] == slow.t_ns[0]
+        assert np.diff(fast.t_ns) == pytest.approx(1e9 / rate_hz / 22, abs=1.0)
+
+
+@pytest.mark.parametrize("options", [{"sensor": -1}, {"sensor": "left"}, {"speed": 1}, {"rate_hz": 0.0}])
+def test_options_of_a_log_that_are_none_are_refused(tmp_path, options):
+    with pytest.raises(UsageError, match=next(iter(options))):
+        read_log(tmp_path / "log.txt", options)
+
+
+def test_a_log_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(DataError, match="cannot be read"):
+        read_log(tmp_path / "log.txt", {})
+
+
+def test_frame_numbers_that_no_time_can_have_are_refused(tmp_path):
+    path = tmp_path / "log.txt"
+    path.write_text("0.0 1 1099511627775 17 100 0\n", encoding="utf-8")
+    with pytest.raises(DataError, match="third column"):
+        read_log(path, {"rate_hz": 1.0})
+
+
 @settings(max_examples=50)
 @given(
     lines=st.lists(
@@ -131,6 +201,15 @@ def test_any_text_is_read_or_refused(lines):
     except DataError:
         return
     assert log.blocks or log.left_out
+
+
+@settings(max_examples=20)
+@given(data=st.binary(max_size=200), frame=st.integers(0, 2**41))
+def test_any_bytes_of_a_file_are_read_or_refused(tmp_path_factory, data, frame):
+    path = tmp_path_factory.mktemp("log") / "log.txt"
+    path.write_bytes(data + f"\n0.0 1 {frame} 17 100 0\n".encode())
+    with suppress(DataError):
+        assert read_log(path, {"rate_hz": 4400.0}).blocks
 
 
 @settings(max_examples=20)

@@ -1,0 +1,299 @@
+"""Driver of the BioTac: batches of SPI transfers in, blocks of counts out.
+
+**Wiring.** The sensor is a slave on SPI, mode 0, 0.5 to 10 MHz, select active low, supply 3.3-5 V; the host clocks
+every byte, so something must keep the time of 4400 words a second. That is an SPI bridge (``spi://bridge/…``, a
+microcontroller that carries out batches by itself, ``docs/links.md``) or, less well, the machine's own SPI
+(``spi://spidev/…``), where the process waits out the pauses itself and another process may lengthen them.
+
+**Sampling.** A batch is one frame: 44 words in 10 ms, pauses in whole microseconds chosen so that the mean rate is
+4400 words a second to 1 us in any stretch (:class:`~tactbench.sensors.biotac.frames.FrameBatches`); an adapter adds
+what it needs itself. Some batches are under way ahead of the one that runs, so that the host may be late by as many
+frames. Words are asked for once: what a batch does cannot depend on what it reads (the option `resends` asks for each
+word again, always).
+
+**Times.** A bridge stamps each batch with its own microseconds: `device_ns` of a row is that stamp, counted on over its
+wraps, and the word's place in the batch; `t_ns` is when the reply was in the host, the same for all rows of a batch.
+Without such a counter there is `t_ns` alone, counted back from the end of the batch.
+
+**What goes wrong, and what a recording then has.** Names in brackets are those of :attr:`BioTacDriver.counts`.
+
+=====================================  =================================================================================
+what                                   in the recording
+=====================================  =================================================================================
+a bit turned on the line               SUSPECT, the number as it came [parity E7]; two turned bits of a byte may pass
+both parities good, a fixed bit not    SUSPECT [reserved bits E7]
+the sensor answers with an error       MISSING [error reply E7]
+the line idle, one word or for long    MISSING [not connected E7]; sensor or select line is not there
+the word before once more              not seen: its bytes are good, so it is taken for this channel's
+a channel that stays where it is       not seen by the driver
+the reply to a batch lost or damaged   its rows are absent: a gap in the sequence [batches lost]
+the host too late for the next batch   its rows come later [batches late]; whole frames that had their time in the pause
+                                       are a gap in the sequence [frames not asked for]
+cable, port or bridge gone             the reading ends with LinkUnplugged
+=====================================  =================================================================================
+
+A gap is never filled. Rows are raw counts.
+
+**Tested** against an emulator written from the same public sources, behind an emulated bridge. It has never met a real
+BioTac, nor a real bridge or spidev. Assumed is above all: that the sensor samples at the last bit of its command, that
+a property is read with the pause of a sampling command, and that a resend needs the same pause.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter, deque
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from tactbench.plugin import (
+    Block,
+    Driver,
+    DriverSettings,
+    LinkError,
+    LinkTimeout,
+    RigError,
+    Source,
+    SpiLink,
+    SpiReply,
+    SpiStep,
+    StreamSpec,
+)
+from tactbench.sensors.biotac.codec import (
+    COMMAND_RATE,
+    FASTEST_CLOCK,
+    PROPERTIES,
+    SAMPLING_PAUSE,
+    SLOWEST_CLOCK,
+    WORD_PAUSE,
+    property_command,
+    property_text,
+)
+from tactbench.sensors.biotac.frames import FrameBatches, counted, streams_of
+from tactbench.sensors.biotac.options import Options
+
+if TYPE_CHECKING:
+    from tactbench.plugin import Link
+
+PATIENCE_S = 0.5
+"""Assumed: a reply that has not come so long after its batch must be over is lost. USB and a busy host take less."""
+
+
+class BioTacDriver(Driver):
+    """One BioTac.
+
+    Parameters
+    ----------
+    settings
+        The link is an SPI link; options are those of :class:`~tactbench.sensors.biotac.options.Options`.
+
+    Raises
+    ------
+    UsageError
+        For options that are not known.
+    RigError
+        If the link is no SPI link, or its clock is not one for a BioTac, or leaves no time for so many resends.
+    LinkError
+        If the link cannot be opened.
+    """
+
+    def __init__(self, settings: DriverSettings) -> None:
+        self._options = Options.checked(settings.options)
+        self._clock = settings.clock
+        self._counts: Counter[str] = Counter()
+        self._running = False
+        link = settings.open_link()
+        try:
+            self._link = _spi(link)
+            self._ahead = min(self._options.batches_ahead, self._link.holds)
+            self._set_up()
+        except BaseException:
+            link.close()
+            raise
+
+    def _set_up(self) -> None:
+        """Begin at position 0 with nothing under way."""
+        options = self._options
+        try:
+            self._batches = FrameBatches(
+                options.frame,
+                speed_hz=self._link.speed_hz,
+                select=options.select,
+                resends=options.resends,
+                words=options.batch_words,
+            )
+        except ValueError as error:
+            raise RigError(
+                f"{self._link.address} is too slow for a BioTac: {error}.",
+                hint=f"Choose a faster clock, or fewer resends than {options.resends}.",
+            ) from error
+        self._sent: deque[tuple[int, int]] = deque()
+        self._skipped = 0
+        self._last: tuple[int, int] | None = None
+        self._heard_ns = self._clock()
+
+    @property
+    def streams(self) -> tuple[StreamSpec, ...]:
+        """The spec's streams, or those channels of theirs that the frame has, at its rates."""
+        rate_hz = COMMAND_RATE.to("Hz")
+        source = Source(tag="derived", reference=f"{rate_hz:g} commands/s in frames of {len(self._options.frame)}")
+        return streams_of(self._options.frame, rate_hz, source)
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Faults by name and channel, as ``parity E7``, ``resent E7`` for words that came good when asked for again.
+
+        Beside them ``batches lost`` (no reply came), ``batches late`` (begun more than a word's time after the end of
+        the batch before) and ``frames not asked for`` (that would have had their time in between).
+        """
+        now = Counter(counted(self._batches.faults))
+        now.update({f"resent {name}": n for name, n in self._batches.resent.items()})
+        return dict(self._counts + now)
+
+    def identify(self) -> Mapping[str, str]:
+        """Return serial number, flex version and software version as the maker's tools show them.
+
+        Raises
+        ------
+        RigError
+            If no serial number that begins with BT is read: there is no BioTac; or while it samples.
+        LinkTimeout, LinkUnplugged, LinkError
+            If the adapter does not answer.
+        """
+        if self._running:
+            raise RigError("A BioTac that samples was asked who it is.", hint="Ask before start, or after stop.")
+        self._property("software version")  # thrown away, as the maker's library does
+        found = {}
+        for name in ("serial number", "flex version", "software version"):
+            raw = self._property(name)
+            text = property_text(name, raw)
+            if text is None and name == "serial number":
+                raise RigError(
+                    f"No BioTac answers at {self._link.address}, select lines {self._options.select:#x}: its serial "
+                    f"number reads {raw.hex(' ')}, expected is a text that begins with BT.",
+                    hint="Check supply, wiring and the option select.",
+                )
+            found[name] = raw.hex(" ") if text is None else text
+        return found
+
+    def _property(self, name: str) -> bytes:
+        select, pauses = self._options.select, (round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us")))
+        data = (property_command(name), bytes(PROPERTIES[name].length))
+        number = self._link.send([SpiStep(part, select, pause) for part, pause in zip(data, pauses, strict=True)])
+        while True:
+            reply = self._link.receive(PATIENCE_S)
+            if reply.number == number:
+                return reply.data[1]
+
+    def start(self) -> None:
+        """Send the first batches; sequence numbers begin at 0, times by the adapter's counter where that stands."""
+        if not self._running:
+            self._counts = Counter(self.counts)
+            self._set_up()
+            self._running = True
+            self._send()
+
+    def _send(self) -> None:
+        while len(self._sent) < self._ahead:
+            first, steps = self._batches.next()
+            self._sent.append((self._link.send(steps), first))
+
+    def read(self, timeout_s: float) -> list[Block]:
+        """Return the frames that are over; see :class:`Driver`. Nothing while it is stopped.
+
+        An adapter without a program of its own carries out a batch in here: then it takes a batch's time at least.
+        """
+        if not self._running:
+            return []
+        for _ in range(self._ahead):
+            self._send()
+            try:
+                reply = self._link.receive(timeout_s)
+            except LinkTimeout:
+                self._give_up_lost()
+                break
+            self._take(reply)
+            timeout_s = 0.0
+        return self._batches.blocks()
+
+    def _give_up_lost(self) -> None:
+        """Drop what is under way if nothing has come for longer than all of it can take."""
+        due_ns = self._ahead * self._batches.timing(0).end_ns + round(PATIENCE_S * 1e9)
+        if self._clock() - self._heard_ns > due_ns:
+            self._link.abandon()
+            self._counts["batches lost"] += len(self._sent)
+            self._sent.clear()
+            self._heard_ns = self._clock()
+
+    def _take(self, reply: SpiReply) -> None:
+        self._heard_ns = self._clock()
+        first = self._answered(reply)
+        if first is None:
+            return
+        device_ns = None
+        if reply.device_us is not None:
+            device_ns = 1000 * self._begun_us(reply.device_us, first)
+        self._batches.take(first, reply.data, t_ns=reply.t_ns, device_ns=device_ns, skipped=self._skipped)
+
+    def _answered(self, reply: SpiReply) -> int | None:
+        """Return the first position of the batch that `reply` is to; those before it are lost. None: to none."""
+        if reply.number not in (number for number, _ in self._sent):
+            return None
+        while True:
+            number, first = self._sent.popleft()
+            if number == reply.number:
+                return first
+            self._counts["batches lost"] += 1
+
+    def _begun_us(self, counter_us: int, first: int) -> int:
+        """Return when a batch began by the adapter's counter, counted on; note what was not asked for before it."""
+        if self._last is None:
+            begun_us = counter_us
+        else:
+            last_first, last_us = self._last
+            begun_us = last_us + (counter_us - last_us) % 2**32
+            word_us = 1e6 / COMMAND_RATE.to("Hz")
+            late_us = begun_us - last_us - (first - last_first) * word_us
+            if late_us > word_us:
+                frames = round(late_us / (self._batches.frame_words * word_us))
+                self._counts["batches late"] += 1
+                self._counts["frames not asked for"] += frames
+                self._skipped += frames * self._batches.frame_words
+        self._last = (first, begun_us)
+        return begun_us
+
+    def stop(self) -> None:
+        """Wait for what is under way and drop it."""
+        if not self._running:
+            return
+        self._running = False
+        with contextlib.suppress(LinkError):
+            while self._sent:
+                self._answered(self._link.receive(PATIENCE_S))
+        self._link.abandon()
+
+    def close(self) -> None:
+        """Stop and close the link."""
+        self.stop()
+        self._link.close()
+
+
+def _spi(link: Link) -> SpiLink:
+    """Return the link if a BioTac can be read through it."""
+    if not isinstance(link, SpiLink):
+        raise RigError(
+            f"{link.address} was given, a {type(link).__name__}; a BioTac needs an SPI link.",
+            hint="Give spi://bridge/PORT?speed_hz=4400000 or spi://spidev/0.0?speed_hz=4400000.",
+        )
+    slowest, fastest = SLOWEST_CLOCK.to("Hz"), FASTEST_CLOCK.to("Hz")
+    if not slowest <= link.speed_hz <= fastest:
+        raise RigError(
+            f"{link.address} runs at {link.speed_hz} Hz, a BioTac takes {slowest:g} to {fastest:g} Hz.",
+            hint="Choose speed_hz=4400000, or the next that the adapter has below.",
+        )
+    return link
+
+
+def build(settings: DriverSettings) -> Driver:
+    """Open the link and return the driver, as ``SensorDescriptor.driver`` promises; raises as :class:`BioTacDriver`."""
+    return BioTacDriver(settings)

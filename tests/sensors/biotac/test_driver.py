@@ -1,0 +1,584 @@
+"""The driver against the emulated sensor: through the bridge's frames on a pseudo-terminal, and in virtual time."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import deque
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import (
+    BridgeEmulator,
+    DriverSettings,
+    EmulatorSettings,
+    LinkError,
+    LinkTimeout,
+    LinkUnplugged,
+    Quality,
+    RigError,
+    SpiBridge,
+    SpiLink,
+    SpiReply,
+    UsageError,
+    load_object,
+    open_link,
+)
+from tactbench.sensors.biotac import driver as module
+from tactbench.sensors.biotac import tactbench_sensors
+from tactbench.sensors.biotac.codec import CHANNELS
+from tactbench.sensors.biotac.driver import build
+from tactbench.sensors.biotac.emulator import Emulator, build_emulator
+from tactbench.sensors.biotac.frames import DEFAULT_FRAME
+from tactbench.sensors.biotac.spec import SPEC
+from tests.links.ends import serving
+
+COLUMN = {channel.name: column for stream in SPEC.streams for column, channel in enumerate(stream.channels)}
+MISSING, SUSPECT = int(Quality.MISSING), int(Quality.SUSPECT)
+SERIAL = {"serial number": "BT-2P-02.2.0-B-11-E-0004", "flex version": "B.D", "software version": "2.38"}
+
+
+class Sensed:
+    """What is sensed: a wave of each channel's own, written down word by word."""
+
+    def __init__(self):
+        self.words = []
+
+    def __call__(self, t_s):
+        self.words.append({n: 2000 + 1500 * math.sin((3 + k) * t_s + k) for k, n in enumerate(CHANNELS)})
+        return self.words[-1]
+
+    def count(self, word):
+        return round(self.words[word][DEFAULT_FRAME[word % 44]])
+
+
+def emulator(sensed, *faults, **options):
+    return build_emulator(EmulatorSettings(sensed, np.random.default_rng(1), options, faults))
+
+
+class Clock:
+    """Nanoseconds that pass only while somebody waits."""
+
+    def __init__(self):
+        self.now_ns = 10**9
+
+    def __call__(self):
+        return self.now_ns
+
+
+class Adapter(SpiLink):
+    """An SPI adapter in virtual time: batches run without the host, a reply is there when its batch is over.
+
+    Replies to batches whose count since the beginning is in `lost` do not come.
+    """
+
+    def __init__(self, exchange, clock, *, speed_hz=4_400_000, holds=4, begin_us=0, counter=True, lost=()):
+        super().__init__("spi://virtual", clock)
+        self.speed_hz, self.holds = speed_hz, holds
+        self.sent = 0
+        self.unplugged = False
+        self._exchange, self._begin_us, self._counter, self._lost = exchange, begin_us, counter, set(lost)
+        self._free_s = 0.0
+        self._replies = deque()
+
+    def _submit(self, number, steps):
+        assert len(self._replies) < self.holds
+        begin_s = now_s = max(self._free_s, 1e-9 * self._clock())
+        data = []
+        for step in steps:
+            data.append(self._exchange(step.select, step.data, now_s))
+            now_s += 8 * len(step.data) / self.speed_hz + 1e-6 * step.pause_us
+        self._free_s = now_s
+        counter_us = (int(1e6 * begin_s) + self._begin_us) % 2**32 if self._counter else None
+        reply = None if self.sent in self._lost else SpiReply(number, tuple(data), round(1e9 * now_s), counter_us)
+        self._replies.append((round(1e9 * now_s), reply))
+        self.sent += 1
+
+    def _collect(self, timeout_s, deadline):
+        if self.unplugged:
+            raise self._unplugged(OSError("pulled"))
+        until_ns = self._clock.now_ns + round(1e9 * timeout_s)
+        while self._replies and self._replies[0][1] is None and len(self._replies) > 1:
+            self._replies.popleft()  # the host hears of it when a later one comes
+        if self._replies and self._replies[0][1] is not None and self._replies[0][0] <= until_ns:
+            due_ns, reply = self._replies.popleft()
+            self._clock.now_ns = max(self._clock.now_ns, due_ns)
+            return reply
+        self._clock.now_ns = until_ns
+        raise self._nothing_came(timeout_s)
+
+    def abandon(self):
+        self._replies.clear()
+
+    def _release(self):
+        pass
+
+
+@contextmanager
+def virtual(sensed, *faults, options=None, **adapter):
+    """A driver in virtual time, its link and its clock."""
+    clock = Clock()
+    link = Adapter(emulator(sensed, *faults, **(options or {})).exchange, clock, **adapter)
+    with build(DriverSettings(lambda: link, SPEC.streams, options or {}, clock)) as driver:
+        yield driver, link, clock
+
+
+def joined(blocks):
+    """Blocks of a stream one after the other, by the stream's name."""
+    found = {}
+    for stream in SPEC.streams:
+        parts = [block for block in blocks if block.stream == stream.name]
+        if parts:
+            keys = ("t_ns", "device_ns", "data", "quality", "sequence")
+            columns = {key: [getattr(part, key) for part in parts] for key in keys}
+            found[stream.name] = {
+                key: None if column[0] is None else np.concatenate(column) for key, column in columns.items()
+            }
+    return found
+
+
+def read_frames(driver, frames, timeout_s=2.0):
+    """Read until so many frames have come, whole or not."""
+    blocks, rows, empty = [], 0, 0
+    while rows < frames:
+        new = driver.read(timeout_s)
+        empty = 0 if new else empty + 1
+        assert empty < 10, "nothing comes any more"
+        rows += sum(len(block.data) for block in new if block.stream == "electrodes")
+        blocks += new
+    return joined(blocks)
+
+
+def assert_sensed(streams, sensed):
+    """Every sample that is not marked is what was sensed at its word."""
+    slow, fast = streams["electrodes"], streams["vibration"]
+    for row, frame in enumerate(slow["sequence"]):
+        for place, name in enumerate(DEFAULT_FRAME):
+            if name != "PAC" and slow["quality"][row, COLUMN[name]] == 0:
+                assert slow["data"][row, COLUMN[name]] == sensed.count(44 * frame + place), (frame, name)
+    for row, n in enumerate(fast["sequence"]):
+        assert fast["quality"][row, 0] or fast["data"][row, 0] == sensed.count(2 * n + 1), n
+
+
+def test_the_sensor_names_driver_emulator_and_log_reader():
+    (descriptor,) = tactbench_sensors()
+    assert load_object(descriptor.driver) is build
+    assert load_object(descriptor.emulator) is build_emulator
+    assert descriptor.emulated_link == "spi"
+    assert callable(load_object(descriptor.log_reader))
+
+
+# In virtual time
+
+
+@pytest.mark.parametrize("speed_hz", [1_000_000, 4_000_000, 4_400_000])
+def test_the_mean_rate_is_4400_words_a_second(speed_hz):
+    sensed = Sensed()
+    with virtual(sensed, speed_hz=speed_hz) as (driver, _, clock):
+        assert driver.streams == SPEC.streams
+        driver.start()
+        streams = read_frames(driver, 100)
+        assert clock.now_ns == pytest.approx(2e9, rel=1e-4)
+        assert driver.counts == {}
+    fast = streams["vibration"]
+    assert np.array_equal(fast["sequence"], np.arange(2200))
+    rate_hz = 1e9 * 2199 / (fast["device_ns"][-1] - fast["device_ns"][0])
+    assert rate_hz == pytest.approx(2200.0, rel=1e-4)
+    # A pause is a whole microsecond, so is the counter.
+    assert np.abs(np.diff(fast["device_ns"]) - 1e9 / 2200).max() <= 2000.0
+    # When a reply came: the end of its frame, up to a microsecond that the counter left out.
+    late_ns = fast["t_ns"][21::22] - fast["device_ns"][21::22]
+    assert 0 < late_ns.min() <= late_ns.max() < 227_273 + 1000
+    assert_sensed(streams, sensed)
+
+
+def test_no_clock_but_the_settings_is_asked():
+    assert not hasattr(module, "time")
+
+
+def test_the_counter_is_counted_on_over_its_wraps():
+    with virtual(Sensed(), begin_us=2**32 - 1_000_000 - 35_000) as (driver, _, _):
+        driver.start()
+        slow = read_frames(driver, 8)["electrodes"]
+        assert driver.counts == {}
+    assert slow["device_ns"].min() < 2**32 * 1000 < slow["device_ns"].max()
+    assert np.diff(slow["device_ns"]) == pytest.approx(1e7, abs=1000)
+
+
+def test_a_lost_reply_is_a_gap_and_the_next_frame_is_whole():
+    sensed = Sensed()
+    with virtual(sensed, lost=[3, 4, 8]) as (driver, _, _):
+        driver.start()
+        streams = read_frames(driver, 7)
+        assert driver.counts == {"batches lost": 3}
+    assert streams["electrodes"]["sequence"].tolist() == [0, 1, 2, 5, 6, 7, 9]
+    assert not streams["electrodes"]["quality"].any()
+    assert len(streams["vibration"]["sequence"]) == 7 * 22
+    assert_sensed(streams, sensed)
+
+
+def test_when_no_reply_comes_it_gives_up_and_goes_on_in_time():
+    with virtual(Sensed(), lost=range(2, 6)) as (driver, _, _):
+        driver.start()
+        slow = read_frames(driver, 6, timeout_s=0.1)["electrodes"]
+        counts = driver.counts
+    assert counts["batches lost"] == 4
+    assert slow["sequence"][:2].tolist() == [0, 1]
+    # Where it goes on, numbers go with the time, to half a frame.
+    frames = (slow["device_ns"] - slow["device_ns"][0]) / 1e7
+    assert np.abs(slow["sequence"] - frames).max() <= 0.5
+    # Half a second of patience and four frames, to a time-out of the reads.
+    assert 50 <= slow["sequence"][2] - 2 <= 70
+    assert counts["frames not asked for"] == slow["sequence"][2] - 6
+    assert counts["batches late"] == 1
+
+
+def test_a_host_that_is_late_leaves_a_gap_as_long_as_the_pause():
+    sensed = Sensed()
+    with virtual(sensed) as (driver, _, clock):
+        driver.start()
+        before = read_frames(driver, 5)
+        clock.now_ns += 500_000_000
+        after = read_frames(driver, 10)["electrodes"]
+        assert driver.counts == {"batches late": 1, "frames not asked for": 46}
+    assert before["electrodes"]["sequence"].tolist() == [*range(5)]
+    assert after["sequence"][0] == 5
+    (gap,) = np.flatnonzero(np.diff(after["sequence"]) > 1)
+    assert after["sequence"][gap + 1] - after["sequence"][gap] == 47
+    frames = (after["device_ns"] - before["electrodes"]["device_ns"][0]) / 1e7
+    assert np.abs(after["sequence"] - frames).max() <= 0.5
+
+
+def test_a_host_that_is_late_by_less_than_what_is_under_way_loses_nothing():
+    with virtual(Sensed(), holds=16, options={"batches_ahead": 16}) as (driver, _, clock):
+        driver.start()
+        for _ in range(10):
+            clock.now_ns += 150_000_000
+            driver.read(0.0)
+        assert driver.counts == {}
+
+
+def test_an_adapter_without_a_counter_has_host_times_alone():
+    sensed = Sensed()
+    with virtual(sensed, counter=False, holds=1) as (driver, _, clock):
+        driver.start()
+        streams = read_frames(driver, 10)
+        assert driver.counts == {}
+    slow, fast = streams["electrodes"], streams["vibration"]
+    assert slow["device_ns"] is None
+    assert np.diff(slow["t_ns"]) == pytest.approx(1e7, abs=1000)
+    assert np.diff(fast["t_ns"]) == pytest.approx(1e9 / 2200, abs=1500)
+    assert fast["t_ns"].max() < clock.now_ns
+    assert_sensed(streams, sensed)
+
+
+def test_stopped_it_reads_nothing_and_begins_anew():
+    with virtual(Sensed(), "parity:channels=E5") as (driver, link, _):
+        assert driver.read(0.0) == []
+        driver.start()
+        driver.start()
+        read_frames(driver, 3)
+        driver.stop()
+        assert driver.read(1.0) == []
+        sent = link.sent
+        driver.start()
+        again = read_frames(driver, 2)["electrodes"]
+        assert again["sequence"].tolist() == [0, 1]
+        assert again["device_ns"][0] >= 1e9 + (sent - 1) * 1e7
+        assert driver.counts == {"parity E5": 5}
+
+
+def test_what_is_asked_while_it_samples_is_refused():
+    with virtual(Sensed()) as (driver, _, _):
+        assert driver.identify() == SERIAL
+        driver.start()
+        with pytest.raises(RigError, match="before start"):
+            driver.identify()
+        driver.stop()
+        assert driver.identify() == SERIAL
+        assert not driver.tare()
+
+
+def test_no_sensor_is_said():
+    with (
+        virtual(Sensed(), "not-connected") as (driver, _, _),
+        pytest.raises(
+            RigError, match="No BioTac answers at spi://virtual, select lines 0x1: its serial number reads ff ff"
+        ),
+    ):
+        driver.identify()
+
+
+def test_another_sensor_is_no_biotac_and_a_version_that_is_no_text_is_shown():
+    clock = Clock()
+    for properties, said in [
+        ({"serial number": b"NT2P0220B11E0004", "flex version": b"BD", "software version": b"0238"}, None),
+        ({"serial number": b"BT2P0220B11E0004", "software version": b"\x00\x01\x02\x03"}, "00 01 02 03"),
+    ]:
+        link = Adapter(Emulator(properties=properties).exchange, clock)
+        with build(DriverSettings(lambda link=link: link, clock=clock)) as driver:
+            if said is None:
+                with pytest.raises(RigError, match="begins with BT"):
+                    driver.identify()
+            else:
+                assert driver.identify() == {**SERIAL, "flex version": "a5 3f", "software version": said}
+
+
+def test_its_select_lines_are_used():
+    with virtual(Sensed(), options={"select": 6}) as (driver, _, _):
+        assert driver.identify() == SERIAL
+        driver.start()
+        assert not read_frames(driver, 2)["electrodes"]["quality"].any()
+    clock = Clock()
+    link = Adapter(emulator(Sensed(), select=2).exchange, clock)
+    with build(DriverSettings(lambda: link, clock=clock)) as driver:
+        driver.start()
+        assert (read_frames(driver, 2)["electrodes"]["quality"] == MISSING).all()
+
+
+def test_another_frame_and_shorter_batches():
+    options = {"frame": "PAC PDC, E1", "batch_words": 7}
+    with virtual(Sensed(), options=options) as (driver, _, _):
+        slow, fast = driver.streams
+        assert [channel.name for channel in slow.channels] == ["E1", "PDC"]
+        assert slow.rate_hz == fast.rate_hz == pytest.approx(4400 / 3)
+        driver.start()
+        streams = read_frames(driver, 500)
+        assert driver.counts == {}
+    for stream in streams.values():
+        assert np.array_equal(stream["sequence"], np.arange(len(stream["sequence"])))
+        assert not stream["quality"].any()
+        rate_hz = 1e9 * (len(stream["sequence"]) - 1) / np.ptp(stream["device_ns"])
+        assert rate_hz == pytest.approx(4400 / 3, rel=1e-4)
+
+
+def test_with_a_resend_words_of_bad_parity_are_replaced():
+    with virtual(Sensed(), "parity:every=7", options={"resends": 1}) as (driver, _, _):
+        driver.start()
+        streams = read_frames(driver, 10)
+        counts = driver.counts
+    assert not any(stream["quality"].any() for stream in streams.values())
+    bad = {name.removeprefix("parity "): n for name, n in counts.items() if name.startswith("parity ")}
+    assert counts == {**{f"parity {k}": n for k, n in bad.items()}, **{f"resent {k}": n for k, n in bad.items()}}
+    assert sum(bad.values()) == 63  # of 880 words, the odd ones of every seventh: the others are resends
+    assert streams["electrodes"]["sequence"].tolist() == [*range(10)]
+
+
+def test_an_unplugged_link_ends_the_reading_and_closes():
+    with virtual(Sensed()) as (driver, link, _):
+        driver.start()
+        driver.read(1.0)
+        link.unplugged = True
+        for _ in range(2):
+            with pytest.raises(LinkUnplugged):
+                driver.read(1.0)
+        driver.stop()
+        driver.close()
+        driver.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"selct": 1}, "selct.*Options are select, frame"),
+        ({"select": 0}, "select: 0 was given"),
+        ({"select": True}, "select: True"),
+        ({"frame": "E1 E20"}, "names of channels"),
+        ({"frame": ""}, "names of channels"),
+        ({"resends": 1.5}, "resends: 1.5"),
+        ({"batches_ahead": 1}, "batches_ahead: 1"),
+    ],
+)
+def test_options_that_are_none_are_refused(options, said):
+    def opened():
+        raise AssertionError("the link is not opened for options that are none")
+
+    with pytest.raises(UsageError, match=said):
+        build(DriverSettings(opened, options=options))
+
+
+@pytest.mark.parametrize(
+    ("speed_hz", "options", "said"),
+    [
+        (100_000, {}, "100000 Hz, a BioTac takes 500000 to 1e"),
+        (20_000_000, {}, "20000000 Hz"),
+        (500_000, {"resends": 1}, "64 bits at 500000 Hz"),
+    ],
+)
+def test_a_clock_that_is_none_for_it_is_refused(speed_hz, options, said):
+    clock = Clock()
+    link = Adapter(emulator(Sensed()).exchange, clock, speed_hz=speed_hz)
+    with pytest.raises(RigError, match=said):
+        build(DriverSettings(lambda: link, options=options, clock=clock))
+    with pytest.raises(LinkError, match="closed"):
+        link.receive(0.0)
+
+
+def test_a_link_of_another_kind_is_refused():
+    with pytest.raises(RigError, match=r"loop://.*ByteLink"):
+        build(DriverSettings(lambda: open_link("loop://")))
+
+
+# Through the bridge, in real time: a machine too busy for it asks for fewer frames, which is counted and no loss
+
+needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
+
+
+@contextmanager
+def bridged(sensed, *faults, options=None, **bridge):
+    """A driver of the emulated sensor behind an emulated bridge on a pseudo-terminal, the bridge and the far end."""
+    options = {"batches_ahead": 16, **(options or {})}
+    model = BridgeEmulator(emulator(sensed, *faults, **options).exchange, **{"holds": 16, **bridge})
+    with serving(model) as far:
+        settings = DriverSettings(lambda: SpiBridge(far.name, speed_hz=4_400_000), SPEC.streams, options)
+        with build(settings) as driver:
+            yield driver, model, far
+
+
+def assert_nothing_lost(streams, counts, sensed):
+    """Every frame that was asked for is there, whole, as it was sensed."""
+    assert set(counts) <= {"batches late", "frames not asked for"}
+    slow, fast = streams["electrodes"], streams["vibration"]
+    rows, unasked = len(slow["sequence"]), counts.get("frames not asked for", 0)
+    assert slow["sequence"][0] == 0
+    assert slow["sequence"][-1] == rows - 1 + unasked
+    assert (np.diff(slow["sequence"]) >= 1).all()
+    assert np.array_equal(fast["sequence"], (22 * slow["sequence"][:, None] + np.arange(22)).ravel())
+    assert not slow["quality"].any()
+    assert not fast["quality"].any()
+    slow["sequence"], fast["sequence"] = np.arange(rows), np.arange(22 * rows)
+    assert_sensed(streams, sensed)
+
+
+@needs_pty
+def test_a_second_at_full_rate_through_the_bridge():
+    sensed = Sensed()
+    with bridged(sensed) as (driver, _, _):
+        assert driver.identify() == SERIAL
+        driver.start()
+        streams = read_frames(driver, 100)
+        counts = driver.counts
+    device_ns, t_ns = streams["electrodes"]["device_ns"], streams["electrodes"]["t_ns"]
+    assert np.median(np.diff(device_ns)) == pytest.approx(1e7, rel=1e-4)
+    assert (np.diff(t_ns) >= 0).all()
+    assert_nothing_lost(streams, counts, sensed)
+
+
+@needs_pty
+@pytest.mark.parametrize(
+    ("fault", "column", "quality", "counts"),
+    [
+        ("parity:channels=E5", "E5", SUSPECT, {"parity E5": 4}),
+        ("dropped-reply:channels=E5", "E5", MISSING, {"not connected E5": 4}),
+        ("error-reply:channels=E5", "E5", MISSING, {"error reply E5": 4}),
+        ("doubled-reply:channels=E5", "E5", 0, {}),
+        ("stuck-channel:channels=E5", "E5", 0, {}),
+    ],
+    ids=lambda value: value.partition(":")[0] if isinstance(value, str) else None,
+)
+def test_a_fault_of_one_channel_through_the_bridge(fault, column, quality, counts):
+    sensed = Sensed()
+    with bridged(sensed, fault, options={"batches_ahead": 4}) as (driver, _, _):
+        driver.start()
+        streams = read_frames(driver, 4)
+        frames = len(streams["electrodes"]["sequence"])
+        seen = {name: n for name, n in driver.counts.items() if not name.startswith(("batches", "frames"))}
+    assert seen == dict.fromkeys(counts, frames)
+    slow, fast = streams["electrodes"], streams["vibration"]
+    assert set(slow["quality"][:, COLUMN[column]]) == {quality}
+    assert not np.delete(slow["quality"], COLUMN[column], axis=1).any()
+    assert not fast["quality"].any()
+    values = slow["data"][:, COLUMN[column]]
+    if fault.startswith("doubled"):
+        assert np.array_equal(values, fast["data"][3::22, 0])
+    if fault.startswith("stuck"):
+        assert set(values) == {sensed.count(DEFAULT_FRAME.index(column))}
+
+
+@needs_pty
+def test_a_sensor_that_is_not_connected_through_the_bridge():
+    with bridged(Sensed(), "not-connected") as (driver, _, _):
+        with pytest.raises(RigError, match="No BioTac answers"):
+            driver.identify()
+        driver.start()
+        streams = read_frames(driver, 2)
+        assert driver.counts["not connected E7"] == len(streams["electrodes"]["sequence"])
+    assert all((stream["quality"] == MISSING).all() for stream in streams.values())
+
+
+@needs_pty
+@pytest.mark.parametrize("fault", ["dropped", "damaged"])
+def test_replies_that_the_bridge_loses_are_gaps_and_the_next_frame_is_whole(fault):
+    sensed = Sensed()
+    with bridged(sensed, options={"batches_ahead": 4}) as (driver, model, _):
+        driver.start()
+        blocks = [block for _ in range(3) for block in driver.read(2.0)]
+        model.faults.add(fault)
+        while "batches lost" not in driver.counts:
+            blocks += driver.read(0.1)
+        model.faults.clear()
+        while not (new := driver.read(2.0)):
+            pass
+        streams = joined(blocks + new)
+        counts = driver.counts
+    slow = streams["electrodes"]
+    # Numbers from 0: replies that came, that were lost, and frames that nobody asked for meanwhile.
+    assert slow["sequence"][-1] + 1 == len(slow["sequence"]) + counts["batches lost"] + counts["frames not asked for"]
+    assert (np.diff(slow["sequence"]) >= 1).all()
+    assert not any(stream["quality"].any() for stream in streams.values())
+    frames = (slow["device_ns"] - slow["device_ns"][0]) / 1e7
+    assert np.abs(slow["sequence"] - slow["sequence"][0] - frames).max() <= 0.5 * (1 + counts["batches late"])
+
+
+@needs_pty
+def test_replies_that_the_bridge_doubles_are_taken_once():
+    sensed = Sensed()
+    with bridged(sensed) as (driver, model, _):
+        model.faults.add("doubled")
+        driver.start()
+        streams = read_frames(driver, 5)
+        counts = driver.counts
+    assert_nothing_lost(streams, counts, sensed)
+
+
+@needs_pty
+def test_a_pulled_bridge_ends_the_reading():
+    with bridged(Sensed()) as (driver, _, far):
+        driver.start()
+        assert driver.read(2.0)
+        far.unplug()
+        with pytest.raises(LinkUnplugged):
+            read_frames(driver, 20)
+        driver.stop()
+
+
+@needs_pty
+def test_a_bridge_that_takes_short_batches_only():
+    with (
+        bridged(Sensed(), largest_payload=300) as (driver, _, _),
+        pytest.raises(LinkError, match="the bridge takes 300"),
+    ):
+        driver.start()
+    with bridged(Sensed(), options={"batch_words": 20}, largest_payload=300) as (driver, _, _):
+        driver.start()
+        read_frames(driver, 3)
+
+
+@needs_pty
+def test_a_bridge_that_holds_fewer_batches_gets_fewer():
+    sensed = Sensed()
+    with bridged(sensed, holds=2) as (driver, _, _):
+        driver.start()
+        streams = read_frames(driver, 5)
+        counts = driver.counts
+    assert_nothing_lost(streams, counts, sensed)
+
+
+@needs_pty
+def test_a_bridge_that_does_not_answer_is_a_timeout():
+    with bridged(Sensed()) as (driver, model, _):
+        model.faults.add("dropped")
+        with pytest.raises(LinkTimeout):
+            driver.identify()
