@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import Quality
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import LARGEST_BYTES, AtiFileError, elements
-from tactbench.rigs.parallel_manipulator.force_torque.nano17 import read_calibration
+from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import read_calibration
 
 # The calibration of a Nano17 FT8577, as a public MATLAB script for ATI matrices quotes it.
 FT8577 = b"""<?xml version="1.0" encoding="utf-8"?>

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import Quality, UsageError
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import AtiFileError
-from tactbench.rigs.parallel_manipulator.force_torque.rdt_codec import (
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     CONFIGURATION_PATH,
     MOST_BUFFERED,
     RESTART_RUN,
@@ -36,7 +36,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.rdt_codec import (
     read_configuration,
     step,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.rdt_emulator import DatagramFault, RdtEmulator
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
 
 REQUESTS = [
     ("12 34 00 00 00 00 00 00", Request(Command.STOP)),
@@ -421,7 +421,7 @@ def test_settings_that_a_box_does_not_have(wrong):
 
 
 def test_faults_that_are_none():
-    with pytest.raises(UsageError, match="dropped, doubled"):
+    with pytest.raises(UsageError, match="no fault called .coffee.*doubled, dropped"):
         DatagramFault("coffee")
 
 

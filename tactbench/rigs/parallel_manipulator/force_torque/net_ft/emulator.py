@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import Fault, UsageError, fault_concerns
-from tactbench.rigs.parallel_manipulator.force_torque.rdt_codec import (
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     MOST_BUFFERED,
     SEQUENCE_MODULUS,
     Command,
