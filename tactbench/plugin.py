@@ -19,6 +19,7 @@ from tactbench.core.errors import (
     PluginContractError,
     RigError,
     TactbenchError,
+    UnknownNameError,
     UsageError,
 )
 from tactbench.core.plugins.checks import Check, Verdict
@@ -93,6 +94,7 @@ if TYPE_CHECKING:
     from tactbench.devices.fault import Fault, fault_concerns
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
+    from tactbench.links.bridge_frame import Frame, FrameDecoder, encode_frame
     from tactbench.links.byte_link import ByteLink
     from tactbench.links.can_link import CanBus, CanFrame, CanLink
     from tactbench.links.can_log import CanLog
@@ -149,6 +151,8 @@ __all__ = [
     "ForceEntry",
     "ForceLoop",
     "ForceRamp",
+    "Frame",
+    "FrameDecoder",
     "Indenter",
     "LabelTarget",
     "Link",
@@ -213,10 +217,12 @@ __all__ = [
     "TaskSpec",
     "Transducer",
     "TransducerFactory",
+    "UnknownNameError",
     "UsageError",
     "Verdict",
     "assumed",
     "derived",
+    "encode_frame",
     "fault_concerns",
     "hookimpl",
     "load_object",
@@ -244,6 +250,8 @@ _ON_DEMAND = {
     "EmulatorSettings": "tactbench.devices.emulator",
     "Fault": "tactbench.devices.fault",
     "FloatArray": "tactbench.core.samples",
+    "Frame": "tactbench.links.bridge_frame",
+    "FrameDecoder": "tactbench.links.bridge_frame",
     "Link": "tactbench.links.link",
     "LinkAddress": "tactbench.links.address",
     "Received": "tactbench.links.link",
@@ -256,6 +264,7 @@ _ON_DEMAND = {
     "SpiReply": "tactbench.links.spi_link",
     "SpiStep": "tactbench.links.spi_link",
     "SpidevLink": "tactbench.links.spidev",
+    "encode_frame": "tactbench.links.bridge_frame",
     "fault_concerns": "tactbench.devices.fault",
     "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",
