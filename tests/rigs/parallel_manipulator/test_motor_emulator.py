@@ -366,7 +366,7 @@ def test_a_flash_defect():
 
 
 def test_faults_that_are_none():
-    with pytest.raises(UsageError, match="no fault called .coffee.*late-answers, motor-fault"):
+    with pytest.raises(UsageError, match=r"no fault called .coffee.*late-answers, motor-fault"):
         MotorFault("coffee")
     with pytest.raises(UsageError, match="1 or more"):
         MotorFault("garbled-line", every=0)
