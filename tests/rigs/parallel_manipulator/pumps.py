@@ -10,7 +10,9 @@ import time
 from collections import deque
 from contextlib import contextmanager
 
-from tactbench.plugin import Link, LinkUnplugged, Received
+import numpy as np
+
+from tactbench.plugin import Block, Link, LinkUnplugged, Received
 from tests.links.ends import pty
 
 
@@ -73,6 +75,29 @@ class VirtualLink(Link):
         while self.now_s < end_s:
             self.now_s = min(max(self.emulator.next_s(), self.now_s + 1e-6), end_s)
             self.arrived.extend(self.emulator.poll(self.now_s))
+
+
+def read_for(driver, link, seconds):
+    """Return one block of what comes in some time."""
+    blocks, end_s = [], link.now_s + seconds
+    while link.now_s < end_s:
+        blocks += driver.read(end_s - link.now_s)
+    return joined(blocks)
+
+
+def joined(blocks):
+    def all_of(name):
+        return np.concatenate([getattr(block, name) for block in blocks])
+
+    marks = [np.zeros(b.data.shape, np.uint8) if b.quality is None else b.quality for b in blocks]
+    return Block(
+        stream=blocks[0].stream,
+        t_ns=all_of("t_ns"),
+        data=all_of("data"),
+        quality=np.concatenate(marks),
+        sequence=all_of("sequence"),
+        device_ns=all_of("device_ns"),
+    )
 
 
 @contextmanager

@@ -14,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.plugin import (
-    Block,
     DriverSettings,
     EmulatorSettings,
     LinkTimeout,
@@ -49,7 +48,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import build as build_emulator
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import RESTART_RUN, Counter, SampleCounter
-from tests.rigs.parallel_manipulator.pumps import VirtualLink, on_udp
+from tests.rigs.parallel_manipulator.pumps import VirtualLink, joined, on_udp, read_for
 
 REQUESTS = [
     ("12 34 00 00 00 00 00 00", Request(Command.STOP)),
@@ -361,29 +360,6 @@ def driver_on(emulator, *, begin_s=100.0, unplugged_s=np.inf, **options):
     link = VirtualLink(emulator, begin_s=begin_s, unplugged_s=unplugged_s)
     given = options if "configuration" in options else COUNTS | options
     return build(DriverSettings(open_link=lambda: link, options=given, clock=link.clock)), link
-
-
-def read_for(driver, link, seconds):
-    """Return one block of what comes in some time."""
-    blocks, end_s = [], link.now_s + seconds
-    while link.now_s < end_s:
-        blocks += driver.read(end_s - link.now_s)
-    return joined(blocks)
-
-
-def joined(blocks):
-    def all_of(name):
-        return np.concatenate([getattr(block, name) for block in blocks])
-
-    marks = [np.zeros(b.data.shape, np.uint8) if b.quality is None else b.quality for b in blocks]
-    return Block(
-        stream=blocks[0].stream,
-        t_ns=all_of("t_ns"),
-        data=all_of("data"),
-        quality=np.concatenate(marks),
-        sequence=all_of("sequence"),
-        device_ns=all_of("device_ns"),
-    )
 
 
 def through(*faults, seconds=2.0, **more):
