@@ -18,6 +18,7 @@ class Options(BaseModel):
 
 
 _Options = TypeVar("_Options", bound=Options)
+_Link = TypeVar("_Link", bound=Link)
 
 
 def read_options(kind: type[_Options], given: Mapping[str, Any], device: str) -> _Options:
@@ -51,10 +52,10 @@ def read_file(path: str, what: str) -> bytes:
         raise UsageError(f"{what} cannot be read: {error}.", hint="Check the path in the rig file.") from error
 
 
-def open_for(settings: DriverSettings, device: str, methods: tuple[str, str], example: str) -> Link:
+def open_for(settings: DriverSettings, device: str, kind: type[_Link], example: str) -> _Link:
     """Return the open link of a driver; raises UsageError if it is of another kind, LinkError if it does not open."""
     link = settings.open_link()
-    if not all(hasattr(link, method) for method in methods):
+    if not isinstance(link, kind):
         link.close()
         raise UsageError(f"{device} cannot be spoken to through {link.address}.", hint=f"Use a link like {example}.")
     return link

@@ -12,11 +12,11 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from tactbench.plugin import Block, Link, LinkUnplugged, Received
+from tactbench.plugin import Block, ByteLink, DatagramLink, Link, LinkUnplugged, Received
 from tests.links.ends import pty
 
 
-class VirtualLink(Link):
+class VirtualLink(ByteLink, DatagramLink):
     """An emulator behind a link whose waits move a virtual clock: from one event of the emulator to the next.
 
     `begin_s` is when the clock starts; `unplugged_s` when the cable is pulled.
@@ -24,7 +24,7 @@ class VirtualLink(Link):
 
     def __init__(self, emulator, *, begin_s=100.0, unplugged_s=float("inf")):
         self.now_s = begin_s
-        super().__init__("virtual", self.clock)
+        Link.__init__(self, "virtual", self.clock)
         self.emulator = emulator
         self.unplugged_s = unplugged_s
         self.arrived = deque()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import (
     Block,
+    ByteLink,
     Driver,
     DriverSettings,
     LinkTimeout,
@@ -30,7 +31,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.wrench import STREAM, Coun
 from tactbench.rigs.parallel_manipulator.options import open_for, read_file, read_options
 
 if TYPE_CHECKING:
-    from tactbench.plugin import ByteLink, FloatArray
+    from tactbench.plugin import FloatArray
 
 ABOUT_S = 2.5
 """Within which the microcontroller has said who it is: it does so once a second."""
@@ -61,7 +62,7 @@ class Nano17Driver(Driver):
         self._beyond = 0
         self._before: list[Block] = []
         self._restart()
-        self._link = cast("ByteLink", open_for(settings, "nano17", ("read", "write"), "serial:///dev/ttyACM0?baud=…"))
+        self._link = open_for(settings, "nano17", ByteLink, "serial:///dev/ttyACM0?baud=921600")
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:

@@ -6,7 +6,6 @@ from collections import Counter as Tally
 from collections.abc import Mapping
 from contextlib import suppress
 from http.client import HTTPException
-from typing import TYPE_CHECKING, cast
 from urllib.parse import urlsplit
 from urllib.request import ProxyHandler, build_opener
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from tactbench.plugin import (
     Block,
+    DatagramLink,
     Driver,
     DriverSettings,
     LinkError,
@@ -44,9 +44,6 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, STREAM, Counter, SampleCounter, stream
 from tactbench.rigs.parallel_manipulator.options import open_for, read_file, read_options
 
-if TYPE_CHECKING:
-    from tactbench.plugin import DatagramLink
-
 ANSWER_S = 0.5
 """Within which a box answers, over the time its records take (assumed: a network of one cable)."""
 HTTP_S = 3.0
@@ -74,12 +71,11 @@ class NetFtDriver(Driver):
         self._kept: list[Received] = []
         self._sampling = False
         self._restart()
-        link = open_for(settings, "net-ft", ("receive", "send"), "udp://192.168.1.1:49152")
-        self._link = cast("DatagramLink", link)
+        self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")
         try:
             self._scale = options.scale(self._configuration())
         except BaseException:
-            link.close()
+            self._link.close()
             raise
 
     def _configuration(self) -> bytes:
