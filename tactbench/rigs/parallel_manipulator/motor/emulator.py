@@ -16,8 +16,9 @@ import numpy as np
 from tactbench.plugin import CanFrame, EmulatorSettings, Fault, Sent, fault_concerns
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
-from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
 from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel
+from tactbench.rigs.parallel_manipulator.options import read_options
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,10 @@ class MotorFault(Fault):
     """Seven times the longest answer at 9600 baud."""
 
 
+SWITCH_M = -8e-3
+"""Where an emulated drive of a rig file has its reference switch, 2 mm from its end stop (assumed)."""
+
+
 class MotorEmulator:
     """A drive with its motor, and its line's pace. The first call is power-on.
 
@@ -47,6 +52,8 @@ class MotorEmulator:
         Units of the drive; mechanics of the motor.
     reference_switch_m
         Where GOHOSEQ finds its switch [m]; None: there is none, and GOHOSEQ is answered "Command not available".
+    baud
+        Of its line, as it was set before.
     faults
         What is wrong with it; may be changed at any time.
     """
@@ -59,11 +66,13 @@ class MotorEmulator:
         profile: MotorProfile | None = None,
         model: MotorModel | None = None,
         reference_switch_m: float | None = None,
+        baud: int = 9600,
         faults: Iterable[MotorFault] = (),
     ) -> None:
         model = model or MotorModel()
         self.drive = Drive(load, profile or MotorProfile(), model, reference_switch_m)
         self.faults = list(faults)
+        self.drive.settings.baud = baud
         self._answer_time_s = model.answer_time.to("s")
         self._rng = rng
         self._seen: Counter[Fault] = Counter()
@@ -175,3 +184,22 @@ class MotorEmulator:
         for byte in line:
             self._out_free_s += byte_s
             self._out.append((self._out_free_s, byte))
+
+
+def build(settings: EmulatorSettings) -> MotorEmulator:
+    """Return an emulated drive; `settings.senses` may give the ``load`` on its motor, N against positive motion.
+
+    Raises
+    ------
+    UsageError
+        For options or faults that are not known.
+    """
+    options = read_options(FaulhaberOptions, settings.options, "faulhaber")
+    return MotorEmulator(
+        lambda _position_m, at_s: settings.senses(at_s).get("load", 0.0),
+        settings.rng,
+        profile=options.profile(),
+        reference_switch_m=SWITCH_M if options.homing == "switch" else None,
+        baud=options.baud,
+        faults=[MotorFault.parse(text) for text in settings.faults],
+    )
