@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 
-from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode
+from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode_frame
 from tactbench.plugin import BridgeEmulator
 
 PIECE = 1000
@@ -24,7 +24,7 @@ def main(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     decoder, emulator = FrameDecoder(), BridgeEmulator(lambda select, data, now_s: data)
     passed = 0
-    hello = b"\0" + encode(Frame(Kind.HELLO, 1))
+    hello = b"\0" + encode_frame(Frame(Kind.HELLO, 1))
     begin = time.perf_counter()
     for _ in range(count // PIECE):
         data = rng.bytes(PIECE)

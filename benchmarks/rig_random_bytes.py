@@ -15,8 +15,8 @@ from contextlib import suppress
 import numpy as np
 
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import AtiFileError
-from tactbench.rigs.parallel_manipulator.force_torque.nano17 import read_calibration
-from tactbench.rigs.parallel_manipulator.force_torque.rdt_codec import (
+from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import read_calibration
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     Command,
     Record,
     RecordReader,
@@ -25,7 +25,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.rdt_codec import (
     encode_request,
     read_configuration,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.rdt_emulator import RdtEmulator
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import RdtEmulator
 from tactbench.rigs.parallel_manipulator.motor.codec import CommandReader, Kind, Line, LineReader, newer_generation
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 

@@ -19,6 +19,7 @@ from tactbench.core.errors import (
     PluginContractError,
     RigError,
     TactbenchError,
+    UnknownNameError,
     UsageError,
 )
 from tactbench.core.plugins.checks import Check, Verdict
@@ -99,6 +100,7 @@ if TYPE_CHECKING:
     from tactbench.devices.sequence import Unwrap
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
+    from tactbench.links.bridge_frame import Frame, FrameDecoder, encode_frame
     from tactbench.links.byte_link import ByteLink, SerialLink
     from tactbench.links.can_link import CanBus, CanFrame, CanLink
     from tactbench.links.can_log import CanLog
@@ -158,6 +160,8 @@ __all__ = [
     "ForceEntry",
     "ForceLoop",
     "ForceRamp",
+    "Frame",
+    "FrameDecoder",
     "Indenter",
     "LabelTarget",
     "Link",
@@ -227,6 +231,7 @@ __all__ = [
     "Transducer",
     "TransducerFactory",
     "UdpLink",
+    "UnknownNameError",
     "Unwrap",
     "UsageError",
     "Verdict",
@@ -234,6 +239,7 @@ __all__ = [
     "derived",
     "drivers_of",
     "emulators_of",
+    "encode_frame",
     "fault_concerns",
     "hookimpl",
     "load_object",
@@ -264,6 +270,8 @@ _ON_DEMAND = {
     "EmulatorSettings": "tactbench.devices.emulator",
     "Fault": "tactbench.devices.fault",
     "FloatArray": "tactbench.core.samples",
+    "Frame": "tactbench.links.bridge_frame",
+    "FrameDecoder": "tactbench.links.bridge_frame",
     "Link": "tactbench.links.link",
     "LinkAddress": "tactbench.links.address",
     "LogReader": "tactbench.devices.log",
@@ -284,6 +292,7 @@ _ON_DEMAND = {
     "Unwrap": "tactbench.devices.sequence",
     "drivers_of": "tactbench.core.plugins.rig_devices",
     "emulators_of": "tactbench.core.plugins.rig_devices",
+    "encode_frame": "tactbench.links.bridge_frame",
     "fault_concerns": "tactbench.devices.fault",
     "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",

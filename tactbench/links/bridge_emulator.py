@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Literal
 
-from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode
+from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode_frame
 from tactbench.links.spi_bridge import BEGIN, HELLO, SETUP, STEP
 
 Exchange = Callable[[int, bytes, float], bytes]
@@ -97,7 +97,7 @@ class BridgeEmulator:
             return self._refusal(frame, f"payload above {self._largest} bytes")
         if frame.kind == Kind.HELLO:
             about = HELLO.pack(VERSION, self._largest, self._holds, self._lines) + b"tactbench emulator"
-            return encode(Frame(Kind.HELLO.reply, frame.number, about))
+            return encode_frame(Frame(Kind.HELLO.reply, frame.number, about))
         if frame.kind == Kind.SETUP:
             return self._set_up(frame)
         if frame.kind == Kind.BATCH:
@@ -111,7 +111,7 @@ class BridgeEmulator:
         if mode > 3 or not speed_hz:
             return self._refusal(frame, "clock or mode is not possible")
         self._speed_hz = min(speed_hz, self._fastest_hz)
-        return encode(Frame(Kind.SETUP.reply, frame.number, SETUP.pack(self._speed_hz, mode)))
+        return encode_frame(Frame(Kind.SETUP.reply, frame.number, SETUP.pack(self._speed_hz, mode)))
 
     def _batch(self, frame: Frame, now_s: float) -> bytes:
         if not self._speed_hz:
@@ -128,7 +128,7 @@ class BridgeEmulator:
                 payload += self._exchange(select, data, t_s)
             t_s += 8 * len(data) / self._speed_hz + pause_us * 1e-6
         self._free_s = t_s
-        reply = encode(Frame(Kind.BATCH.reply, frame.number, payload))
+        reply = encode_frame(Frame(Kind.BATCH.reply, frame.number, payload))
         if "damaged" in self.faults:
             reply = bytes([reply[0], reply[1] ^ 0x80]) + reply[2:]
         if "doubled" in self.faults:
@@ -140,7 +140,7 @@ class BridgeEmulator:
 
     @staticmethod
     def _refusal(frame: Frame, reason: str) -> bytes:
-        return encode(Frame(Kind.ERROR.reply, frame.number, reason.encode("ascii")))
+        return encode_frame(Frame(Kind.ERROR.reply, frame.number, reason.encode("ascii")))
 
 
 def _steps(payload: bytes) -> list[tuple[int, int, bytes]] | None:

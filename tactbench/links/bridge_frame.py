@@ -1,4 +1,6 @@
-"""Frames of the SPI bridge: version, kind, number, length, payload and CRC, between zero bytes.
+"""Frames of our own for byte streams: version, kind, number, length, payload and CRC, between zero bytes.
+
+The SPI bridge and the gauge stream speak them.
 
 The format is this project's own, version 1; ``docs/links.md`` specifies it. Zero bytes stand between frames and nowhere
 else (consistent overhead byte stuffing, S. Cheshire and M. Baker, IEEE/ACM Transactions on Networking 7(2), 1999), so
@@ -12,6 +14,8 @@ import zlib
 from dataclasses import dataclass
 from enum import IntEnum
 
+from tactbench.links.link import Received
+
 VERSION = 1
 LARGEST_PAYLOAD = 0xFFFF
 
@@ -22,7 +26,7 @@ _LARGEST_FRAME = (_HEAD.size + LARGEST_PAYLOAD + _CRC.size) * 255 // 254 + 2
 
 
 class Kind(IntEnum):
-    """What a frame is; a reply is its request's kind with the top bit set."""
+    """What a frame of the SPI bridge is; a reply is its request's kind with the top bit set."""
 
     HELLO = 0x01
     SETUP = 0x02
@@ -46,7 +50,7 @@ class Frame:
     version: int = VERSION
 
 
-def encode(frame: Frame) -> bytes:
+def encode_frame(frame: Frame) -> bytes:
     """Return the bytes of a frame, its closing zero included."""
     body = _HEAD.pack(frame.version, frame.kind, frame.number, len(frame.payload)) + frame.payload
     return _stuffed(body + _CRC.pack(zlib.crc32(body))) + b"\0"
@@ -65,6 +69,19 @@ class FrameDecoder:
         self.damaged = 0
         self._pending = bytearray()
         self._skipping = False
+        self._began_ns = 0
+
+    def stamped(self, received: Received) -> list[tuple[Frame, int]]:
+        """Return the frames that `received` completes, each with when its first byte was in the host [ns]."""
+        if not self.within_frame:
+            self._began_ns = received.t_ns
+        frames = []
+        for frame in self.feed(received.data):
+            frames.append((frame, self._began_ns))
+            self._began_ns = received.t_ns
+        if self.within_frame and b"\0" in received.data:
+            self._began_ns = received.t_ns
+        return frames
 
     @property
     def within_frame(self) -> bool:

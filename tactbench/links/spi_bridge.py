@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from tactbench.core.errors import LinkError, LinkTimeout
-from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode
+from tactbench.links.bridge_frame import VERSION, Frame, FrameDecoder, Kind, encode_frame
 from tactbench.links.byte_link import ByteLink
 from tactbench.links.spi_link import SpiLink, SpiReply, SpiStep
 
@@ -72,7 +72,6 @@ class SpiBridge(SpiLink):
         self.unexpected = 0
         self._decoder = FrameDecoder()
         self._frames: deque[tuple[Frame, int]] = deque()
-        self._began_ns = 0
         self._waiting: dict[int, tuple[int, ...]] = {}
         self._bytes = port
         try:
@@ -94,7 +93,7 @@ class SpiBridge(SpiLink):
     def _greet(self, wake_s: float) -> None:
         deadline = self.timer() + wake_s
         while True:
-            self._bytes.write(b"\0" + encode(Frame(Kind.HELLO, 0)))
+            self._bytes.write(b"\0" + encode_frame(Frame(Kind.HELLO, 0)))
             try:
                 hello = self._answer(Kind.HELLO, min(_ASK_S, wake_s))
                 break
@@ -111,7 +110,7 @@ class SpiBridge(SpiLink):
         self.name = hello.payload[HELLO.size :].decode("ascii", "replace")
 
     def _set_up(self, speed_hz: int, mode: int) -> None:
-        self._bytes.write(encode(Frame(Kind.SETUP, 0, SETUP.pack(speed_hz, mode))))
+        self._bytes.write(encode_frame(Frame(Kind.SETUP, 0, SETUP.pack(speed_hz, mode))))
         reply = self._answer(Kind.SETUP, 1.0)
         try:
             self.speed_hz, _ = SETUP.unpack(reply.payload)
@@ -141,13 +140,7 @@ class SpiBridge(SpiLink):
                 received = self._bytes.read(max(0.0, left_s))
             except LinkTimeout:
                 raise self._nothing_came(timeout_s) from None
-            if not self._decoder.within_frame:
-                self._began_ns = received.t_ns
-            for frame in self._decoder.feed(received.data):
-                self._frames.append((frame, self._began_ns))
-                self._began_ns = received.t_ns
-            if self._decoder.within_frame and b"\0" in received.data:
-                self._began_ns = received.t_ns
+            self._frames.extend(self._decoder.stamped(received))
         return self._frames.popleft()
 
     def _submit(self, number: int, steps: Sequence[SpiStep]) -> None:
@@ -168,7 +161,7 @@ class SpiBridge(SpiLink):
                 f"{self.address}: the bridge holds {self.holds} batches, and that many wait for their replies.",
                 hint="Receive a reply first; where none comes, abandon them.",
             )
-        self._bytes.write(encode(Frame(Kind.BATCH, number, payload)))
+        self._bytes.write(encode_frame(Frame(Kind.BATCH, number, payload)))
         self._waiting[number] = tuple(len(step.data) for step in steps)
 
     def _collect(self, timeout_s: float, deadline: float) -> SpiReply:

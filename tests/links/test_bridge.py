@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode
+from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode_frame
 from tactbench.links.spi_bridge import HELLO, SETUP
 from tactbench.plugin import BridgeEmulator, LinkError, LinkTimeout, SerialLink, SpiBridge, SpiStep
 from tests.links.ends import loopback, pty, serving
@@ -40,7 +40,7 @@ def test_bytes_of_a_frame(frame, sent):
     body = bytes([1, frame.kind]) + frame.number.to_bytes(2, "little") + len(frame.payload).to_bytes(2, "little")
     crc = crc32(body + frame.payload)
     assert 0 not in crc, "the stuffing above is written for a CRC without a zero"
-    assert encode(frame) == bytes.fromhex(sent.format(crc=crc.hex()))
+    assert encode_frame(frame) == bytes.fromhex(sent.format(crc=crc.hex()))
 
 
 def crc32(data: bytes) -> bytes:
@@ -61,7 +61,7 @@ def test_vectors_of_the_document():
     emulator = BridgeEmulator(Told())
     for (_, request), (_, reply) in zip(lines[::2], lines[1::2], strict=True):
         (frame,) = FrameDecoder().feed(request)
-        assert encode(frame) == request
+        assert encode_frame(frame) == request
         assert sent(emulator.feed(request, 1.0) + emulator.poll(2.0)) == reply
 
 
@@ -80,13 +80,13 @@ def test_after_any_bytes_the_next_frame_but_one_is_whole(noise, frame):
     """One zero byte ends the noise; a frame right behind it without one is lost with it."""
     decoder = FrameDecoder()
     decoder.feed(noise)
-    assert decoder.feed(encode(frame) + encode(frame))[-1] == frame
+    assert decoder.feed(encode_frame(frame) + encode_frame(frame))[-1] == frame
 
 
 @settings(max_examples=100)
 @given(st.lists(FRAMES, min_size=3, max_size=3), st.data())
 def test_one_turned_bit_costs_at_most_the_frame_it_hit_and_the_next(frames, data):
-    sent = [encode(frame) for frame in frames]
+    sent = [encode_frame(frame) for frame in frames]
     place = data.draw(st.integers(0, len(sent[0]) - 1))
     sent[0] = bytearray(sent[0])
     sent[0][place] ^= 1 << data.draw(st.integers(0, 7))
@@ -102,7 +102,7 @@ def test_an_endless_frame_does_not_fill_the_memory():
         assert decoder.feed(b"\x05" * 4096) == []
     assert decoder.damaged == 1
     assert len(decoder._pending) < 70_000
-    assert decoder.feed(b"\0" + encode(Frame(1, 2)))[-1] == Frame(1, 2)
+    assert decoder.feed(b"\0" + encode_frame(Frame(1, 2)))[-1] == Frame(1, 2)
 
 
 class Told:
@@ -132,14 +132,14 @@ def batch(*steps):
 def ready(**options):
     bus = Told()
     emulator = BridgeEmulator(bus, **options)
-    emulator.feed(encode(Frame(Kind.SETUP, 0, SETUP.pack(1_000_000, 0))), 0.0)
+    emulator.feed(encode_frame(Frame(Kind.SETUP, 0, SETUP.pack(1_000_000, 0))), 0.0)
     return emulator, bus
 
 
 def test_a_batch_runs_by_the_bus_clock_and_its_pauses():
     """At 1 MHz two bytes take 16 us: the second transfer begins after 16 + 50 us, the reply is due after 92 us."""
     emulator, bus = ready()
-    request = encode(Frame(Kind.BATCH, 5, batch(SpiStep(b"\x81\x00", 3, 50), SpiStep(b"\0\0", 1, 10))))
+    request = encode_frame(Frame(Kind.BATCH, 5, batch(SpiStep(b"\x81\x00", 3, 50), SpiStep(b"\0\0", 1, 10))))
     assert emulator.feed(request, 2.0) == []
     assert [(select, data) for select, data, _ in bus.told] == [(3, b"\x81\x00"), (1, b"\0\0")]
     assert [t_s for *_, t_s in bus.told] == pytest.approx([2.0, 2.000066], abs=1e-12)
@@ -154,7 +154,7 @@ def test_a_batch_runs_by_the_bus_clock_and_its_pauses():
 
 def test_the_next_batch_begins_when_the_last_is_over():
     emulator, bus = ready()
-    request = [encode(Frame(Kind.BATCH, n, batch(SpiStep(b"\0" * 125)))) for n in range(2)]  # 1 ms each
+    request = [encode_frame(Frame(Kind.BATCH, n, batch(SpiStep(b"\0" * 125)))) for n in range(2)]  # 1 ms each
     emulator.feed(request[0] + request[1], 1.0)
     assert [t_s for *_, t_s in bus.told] == pytest.approx([1.0, 1.001], abs=1e-12)
     assert [frame.number for frame in replies(emulator.poll(1.5))] == [0, 1]
@@ -175,17 +175,19 @@ def test_the_next_batch_begins_when_the_last_is_over():
 )
 def test_the_bridge_says_why_it_refuses(frame, reason):
     emulator, _ = ready(largest_payload=100, select_lines=0x07)
-    assert replies(emulator.feed(encode(frame), 0.0)) == [Frame(0xFF, 9, reason.encode())]
+    assert replies(emulator.feed(encode_frame(frame), 0.0)) == [Frame(0xFF, 9, reason.encode_frame())]
 
 
 def test_a_bridge_that_was_not_set_up_refuses_batches():
-    data = BridgeEmulator(loopback).feed(encode(Frame(Kind.BATCH, 1, batch(SpiStep(b"a")))), 0.0)
+    data = BridgeEmulator(loopback).feed(encode_frame(Frame(Kind.BATCH, 1, batch(SpiStep(b"a")))), 0.0)
     assert replies(data) == [Frame(0xFF, 1, b"not set up")]
 
 
 def test_the_bridge_holds_so_many_batches():
     emulator, _ = ready(holds=2)
-    data = emulator.feed(b"".join(encode(Frame(Kind.BATCH, n, batch(SpiStep(b"a", 1, 1000)))) for n in range(3)), 0.0)
+    data = emulator.feed(
+        b"".join(encode_frame(Frame(Kind.BATCH, n, batch(SpiStep(b"a", 1, 1000)))) for n in range(3)), 0.0
+    )
     assert replies(data) == [Frame(0xFF, 2, b"full")]
 
 
@@ -194,7 +196,7 @@ def test_the_bridge_holds_so_many_batches():
 def test_the_bridge_survives_any_bytes(noise):
     emulator, _ = ready()
     emulator.feed(noise + b"\0", 0.0)
-    (hello,) = replies(emulator.feed(encode(Frame(Kind.HELLO, 1)), 0.0))
+    (hello,) = replies(emulator.feed(encode_frame(Frame(Kind.HELLO, 1)), 0.0))
     assert hello.kind == Kind.HELLO.reply
 
 
@@ -320,7 +322,7 @@ def test_a_bridge_of_another_version_is_refused():
     class Newer(BridgeEmulator):
         def feed(self, data, now_s):
             about = HELLO.pack(2, 10, 1, 1)
-            return [(now_s, encode(Frame(Kind.HELLO.reply, 0, about, version=2)))] if data else []
+            return [(now_s, encode_frame(Frame(Kind.HELLO.reply, 0, about, version=2)))] if data else []
 
     with serving(Newer(loopback)) as far, pytest.raises(LinkError, match="speaks version 2"):
         SpiBridge(SerialLink(far.name), speed_hz=1000)
@@ -355,7 +357,7 @@ def test_stamp_of_a_reply_is_that_of_its_first_byte():
         serving(BridgeEmulator(loopback)) as far,
         SpiBridge(SerialLink(far.name, clock=lambda: ticks[0]), speed_hz=1000) as link,
     ):
-        reply = encode(Frame(0x83, 0, bytes(4) + b"ab"))
+        reply = encode_frame(Frame(0x83, 0, bytes(4) + b"ab"))
         link._waiting[0] = (2,)
         for t_ns, part in ((1, reply[:5]), (2, reply[5:])):
             ticks[0] = t_ns

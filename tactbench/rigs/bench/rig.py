@@ -28,8 +28,8 @@ from tactbench.plugin import (
     RigError,
     RigFile,
     Scalar,
-    SceneSamples,
     Scene,
+    SceneSamples,
     SensorDescriptor,
     StreamClock,
     StreamCounts,
@@ -197,7 +197,8 @@ class Bench:
         )
         if self._operator is None:
             raise RigError(
-                f"Somebody has to press: {text}", hint="Start it at a terminal, or use a rig file with emulated devices."
+                f"Somebody has to press: {text}",
+                hint="Start it at a terminal, or use a rig file with emulated devices.",
             )
         self._operator.asked(text)
 

@@ -1,4 +1,43 @@
-"""Devices of the rig with a linear motor and a force-torque sensor: codecs and emulators, no rig yet.
+"""Devices of the rig with a linear motor and a force-torque sensor: drivers and emulators, no rig yet.
 
-Nothing here has met a real device: each codec is tested against public descriptions and against the emulator beside it.
+Nothing here has met a real device: each codec is tested against public descriptions, each driver against the emulator
+beside it.
 """
+
+from __future__ import annotations
+
+from tactbench.plugin import DeviceDescriptor, hookimpl
+
+TACTBENCH_API = 1
+
+
+@hookimpl
+def tactbench_devices() -> list[DeviceDescriptor]:
+    """Offer the devices."""
+    here = __name__
+    return [
+        DeviceDescriptor(
+            name="net-ft",
+            title="ATI force-torque sensor behind a Net F/T box, by UDP",
+            kind="force",
+            driver=f"{here}.force_torque.net_ft.driver:build",
+            emulator=f"{here}.force_torque.net_ft.emulator:build",
+            emulated_link="datagram",
+        ),
+        DeviceDescriptor(
+            name="nano17",
+            title="ATI Nano17 by its gauge voltages, from a microcontroller of one's own",
+            kind="force",
+            driver=f"{here}.force_torque.nano17.driver:build",
+            emulator=f"{here}.force_torque.nano17.emulator:build",
+            emulated_link="bytes",
+        ),
+        DeviceDescriptor(
+            name="faulhaber",
+            title="linear motor on a Faulhaber drive, ASCII by RS232",
+            kind="motor",
+            driver=f"{here}.motor.driver:build",
+            emulator=f"{here}.motor.emulator:build",
+            emulated_link="bytes",
+        ),
+    ]

@@ -1,15 +1,44 @@
-"""Gauge voltages through a calibration file: golden vectors, both ways to the matrix, and files that are refused."""
+"""Gauge voltages through a calibration file: golden vectors, both ways to the matrix, files that are refused.
 
+The gauge stream: its vectors, its emulator and its driver.
+"""
+
+import math
+import struct
+import zlib
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import Quality
+from tactbench.plugin import (
+    DriverSettings,
+    EmulatorSettings,
+    Frame,
+    LinkTimeout,
+    LinkUnplugged,
+    Quality,
+    Received,
+    RigError,
+    UsageError,
+    encode_frame,
+    open_link,
+)
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import LARGEST_BYTES, AtiFileError, elements
-from tactbench.rigs.parallel_manipulator.force_torque.nano17 import read_calibration
+from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import read_calibration
+from tactbench.rigs.parallel_manipulator.force_torque.nano17.driver import build
+from tactbench.rigs.parallel_manipulator.force_torque.nano17.emulator import GaugeEmulator, GaugeFault
+from tactbench.rigs.parallel_manipulator.force_torque.nano17.emulator import build as build_emulator
+from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
+    About,
+    GaugeReader,
+    encode_about,
+    encode_sample,
+)
+from tests.rigs.parallel_manipulator.pumps import VirtualLink, joined, on_pty, read_for
 
 # The calibration of a Nano17 FT8577, as a public MATLAB script for ATI matrices quotes it.
 FT8577 = b"""<?xml version="1.0" encoding="utf-8"?>
@@ -195,6 +224,267 @@ def test_any_bytes_raise_nothing_else(noise, place):
     for data in (noise, FT8577[:place] + noise + FT8577[place + len(noise) :]):
         with suppress(AtiFileError):
             read_calibration(data)
+
+
+# The gauge stream -----------------------------------------------------------------------------------------------------
+
+VECTORS = [
+    (About(1, 1000.0, "tactbench emulator"), 0x21, 0, struct.pack("<HI", 1, 1_000_000) + b"tactbench emulator"),
+    ((0, 0, (0, 0, 0, 0, 0, 0)), 0x20, 0, bytes(20)),
+    (
+        (65538, 2**32 - 1, (1, -1, 32767, -32768, 256, -2)),
+        0x20,
+        2,
+        struct.pack("<II6h", 65538, 2**32 - 1, 1, -1, 32767, -32768, 256, -2),
+    ),
+]
+
+
+def unstuffed(line):
+    """Cheshire and Baker 1999, as the paper has it: each code is the way to the next zero."""
+    body, place = b"", 0
+    while place < len(line):
+        code = line[place]
+        body += line[place + 1 : place + code] + (b"\0" if code < 255 else b"")
+        place += code
+    return body[:-1]
+
+
+def test_vectors_of_the_document():
+    text = (Path(__file__).parents[3] / "docs" / "links.md").read_text(encoding="utf-8")
+    block = text.split("## The gauge stream")[1].split("```text\n")[1].split("```")[0]
+    lines = [bytes.fromhex(line) for line in block.splitlines()]
+    for line, (what, kind, number, payload) in zip(lines, VECTORS, strict=True):
+        assert (encode_about(what) if isinstance(what, About) else encode_sample(*what)) == line
+        body = unstuffed(line[:-1])
+        assert body[:6] == struct.pack("<BBHH", 1, kind, number, len(payload))
+        assert body[6:-4] == payload
+        assert body[-4:] == struct.pack("<I", zlib.crc32(body[:-4]))
+    reader = GaugeReader()
+    reader.feed(Received(b"".join(lines), 5))
+    samples, stamps = reader.taken()
+    assert reader.about == VECTORS[0][0]
+    assert samples.counter.tolist() == [0, 65538]
+    assert samples.micros.tolist() == [0, 2**32 - 1]
+    assert samples.counts.tolist() == [[0] * 6, [1, -1, 32767, -32768, 256, -2]]
+    assert stamps.tolist() == [5, 5]
+
+
+def test_frames_are_stamped_with_their_first_byte_and_damaged_ones_counted():
+    frames = [encode_sample(n, n, (n,) * 6) for n in range(4)]
+    reader, line = GaugeReader(), frames[0] + frames[1][:-3] + frames[2] + frames[3]
+    for t_ns, start in enumerate(range(0, len(line), 7)):
+        reader.feed(Received(line[start : start + 7], t_ns))
+    samples, stamps = reader.taken()
+    assert samples.counter.tolist() == [0, 3]
+    assert stamps.tolist() == [0, len(line[: -len(frames[3])]) // 7]
+    assert reader.damaged == 1
+    reader.feed(Received(encode_frame(Frame(0x20, 0, bytes(19))) + encode_frame(Frame(0x22, 0)), 0))
+    assert (len(reader), reader.unknown) == (0, 2)
+    with pytest.raises(RigError, match="version 2"):
+        reader.feed(Received(encode_frame(Frame(0x20, 0, bytes(20), version=2)), 0))
+
+
+@given(st.lists(st.binary(max_size=60), max_size=10))
+@settings(max_examples=40)
+def test_any_bytes_are_survived(pieces):
+    reader = GaugeReader()
+    for piece in pieces:
+        with suppress(RigError):
+            reader.feed(Received(piece, 0))
+    reader.feed(Received(b"\0" + encode_sample(7, 8, (9,) * 6), 0))
+    assert reader.taken()[0].counter[-1] == 7
+
+
+REST_V = (0.3, -0.2, 0.1, 0.05, -0.4, 0.25)
+
+
+def pressed(time_s):
+    """Nothing for half a second, then a wrench that every axis takes part in."""
+    wave = 0.0 if time_s < 100.5 else 0.5 - 0.5 * math.cos(2 * math.pi * 3.0 * (time_s - 100.5))
+    return (1.0 * wave, -2.0 * wave, -5.0 * wave, 0.01 * wave, -0.02 * wave, 0.003 * wave)
+
+
+@pytest.fixture
+def calibration_file(tmp_path):
+    file = tmp_path / "FT8577.cal"
+    file.write_bytes(FT8577)
+    return str(file)
+
+
+def gauges(wrench=pressed, rest_v=REST_V, **more):
+    return GaugeEmulator(wrench, read_calibration(FT8577), rest_v, **more)
+
+
+def driver_on(emulator, calibration_file, *, unplugged_s=math.inf, **options):
+    link = VirtualLink(emulator, unplugged_s=unplugged_s)
+    options = {"calibration": calibration_file} | options
+    return build(DriverSettings(open_link=lambda: link, options=options, clock=link.clock)), link
+
+
+def test_a_wrench_comes_back_through_gauges_frames_and_bias(calibration_file):
+    driver, link = driver_on(gauges(), calibration_file)
+    assert driver.identify() == {
+        "model": "Nano17",
+        "calibration": "FT8577 SI-25-0.25",
+        "converter": "tactbench emulator",
+        "firmware": "1",
+        "rate_hz": "1000",
+    }
+    driver.start()
+    block = read_for(driver, link, 1.0)
+    # The microcontroller counts from power-on, which was at 100 s; its microseconds are whole.
+    at_s = 100.0 + block.device_ns / 1e9
+    expected = np.array([pressed(t) for t in at_s])
+    # Half a step in each gauge, and in the bias that was taken from steady readings, all in the worst direction.
+    most = STEP_V * np.abs(np.array(read_calibration(FT8577).matrix)).sum(axis=1)
+    assert (np.abs(block.data - expected) <= most * (1 + 1e-9)).all()
+    assert np.abs(expected).max() > 4.0
+    assert np.diff(block.sequence).tolist() == [1] * (len(block.data) - 1)
+    assert set(np.diff(block.device_ns)) == {1_000_000}
+    # A frame is on the line for 32 bytes at 921600 baud, two where it waits for the one that says who sends it.
+    delay_ns = block.t_ns - round(100e9) - block.device_ns
+    assert delay_ns.min() >= 10e9 * 32 / 921_600 - 1
+    assert delay_ns.max() <= 10e9 * 2 * 40 / 921_600
+    assert not block.quality.any()
+    assert driver.counts == {}
+
+
+def test_counters_are_counted_on_over_their_wraps(calibration_file):
+    driver, link = driver_on(
+        gauges(first_counter=2**32 - 150, first_micros=2**32 - 130_000), calibration_file, bias_samples=0
+    )
+    driver.start()
+    block = read_for(driver, link, 0.3)
+    assert np.diff(block.sequence).tolist() == [1] * (len(block.data) - 1)
+    assert block.sequence[-1] > 2**32
+    assert set(np.diff(block.device_ns)) == {1_000_000}
+
+
+def test_the_zero_is_taken_where_it_is_asked_for(calibration_file):
+    load = {"now": -1.0}
+    driver, link = driver_on(gauges(lambda t: (0, 0, load["now"], 0, 0, 0)), calibration_file, bias_samples=0)
+    driver.start()
+    loaded = read_for(driver, link, 0.2)
+    zero_n = read_calibration(FT8577).wrench(REST_V)
+    assert np.abs(loaded.data - zero_n - [0, 0, -1.0, 0, 0, 0]).max() < 2e-3
+    assert driver.tare()
+    load["now"] = -3.0
+    block = read_for(driver, link, 0.3)
+    # What came while the zero was taken is of the old one, and is not lost.
+    assert block.sequence[0] == loaded.sequence[-1] + 1
+    assert np.diff(block.sequence).tolist() == [1] * (len(block.data) - 1)
+    assert np.abs(block.data[:100] - loaded.data[-1]).max() < 2e-3
+    assert block.data[-1, 2] == pytest.approx(-2.0, abs=2e-3)
+
+
+def test_faults_are_gaps_doubles_and_marks(calibration_file):
+    faults = [
+        GaugeFault("dropped", every=10, start_s=101.0, end_s=102.0),
+        GaugeFault("doubled", every=10, start_s=102.0, end_s=103.0),
+        GaugeFault("damaged", every=10, start_s=103.0, end_s=104.0),
+        GaugeFault("saturated", start_s=104.0, end_s=104.5),
+    ]
+    driver, link = driver_on(gauges(faults=faults), calibration_file)
+    driver.start()
+    block = read_for(driver, link, 5.0)
+    steps = np.diff(block.sequence)
+    assert {int(step): int((steps == step).sum()) for step in np.unique(steps) if step != 1} == {0: 100, 2: 200}
+    saturated = (block.device_ns >= round(4e9)) & (block.device_ns < round(4.5e9))
+    assert (block.quality[saturated] == Quality.SATURATED).all()
+    assert (block.quality[~saturated] == Quality.GOOD).all()
+    assert driver.counts == {"damaged": 100}
+    with pytest.raises(UsageError, match=r"no fault called .coffee.*damaged, doubled"):
+        GaugeFault("coffee")
+
+
+def test_readings_beyond_the_rated_range_are_counted(calibration_file):
+    driver, link = driver_on(gauges(lambda t: (0, 0, 0 if t < 100.5 else -36.0, 0, 0, 0)), calibration_file)
+    driver.start()
+    block = read_for(driver, link, 1.0)
+    assert not block.quality.any()
+    assert driver.counts == {"beyond_range": int((block.data[:, 2] < -35).sum())}
+
+
+def test_no_zero_is_taken_at_an_end(calibration_file):
+    driver, _ = driver_on(gauges(faults=[GaugeFault("saturated")]), calibration_file)
+    with pytest.raises(RigError, match="at an end"):
+        driver.start()
+
+
+def test_a_microcontroller_that_restarts_is_not_followed_silently(calibration_file):
+    emulator = gauges()
+    driver, link = driver_on(emulator, calibration_file)
+    driver.start()
+    link.emulator = gauges()
+    with pytest.raises(RigError, match="begun to count its samples anew"):
+        read_for(driver, link, 1.0)
+
+
+def test_other_rates_are_refused_with_the_right_one(calibration_file):
+    driver, _ = driver_on(gauges(rate_hz=500), calibration_file)
+    with pytest.raises(RigError, match=r"500 times a second.*1000.*rate_hz: 500"):
+        driver.identify()
+
+
+def test_something_else_on_the_line(calibration_file):
+    driver, _ = driver_on(gauges(faults=[GaugeFault("damaged")]), calibration_file)
+    with pytest.raises(LinkTimeout, match=r"sent 100 samples within .*0 samples, .* damaged"):
+        driver.start()
+
+
+def test_unplugged(calibration_file):
+    driver, link = driver_on(gauges(), calibration_file, unplugged_s=101.0)
+    driver.start()
+    with pytest.raises(LinkUnplugged):
+        read_for(driver, link, 5.0)
+    driver.stop()
+    driver.close()
+    driver.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "'calibration' of nano17"),
+        ({"calibration": "/nowhere/FT0.cal"}, "The calibration cannot be read"),
+        ({"calibration": __file__}, "not an XML file"),
+        ({"calibration": "x", "bias": True}, "no option of nano17 called 'bias'.*bias_samples"),
+        ({"calibration": "x", "bias_samples": -1}, "'bias_samples' of nano17"),
+    ],
+)
+def test_options_that_are_refused(options, message):
+    with pytest.raises(UsageError, match=message):
+        build(DriverSettings(open_link=lambda: open_link("loop://"), options=options))
+
+
+def test_the_emulator_of_a_rig_file_on_a_pseudo_terminal(calibration_file):
+    """In real time."""
+    settings_ = EmulatorSettings(
+        senses=lambda t: {"fz": -2.5},
+        rng=np.random.default_rng(5),
+        options={"calibration": calibration_file, "bias_samples": 0, "rate_hz": 500},
+        faults=["doubled:every=50"],
+    )
+    with on_pty(build_emulator(settings_)) as end:
+        address = f"serial://{end.name}?baud=921600"
+        with build(DriverSettings(open_link=lambda: open_link(address), options=settings_.options)) as driver:
+            end.opened()
+            assert driver.identify()["rate_hz"] == "500"
+            driver.start()
+            blocks = []
+            while sum(len(block.data) for block in blocks) < 200:
+                blocks += driver.read(10.0)
+            block = joined(blocks)
+            end.unplug()
+            with pytest.raises(LinkUnplugged):
+                list(iter(lambda: driver.read(10.0), None))
+    assert set(np.diff(block.sequence)) == {0, 1}
+    # The gauges of this sensor have a rest of their own, which was not taken off.
+    assert np.ptp(block.data, axis=0).max() == 0
+    assert np.abs(block.data[0, 2] + 2.5) > 0.01
+    with pytest.raises(UsageError, match="2592 samples"):
+        gauges(rate_hz=3000)
 
 
 def test_text_is_that_of_its_element():

@@ -14,13 +14,18 @@ from dataclasses import dataclass
 from enum import Enum, IntFlag
 from typing import NamedTuple
 
+from tactbench.plugin import Received
+
 BITS_PER_BYTE = 10
 """Start bit, 8 data bits, stop bit: 8N1 (sourced: the manual, page 13)."""
 BAUDS = (600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 """Selectable rates: from 600 to 115200 (sourced: the manual); the steps between are the usual ones (assumed)."""
 
 LONGEST_LINE = 128
-"""Bytes after which a line without an end is given up (assumed: the longest answer in the sources has 34)."""
+"""Bytes after which a line without an end is given up (assumed)."""
+
+LONGEST_ANSWER = 34
+"""Bytes of the longest answer in the sources, the refusal of a drive that is too hot."""
 
 OK = "OK"
 UNKNOWN_COMMAND = "Unknown command"
@@ -185,6 +190,19 @@ class LineReader:
     def __init__(self) -> None:
         self.counts = LineCounts()
         self._line = bytearray()
+        self._began_ns = 0
+
+    def stamped(self, received: Received) -> list[tuple[Line, int]]:
+        """Return the lines that `received` completes, each with when its first byte was in the host [ns]."""
+        if not self._line:
+            self._began_ns = received.t_ns
+        found = []
+        for line in self.feed(received.data):
+            found.append((line, self._began_ns))
+            self._began_ns = received.t_ns
+        if b"\n" in received.data:
+            self._began_ns = received.t_ns
+        return found
 
     def feed(self, data: bytes) -> list[Line]:
         """Return the lines that `data` completes, notices among them; raises nothing."""

@@ -1,7 +1,11 @@
-"""The motor's drive at the end of its line: bytes in, bytes out, on a clock that is passed in; no input or output."""
+"""The motor's drive at the end of its line: bytes in, bytes out, on a clock that is passed in; no input or output.
+
+A :class:`tactbench.plugin.DeviceEmulator`.
+"""
 
 from __future__ import annotations
 
+import math
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -9,11 +13,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from tactbench.plugin import Fault, fault_concerns
+from tactbench.plugin import CanFrame, EmulatorSettings, Fault, Sent, fault_concerns
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
-from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
 from tactbench.rigs.parallel_manipulator.motor.servo import Load, MotorModel
+from tactbench.rigs.parallel_manipulator.options import read_options
 
 
 @dataclass(frozen=True)
@@ -30,8 +35,12 @@ class MotorFault(Fault):
     """Seven times the longest answer at 9600 baud."""
 
 
+SWITCH_M = -8e-3
+"""Where an emulated drive of a rig file has its reference switch, 2 mm from its end stop (assumed)."""
+
+
 class MotorEmulator:
-    """A drive with its motor, and its line's pace.
+    """A drive with its motor, and its line's pace. The first call is power-on.
 
     Parameters
     ----------
@@ -43,10 +52,10 @@ class MotorEmulator:
         Units of the drive; mechanics of the motor.
     reference_switch_m
         Where GOHOSEQ finds its switch [m]; None: there is none, and GOHOSEQ is answered "Command not available".
+    baud
+        Of its line, as it was set before.
     faults
         What is wrong with it; may be changed at any time.
-    start_s
-        Time of power-on.
     """
 
     def __init__(
@@ -57,37 +66,42 @@ class MotorEmulator:
         profile: MotorProfile | None = None,
         model: MotorModel | None = None,
         reference_switch_m: float | None = None,
+        baud: int = 9600,
         faults: Iterable[MotorFault] = (),
-        start_s: float = 0.0,
     ) -> None:
         model = model or MotorModel()
         self.drive = Drive(load, profile or MotorProfile(), model, reference_switch_m)
         self.faults = list(faults)
+        self.drive.settings.baud = baud
         self._answer_time_s = model.answer_time.to("s")
         self._rng = rng
         self._seen: Counter[Fault] = Counter()
         self._reader = CommandReader()
-        self._start_s = self._now_s = self._in_free_s = self._out_free_s = start_s
+        self._start_s: float | None = None
+        self._now_s = self._in_free_s = self._out_free_s = -math.inf
         self._ticks = 0
         self._in: deque[tuple[float, int]] = deque()
         self._answers: deque[tuple[float, str]] = deque()
         self._out: deque[tuple[float, int]] = deque()
 
-    def feed(self, data: bytes, now_s: float) -> bytes:
+    def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.
 
         Times do not go back: an earlier one counts as the latest seen.
         """
+        assert isinstance(piece, bytes)
         now_s = max(now_s, self._now_s)
         byte_s = line_time_s(1, self.drive.settings.baud)
         self._in_free_s = max(self._in_free_s, now_s)
-        for byte in data:
+        for byte in piece:
             self._in_free_s += byte_s
             self._in.append((self._in_free_s, byte))
         return self.poll(now_s)
 
-    def poll(self, now_s: float) -> bytes:
-        """Go on to `now_s`; return the bytes whose last bit has left the drive by then."""
+    def poll(self, now_s: float) -> list[Sent]:
+        """Go on to `now_s`; return each byte whose last bit has left the drive by then, with that time."""
+        if self._start_s is None:
+            self._start_s = now_s
         now_s = max(now_s, self._now_s)
         while self._in and self._in[0][0] <= now_s:
             at_s, byte = self._in.popleft()
@@ -95,18 +109,22 @@ class MotorEmulator:
             for command in self._reader.feed(bytes([byte])):
                 self._carry_out(command, at_s)
         self._go_to(now_s)
-        found = bytearray()
+        found: list[Sent] = []
         while self._out and self._out[0][0] <= now_s:
-            found.append(self._out.popleft()[1])
-        return bytes(found)
+            sent_s, byte = self._out.popleft()
+            found.append((sent_s, bytes([byte])))
+        return found
 
-    def next_event_s(self) -> float:
-        """Return when something may happen next: a byte in, an answer, a byte out, or a tick of the drive."""
+    def next_s(self) -> float:
+        """Return when something may happen next: a byte in, an answer, a byte out, or a tick; 0 before power-on."""
+        if self._start_s is None:
+            return 0.0
         queued = [due[0] for queue in (self._in, self._answers, self._out) for due in list(queue)[:1]]
         return min([self._tick_s(), *queued])
 
     def _tick_s(self) -> float:
         """Return the time of the next tick."""
+        assert self._start_s is not None
         return self._start_s + (self._ticks + 1) * self.drive.servo.tick_s
 
     def _go_to(self, now_s: float) -> None:
@@ -166,3 +184,22 @@ class MotorEmulator:
         for byte in line:
             self._out_free_s += byte_s
             self._out.append((self._out_free_s, byte))
+
+
+def build(settings: EmulatorSettings) -> MotorEmulator:
+    """Return an emulated drive; `settings.senses` may give the ``load`` on its motor, N against positive motion.
+
+    Raises
+    ------
+    UsageError
+        For options or faults that are not known.
+    """
+    options = read_options(FaulhaberOptions, settings.options, "faulhaber")
+    return MotorEmulator(
+        lambda _position_m, at_s: settings.senses(at_s).get("load", 0.0),
+        settings.rng,
+        profile=options.profile(),
+        reference_switch_m=SWITCH_M if options.homing == "switch" else None,
+        baud=options.baud,
+        faults=[MotorFault.parse(text) for text in settings.faults],
+    )

@@ -7,10 +7,13 @@ motor: these are assumed, and a rig states its own.
 from __future__ import annotations
 
 import math
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tactbench.plugin import Quantity, RigError, assumed, sourced
+from tactbench.rigs.parallel_manipulator.motor.codec import BAUDS
+from tactbench.rigs.parallel_manipulator.options import Options
 
 _MANUAL = "Faulhaber manual MCBL 3564K024B CS, the rotary drive of the same generation"
 
@@ -109,3 +112,71 @@ class MotorProfile(BaseModel):
         if abs(found) > largest:
             raise RigError(f"A {what} of {value:g} {si} is {found} units; the drive takes at most {largest}.")
         return found
+
+
+class FaulhaberOptions(Options):
+    """What a rig file says of a motor and its drive."""
+
+    node: int | None = Field(default=None, ge=1, le=255)
+    """Address on a line with several drives."""
+    baud: int = 9600
+    """As in the link's address: time-outs go by it."""
+    increment_m: float | None = Field(default=None, gt=0.0)
+    """Length of one increment; this and the next three: as :class:`MotorProfile`, whose defaults are assumed."""
+    speed_unit_m_s: float | None = Field(default=None, gt=0.0)
+    acceleration_unit_m_s2: float | None = Field(default=None, gt=0.0)
+    current_unit_a: float | None = Field(default=None, gt=0.0)
+    lower_m: float | None = Field(default=None, lt=0.0)
+    """Ends of travel, kept by the drive and by the driver; without them the motor can be watched, not moved. The drive
+    takes a negative and a positive one."""
+    upper_m: float | None = Field(default=None, gt=0.0)
+    speed_m_s: float | None = Field(default=None, gt=0.0)
+    """Of moves; this and the next three: None leaves what the drive has."""
+    acceleration_m_s2: float | None = Field(default=None, gt=0.0)
+    """Of starting and braking."""
+    peak_current_a: float | None = Field(default=None, gt=0.0)
+    continuous_current_a: float | None = Field(default=None, gt=0.0)
+    homing: Literal["here", "switch", "end-stop"] = "here"
+    """Where positions count from: the place at which it stands, the drive's reference switch, or an end stop that is
+    run against."""
+    home_m: float = 0.0
+    """What that place is called."""
+    homing_speed_m_s: float = 0.005
+    """Negative: towards negative positions; of a switch without sign."""
+    homing_current_a: float = Field(default=0.2, gt=0.0)
+    """With which it runs against an end stop."""
+    retreat_m: float | None = None
+    """Where it goes to be away from the sensor."""
+    retreat_speed_m_s: float | None = Field(default=None, gt=0.0)
+
+    @model_validator(mode="after")
+    def _possible(self) -> FaulhaberOptions:
+        if self.baud not in BAUDS:
+            raise ValueError(f"baud is one of {', '.join(map(str, BAUDS))}")
+        if (self.lower_m is None) != (self.upper_m is None):
+            raise ValueError("give both lower_m and upper_m, or none")
+        if self.homing_speed_m_s == 0.0:
+            raise ValueError("a homing speed is not 0")
+        if self.retreat_m is not None and not self.within(self.retreat_m):
+            raise ValueError("retreat_m is between lower_m and upper_m")
+        return self
+
+    def within(self, position_m: float) -> bool:
+        """Return whether a position is within the ends of travel; False where there are none."""
+        return self.lower_m is not None and self.upper_m is not None and self.lower_m <= position_m <= self.upper_m
+
+    def profile(self) -> MotorProfile:
+        """Return the units."""
+        stated = {
+            "position_unit": (self.increment_m, "m"),
+            "speed_unit": (self.speed_unit_m_s, "m/s"),
+            "acceleration_unit": (self.acceleration_unit_m_s2, "m/s/s"),
+            "current_unit": (self.current_unit_a, "A"),
+        }
+        return MotorProfile(
+            **{
+                name: sourced(value, unit, "the rig file")
+                for name, (value, unit) in stated.items()
+                if value is not None
+            }
+        )

@@ -65,7 +65,9 @@ class GaugeCalibration(BaseModel):
         -------
         (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m].
         """
-        wrench: FloatArray = (np.asarray(volts, dtype=float) - np.asarray(bias, dtype=float)) @ np.array(self.matrix).T
+        loaded = np.asarray(volts, dtype=float) - np.asarray(bias, dtype=float)
+        # Not by a matrix product, whose last bit depends on how many rows it is given at once.
+        wrench: FloatArray = (loaded[..., None, :] * np.array(self.matrix)).sum(axis=-1)
         return wrench
 
     def volts(self, wrench: npt.ArrayLike, bias: npt.ArrayLike = 0.0) -> FloatArray:

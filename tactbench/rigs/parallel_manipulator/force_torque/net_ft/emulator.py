@@ -1,4 +1,7 @@
-"""A Net F/T box as a model without input or output: requests in, datagrams out, on a clock that is passed in."""
+"""A Net F/T box as a model without input or output: requests in, datagrams out, on a clock that is passed in.
+
+A :class:`tactbench.plugin.DeviceEmulator`.
+"""
 
 from __future__ import annotations
 
@@ -12,23 +15,30 @@ from xml.sax.saxutils import escape
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import Fault, UsageError, fault_concerns
-from tactbench.rigs.parallel_manipulator.force_torque.rdt_codec import (
+from tactbench.plugin import (
+    CanFrame,
+    EmulatorSettings,
+    Fault,
+    Sent,
+    UsageError,
+    fault_concerns,
+)
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     MOST_BUFFERED,
+    SENSOR_RATE_HZ,
     SEQUENCE_MODULUS,
     Command,
     CountScale,
     DatagramError,
+    NetFtOptions,
     Record,
     Request,
     Status,
     decode_request,
     encode_record,
 )
-
-SENSOR_RATE_HZ = 7000
-"""The box samples at 7 kHz and sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
-public client)."""
+from tactbench.rigs.parallel_manipulator.force_torque.wrench import wrench_of
+from tactbench.rigs.parallel_manipulator.options import read_file, read_options
 
 
 @dataclass(frozen=True)
@@ -119,32 +129,33 @@ class RdtEmulator:
             "<scfgfu>N</scfgfu><scfgtu>Nm</scfgtu></netft>\n"
         ).encode()
 
-    def feed(self, datagram: bytes, now_s: float) -> list[bytes]:
+    def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take one datagram of the host; return what `poll` returns.
 
         Times do not go back: an earlier one counts as the latest seen.
         """
         sent = self.poll(now_s)
+        assert isinstance(piece, bytes)
         try:
-            request = decode_request(datagram)
+            request = decode_request(piece)
         except DatagramError:
             self.rejected += 1
             return sent
         return sent + self._carry_out(request)
 
-    def poll(self, now_s: float) -> list[bytes]:
-        """Go on to `now_s`; return the datagrams that are due by then."""
+    def poll(self, now_s: float) -> list[Sent]:
+        """Go on to `now_s`; return the datagrams that are due by then, each with its time."""
         self._now_s = max(self._now_s, now_s)
-        sent: list[bytes] = []
+        sent: list[Sent] = []
         while self._next is not None and self._next / SENSOR_RATE_HZ <= self._now_s:
             sent += self._one(self._next)
         return sent
 
-    def next_event_s(self) -> float:
+    def next_s(self) -> float:
         """Return when the next record is due; infinite while nothing is being sent."""
         return math.inf if self._next is None else self._next / SENSOR_RATE_HZ
 
-    def _carry_out(self, request: Request) -> list[bytes]:
+    def _carry_out(self, request: Request) -> list[Sent]:
         match request.command:
             case Command.START_REALTIME | Command.START_BUFFERED:
                 ended = self._ended(self._now_s)
@@ -170,7 +181,7 @@ class RdtEmulator:
         )
         return np.clip(wrench, -self._largest, self._largest), beyond
 
-    def _one(self, sample: int) -> list[bytes]:
+    def _one(self, sample: int) -> list[Sent]:
         at_s = sample / SENSOR_RATE_HZ
         wrench, saturated = self._sensed(at_s)
         if self._threshold_n is not None and (np.abs(wrench[:3]) > self._threshold_n).any():
@@ -188,7 +199,7 @@ class RdtEmulator:
         )
         self._sequence = (self._sequence + 1) % SEQUENCE_MODULUS
         self._next = sample + self.every
-        sent: list[bytes] = []
+        sent: list[Sent] = []
         if self._buffered:
             self._buffer.append(encode_record(record))
             if len(self._buffer) == self._buffer_records:
@@ -206,16 +217,16 @@ class RdtEmulator:
         self._buffer.clear()
         return datagram
 
-    def _ended(self, at_s: float) -> list[bytes]:
+    def _ended(self, at_s: float) -> list[Sent]:
         """Stop sending; return what is still under way (assumed: a started buffer is sent)."""
         self._next = None
         sent = self._on_the_way(self._flushed(), at_s) if self._buffer else []
         if self._held is not None:
-            sent.append(self._held)
+            sent.append((at_s, self._held))
             self._held = None
         return sent
 
-    def _on_the_way(self, datagram: bytes, at_s: float) -> list[bytes]:
+    def _on_the_way(self, datagram: bytes, at_s: float) -> list[Sent]:
         """Return what arrives of a datagram sent at a time, in the order of arrival."""
         dropped, doubled, late = (
             fault_concerns(self.faults, name, at_s, self._seen) for name in ("dropped", "doubled", "out-of-order")
@@ -228,4 +239,27 @@ class RdtEmulator:
             self._held = None
         elif late:
             self._held = arriving.pop()
-        return arriving
+        return [(at_s, piece) for piece in arriving]
+
+
+def build(settings: EmulatorSettings) -> RdtEmulator:
+    """Return an emulated box that reads `settings.senses`: fx, fy, fz [N], tx, ty, tz [N*m].
+
+    Raises
+    ------
+    UsageError
+        For options or faults that are not known, or if the box is to be asked by HTTP.
+    """
+    options = read_options(NetFtOptions, settings.options, "net-ft")
+    if options.configuration.startswith("http"):
+        raise UsageError(
+            "An emulated net-ft has no web page.",
+            hint="Give counts_per_newton and counts_per_newton_metre, or a file.",
+        )
+    configuration = read_file(options.configuration, "The box's configuration") if options.configuration else b""
+    return RdtEmulator(
+        lambda at_s: wrench_of(settings.senses(at_s)),
+        scale=options.scale(configuration),
+        rate_hz=options.rate_hz,
+        faults=[DatagramFault.parse(text) for text in settings.faults],
+    )

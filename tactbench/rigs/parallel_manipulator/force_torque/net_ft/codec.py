@@ -7,14 +7,12 @@ core/src/detail/protocol.cpp, sequence.cpp and status.cpp).
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum, IntEnum, IntFlag
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tactbench.plugin import Quality, RigError
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import (
@@ -24,6 +22,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import (
     elements,
     unit,
 )
+from tactbench.rigs.parallel_manipulator.options import Options
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
@@ -36,10 +35,52 @@ _REQUEST = struct.Struct(">HHI")
 _RECORD = struct.Struct(">III6i")
 _HEADER = 0x1234
 RECORD_BYTES = _RECORD.size
+RECORDS = np.dtype([("rdt_sequence", ">u4"), ("ft_sequence", ">u4"), ("status", ">u4"), ("counts", ">i4", (6,))])
+"""The same as `_RECORD`, for many at once."""
 MOST_BUFFERED = 40
 """Records in one datagram of buffered transfer, at most (sourced: ATI manual 9620-05-NET FT, section 7.4, as quoted in
 a public client)."""
 SEQUENCE_MODULUS = 1 << 32
+SENSOR_RATE_HZ = 7000
+"""The box samples at 7 kHz and sends every n-th sample (sourced: ATI manual 9620-05-NET FT, section 4.7, as quoted in a
+public client)."""
+
+
+class NetFtOptions(Options):
+    """What a rig file says of a box."""
+
+    rate_hz: float = Field(default=1000.0, gt=0.0, le=SENSOR_RATE_HZ)
+    """Records a second that the box is set to send; its own web page sets them, no request does."""
+    counts_per_newton: float | None = Field(default=None, gt=0.0)
+    counts_per_newton_metre: float | None = Field(default=None, gt=0.0)
+    configuration: str = ""
+    """In place of the counts: ``http`` asks the box that the link goes to, ``http://…`` another address; anything else
+    is a file that holds the box's ``netftapi2.xml``."""
+    bias: bool = False
+    """Whether starting takes the present reading as zero: the sensor must be unloaded then."""
+    buffered: bool = False
+    """Whether several records come in a datagram: less work at high rates, and later."""
+
+    @model_validator(mode="after")
+    def _one_scale(self) -> NetFtOptions:
+        counts = [self.counts_per_newton, self.counts_per_newton_metre]
+        if (None in counts) if not self.configuration else (counts != [None, None]):
+            raise ValueError(
+                "give counts_per_newton and counts_per_newton_metre, or else configuration: http or a file; the box's "
+                "web page shows them"
+            )
+        return self
+
+    @property
+    def every(self) -> int:
+        """Samples of the sensor from one record to the next."""
+        return max(1, int(SENSOR_RATE_HZ // self.rate_hz))
+
+    def scale(self, configuration: bytes) -> CountScale:
+        """Return counts per unit; `configuration` is what the file or the box says, if one is asked for."""
+        if self.counts_per_newton is None or self.counts_per_newton_metre is None:
+            return read_configuration(configuration)
+        return CountScale(per_newton=self.counts_per_newton, per_newton_metre=self.counts_per_newton_metre)
 
 
 class DatagramError(RigError, ValueError):
@@ -112,14 +153,25 @@ def decode_record(data: bytes) -> Record:
     return Record(rdt, ft, status, tuple(counts))
 
 
-def decode_buffer(data: bytes) -> list[Record]:
-    """Return the records in a datagram of buffered transfer; raises DatagramError if it is none."""
+def decode_records(data: bytes, *, most: int = 1) -> npt.NDArray[np.void]:
+    """Return the records of a datagram, an array of :data:`RECORDS`.
+
+    Parameters
+    ----------
+    data
+        A datagram, or several whole ones joined.
+    most
+        Records it may hold: 1, :data:`MOST_BUFFERED` for buffered transfer.
+
+    Raises
+    ------
+    DatagramError
+        If it is no such datagram.
+    """
     n, rest = divmod(len(data), RECORD_BYTES)
-    if rest or not 1 <= n <= MOST_BUFFERED:
-        raise DatagramError(
-            f"A buffer has 1 to {MOST_BUFFERED} records of {RECORD_BYTES} bytes, not {len(data)} bytes."
-        )
-    return [decode_record(data[start : start + RECORD_BYTES]) for start in range(0, len(data), RECORD_BYTES)]
+    if rest or not 1 <= n <= most:
+        raise DatagramError(f"A datagram has 1 to {most} records of {RECORD_BYTES} bytes, not {len(data)} bytes.")
+    return np.frombuffer(data, RECORDS)
 
 
 class Status(IntFlag):
@@ -175,12 +227,25 @@ def health(status: int) -> Health:
 
 
 def quality(status: int) -> Quality:
-    """Return the mark of all six channels: a saturated sensor is told apart from other errors."""
+    """Return the mark of all six channels: a saturated sensor is told apart from other errors.
+
+    Errors are SUSPECT, not MISSING: the box forbids the use of the values, yet many of its bits (of the network, of
+    other buses) do not touch them, and a mark keeps both facts.
+    """
     if health(status) is not Health.ERROR:
         return Quality.GOOD
     known = Status.ERROR_SUMMARY | Status.CONDITION_LATCHED | Status.SATURATION_OR_CONVERTER
     marks = Quality.SATURATED if status & Status.SATURATION_OR_CONVERTER else Quality.GOOD
     return marks | Quality.SUSPECT if status & ~int(known) or not marks else marks
+
+
+def status_text(status: int) -> str:
+    """Return what a status word says, in words."""
+    if status == 0:
+        return "healthy"
+    names = [bit.name.lower().replace("_", " ") for bit in Status if status & bit and bit.name]
+    left = status & ~sum(Status)
+    return ", ".join([*names, *([f"undefined bits {left:08X}"] if left else [])])
 
 
 class CountScale(BaseModel):
@@ -234,118 +299,3 @@ def read_configuration(data: bytes) -> CountScale:
         raise AtiFileError(
             f"Counts per unit are positive numbers, not {texts['cfgcpf']!r} and {texts['cfgcpt']!r}."
         ) from error
-
-
-class Step(Enum):
-    """How one sequence number follows another."""
-
-    IN_ORDER = "in order"
-    DUPLICATE = "duplicate"
-    GAP = "gap"
-    OUT_OF_ORDER = "out of order"
-
-
-def step(previous: int, current: int) -> tuple[Step, int]:
-    """Return how `current` follows `previous`, and how many records were lost between them.
-
-    Differences are modulo 2^32: 0 is a duplicate, 1 in order, up to 2^31 - 1 a gap, above out of order (sourced:
-    pyNetFT, sequence.cpp).
-    """
-    delta = (current - previous) % SEQUENCE_MODULUS
-    if delta == 0:
-        return Step.DUPLICATE, 0
-    if delta == 1:
-        return Step.IN_ORDER, 0
-    return (Step.GAP, delta - 1) if delta < SEQUENCE_MODULUS // 2 else (Step.OUT_OF_ORDER, 0)
-
-
-RESTART_RUN = 4
-"""Records behind the last one, each in order after the other, that mean a restarted sensor and not late datagrams
-(assumed)."""
-
-
-@dataclass
-class RecordCounts:
-    """What came in: ``received = passed on + duplicates + late``."""
-
-    received: int = 0
-    """Records, whatever became of them."""
-    rejected: int = 0
-    """Datagrams that are none of this protocol."""
-    lost: int = 0
-    """Records missing where they were due; those that came late are among them."""
-    duplicates: int = 0
-    late: int = 0
-    restarts: int = 0
-    warnings: int = 0
-    errors: int = 0
-    """Records passed on with an error status, saturated ones among them."""
-    saturated: int = 0
-
-
-class Sample(NamedTuple):
-    """A record that is passed on."""
-
-    record: Record
-    lost_before: int
-    """Records missing directly before it."""
-    quality: Quality
-
-
-class RecordReader:
-    """Datagrams into records in order: duplicates and late ones are kept out and counted, gaps marked, never filled.
-
-    Parameters
-    ----------
-    buffered
-        Whether datagrams may hold several records.
-    """
-
-    def __init__(self, *, buffered: bool = False) -> None:
-        self.counts = RecordCounts()
-        self._buffered = buffered
-        self._previous: int | None = None
-        self._behind: list[int] = []
-
-    def restart(self) -> None:
-        """Expect a new count: after every start request."""
-        self._previous = None
-        self._behind.clear()
-
-    def feed(self, datagram: bytes) -> list[Sample]:
-        """Return the records of a datagram that are passed on; raises nothing."""
-        try:
-            records: Sequence[Record] = decode_buffer(datagram) if self._buffered else [decode_record(datagram)]
-        except DatagramError:
-            self.counts.rejected += 1
-            return []
-        return [sample for record in records if (sample := self._taken(record)) is not None]
-
-    def _taken(self, record: Record) -> Sample | None:
-        counts = self.counts
-        counts.received += 1
-        how, lost = (Step.IN_ORDER, 0) if self._previous is None else step(self._previous, record.rdt_sequence)
-        if how is Step.OUT_OF_ORDER:
-            after = step(self._behind[-1], record.rdt_sequence)[0] if self._behind else Step.IN_ORDER
-            if after is Step.DUPLICATE:
-                counts.duplicates += 1
-                return None
-            if after is not Step.IN_ORDER:
-                self._behind.clear()
-            self._behind.append(record.rdt_sequence)
-            if len(self._behind) < RESTART_RUN:
-                counts.late += 1
-                return None
-            counts.restarts += 1
-        self._behind.clear()
-        if how is Step.DUPLICATE:
-            counts.duplicates += 1
-            return None
-        self._previous = record.rdt_sequence
-        counts.lost += lost
-        marks = quality(record.status)
-        found = health(record.status)
-        counts.warnings += found is Health.WARNING
-        counts.errors += found is Health.ERROR
-        counts.saturated += bool(marks & Quality.SATURATED)
-        return Sample(record, lost, marks)

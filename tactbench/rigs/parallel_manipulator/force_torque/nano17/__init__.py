@@ -1,0 +1,1 @@
+"""An ATI Nano17 by its six gauge voltages, digitised by a microcontroller on a byte stream."""

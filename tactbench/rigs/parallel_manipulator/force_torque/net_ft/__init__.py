@@ -1,0 +1,1 @@
+"""The ATI Net F/T box: raw data transfer over UDP."""

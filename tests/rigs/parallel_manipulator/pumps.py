@@ -1,0 +1,162 @@
+"""Emulators behind links: in virtual time, and on real sockets and pseudo-terminals in threads."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import threading
+import time
+from collections import deque
+from contextlib import contextmanager
+
+import numpy as np
+
+from tactbench.plugin import Block, ByteLink, DatagramLink, Link, LinkUnplugged, Received
+from tests.links.ends import pty
+
+
+class VirtualLink(ByteLink, DatagramLink):
+    """An emulator behind a link whose waits move a virtual clock: from one event of the emulator to the next.
+
+    `begin_s` is when the clock starts; `unplugged_s` when the cable is pulled.
+    """
+
+    def __init__(self, emulator, *, begin_s=100.0, unplugged_s=float("inf")):
+        self.now_s = begin_s
+        Link.__init__(self, "virtual", self.clock)
+        self.emulator = emulator
+        self.unplugged_s = unplugged_s
+        self.arrived = deque()
+
+    def clock(self):
+        return round(self.now_s * 1e9)
+
+    def _release(self):
+        pass
+
+    def _check(self):
+        self._usable()
+        if self.now_s >= self.unplugged_s:
+            raise LinkUnplugged("The cable was pulled.")
+
+    def send(self, data):
+        self._check()
+        self.arrived.extend(self.emulator.feed(data, self.now_s))
+
+    write = send
+
+    def _wait(self, timeout_s):
+        self._check()
+        end_s = self.now_s + timeout_s
+        self.arrived.extend(self.emulator.poll(self.now_s))
+        while not self.arrived and self.now_s < end_s:
+            self.now_s = min(max(self.emulator.next_s(), self.now_s), end_s)
+            self._check()
+            self.arrived.extend(self.emulator.poll(self.now_s))
+        if not self.arrived:
+            raise self._nothing_came(timeout_s)
+
+    def receive(self, timeout_s):
+        self._wait(timeout_s)
+        sent_s, data = self.arrived.popleft()
+        return Received(data, round(sent_s * 1e9))
+
+    def read(self, timeout_s):
+        self._wait(timeout_s)
+        first_s = self.arrived[0][0]
+        data = b"".join(piece for _, piece in self.arrived)
+        self.arrived.clear()
+        return Received(data, round(first_s * 1e9))
+
+    def go(self, seconds):
+        """Let time pass without anybody reading."""
+        end_s = self.now_s + seconds
+        while self.now_s < end_s:
+            self.now_s = min(max(self.emulator.next_s(), self.now_s + 1e-6), end_s)
+            self.arrived.extend(self.emulator.poll(self.now_s))
+
+
+def read_for(driver, link, seconds):
+    """Return one block of what comes in some time."""
+    blocks, end_s = [], link.now_s + seconds
+    while link.now_s < end_s:
+        blocks += driver.read(end_s - link.now_s)
+    return joined(blocks)
+
+
+def joined(blocks):
+    def all_of(name):
+        return np.concatenate([getattr(block, name) for block in blocks])
+
+    marks = [np.zeros(b.data.shape, np.uint8) if b.quality is None else b.quality for b in blocks]
+    return Block(
+        stream=blocks[0].stream,
+        t_ns=all_of("t_ns"),
+        data=all_of("data"),
+        quality=np.concatenate(marks),
+        sequence=all_of("sequence"),
+        device_ns=all_of("device_ns"),
+    )
+
+
+@contextmanager
+def in_thread(serve):
+    """Run `serve(ended)` in a thread; on leaving set the event and wait for it."""
+    ended = threading.Event()
+    thread = threading.Thread(target=serve, args=[ended])
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join(10.0)
+        assert not thread.is_alive()
+
+
+# How long an end of a service is waited for; also what bounds a wait whose next event is far.
+LONGEST_WAIT_S = 0.02
+
+
+@contextmanager
+def on_udp(emulator):
+    """Serve an emulator on loopback UDP in real time; yields its port."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+        own.bind(("127.0.0.1", 0))
+
+        def serve(ended):
+            host = None
+            while not ended.is_set():
+                # A time-out of zero would not block at all.
+                own.settimeout(min(max(emulator.next_s() - time.monotonic(), 1e-4), LONGEST_WAIT_S))
+                try:
+                    datagram, host = own.recvfrom(2048)
+                    sent = emulator.feed(datagram, time.monotonic())
+                except TimeoutError:
+                    sent = emulator.poll(time.monotonic())
+                for _, answer in sent:
+                    own.sendto(answer, host)
+
+        with in_thread(serve):
+            yield own.getsockname()[1]
+
+
+@contextmanager
+def on_pty(emulator):
+    """Serve an emulator on a pseudo-terminal in real time; yields the terminal."""
+    with pty() as end:
+
+        def serve(ended):
+            while not ended.is_set():
+                wait_s = min(max(emulator.next_s() - time.monotonic(), 0.0), LONGEST_WAIT_S)
+                try:
+                    ready, _, _ = select.select([end.master], [], [], wait_s)
+                    data = os.read(end.master, 65536) if ready else b""
+                    sent = emulator.feed(data, time.monotonic()) if data else emulator.poll(time.monotonic())
+                    if sent:
+                        os.write(end.master, b"".join(piece for _, piece in sent))
+                except (OSError, ValueError):
+                    return
+
+        with in_thread(serve):
+            yield end

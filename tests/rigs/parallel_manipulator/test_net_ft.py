@@ -1,0 +1,646 @@
+"""Raw data transfer of a Net F/T box: golden vectors, the emulated box, and the driver, also over a real socket."""
+
+import dataclasses
+import http.server
+import socket
+import threading
+import time
+from contextlib import contextmanager
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.plugin import (
+    DriverSettings,
+    EmulatorSettings,
+    LinkTimeout,
+    LinkUnplugged,
+    Quality,
+    RigError,
+    UsageError,
+    open_link,
+)
+from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import AtiFileError
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
+    CONFIGURATION_PATH,
+    MOST_BUFFERED,
+    Command,
+    CountScale,
+    DatagramError,
+    Health,
+    Record,
+    Request,
+    Status,
+    decode_record,
+    decode_records,
+    decode_request,
+    encode_record,
+    encode_request,
+    health,
+    quality,
+    read_configuration,
+    status_text,
+)
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build, fetched
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
+from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import build as build_emulator
+from tactbench.rigs.parallel_manipulator.force_torque.wrench import RESTART_RUN, Counter, SampleCounter
+from tests.rigs.parallel_manipulator.pumps import VirtualLink, joined, on_udp, read_for
+
+REQUESTS = [
+    ("12 34 00 00 00 00 00 00", Request(Command.STOP)),
+    ("12 34 00 02 00 00 00 00", Request(Command.START_REALTIME)),
+    ("12 34 00 02 00 00 00 01", Request(Command.START_REALTIME, 1)),
+    ("12 34 00 02 00 00 00 0A", Request(Command.START_REALTIME, 10)),
+    ("12 34 00 02 00 00 03 E8", Request(Command.START_REALTIME, 1000)),
+    ("12 34 00 02 FF FF FF FF", Request(Command.START_REALTIME, 0xFFFFFFFF)),
+    ("12 34 00 03 00 00 00 00", Request(Command.START_BUFFERED)),
+    ("12 34 00 03 00 00 00 64", Request(Command.START_BUFFERED, 100)),
+    ("12 34 00 41 00 00 00 00", Request(Command.RESET_CONDITION_LATCH)),
+    ("12 34 00 42 00 00 00 00", Request(Command.SET_SOFTWARE_BIAS)),
+]
+ZERO = " ".join(["00"] * 24)
+# AT-2: bytes, sequences, status, values by 1e6 counts per unit, health.
+RECORDS = [
+    (f"00 00 00 01 00 00 00 01 00 00 00 00 {ZERO}", 1, 1, 0, [0] * 6, Health.HEALTHY),
+    (f"00 00 00 02 00 00 00 08 00 00 00 00 00 0F 42 40 {ZERO[:59]}", 2, 8, 0, [1, 0, 0, 0, 0, 0], Health.HEALTHY),
+    (
+        f"00 00 00 03 00 00 00 0F 00 00 00 00 00 00 00 00 FF F0 BD C0 {ZERO[:47]}",
+        3, 15, 0, [0, -1, 0, 0, 0, 0], Health.HEALTHY,
+    ),
+    (
+        f"00 00 00 04 00 00 00 16 00 00 00 00 {ZERO[:23]} FF D9 DA 60 {ZERO[:35]}",
+        4, 22, 0, [0, 0, -2.5, 0, 0, 0], Health.HEALTHY,
+    ),
+    (
+        "00 00 00 05 00 00 00 1D 00 00 00 00 00 00 00 01 FF FF FF FF 00 00 00 02 FF FF FF FE 00 00 00 03 FF FF FF FD",
+        5, 29, 0, [1e-6, -1e-6, 2e-6, -2e-6, 3e-6, -3e-6], Health.HEALTHY,
+    ),
+    (
+        "00 00 00 06 00 00 00 24 00 00 00 00 00 BC 61 4E FF 7A 40 08 00 07 A1 20 00 03 D0 90 FF FE 17 B8 00 00 F4 24",
+        6, 36, 0, [12.345678, -8.765432, 0.5, 0.25, -0.125, 0.0625], Health.HEALTHY,
+    ),
+    (
+        f"00 00 00 07 00 00 00 2B 80 01 00 00 {ZERO[:23]} FE FC 99 C0 {ZERO[:35]}",
+        7, 43, 0x80010000, [0, 0, -17, 0, 0, 0], Health.WARNING,
+    ),
+    (f"00 00 00 08 00 00 00 32 80 02 00 00 {ZERO}", 8, 50, 0x80020000, [0] * 6, Health.ERROR),
+    (f"00 00 00 09 00 00 00 39 80 00 00 04 {ZERO}", 9, 57, 0x80000004, [0] * 6, Health.ERROR),
+    (f"00 00 00 0A 00 00 00 40 FF FF FF FF {ZERO}", 10, 64, 0xFFFFFFFF, [0] * 6, Health.ERROR),
+    (
+        f"7F FF FF FF 80 00 00 00 00 00 00 00 7F FF FF FF 80 00 00 00 {ZERO[:47]}",
+        0x7FFFFFFF, 0x80000000, 0, [2147.483647, -2147.483648, 0, 0, 0, 0], Health.HEALTHY,
+    ),
+    (
+        f"FF FF FF FF FF FF FF F0 00 00 00 00 {ZERO[:59]} 00 0F 42 40",
+        0xFFFFFFFF, 0xFFFFFFF0, 0, [0, 0, 0, 0, 0, 1], Health.HEALTHY,
+    ),
+    (
+        f"00 00 00 00 FF FF FF F7 00 00 00 00 {ZERO[:59]} 00 0F 42 40",
+        0, 0xFFFFFFF7, 0, [0, 0, 0, 0, 0, 1], Health.HEALTHY,
+    ),
+]  # fmt: skip
+# Previous and next number, and how many numbers on that is: 0 a duplicate, more than 1 a gap, below 0 out of order.
+STEPS = [
+    (1, 2, 1),
+    (2, 2, 0),
+    (2, 5, 3),
+    (5, 4, -1),
+    (0xFFFFFFFF, 0, 1),
+    (0xFFFFFFFF, 3, 4),
+    (0, 0xFFFFFFFF, -1),
+    (0, 0x7FFFFFFF, 0x7FFFFFFF),
+    (0, 0x80000000, -0x80000000),
+]
+SCALE = CountScale(per_newton=1e6, per_newton_metre=1e6)
+
+
+@pytest.mark.parametrize(("sent", "request_"), REQUESTS, ids=[f"AT-1.{i + 1}" for i in range(len(REQUESTS))])
+def test_requests(sent, request_):
+    assert encode_request(request_) == bytes.fromhex(sent)
+    assert decode_request(bytes.fromhex(sent)) == request_
+
+
+@pytest.mark.parametrize(
+    ("sent", "rdt", "ft", "status", "values", "how"), RECORDS, ids=[f"AT-2.{i + 1}" for i in range(len(RECORDS))]
+)
+def test_records(sent, rdt, ft, status, values, how):
+    record = decode_record(bytes.fromhex(sent))
+    (many,) = decode_records(bytes.fromhex(sent)).tolist()
+    assert (*many[:3], tuple(many[3])) == record
+    assert record[:3] == (rdt, ft, status)
+    assert SCALE.wrench(record.counts).tolist() == values
+    assert SCALE.counts(values).tolist() == list(record.counts)
+    assert health(status) is how
+    assert encode_record(record) == bytes.fromhex(sent)
+
+
+@pytest.mark.parametrize(("previous", "current", "on"), STEPS, ids=[f"AT-sequence.{i + 1}" for i in range(len(STEPS))])
+def test_sequence_steps(previous, current, on):
+    assert Counter().counted_on([previous, current]).tolist() == [previous, previous + on]
+
+
+@given(st.integers(0, 2**32 - 1), st.lists(st.integers(-1000, 2**31 - 1), min_size=1, max_size=30), st.integers(1, 9))
+@settings(max_examples=60)
+def test_counters_are_counted_on_in_any_blocks(first, steps, block):
+    expected = np.cumsum([first, *steps])
+    counter = Counter()
+    found = [counter.counted_on(expected[n : n + block] % 2**32) for n in range(0, len(expected), block)]
+    assert np.concatenate(found).tolist() == expected.tolist()
+
+
+@pytest.mark.parametrize("block", [1, 3, 100])
+def test_a_count_that_begins_anew_is_told_from_late_datagrams(block):
+    def fed(numbers):
+        counter = SampleCounter("The box")
+        for n in range(0, len(numbers), block):
+            counter.counted_on(numbers[n : n + block])
+
+    fed([1000, 1001, 998, 999, 1000, 1002, 997, 1003, 1003])  # Three in a row are late at most.
+    for restarted in ([*range(1, RESTART_RUN + 1)], [1, 1, 2, 2, 3, 3, 4]):
+        with pytest.raises(RigError, match="The box has begun to count its samples anew"):
+            fed([*range(1000, 1010), *restarted])
+
+
+def test_other_lengths_are_rejected():
+    for n in (0, 8, 35, 37, 72):
+        with pytest.raises(DatagramError, match="36 bytes"):
+            decode_record(bytes(n))
+    for n in (0, 7, 9):
+        with pytest.raises(DatagramError, match="8 bytes"):
+            decode_request(bytes(n))
+    with pytest.raises(DatagramError, match="begins with 1234"):
+        decode_request(bytes.fromhex("1235000200000000"))
+    with pytest.raises(DatagramError, match="no command 0001"):
+        decode_request(bytes.fromhex("1234000100000000"))
+    assert len(decode_records(bytes(36 * 3), most=MOST_BUFFERED)) == 3
+    for n in (0, 35, 36 * (MOST_BUFFERED + 1)):
+        with pytest.raises(DatagramError, match="1 to 40"):
+            decode_records(bytes(n), most=MOST_BUFFERED)
+    with pytest.raises(ValueError, match="2\\^32"):
+        encode_request(Request(Command.STOP, 1 << 32))
+    with pytest.raises(ValueError, match="32-bit"):
+        encode_record(Record(0, 0, 0, (1 << 31, 0, 0, 0, 0, 0)))
+
+
+def test_marks_of_a_status():
+    assert quality(0) == Quality.GOOD
+    assert quality(0x80010000) == Quality.GOOD
+    assert quality(0x80020000) == quality(0x80030000) == Quality.SATURATED
+    assert quality(0x80000004) == quality(0x80000000) == quality(1) == Quality.SUSPECT
+    assert quality(0xFFFFFFFF) == Quality.SATURATED | Quality.SUSPECT
+    assert Status(0x80020000) == Status.ERROR_SUMMARY | Status.SATURATION_OR_CONVERTER
+    assert status_text(0) == "healthy"
+    assert status_text(0x80020004) == "error summary, saturation or converter, temperature"
+    assert status_text(0x00008001) == "undefined bits 00008001"
+
+
+def configuration(**changed):
+    tags = {"prodname": "Net F/T", "cfgcpf": "1000000", "cfgcpt": "1000", "scfgfu": "N", "scfgtu": "Nmm"} | changed
+    return ("<netft>" + "".join(f"<{tag}>{text}</{tag}>" for tag, text in tags.items()) + "</netft>").encode()
+
+
+def test_counts_per_unit_of_the_box_become_si():
+    scale = read_configuration(configuration())
+    assert (scale.per_newton, scale.per_newton_metre, scale.product) == (1e6, 1e6, "Net F/T")
+    assert read_configuration(configuration(scfgtu="N-m")).per_newton_metre == 1e3
+    assert read_configuration(configuration(scfgfu="kN")).per_newton == 1e3
+    kilogram = read_configuration(configuration(scfgtu="kg-cm"))
+    assert kilogram.wrench([0, 0, 0, 0, 0, 1000])[5] == pytest.approx(9.80665e-2)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (configuration(scfgfu="stone"), "stone"),
+        (configuration(cfgcpf="many"), "many"),
+        (configuration(cfgcpf="0"), "positive"),
+        (configuration(cfgcpt="inf"), "positive"),
+        (configuration().replace(b"<cfgcpf>1000000</cfgcpf>", b""), "no cfgcpf"),
+        (configuration().replace(b"</netft>", b"<cfgcpf>1</cfgcpf></netft>"), "twice"),
+        (b"<!DOCTYPE x><netft/>", "document type"),
+    ],
+)
+def test_configurations_that_are_refused(data, message):
+    with pytest.raises(AtiFileError, match=message):
+        read_configuration(data)
+
+
+# The emulator --------------------------------------------------------------------------------------------------------
+
+
+def pressed(time_s):
+    """Return a wrench that every axis takes part in, within the range of a Nano17."""
+    wave = np.sin(2 * np.pi * 3.0 * time_s)
+    return (1.0 * wave, -2.0 * wave, -5.0 + wave, 0.01 * wave, -0.02 * wave, 0.003)
+
+
+def box(wrench=pressed, **more):
+    return RdtEmulator(wrench, **more)
+
+
+def start(emulator, now_s=0.0, records=0, command=Command.START_REALTIME):
+    return emulator.feed(encode_request(Request(command, records)), now_s)
+
+
+def records_in(sent):
+    """Return the records of what an emulator sent, in the order of arrival."""
+    return [Record(*r[:3], tuple(r[3])) for _, d in sent for r in decode_records(d, most=MOST_BUFFERED).tolist()]
+
+
+def sequences(records):
+    return [record.rdt_sequence for record in records]
+
+
+def test_what_is_sensed_comes_back_to_a_count():
+    emulator = box()
+    assert start(emulator) == []
+    sent = emulator.poll(0.1)
+    records = records_in(sent)
+    assert sequences(records) == list(range(1, 101))
+    scale = read_configuration(emulator.configuration())
+    for (sent_s, _), record in zip(sent, records, strict=True):
+        # The sensor's own count tells the time: 7 kHz, 1 at time 0.
+        at_s = (record.ft_sequence - 1) / 7000
+        assert sent_s == at_s
+        assert np.abs(scale.wrench(record.counts) - pressed(at_s)).max() <= 0.5e-6 * (1 + 1e-9)
+
+
+def test_sequences_count_as_in_the_vectors():
+    """AT-2: the sensor samples seven times for a record at 1 kHz."""
+    emulator = box()
+    start(emulator)
+    assert {b.ft_sequence - a.ft_sequence for a, b in pairwise(records_in(emulator.poll(0.01)))} == {7}
+
+
+@pytest.mark.parametrize(("asked", "sent"), [(1000, 1000), (7000, 7000), (3000, 3500), (999, 1000), (1, 1)])
+def test_rates_divide_that_of_the_sensor(asked, sent):
+    assert box(rate_hz=asked).rate_hz == sent
+    assert driver_on(box(rate_hz=asked), rate_hz=asked)[0].streams[0].rate_hz == sent
+
+
+def test_counts_end_by_themselves_and_stop_ends_the_rest():
+    emulator = box()
+    start(emulator, records=10)
+    assert len(emulator.poll(1.0)) == 10
+    assert emulator.next_s() == np.inf
+    start(emulator, 1.0)
+    assert len(emulator.poll(1.05)) == 50
+    emulator.feed(encode_request(Request(Command.STOP)), 1.05)
+    assert emulator.poll(2.0) == []
+    assert emulator.feed(b"hello", 2.0) == []
+    assert emulator.rejected == 1
+
+
+def test_next_s_paces():
+    emulator, times = box(), []
+    start(emulator)
+    while len(times) < 30:
+        due_s = emulator.next_s()
+        assert emulator.poll(due_s - 1e-6) == []
+        assert len(emulator.poll(due_s)) == 1
+        times.append(due_s)
+    assert np.diff(times) == pytest.approx(1e-3)
+
+
+def test_buffered_transfer():
+    emulator = box(buffer_records=8)
+    start(emulator, records=20, command=Command.START_BUFFERED)
+    sent = emulator.poll(1.0)
+    assert [len(datagram) // 36 for _, datagram in sent] == [8, 8, 4]
+    assert sequences(records_in(sent)) == list(range(1, 21))
+
+
+def test_bias_and_latch():
+    emulator = box(lambda t: (0, 0, -3.0 if t < 0.5 else -4.0, 0, 0, 0), threshold_n=3.5)
+    emulator.feed(encode_request(Request(Command.SET_SOFTWARE_BIAS)), 0.1)
+    start(emulator, 0.1)
+    before = records_in(emulator.poll(0.2))[-1]
+    assert (before.status, before.counts[2]) == (0, 0)
+    after = records_in(emulator.poll(0.6))[-1]
+    assert (after.status, after.counts[2]) == (0x80010000, -1_000_000)
+    low = box(lambda t: (0, 0, -4.0 if t < 0.5 else 0.0, 0, 0, 0), threshold_n=3.5)
+    start(low)
+    assert records_in(low.poll(0.7))[-1].status == 0x80010000  # It stays, after the load is gone,
+    low.feed(encode_request(Request(Command.RESET_CONDITION_LATCH)), 0.7)
+    assert records_in(low.poll(0.8))[-1].status == 0  # until it is reset.
+
+
+def test_a_sensor_at_its_end_says_so():
+    emulator = box(lambda t: (0, 0, -40.0, 0, 0, 0))
+    start(emulator)
+    (record,) = records_in(emulator.poll(0.0005))
+    assert quality(record.status) == Quality.SATURATED
+    assert record.counts[2] == -35_000_000
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"rate_hz": 0.0}, {"rate_hz": 7001.0}, {"buffer_records": 41}, {"buffer_records": 0}]
+)
+def test_settings_that_a_box_does_not_have(wrong):
+    with pytest.raises(UsageError):
+        box(**wrong)
+
+
+def test_faults_that_are_none():
+    with pytest.raises(UsageError, match=r"no fault called .coffee.*doubled, dropped"):
+        DatagramFault("coffee")
+
+
+# The driver, in virtual time ------------------------------------------------------------------------------------------
+
+COUNTS = {"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6}
+
+
+def driver_on(emulator, *, begin_s=100.0, unplugged_s=np.inf, **options):
+    """Return a driver and the link in virtual time between it and `emulator`."""
+    link = VirtualLink(emulator, begin_s=begin_s, unplugged_s=unplugged_s)
+    given = options if "configuration" in options else COUNTS | options
+    return build(DriverSettings(open_link=lambda: link, options=given, clock=link.clock)), link
+
+
+def through(*faults, seconds=2.0, **more):
+    """Return the driver after some time of a box with faults, and the block of that time."""
+    emulator = box(faults=faults, **more)
+    driver, link = driver_on(emulator, begin_s=0.0)
+    driver.start()
+    block = read_for(driver, link, seconds - link.now_s)
+    driver.close()
+    return driver, block
+
+
+def test_the_driver_reads_forces_in_newtons_with_both_clocks():
+    driver, link = driver_on(box())
+    assert driver.identify() == {"model": "Net F/T", "rate_hz": "1000", "status": "healthy"}
+    driver.start()
+    block = read_for(driver, link, 1.0)
+    (stream,) = driver.streams
+    assert (stream.name, stream.rate_hz, block.stream) == ("force_torque", 1000.0, "force_torque")
+    assert [(c.name, c.unit, c.kind) for c in stream.channels] == [
+        *((axis, "N", "force") for axis in ("fx", "fy", "fz")),
+        *((axis, "N*m", "torque") for axis in ("tx", "ty", "tz")),
+    ]
+    # The box counts from 1 at time 0; its records are as old as the samples that they hold.
+    at_s = block.device_ns / 1e9 - 1 / 7000
+    assert np.abs(block.data - np.array([pressed(t) for t in at_s])).max() <= 1e-6
+    assert np.abs(block.t_ns / 1e9 - at_s).max() < 2e-9  # Nanoseconds are whole.
+    assert block.sequence.tolist() == list(range(1, len(block.data) + 1))
+    assert np.diff(block.device_ns).tolist() == [1_000_000] * (len(block.data) - 1)
+    assert not block.quality.any()
+    assert driver.counts == {}
+
+
+def test_counters_are_counted_on_over_their_wraps():
+    driver, link = driver_on(box(first_sequence=2**32 - 3), begin_s=0.0)
+    driver.start()
+    block = read_for(driver, link, 0.05)
+    assert block.sequence.tolist() == list(range(2**32 - 3, 2**32 - 3 + len(block.data)))
+    assert set(np.diff(block.device_ns)) == {1_000_000}
+
+
+def test_dropped_datagrams_are_gaps_in_the_sequence():
+    driver, block = through(DatagramFault("dropped", every=7))
+    assert block.sequence.tolist() == [n for n in range(1, 2001) if n % 7]
+    assert driver.counts == {}
+
+
+def test_doubled_datagrams_have_one_number():
+    _, block = through(DatagramFault("doubled", 1.0, 1.5))
+    assert len(block.sequence) == 2500
+    assert np.unique(block.sequence).tolist() == list(range(1, 2001))
+
+
+def test_late_datagrams_have_lower_numbers():
+    _, block = through(DatagramFault("out-of-order", every=10))
+    # Each tenth comes after its successor; the last of them has none yet.
+    expected = [n + (n % 10 == 0) - (n % 10 == 1 and n > 1) for n in range(1, 2000)]
+    assert block.sequence.tolist() == expected
+
+
+def test_one_fault_does_not_shift_another():
+    _, alone = through(DatagramFault("dropped", every=7))
+    _, both = through(DatagramFault("dropped", every=7), DatagramFault("doubled", every=5))
+    assert sorted(set(both.sequence.tolist())) == alone.sequence.tolist()
+
+
+def test_a_saturated_sensor_is_marked_and_counted():
+    driver, block = through(DatagramFault("saturated", 0.5, 1.0))
+    saturated = (block.device_ns / 1e9 - 1 / 7000 >= 0.5 - 1e-9) & (block.device_ns / 1e9 - 1 / 7000 < 1.0 - 1e-9)
+    assert (block.quality[saturated] == Quality.SATURATED).all()
+    assert (block.quality[~saturated] == Quality.GOOD).all()
+    assert driver.counts == {"errors": saturated.sum(), "saturated": saturated.sum(), "warnings": 0}
+
+
+def test_a_threshold_is_a_warning():
+    driver, link = driver_on(box(lambda t: (0, 0, -4.0, 0, 0, 0), threshold_n=3.5))
+    assert driver.identify()["status"] == "error summary, condition latched"
+    driver.start()
+    block = read_for(driver, link, 0.1)
+    assert not block.quality.any()
+    assert driver.counts["warnings"] == len(block.data)
+
+
+def test_the_bias_makes_the_present_reading_zero():
+    load = {"now": -1.0}
+    driver, link = driver_on(box(lambda t: (0, 0, load["now"], 0, 0, 0)), bias=True)
+    driver.start()
+    assert (read_for(driver, link, 0.1).data == 0).all()
+    load["now"] = -3.0
+    assert read_for(driver, link, 0.1).data[-1, 2] == -2.0
+    assert driver.tare()
+    assert (read_for(driver, link, 0.1).data == 0).all()
+
+
+def test_several_records_in_a_datagram():
+    driver, link = driver_on(box(rate_hz=7000, buffer_records=40), rate_hz=7000, buffered=True)
+    driver.start()
+    block = read_for(driver, link, 0.5)
+    # From the first datagram on: starting waits for it.
+    assert len(block.data) == 7000 // 2 // 40 * 40 + 40
+    assert len(set(block.t_ns.tolist())) == len(block.data) // 40
+    assert set(np.diff(block.sequence)) == {1}
+
+
+def test_a_box_that_is_silent_or_gone():
+    driver, link = driver_on(box(faults=[DatagramFault("dropped", end_s=102.0)]))
+    for ask in (driver.identify, driver.start):
+        with pytest.raises(LinkTimeout):
+            ask()
+    driver.stop()
+    assert driver.read(0.1) == []
+    link.now_s = max(link.now_s, 102.0)
+    driver.start()
+    assert driver.read(0.1)[0].sequence[0] == 1
+    # Stopped, it sends nothing, and what was under way belongs to nobody.
+    link.go(0.01)
+    driver.stop()
+    driver.start()
+    assert driver.read(0.0)[0].sequence[0] == 1
+    link.unplugged_s = link.now_s
+    with pytest.raises(LinkUnplugged):
+        driver.read(0.1)
+    driver.close()
+    driver.close()
+
+
+def test_other_rates_are_refused_with_the_right_one():
+    driver, _ = driver_on(box(rate_hz=500), rate_hz=1000)
+    with pytest.raises(RigError, match=r"every 14th.*every 7th.*rate_hz: 500"):
+        driver.identify()
+    driver.start()
+    with pytest.raises(RigError, match="is sampling"):
+        driver.identify()
+
+
+@given(st.lists(st.binary(max_size=80), max_size=10), st.booleans())
+@settings(max_examples=40)
+def test_any_datagrams_are_survived(datagrams, buffered):
+    emulator = box(rate_hz=1)
+    driver, link = driver_on(emulator, rate_hz=1, buffered=buffered)
+    for datagram in datagrams:
+        emulator.feed(datagram, link.now_s)
+    driver.start()
+    driver.read(0.0)
+    noise = [datagram for datagram in datagrams if len(datagram) not in (36, 72)]
+    link.arrived.extend((link.now_s, datagram) for datagram in noise)
+    while link.arrived:
+        assert driver.read(0.0) == []
+    assert driver.counts == ({"rejected": len(noise)} if noise else {})
+
+
+# Options --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "counts_per_newton and counts_per_newton_metre, or else configuration"),
+        ({"counts_per_newton": 1e6}, "or else configuration"),
+        (COUNTS | {"configuration": "http"}, "or else configuration"),
+        (COUNTS | {"rate_hz": 8000}, "'rate_hz' of net-ft"),
+        (COUNTS | {"counts_per_newton": 0}, "'counts_per_newton' of net-ft"),
+        (COUNTS | {"rate": 1000}, "no option of net-ft called 'rate'.*rate_hz"),
+        ({"configuration": "http"}, "names no host"),
+        ({"configuration": "/nowhere/at/all.xml"}, "cannot be read"),
+    ],
+)
+def test_options_that_are_refused(options, message):
+    link = VirtualLink(box())
+    with pytest.raises(UsageError, match=message):
+        build(DriverSettings(open_link=lambda: link, options=options, clock=link.clock))
+
+
+def test_a_link_without_datagrams_is_refused():
+    with pytest.raises(UsageError, match=r"net-ft cannot be spoken to through loop://"):
+        build(DriverSettings(open_link=lambda: open_link("loop://"), options=COUNTS))
+
+
+def test_the_scale_comes_from_a_file(tmp_path):
+    file = tmp_path / "netftapi2.xml"
+    file.write_bytes(configuration(prodname="Box 3"))
+    settings = EmulatorSettings(
+        senses=lambda t: {"fz": -2.5, "tx": 0.001},
+        rng=np.random.default_rng(0),
+        options={"configuration": str(file), "rate_hz": 500},
+        faults=["dropped:every=5"],
+    )
+    driver, link = driver_on(build_emulator(settings), **settings.options)
+    assert driver.identify()["model"] == "Box 3"
+    driver.start()
+    block = read_for(driver, link, 0.1)
+    assert block.data[0].tolist() == [0, 0, -2.5, 0.001, 0, 0]
+    assert 2 in np.diff(block.sequence)
+    with pytest.raises(UsageError, match="no web page"):
+        build_emulator(dataclasses.replace(settings, options={"configuration": "http"}))
+
+
+# Over real sockets, in real time --------------------------------------------------------------------------------------
+
+STEADY = (1.0, -2.0, -3.5, 0.01, -0.02, 0.03)
+
+
+@contextmanager
+def web_page(page):
+    """Serve a box's configuration by HTTP; yields the port."""
+
+    class Page(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            self.send_response(200 if self.path == CONFIGURATION_PATH else 404)
+            self.send_header("Content-Type", "application/xml")
+            self.send_header("Content-Length", str(len(page)))
+            self.end_headers()
+            self.wfile.write(page)
+
+        def log_message(self, *_):
+            pass
+
+    with http.server.HTTPServer(("127.0.0.1", 0), Page) as pages:
+        thread = threading.Thread(target=pages.serve_forever)
+        thread.start()
+        try:
+            yield pages.server_port
+        finally:
+            pages.shutdown()
+            thread.join(10.0)
+
+
+def test_the_driver_reads_the_box_over_a_socket():
+    emulator = box(lambda t: STEADY)
+    with on_udp(emulator) as port, web_page(emulator.configuration()) as page:
+        options = {"configuration": f"http://127.0.0.1:{page}{CONFIGURATION_PATH}"}
+        address = f"udp://127.0.0.1:{port}"
+        with build(DriverSettings(open_link=lambda: open_link(address), options=options)) as driver:
+            assert driver.identify()["model"] == "EMULATED Net F/T"
+            before_ns = time.monotonic_ns()
+            driver.start()
+            blocks = []
+            while sum(len(block.data) for block in blocks) < 300:
+                blocks += driver.read(10.0)
+    block = joined(blocks)
+    assert block.data.tolist() == [list(STEADY)] * len(block.data)
+    assert block.sequence.tolist() == list(range(1, len(block.data) + 1))
+    assert set(np.diff(block.device_ns)) == {1_000_000}
+    # Received in order, and none before it was asked for or sent.
+    assert (np.diff(block.t_ns) >= 0).all()
+    assert block.t_ns[0] > before_ns
+    assert driver.counts == {}
+
+
+def test_a_box_that_nobody_runs_is_unplugged():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        address = f"udp://127.0.0.1:{other.getsockname()[1]}"
+    driver = build(DriverSettings(open_link=lambda: open_link(address), options=COUNTS))
+    with driver, pytest.raises(LinkUnplugged):
+        driver.start()
+
+
+def test_pages_that_are_none(tmp_path):
+    with web_page(b" " * (1 << 20) + b"<netft/>") as page:
+        address = f"http://127.0.0.1:{page}"
+        with pytest.raises(RigError, match="larger than"):
+            fetched(address + CONFIGURATION_PATH)
+        with pytest.raises(RigError, match="404"):
+            fetched(address + "/other.xml")
+    with pytest.raises(RigError, match="refused"):
+        fetched(address + CONFIGURATION_PATH)
+
+
+def test_pynetft_reads_the_box():
+    """A client of others, which confirms the reading of its own source and not of the device."""
+    pynetft = pytest.importorskip("pynetft", reason="pynetft, a client of others, is not installed")
+    emulator = box(lambda t: STEADY)
+    with on_udp(emulator) as port, web_page(emulator.configuration()) as page:
+        config = pynetft.Config(sensor_host="127.0.0.1", rdt_port=port, http_port=page)
+        with pynetft.Client(config, queue_size=64) as client:
+            stream = client.samples(timeout=10.0)
+            samples = [next(stream) for _ in range(50)]
+            found = client.health()
+    for sample in samples:
+        assert (*sample.force, *sample.torque) == pytest.approx(STEADY, abs=0.5e-6)
+        assert sample.status == 0
+    assert (found.device_error_count, found.malformed_count) == (0, 0)
+    assert found.sensor_configuration.calibration.counts_per_force_unit == 1e6
