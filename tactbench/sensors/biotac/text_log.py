@@ -104,7 +104,7 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
         clock="host" if timed else "nominal" if rate_hz is not None else "none",
         started=" ".join(re.findall(r"^\s*(?:Date|Time):\s*(.*\S)", header, re.MULTILINE)),
         remarks=(
-            "read by the documents of the maker's text log; an error reply looks like bad parity there",
+            "read as the maker's documents describe the text log; an error reply looks like bad parity in it",
             *(() if timed else ("the log has no times",)),
         ),
         counts=counted(log.faults) | {f"lines: {reason}": n for reason, n in log.left_out.items()},

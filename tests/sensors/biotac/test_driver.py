@@ -19,7 +19,6 @@ from tactbench.plugin import (
     LinkUnplugged,
     Quality,
     RigError,
-    SpiBridge,
     SpiLink,
     SpiReply,
     UsageError,
@@ -417,7 +416,7 @@ def test_a_clock_that_is_none_for_it_is_refused(speed_hz, options, said):
 
 
 def test_a_link_of_another_kind_is_refused():
-    with pytest.raises(RigError, match=r"loop://.*ByteLink"):
+    with pytest.raises(RigError, match=r"loop:// was given, .* needs an SPI link"):
         build(DriverSettings(lambda: open_link("loop://")))
 
 
@@ -432,7 +431,7 @@ def bridged(sensed, *faults, options=None, **bridge):
     options = {"batches_ahead": 16, **(options or {})}
     model = BridgeEmulator(emulator(sensed, *faults, **options).exchange, **{"holds": 16, **bridge})
     with serving(model) as far:
-        settings = DriverSettings(lambda: SpiBridge(far.name, speed_hz=4_400_000), SPEC.streams, options)
+        settings = DriverSettings(lambda: open_link(f"spi://bridge/{far.name}?speed_hz=4400000"), SPEC.streams, options)
         with build(settings) as driver:
             yield driver, model, far
 
