@@ -68,7 +68,7 @@ def test_vectors_of_the_document():
 @settings(max_examples=100)
 @given(st.lists(FRAMES, max_size=5), st.integers(1, 40))
 def test_frames_come_back_in_any_pieces(frames, piece):
-    data = b"".join(map(encode, frames))
+    data = b"".join(map(encode_frame, frames))
     decoder = FrameDecoder()
     found = [frame for place in range(0, len(data), piece) for frame in decoder.feed(data[place : place + piece])]
     assert (found, decoder.damaged, decoder.within_frame) == (frames, 0, False)

@@ -7,14 +7,14 @@ import json
 import click
 
 SCENARIOS = "scenarios"
-FAMILIES = ("sensors", "rigs", "tasks", "estimators", "effects", SCENARIOS)
+FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", SCENARIOS)
 
 
 @click.command(name="list")
 @click.argument("family", type=click.Choice(FAMILIES), required=False)
 @click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
 def command(family: str | None, shape: str) -> None:
-    """List sensors, rigs, tasks, estimators, effects, and the scenarios that sensors state."""
+    """List sensors, rigs, force sensors and motors, tasks, estimators, effects, and the scenarios that sensors state."""
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()

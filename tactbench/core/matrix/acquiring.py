@@ -62,6 +62,7 @@ def acquire_missing(
     simulated = all(_computed(order) for order in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     told.begin("recording", len(missing), alone=False)
+    outcomes: Iterator[tuple[Order, str | BaseException]]
     try:
         if operator is not None and not simulated:
             outcomes = _one_by_one(missing, operator)
@@ -94,7 +95,7 @@ def _computed(order: Order) -> bool:
     return devices.emulation.time == "virtual" and all(entry is None or entry.emulated for entry in used)
 
 
-def _one_by_one(orders: Sequence[Order], operator: Operator) -> Iterator[tuple[Order, str | Exception]]:
+def _one_by_one(orders: Sequence[Order], operator: Operator) -> Iterator[tuple[Order, str | BaseException]]:
     """Carry out scenes in this process; what a rig raises is the scene's outcome."""
     for order in orders:
         try:

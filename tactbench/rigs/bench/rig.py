@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -130,11 +131,13 @@ class Bench:
         file = self._used(sensor)
         with ExitStack() as stack:
             simulated = stack.enter_context(self._simulated(file, sensor, scene, seed))
-            senses = None if simulated is None else SceneSamples(simulated, scene.profile.duration.to("s"))
+            profile = scene.profile
+            duration_s = profile.duration.to("s")
+            senses = None if simulated is None else SceneSamples(simulated, duration_s, rest_s=profile.hold_s)
             emulators = {} if senses is None else emulators_of(file, load_registry(), sensor.name, senses)
             emulated = stack.enter_context(EmulatedDevices(emulators, time=file.emulation.time)) if emulators else None
             clock = time.monotonic_ns if emulated is None else emulated.clock
-            links = {} if emulated is None else {name: emulated.opener(name) for name in emulators}
+            links = {} if emulated is None else {name: partial(emulated.open_link, name) for name in emulators}
             drivers = drivers_of(file, load_registry(), sensor.name, links, clock)
             for driver in drivers.values():
                 stack.callback(driver.close)
@@ -163,7 +166,7 @@ class Bench:
                 clocks=_clocks((*own, *reference), virtual=advance is not None),
                 emulation=self._emulation(file, tuple(emulators)) if emulators else None,
                 reading=reading,
-                duration_s=scene.profile.duration.to("s"),
+                duration_s=duration_s,
                 pressed=pressed,
             )
 
@@ -192,8 +195,8 @@ class Bench:
             return
         profile = scene.profile
         text = (
-            f"{scene.name}: {sensor.spec.title}, {scene.indenter}. Touch nothing for {profile.hold_s:.0f} s, then press "
-            f"slowly to {profile.largest_n:g} N and back, within {profile.duration.to('s'):.0f} s in all."
+            f"{scene.name}: {sensor.spec.title}, {scene.indenter}. Touch nothing for {profile.hold_s:.0f} s, then "
+            f"press slowly to {profile.largest_n:g} N and back, within {profile.duration.to('s'):.0f} s in all."
         )
         if self._operator is None:
             raise RigError(
@@ -256,7 +259,8 @@ def build(context: RigContext) -> Bench:
     if context.rig_file is None:
         raise UsageError(
             "The rig 'bench' needs to know its devices.",
-            hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft --write-rig-file FILE` makes one.",
+            hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft --write-rig-file FILE` makes "
+            "one.",
         )
     physics: Rig | None = None
     if context.rig_file.emulated:

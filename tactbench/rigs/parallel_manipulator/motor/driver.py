@@ -109,7 +109,7 @@ class FaulhaberDriver(Driver):
         self._away = None if options.retreat_m is None else self._profile.increments(options.retreat_m)
         self._away_speed = None if options.retreat_speed_m_s is None else self._profile.speed(options.retreat_speed_m_s)
         self._version = ""
-        self._link = open_for(settings, "faulhaber", ByteLink, "serial:///dev/ttyUSB0?baud=9600")
+        self._link = open_for(settings, "faulhaber", ByteLink, "serial:///dev/ttyUSB0?baud=9600")  # type: ignore[type-abstract]
         self._exchange = Exchange(self._link, settings.clock, baud=options.baud, node=options.node)
         self._state: MotorState | None = None
         self._samples: deque[MotorState] = deque(maxlen=MOST_SAMPLES)

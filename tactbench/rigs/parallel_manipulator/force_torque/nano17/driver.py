@@ -62,7 +62,7 @@ class Nano17Driver(Driver):
         self._beyond = 0
         self._before: list[Block] = []
         self._restart()
-        self._link = open_for(settings, "nano17", ByteLink, "serial:///dev/ttyACM0?baud=921600")
+        self._link = open_for(settings, "nano17", ByteLink, "serial:///dev/ttyACM0?baud=921600")  # type: ignore[type-abstract]
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:

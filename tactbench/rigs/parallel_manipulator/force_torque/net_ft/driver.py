@@ -71,7 +71,7 @@ class NetFtDriver(Driver):
         self._kept: list[Received] = []
         self._sampling = False
         self._restart()
-        self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")
+        self._link = open_for(settings, "net-ft", DatagramLink, "udp://192.168.1.1:49152")  # type: ignore[type-abstract]
         try:
             self._scale = options.scale(self._configuration())
         except BaseException:
