@@ -171,6 +171,47 @@ def test_an_exception_leaves_nothing_and_the_old_file_alone(tmp_path, make_meta,
     assert [one.name for one in tmp_path.iterdir()] == ["press.h5"]
 
 
+def appended_until_interrupted(folder, meta, after_us):
+    """Append until a signal comes, then one more, and complete; return how many appends returned before it."""
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, stop)
+    returned = 0
+    try:
+        with RecordingWriter(folder / "x.h5", meta) as writer:
+            try:
+                signal.setitimer(signal.ITIMER_REAL, after_us * 1e-6)
+                while True:
+                    writer.append(block(returned * ROWS, device_ns=np.arange(ROWS) + returned * ROWS))
+                    returned += 1
+            except KeyboardInterrupt:
+                writer.append(block((returned + 1) * ROWS, device_ns=np.arange(ROWS)))
+                writer.complete_at(folder / "kept.h5")
+                raise
+    except KeyboardInterrupt:
+        return returned
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.parametrize("after_us", range(3000, 13000, 1000))
+def test_interrupted_anywhere_while_appending_the_rows_so_far_are_completed(tmp_path, make_meta, after_us):
+    """All rows whose append had returned are there, in order, and what is appended afterwards is too."""
+    returned = appended_until_interrupted(tmp_path, make_meta(), after_us)
+    assert [one.name for one in tmp_path.iterdir()] == ["kept.h5"]
+    with open_recording(tmp_path / "kept.h5") as recording:
+        recording.verify()
+        data = recording.read("taxels").data
+    # The block in flight may be whole in the journal although its append did not return.
+    rows = len(data) // ROWS
+    assert rows in (returned + 1, returned + 2)
+    assert np.array_equal(data[: returned * ROWS], block(0, returned * ROWS).data)
+    assert np.array_equal(data[-ROWS:], block((returned + 1) * ROWS).data)
+
+
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
