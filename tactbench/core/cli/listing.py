@@ -14,7 +14,7 @@ FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", SCEN
 @click.argument("family", type=click.Choice(FAMILIES), required=False)
 @click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
 def command(family: str | None, shape: str) -> None:
-    """List sensors, rigs, force sensors and motors, tasks, estimators, effects, and the scenarios that sensors state."""
+    """List sensors, rigs, devices (force sensors, motors), tasks, estimators, effects and sensors' scenarios."""
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()

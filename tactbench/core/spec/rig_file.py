@@ -44,6 +44,8 @@ class ForceEntry(DeviceEntry):
     """Its channel along which the sensor is pressed."""
     sign: Literal[-1, 1] = 1
     """-1: pressing makes that channel fall."""
+    zero_s: float = Field(default=2.0, ge=0)
+    """Seconds without load before each scene whose mean becomes zero on every channel; 0: the device keeps its own."""
 
 
 class NamedDevice(DeviceEntry):

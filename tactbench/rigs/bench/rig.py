@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from tactbench.plugin import (
     Acquisition,
     Block,
     ChannelSpec,
+    Driver,
     EmulatedDevices,
     Emulation,
     ForceEntry,
@@ -42,6 +44,11 @@ from tactbench.plugin import (
     load_registry,
 )
 
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from tactbench.plugin import Clock, FloatArray
+
 FORCE = "force"
 """Name of the force sensor's entry among the drivers."""
 _PRESSED = "normal"
@@ -63,6 +70,8 @@ class BenchAcquisition:
     duration_s: float
     pressed: tuple[str, int, int] | None
     """Stream, column and sign of the force along which the sensor is pressed."""
+    zero: Mapping[str, FloatArray]
+    """By stream of the force sensor: (channels,) what it read without load, taken off."""
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks until the scene is over, or a device is gone."""
@@ -89,11 +98,12 @@ class BenchAcquisition:
         return self.reading.ended
 
     def _turned(self, block: Block) -> Block:
-        """Return the block with the force positive when pressing."""
-        if self.pressed is None or self.pressed[0] != block.stream or self.pressed[2] > 0:
+        """Return the block with forces from the unloaded sensor's, and positive when pressing."""
+        if block.stream not in self.zero:
             return block
-        data = np.array(block.data)
-        data[:, self.pressed[1]] *= -1
+        data = block.data - self.zero[block.stream]
+        if self.pressed is not None and self.pressed[0] == block.stream:
+            data[:, self.pressed[1]] *= self.pressed[2]
         return replace(block, data=data)
 
 
@@ -146,8 +156,8 @@ class Bench:
             }
             self._prompt(file, sensor, scene)
             advance = emulated.advance if emulated is not None and file.emulation.time == "virtual" else None
+            zero = _zero_of(drivers[FORCE], file.force.zero_s, clock) if file.force is not None else {}
             reading = stack.enter_context(Reading(drivers, clock=clock, advance=advance))
-            tared = FORCE in drivers and drivers[FORCE].tare()
             own = drivers[sensor.name].streams
             reference, pressed = self._reference(file.force, drivers[FORCE].streams if FORCE in drivers else ())
             if senses is not None:
@@ -160,7 +170,7 @@ class Bench:
                 drawn={
                     **(simulated.drawn if simulated is not None else {}),
                     **about,
-                    "force sensor tared": "by itself, before the scene" if tared else "no",
+                    **{f"zero of {stream}": ", ".join(f"{value:.6g}" for value in zero[stream]) for stream in zero},
                     **self._mounting(file.force),
                 },
                 clocks=_clocks((*own, *reference), virtual=advance is not None),
@@ -168,6 +178,7 @@ class Bench:
                 reading=reading,
                 duration_s=duration_s,
                 pressed=pressed,
+                zero=zero,
             )
 
     def _used(self, sensor: SensorDescriptor) -> RigFile:
@@ -242,6 +253,20 @@ class Bench:
             devices=names,
             faults=tuple(f"{name}: {fault}" for name in names for fault in entries[name].faults),
         )
+
+
+def _zero_of(driver: Driver, seconds: float, clock: Clock) -> dict[str, FloatArray]:
+    """Return the mean of every channel of an unloaded force sensor over so many seconds, by stream; 0 without any."""
+    rows: dict[str, list[npt.NDArray[Any]]] = {}
+    if seconds > 0:
+        driver.start()
+        until_ns = clock() + round(1e9 * seconds)
+        while clock() < until_ns:
+            for block in driver.read(min(0.1, max(0.0, (until_ns - clock()) * 1e-9))):
+                rows.setdefault(block.stream, []).append(block.data)
+        driver.stop()
+    found = {stream.name: np.zeros(len(stream.channels)) for stream in driver.streams}
+    return found | {name: np.concatenate(blocks).mean(axis=0) for name, blocks in rows.items()}
 
 
 def _clocks(streams: tuple[StreamSpec, ...], *, virtual: bool) -> dict[str, StreamClock]:
