@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from tactbench.core.spec.quantity import Frozen
+from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
 
@@ -27,6 +28,9 @@ class SensorDescriptor(Frozen):
     """``module:callable`` -> the device as a model at the far end of `emulated_link`, called with EmulatorSettings."""
     emulated_link: EmulatedLink | None = None
     """What the driver speaks through; needed where there is an emulator."""
+    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
+    """Options that the driver needs and only a real device's papers state, as they are of the emulated one: they hold
+    where a rig file's entry of an emulated device leaves them out."""
 
     @property
     def name(self) -> str:
@@ -47,6 +51,8 @@ class DeviceDescriptor(Frozen):
     emulator: str | None = Field(default=None, pattern=_WHERE)
     """As of a sensor."""
     emulated_link: EmulatedLink | None = None
+    """As of a sensor."""
+    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
     """As of a sensor."""
 
 
