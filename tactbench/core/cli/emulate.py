@@ -272,7 +272,10 @@ def _say_where(
     text: dict[str, Any] = {"version": 1, "rig": "bench" if file is None else file.rig}
     if file is not None and file.title:
         text["title"] = file.title
-    plain = {name: entry.model_dump(mode="json", exclude_defaults=True) for name, entry in found.items()}
+    plain = {}
+    for name, entry in found.items():
+        fields = entry.model_dump(mode="json", exclude_defaults=True)
+        plain[name] = {key: fields[key] for key in ("device", *fields) if key in fields}
     text["sensors"] = {name: plain.pop(name) for name in sensors}
     if "force" in plain:
         text["force"] = plain.pop("force")
