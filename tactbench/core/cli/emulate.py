@@ -99,21 +99,23 @@ def emulate(
     from itertools import count
 
     from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.rig_devices import descriptor_of, emulated_device
+    from tactbench.core.plugins.rig_devices import descriptor_of, emulated_device, options_of
     from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 
     if out is not None and out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(HEAD):
         raise UsageError(f"{out} is there already, and not from `tactbench emulate`.", hint="Give another name.")
     devices: dict[str, EmulatedDevice] = {}
+    said: dict[str, DeviceEntry] = {}
     for name, entry in entries.items():
+        descriptor = descriptor_of(registry, name, entry)
+        said[name] = entry.model_copy(update={"options": options_of(descriptor, entry)})
         if entry.emulated:
-            descriptor = descriptor_of(registry, name, entry)
             devices[name] = emulated_device(descriptor, name, entry, presser.senses(name), presser.seed)
     if not devices:
         raise UsageError("No device in the rig file is emulated.", hint="Write `link: emulated` for one.")
     presser.draw(1)
     with EmulatedDevices(devices, time="real", can=can) as emulated:
-        _say_where(emulated, entries, file, out)
+        _say_where(emulated, said, file, out)
         for number in count(1) if presses is None else range(1, presses + 1):
             if number > 1:
                 presser.draw(number)
@@ -270,7 +272,10 @@ def _say_where(
     text: dict[str, Any] = {"version": 1, "rig": "bench" if file is None else file.rig}
     if file is not None and file.title:
         text["title"] = file.title
-    plain = {name: entry.model_dump(mode="json", exclude_defaults=True) for name, entry in found.items()}
+    plain = {}
+    for name, entry in found.items():
+        fields = entry.model_dump(mode="json", exclude_defaults=True)
+        plain[name] = {key: fields[key] for key in ("device", *fields) if key in fields}
     text["sensors"] = {name: plain.pop(name) for name in sensors}
     if "force" in plain:
         text["force"] = plain.pop("force")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import PluginContractError, TactbenchError, UsageError
 from tactbench.core.plugins.registry import Registry, load_object
+from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import DeviceEntry, ForceEntry, NamedDevice, RigFile
 
@@ -84,8 +85,9 @@ def emulated_device(
 
     of_link, of_device = split_faults(entry.faults)
     rng = np.random.default_rng([seed, *name.encode()])
-    emulator = load_object(descriptor.emulator)(EmulatorSettings(own, rng, entry.options, of_device))
-    baud = entry.options.get("baud")
+    options = options_of(descriptor, entry)
+    emulator = load_object(descriptor.emulator)(EmulatorSettings(own, rng, options, of_device))
+    baud = options.get("baud")
     return EmulatedDevice(descriptor.emulated_link, emulator, of_link, baud if isinstance(baud, int) else None)
 
 
@@ -139,7 +141,8 @@ def drivers_of(
                         hint="Give the address of its link: `tactbench emulate` prints one.",
                     )
                 streams = descriptor.spec.streams if isinstance(descriptor, SensorDescriptor) else ()
-                driver = load_object(descriptor.driver)(DriverSettings(opener, streams, entry.options, clock))
+                options = options_of(descriptor, entry)
+                driver = load_object(descriptor.driver)(DriverSettings(opener, streams, options, clock))
             opened.callback(driver.close)
             drivers[name] = driver
         opened.pop_all()
@@ -161,6 +164,11 @@ def _used(
             with _entry(name):
                 used[name] = entry, descriptor_of(registry, name, entry)
     return used
+
+
+def options_of(descriptor: SensorDescriptor | DeviceDescriptor, entry: DeviceEntry) -> dict[str, Scalar | bool]:
+    """Return the options of an entry, with those of the emulated device that it leaves out, if it is one."""
+    return {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
 
 
 def descriptor_of(registry: Registry, name: str, entry: DeviceEntry) -> SensorDescriptor | DeviceDescriptor:

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from tactbench.core.spec.quantity import Frozen
+from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
 
@@ -29,6 +30,9 @@ class SensorDescriptor(Frozen):
     """What the driver speaks through; needed where there is an emulator."""
     log_reader: str | None = Field(default=None, pattern=_WHERE)
     """``module:callable``, called with (Path, options): a DeviceLog; for logs of the device's own tools."""
+    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
+    """Options that the driver needs and only a real device's papers state, as they are of the emulated one: they hold
+    where a rig file's entry of an emulated device leaves them out."""
 
     @property
     def name(self) -> str:
@@ -49,6 +53,8 @@ class DeviceDescriptor(Frozen):
     emulator: str | None = Field(default=None, pattern=_WHERE)
     """As of a sensor."""
     emulated_link: EmulatedLink | None = None
+    """As of a sensor."""
+    emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
     """As of a sensor."""
 
 

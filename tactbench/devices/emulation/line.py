@@ -113,6 +113,11 @@ class Line:
         self._out: deque[tuple[float, Piece]] = deque()
         self._in_free_s = self._out_free_s = -math.inf
 
+    @property
+    def paced(self) -> bool:
+        """Whether bytes pass one at a time."""
+        return self._byte_s > 0.0
+
     def feed(self, piece: Piece, now_s: float) -> None:
         """Take what the host sends at `now_s`; deliver what is due by then."""
         self.poll(now_s)

@@ -59,6 +59,7 @@ def test_the_rig_file_printed_is_the_one_written_and_opens_the_devices(emulate, 
     file = load_yaml(tmp_path / "rig.yaml", RigFile)
     assert (file.rig, list(file.entries())) == ("bench", ["pad", "force", "motor"])
     assert all(entry.link.startswith("udp://127.0.0.1:") for entry in file.entries().values())
+    assert file.force.options == {"unit": "N"}  # as of a real one, from now on
     assert "tactbench record --rig bench --rig-file rig.yaml --sensor pad --live --out press.h5" in err
     assert "Press 1 of 2: 5 N after 0.5 s" in err
     assert "Press 2 of 2" in err

@@ -39,7 +39,14 @@ def tactbench_sensors():
 def tactbench_devices():
     where = {"driver": f"{HERE}:build_driver", "emulated_link": "datagram"}
     return [
-        DeviceDescriptor(name="scale", title="a scale", kind="force", emulator=f"{HERE}:build_emulator", **where),
+        DeviceDescriptor(
+            name="scale",
+            title="a scale",
+            kind="force",
+            emulator=f"{HERE}:build_emulator",
+            emulated_options={"unit": "N"},
+            **where,
+        ),
         DeviceDescriptor(name="bare-scale", title="a scale", kind="force", driver=f"{HERE}:build_driver"),
         DeviceDescriptor(name="screw", title="a motor", kind="motor", emulator=f"{HERE}:build_emulator", **where),
     ]
@@ -78,8 +85,10 @@ class TalkingDriver(Driver):
     """Reads them."""
 
     def __init__(self, settings):
-        if set(settings.options) - {"silent", "baud"}:
+        if set(settings.options) - {"silent", "baud", "unit"}:
             raise UsageError(f"It has no option {next(iter(settings.options))!r}.")
+        if not settings.streams and "unit" not in settings.options:
+            raise UsageError("A scale needs the option 'unit'.")
         fz = StreamSpec(name="scale", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
         self._streams = settings.streams or (fz,)
         self._clock = settings.clock

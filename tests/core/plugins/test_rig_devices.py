@@ -121,6 +121,16 @@ def test_errors_of_drivers_name_the_entry_and_the_next_step(changed, sensor, err
         drivers_of(file, REGISTRY, sensor, dict.fromkeys(("pad", "force"), lambda: None), devices.clock)
 
 
+def test_options_of_the_emulated_device_hold_for_it_alone():
+    """An emulated scale has its unit; of a real one nobody knows it but the rig file."""
+    file = rig_file(force={"device": "scale", "link": "udp://127.0.0.1:9"})
+    with (
+        EmulatedDevices(emulators_of(file, REGISTRY, "pad", sense)) as devices,
+        pytest.raises(UsageError, match=r"entry 'force'.*needs the option 'unit'"),
+    ):
+        drivers_of(file, REGISTRY, "pad", {"pad": devices.opener("pad")}, devices.clock)
+
+
 def test_an_emulated_device_that_nothing_emulates_is_said():
     with pytest.raises(UsageError, match=r"nothing emulates it here.*tactbench emulate"):
         drivers_of(rig_file(), REGISTRY, "pad", {}, lambda: 0)

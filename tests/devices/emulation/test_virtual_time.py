@@ -144,13 +144,32 @@ def test_everything_happens_in_order_of_time_whoever_is_waited_for():
     assert len(seen) == 10 + 33
 
 
-def test_a_datagram_stays_whole_and_a_read_takes_all_that_has_come_or_what_it_was_asked_for():
-    models = {"a": on("bytes", Recorder(0.01)), "b": on("datagram", Recorder(0.01))}
-    with EmulatedDevices(models) as devices, devices.open_link("a") as a, devices.open_link("b") as b:
-        devices.advance(30 * MS)
-        assert (a.read(0.0, size=4).data, a.read(0.0).data) == (bytes([0, 0, 0, 1]), bytes([0, 0, 2, 0, 0]))
+def test_pieces_that_have_come_keep_their_times():
+    models = {"a": on("bytes", Recorder(0.01)), "b": on("datagram", Recorder(0.01)), "c": on("spi", Complement())}
+    devices = EmulatedDevices(models)
+    with devices.open_link("a") as a, devices.open_link("b") as b, devices.open_link("c") as c:
         assert isinstance(b, DatagramLink)
-        assert [b.receive(0.0).data[0] for _ in range(3)] == [0, 1, 2]
+        for _ in range(3):
+            c.send([SpiStep(b"", pause_us=10_000)])
+        devices.advance(30 * MS)
+        for number in range(3):
+            for came in (a.read(0.0), b.receive(0.0)):
+                assert (came.data[0], came.t_ns) == (number, (number + 1) * 10 * MS)
+            assert c.receive(0.0).t_ns == (number + 1) * 10 * MS
+
+
+def test_a_read_takes_no_more_than_it_was_asked_for():
+    with EmulatedDevices({"a": on("bytes", Recorder(0.01))}) as devices, devices.open_link("a") as link:
+        assert [link.read(1.0, size=2).data for _ in range(4)] == [b"\0\0", b"\0", b"\1\0", b"\0"]
+
+
+def test_bytes_of_a_line_with_a_pace_are_read_together_once_they_have_come():
+    device = EmulatedDevice("bytes", Recorder(0.01), baud=9600)
+    with EmulatedDevices({"a": device}) as devices, devices.open_link("a") as link:
+        assert (link.read(1.0).data, devices.clock()) == (b"\0", 10 * MS)
+        devices.advance(30 * MS)
+        came = link.read(0.0)
+        assert (came.data, came.t_ns) == (bytes([0, 0, 1, 0, 0, 2]), 10 * MS + round(1e10 / 9600))
 
 
 def test_what_was_sent_before_the_link_was_opened_is_not_seen():
