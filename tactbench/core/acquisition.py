@@ -121,10 +121,6 @@ def _of_devices(acquisition: Acquisition, descriptor: RigDescriptor, rows: Mappi
     emulation: Emulation | None = getattr(acquisition, "emulation", None)
     clocks: Mapping[str, StreamClock] = getattr(acquisition, "clocks", {})
     counts: Mapping[str, StreamCounts] = getattr(acquisition, "stream_counts", {})
-    if emulation is not None and emulation.time == "virtual":
-        # Delays of a simulation are no jitter that a fit could take off, and its times have one clock.
-        bare = {"source": "simulated", "method": "none", "segments": ()}
-        clocks = {name: one.model_copy(update=bare) for name, one in clocks.items()}
     sources = {one.source for one in clocks.values()}
     simulated = descriptor.simulated or (emulation is not None and emulation.time == "virtual")
     return {

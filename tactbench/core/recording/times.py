@@ -16,9 +16,10 @@ Blocks = Iterable[tuple[str, Columns]]
 def with_clock_fits(meta: RecordingMeta, blocks: Blocks) -> RecordingMeta:
     """Return `meta` with the lines of every stream in `blocks` that has a device clock.
 
-    A stream with times of its device has one unless `meta` says that its times are the host's, or simulated.
+    A stream with times of its device has one unless `meta` says that its times are the host's. In virtual time, too:
+    what a device's link and its batches add to a time is added there as well.
     """
-    otherwise = StreamClock(source="simulated" if meta.clock == "simulated" else "device")
+    otherwise = StreamClock(source="device")
     fits: dict[str, ClockFit] = {}
     for stream, columns in blocks:
         if "device_ns" in columns and meta.clocks.get(stream, otherwise).source == "device":

@@ -173,7 +173,7 @@ class Bench:
                     **{f"zero of {stream}": ", ".join(f"{value:.6g}" for value in zero[stream]) for stream in zero},
                     **self._mounting(file.force),
                 },
-                clocks=_clocks((*own, *reference), virtual=advance is not None),
+                clocks={},
                 emulation=self._emulation(file, tuple(emulators)) if emulators else None,
                 reading=reading,
                 duration_s=duration_s,
@@ -267,10 +267,6 @@ def _zero_of(driver: Driver, seconds: float, clock: Clock) -> dict[str, FloatArr
         driver.stop()
     found = {stream.name: np.zeros(len(stream.channels)) for stream in driver.streams}
     return found | {name: np.concatenate(blocks).mean(axis=0) for name, blocks in rows.items()}
-
-
-def _clocks(streams: tuple[StreamSpec, ...], *, virtual: bool) -> dict[str, StreamClock]:
-    return {stream.name: StreamClock(source="simulated" if virtual else "host") for stream in streams}
 
 
 def build(context: RigContext) -> Bench:

@@ -23,6 +23,7 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             driver=f"{here}.force_torque.net_ft.driver:build",
             emulator=f"{here}.force_torque.net_ft.emulator:build",
             emulated_link="datagram",
+            emulated_options={"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6},
         ),
         DeviceDescriptor(
             name="nano17",
