@@ -42,7 +42,6 @@ from tactbench.plugin import (
     Block,
     ChannelSpec,
     Clock,
-    DatagramLink,
     Driver,
     LinkTimeout,
     Quality,
@@ -53,6 +52,7 @@ from tactbench.plugin import (
     StreamSpec,
     Unwrap,
     load_registry,
+    open_link,
 )
 
 HEAD = struct.Struct("<IQ")
@@ -134,7 +134,7 @@ class SyntheticDriver(Driver):
 
     def __init__(self, device: Device, port: int) -> None:
         self._device = device
-        self._link = DatagramLink("127.0.0.1", port)
+        self._link = open_link(f"udp://127.0.0.1:{port}")
         self._unwrap = Unwrap(BITS, device.rate_hz)
         self._datagrams = 0
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from tactbench.plugin import Block, ChannelSpec, Clock, DatagramLink, Driver, LinkTimeout, StreamSpec, Unwrap
+from tactbench.plugin import Block, ChannelSpec, Clock, DatagramLink, Driver, LinkTimeout, StreamSpec, Unwrap, open_link
 
 HEAD = struct.Struct("<I")
 BITS = 16
@@ -30,13 +30,13 @@ class Far:
         self.socket.bind(("127.0.0.1", 0))
         self.socket.settimeout(_SOCKET_S)
         self.port = self.socket.getsockname()[1]
-        self.peer: int | None = None
+        self.peer: tuple[str, int] | None = None
 
     def send(self, first: int, rows: int) -> None:
         """Send rows first, first + 1 …; each channel reads the number of its row."""
         numbers = np.arange(first, first + rows)
         data = np.repeat(numbers[:, None], len(self.stream.channels), axis=1).astype(self.stream.dtype)
-        self.socket.sendto(HEAD.pack(first % (1 << BITS)) + data.tobytes(), ("127.0.0.1", self.peer))
+        self.socket.sendto(HEAD.pack(first % (1 << BITS)) + data.tobytes(), self.peer)
 
     def taken(self) -> None:
         """Wait until the reader has passed on the datagram before, and asks for the next one."""
@@ -47,8 +47,11 @@ class NumberedDriver(Driver):
     """Reads one datagram a call, and says so to the device when it is called again."""
 
     def __init__(self, far: Far, clock: Clock) -> None:
-        self.link = DatagramLink("127.0.0.1", far.port, clock=clock)
-        far.peer = self.link.local_port
+        link = open_link(f"udp://127.0.0.1:{far.port}", clock)
+        assert isinstance(link, DatagramLink)
+        self.link = link
+        self.link.send(b"here")
+        far.peer = far.socket.recvfrom(16)[1]
         self.sampling = False
         self.stops = 0
         self._stream = far.stream
