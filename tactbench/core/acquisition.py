@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from tactbench.core.plugins.interfaces import Acquisition, Rig
 from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Role, Scene
@@ -31,6 +32,7 @@ def acquire(
     path: Path,
     clock: Callable[[], float],
     provenance: Mapping[str, Any],
+    watch: Callable[[Block], None] | None = None,
 ) -> Acquired:
     """Carry out `scene` and write what the rig yields to `path`.
 
@@ -43,6 +45,8 @@ def acquire(
     clock
         Seconds, monotonic; its difference over the scene becomes ``provenance["sim_s"]`` for a simulated rig and
         ``provenance["acquisition_s"]`` otherwise. Writing the file is not counted.
+    watch
+        Is given every block before it is written; it must not keep or change it, nor wait.
 
     Raises
     ------
@@ -63,6 +67,8 @@ def acquire(
                 spent += clock() - began
                 if block is None:
                     break
+                if watch is not None:
+                    watch(block)
                 writer.append(block)
             key = "sim_s" if descriptor.simulated else "acquisition_s"
             writer.revise(
