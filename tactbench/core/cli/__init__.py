@@ -19,6 +19,7 @@ VERBS = {
     "show": ("show", "Show sensors side by side, or a task, rig or estimator."),
     "choose": ("choose", "Say which sensor meets a wish, which misses it by how much, and what is unknown."),
     "record": ("record", "Carry out one scene into one recording."),
+    "doctor": ("doctor", "Show ports, permissions, extras and clocks, and whether a rig's devices answer."),
     "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
     "import": ("import_", "Turn foreign tables into recordings, as a mapping file says."),
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),

@@ -42,8 +42,8 @@ class TerminalOperator:
                 hint="Run it in a terminal, or add --yes if all of that is done already.",
             )
         with self._paused():
-            remark(f"{text}\nPress Enter when it is done, Ctrl-C to end.")
             _forget_typed()
+            remark(f"{text}\nPress Enter when it is done, Ctrl-C to end.")
             if not sys.stdin.readline():
                 raise RigError("The question was left without an answer.", hint="Press Enter when it is done.")
 
