@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     "--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="The recording, a .h5 file."
 )
 @click.option("--replace", is_flag=True, help="Replace the file if it is there already.")
+@click.option("--live", is_flag=True, help="Show taxels, force, rates and losses on stderr meanwhile.")
 def command(
     sensor: str,
     rig: str,
@@ -39,6 +40,7 @@ def command(
     seed: int,
     out: Path,
     replace: bool,
+    live: bool,
     effects: str | None,
     rung: str | None,
     tolerance: float | None,
@@ -46,6 +48,7 @@ def command(
 ) -> None:
     """Carry out one scene into one recording."""
     import time
+    from contextlib import ExitStack
 
     from tactbench.core.acquisition import acquire
     from tactbench.core.errors import UsageError
@@ -63,10 +66,19 @@ def command(
     built = _built(registry, rig)
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
-    made = acquire(
-        built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
-        provenance=gather(),
-    )  # fmt: skip
+    provenance = gather()
+    with ExitStack() as stack:
+        watch = None
+        if live:
+            from tactbench.core.cli.live import LiveView
+
+            simulated = " (SIM)" if registry.rigs[rig].simulated else ""
+            view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{simulated}, {scene.indenter}"))
+            built, watch = view.beside(built), view.watch
+        made = acquire(
+            built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
+            provenance=provenance, watch=watch,
+        )  # fmt: skip
     meta = made.meta
     spent = float(meta.provenance.get("sim_s", meta.provenance.get("acquisition_s", 0.0)))
     simulated = " (SIM)" if meta.simulated else ""

@@ -1,0 +1,218 @@
+"""``tactbench doctor``: what this machine has for devices, and whether those of a rig answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from tactbench.core.cli.device_check import DeviceCheck, StreamCheck
+    from tactbench.core.cli.host_devices import DeviceFile, Host
+    from tactbench.core.plugins.registry import Registry
+    from tactbench.core.spec.rig_file import RigFile
+
+Rows = list[tuple[str, ...]]
+
+
+@click.command(name="doctor")
+@click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
+              help="Also open the devices of this rig, and read them while nothing touches them.")  # fmt: skip
+@click.option("--sensor", metavar="NAME", help="Of the rig's sensors, this one alone.")
+@click.option("--seconds", type=click.FloatRange(min=0.1, max=600), default=3.0, show_default=True, metavar="T",
+              help="How long each device is read.")  # fmt: skip
+@click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
+@click.pass_context
+def command(ctx: click.Context, rig_file: Path | None, sensor: str | None, seconds: float, shape: str) -> None:
+    """Show ports, permissions, buses, extras, drivers and the clock; with --rig-file whether its devices answer.
+
+    Nothing is opened without --rig-file; motors are never started. Exit code 1 if something is wrong, 2 for a wrong
+    rig file.
+    """
+    import json
+    import time
+    from dataclasses import asdict
+
+    from tactbench.core.cli.device_check import as_plain, check_devices
+    from tactbench.core.cli.host_devices import look_at_host
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.errors import UsageError
+    from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.spec.rig_file import RigFile
+    from tactbench.core.spec.yaml_file import load_yaml
+
+    if sensor is not None and rig_file is None:
+        raise UsageError("--sensor picks one of a rig's sensors.", hint="Give the rig with --rig-file FILE.")
+    registry = load_registry()
+    rig = None if rig_file is None else load_yaml(rig_file, RigFile)
+    sensors = _sensors(rig, sensor, registry)
+    host = look_at_host()
+    checks: list[DeviceCheck] = []
+    if rig is not None:
+        remark(f"Reading each device for {seconds:g} s; nothing may touch them.")
+        checks = check_devices(rig, registry, sensors, seconds=seconds, clock=time.monotonic_ns)
+    problems = [*host.problems, *(f"{check.name}: {text}" for check in checks for text in check.problems)]
+    if shape == "json":
+        about = {
+            "host": asdict(host),
+            "drivers": [
+                dict(zip(("name", "kind", "driver", "emulator"), row, strict=True)) for row in _drivers(registry)
+            ],
+            "devices": as_plain(checks),
+            "problems": problems,
+        }
+        click.echo(json.dumps(about, indent=1, ensure_ascii=False, allow_nan=False))
+    else:
+        _print(host, registry, rig, checks, problems)
+    ctx.exit(1 if problems else 0)
+
+
+def _sensors(rig: RigFile | None, sensor: str | None, registry: Registry) -> tuple[str, ...]:
+    """Return the sensors to look at; raises UnknownNameError for one that the file or the registry does not have."""
+    from tactbench.core.errors import UnknownNameError
+
+    if rig is None:
+        return ()
+    if sensor is not None and sensor not in rig.sensors:
+        raise UnknownNameError("sensor in this rig file", sensor, rig.sensors)
+    asked = tuple(rig.sensors) if sensor is None else (sensor,)
+    for name in asked:
+        registry.sensors[name]
+    for name, entry in rig.entries().items():
+        if name not in rig.sensors:
+            registry.devices[str(getattr(entry, "device", name))]
+    return asked
+
+
+def _drivers(registry: Registry) -> Rows:
+    """Return name, kind, driver and emulator of what can be connected."""
+    rows = [(one.name, "sensor", one.driver, one.emulator) for one in registry.sensors if one.driver or one.emulator]
+    rows += [(one.name, one.kind, one.driver, one.emulator) for one in registry.devices]
+    return [(name, kind, driver or "", emulator or "") for name, kind, driver, emulator in rows]
+
+
+def _print(
+    host: Host, registry: Registry, rig: RigFile | None, checks: Sequence[DeviceCheck], problems: Sequence[str]
+) -> None:
+    ports = [_port(one) for one in host.serial]
+    _table("serial ports", ("port", "what", "usb", "may open", "name that stays"), ports)
+    _table("buses, network, clock", ("", "here", "next step"), list(_machine(host)))
+    extras = [
+        (one.name, ", ".join(one.requires), *(("missing", one.command) if one.missing else ("installed", "")))
+        for one in host.extras
+    ]
+    _table("extras", ("extra", "requires", "state", "install it with"), extras)
+    drivers = [
+        (name, kind, "yes" if driver else "no", "yes" if made else "no")
+        for name, kind, driver, made in _drivers(registry)
+    ]
+    _table("devices that can be connected", ("name", "kind", "driver", "emulator"), drivers)
+    if rig is not None:
+        _print_rig(checks)
+    for text in problems:
+        click.secho("Wrong: ", fg="red", bold=True, nl=False)
+        click.echo(text)
+    if not problems:
+        click.echo("Nothing is wrong." if rig else "Nothing is wrong. To try the devices themselves: --rig-file FILE")
+
+
+def _port(port: DeviceFile) -> tuple[str, ...]:
+    allowed = "yes" if port.allowed else f"no ({port.group or 'not its owner'})"
+    return port.path, port.title, port.usb, allowed, ", ".join(port.names)
+
+
+def _machine(host: Host) -> Iterator[tuple[str, ...]]:
+    """Yield a line for each thing: its name, what is here, and the next step if there is one."""
+    network, clock = host.network, host.clock
+    yield "socketcan", "AF_CAN is there" if network.socketcan else "the kernel has no AF_CAN", ""
+    for interface in host.can:
+        yield f"CAN {interface.name}", "up" if interface.up else "down", interface.hint
+    if not host.can:
+        yield "CAN", "no interface", "an adapter with Lawicel's commands needs none: see slcan"
+    usb = [port for port in host.serial if port.usb]
+    candidates = ", ".join(f"can://slcan/{port.address}?bitrate=1000000" for port in usb)
+    yield "slcan", candidates or "no serial port on USB", "if it is such an adapter" if usb else ""
+    for device in host.spi:
+        yield "SPI", device.path, "" if device.allowed else device.hint
+    if not host.spi:
+        yield "SPI", "no /dev/spidev*", "a bridge on a serial port needs none: docs/links.md"
+    route = f"goes out from {network.multicast_from}" if network.multicast_from else "no route"
+    yield "multicast", route, ""
+    if network.largest_buffer_bytes is not None:
+        yield "datagrams", f"buffer of at most {network.largest_buffer_bytes} bytes", ""
+    for hint in network.hints:
+        yield "", "", hint
+    late = f"late by {clock.late_median_us / 1e3:.2f} ms (median of {clock.sleeps})"
+    yield "sleep of 5 ms", f"{late}, {clock.late_largest_us / 1e3:.2f} ms at most", ""
+    yield "clock", f"steps of {clock.step_ns} ns", ""
+    steered = "" if clock.steered_ppm is None else f"; NTP steers by {clock.steered_ppm:+.2f} ppm now"
+    yield "wall clock", f"{clock.wall_us:+.1f} us against it in half a second{steered}", ""
+
+
+def _print_rig(checks: Sequence[DeviceCheck]) -> None:
+    said = [
+        (check.name, check.device, check.link, _identity(check), "; ".join([*check.remarks, *_counts(check)]))
+        for check in checks
+    ]
+    _table("the rig's devices", ("name", "device", "link", "says", "remarks"), said)
+    streams = [(check.name, *_stream(stream)) for check in checks for stream in check.streams]
+    if streams:
+        _table(
+            "streams",
+            ("device", "stream", "rows", "Hz", "stated", "lost", "GAP", "MISSING", "SUSPECT", "SATURATED"),
+            streams,
+        )
+    noise = [row for check in checks for stream in check.streams for row in _noise(check, stream)]
+    if noise:
+        _table("unloaded", ("device", "stream", "channels", "mean", "standard deviation", "largest", "constant"), noise)
+
+
+def _identity(check: DeviceCheck) -> str:
+    if check.identity:
+        return ", ".join(f"{name} {value}" for name, value in check.identity.items())
+    return "-" if check.problems or check.emulated else "nothing"
+
+
+def _counts(check: DeviceCheck) -> list[str]:
+    return [f"{number} {name}" for name, number in check.counts.items()]
+
+
+def _stream(stream: StreamCheck) -> tuple[str, ...]:
+    rates = ("-" if rate is None else f"{rate:.5g}" for rate in (stream.rate_hz, stream.nominal_hz))
+    return (stream.stream, str(stream.rows), *rates, str(stream.lost), *map(str, stream.marks.values()))
+
+
+def _noise(check: DeviceCheck, stream: StreamCheck) -> Iterator[tuple[str, ...]]:
+    for one in stream.noise:
+        means = list(one.means.values())
+        mean = "-"
+        if one.kind in ("force", "torque"):
+            mean = ", ".join(f"{name} {value:+.4g}" for name, value in one.means.items())
+        elif means:
+            mean = f"{min(means):.5g} … {max(means):.5g}" if len(means) > 1 else f"{means[0]:.5g}"
+        sd = "-" if one.sd_median is None else f"{one.sd_median:.3g} {one.unit}"
+        largest = "-" if one.sd_largest is None else f"{one.sd_largest:.3g} ({one.noisiest})"
+        constant = ", ".join(one.constant) if len(one.constant) <= 4 else f"{len(one.constant)} channels"
+        yield check.name, stream.stream, f"{one.channels} {one.kind}", mean, sd, largest, constant
+
+
+def _table(title: str, head: tuple[str, ...], rows: Rows) -> None:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    from tactbench.core.cli.screen import console
+
+    screen = console()
+    screen.print(Text(title, style="bold"))
+    if not rows:
+        screen.print("  none\n")
+        return
+    table: Any = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in head:
+        table.add_column(Text(name), overflow="fold")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    screen.print(table)

@@ -1,0 +1,57 @@
+"""Whoever stands at a rig: asked on stderr, answers with Enter."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+
+from tactbench.core.cli.screen import remark
+from tactbench.core.errors import RigError
+
+
+class TerminalOperator:
+    """An :class:`~tactbench.core.plugins.interfaces.Operator` at the terminal.
+
+    Parameters
+    ----------
+    yes
+        Everything asked for is done already: show it and go on (``--yes``).
+    paused
+        Entered while somebody is asked, so that nothing else draws on the terminal: ``LiveView.paused``.
+    """
+
+    def __init__(self, *, yes: bool = False, paused: Callable[[], AbstractContextManager[None]] = nullcontext) -> None:
+        self._yes = yes
+        self._paused = paused
+
+    def asked(self, text: str) -> None:
+        """Show `text` and wait for Enter; one pressed before it was shown does not count.
+
+        Raises
+        ------
+        RigError
+            If stdin is no terminal, or is closed (Ctrl-D).
+        """
+        if self._yes:
+            remark(text)
+            return
+        if not sys.stdin.isatty():
+            raise RigError(
+                f"Somebody has to be there: {text}",
+                hint="Run it in a terminal, or add --yes if all of that is done already.",
+            )
+        with self._paused():
+            _forget_typed()
+            remark(f"{text}\nPress Enter when it is done, Ctrl-C to end.")
+            if not sys.stdin.readline():
+                raise RigError("The question was left without an answer.", hint="Press Enter when it is done.")
+
+
+def _forget_typed() -> None:
+    """Drop what was typed before, where the system can."""
+    try:
+        import termios
+    except ImportError:  # Windows
+        return
+    termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
