@@ -188,7 +188,7 @@ def test_increments_add_up_and_there_is_one_at_a_time():
 
 @pytest.mark.parametrize(("baud", "longest_s"), [(9600, 0.065), (115200, 0.03)])
 def test_an_increment_under_force_control_takes_so_long(baud, longest_s):
-    """From the call to the knowledge that it has ended: a question that is out, LR, M, TPOS, OST, and the motor's move."""
+    """From the call to the knowledge of its end: a question that is out, LR, M, TPOS, OST, and the motor's move."""
     driver, link = ready(baud=baud)
     times = []
     for _ in range(10):
