@@ -79,15 +79,16 @@ class VirtualLink(ByteLink, DatagramLink):
 
 def read_for(driver, link, seconds):
     """Return one block of what comes in some time."""
-    blocks, end_s = [], link.now_s + seconds
-    while link.now_s < end_s:
-        blocks += driver.read(end_s - link.now_s)
+    blocks, end_ns = [], link.clock() + round(1e9 * seconds)
+    while link.clock() < end_ns:
+        blocks += driver.read((end_ns - link.clock()) / 1e9)
     return joined(blocks)
 
 
 def joined(blocks):
     def all_of(name):
-        return np.concatenate([getattr(block, name) for block in blocks])
+        parts = [getattr(block, name) for block in blocks]
+        return None if parts[0] is None else np.concatenate(parts)
 
     marks = [np.zeros(b.data.shape, np.uint8) if b.quality is None else b.quality for b in blocks]
     return Block(

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from tactbench.plugin import ByteLink, Clock, LinkTimeout, Received
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     LONGEST_ANSWER,
+    LONGEST_LINE,
     Kind,
     Line,
     LineReader,
@@ -192,12 +193,11 @@ class Exchange:
     def quiet(self) -> None:
         """Drop what comes until nothing has come for the time of an answer; at most ten times that."""
         seen = bytearray()
-        for _ in range(10):
-            try:
+        deadline = self._clock() + round(1e10 * self.answer_s)
+        with suppress(LinkTimeout):
+            while self._clock() < deadline:
                 seen += self._link.read(self.answer_s).data
-            except LinkTimeout:
-                break
-            self._refuse_newer(seen)
+                self._refuse_newer(seen[-LONGEST_LINE:])
         self._reader.clear()
         self._asked.clear()
         self._marking, self._missed = False, 0

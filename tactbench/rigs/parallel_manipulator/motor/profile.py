@@ -131,9 +131,11 @@ class FaulhaberOptions(Options):
     takes a negative and a positive one."""
     upper_m: float | None = Field(default=None, gt=0.0)
     speed_m_s: float | None = Field(default=None, gt=0.0)
-    """Of moves; this and the next three: None leaves what the drive has."""
+    """Of moves; this and the next four: None leaves what the drive has."""
     acceleration_m_s2: float | None = Field(default=None, gt=0.0)
     """Of starting and braking."""
+    corridor_m: float | None = Field(default=None, gt=0.0)
+    """Around a target, within which the drive says that it is reached: well below the shortest move."""
     peak_current_a: float | None = Field(default=None, gt=0.0)
     continuous_current_a: float | None = Field(default=None, gt=0.0)
     homing: Literal["here", "switch", "end-stop"] = "here"

@@ -1,0 +1,91 @@
+"""The devices by their names: what listings see, and drivers and emulators that fit each other."""
+
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import DriverSettings, EmulatorSettings, load_object, load_registry
+from tests.rigs.parallel_manipulator.pumps import VirtualLink, joined, read_for
+from tests.rigs.parallel_manipulator.test_nano17 import FT8577
+
+POINT = EntryPoint("parallel-manipulator", "tactbench.rigs.parallel_manipulator", "tactbench")
+
+
+def devices():
+    registry = load_registry([POINT])
+    assert registry.failures == []
+    return {device.name: device for device in registry.devices}
+
+
+def test_the_package_brings_two_force_sensors_and_a_motor():
+    found = {name: (device.kind, device.emulated_link) for name, device in devices().items()}
+    assert found == {"net-ft": ("force", "datagram"), "nano17": ("force", "bytes"), "faulhaber": ("motor", "bytes")}
+
+
+def test_listing_them_imports_neither_numpy_nor_links():
+    code = (
+        "import sys; from tactbench.rigs.parallel_manipulator import tactbench_devices; tactbench_devices(); "
+        "assert not {'numpy', 'serial', 'tactbench.links.link'} & set(sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
+
+
+@pytest.mark.parametrize("name", ["net-ft", "nano17", "faulhaber"])
+def test_driver_and_emulator_take_the_same_options(name, tmp_path):
+    calibration = tmp_path / "FT8577.cal"
+    calibration.write_bytes(FT8577)
+    options = {
+        "net-ft": {"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6, "bias": True},
+        "nano17": {"calibration": str(calibration), "bias_samples": 50},
+        "faulhaber": {"lower_m": -9e-3, "upper_m": 9e-3, "peak_current_a": 0.5},
+    }[name]
+    descriptor = devices()[name]
+
+    def senses(time_s):
+        return {} if time_s < 100.5 else {"fz": -2.0, "load": 1.0}
+
+    def block_of_a_second():
+        emulator = load_object(descriptor.emulator)(EmulatorSettings(senses, np.random.default_rng(3), options))
+        link = VirtualLink(emulator)
+        with load_object(descriptor.driver)(DriverSettings(lambda: link, options=options, clock=link.clock)) as driver:
+            assert driver.identify()
+            driver.start()
+            assert driver.tare() is (name != "faulhaber")
+            block = read_for(driver, link, 2.0)
+            assert [stream.name for stream in driver.streams] == [block.stream]
+            assert block.data.shape[1] == len(driver.streams[0].channels)
+            assert driver.counts == {}
+        return block
+
+    first, again = block_of_a_second(), block_of_a_second()
+    if name != "faulhaber":
+        assert first.data[-1] == pytest.approx([0, 0, -2, 0, 0, 0], abs=2e-3)
+    # Virtual time: the same each time, to the bit.
+    for attribute in ("t_ns", "data", "quality"):
+        assert np.array_equal(getattr(first, attribute), getattr(again, attribute), equal_nan=attribute == "data")
+
+
+def test_blocks_of_any_size_hold_the_same_samples(tmp_path):
+    calibration = tmp_path / "FT8577.cal"
+    calibration.write_bytes(FT8577)
+    options = {"calibration": str(calibration)}
+    descriptor = devices()["nano17"]
+    found = []
+    for wait_s in (0.002, 0.3):
+        emulator = load_object(descriptor.emulator)(
+            EmulatorSettings(lambda t: {"fy": np.sin(t)}, np.random.default_rng(3), options)
+        )
+        link = VirtualLink(emulator)
+        driver = load_object(descriptor.driver)(
+            DriverSettings(lambda link=link: link, options=options, clock=link.clock)
+        )
+        driver.start()
+        blocks = []
+        while link.now_s < 102.0:
+            link.go(wait_s)
+            blocks += driver.read(0.0)
+        found.append(joined(blocks).data[:1500])
+    assert np.array_equal(found[0], found[1])

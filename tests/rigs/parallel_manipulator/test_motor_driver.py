@@ -1,0 +1,711 @@
+"""The motor's driver against its emulator: answers apart from notices, moves, homing, retreats, and what goes wrong."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.plugin import (
+    DriverSettings,
+    EmulatorSettings,
+    LinkTimeout,
+    LinkUnplugged,
+    Quality,
+    RigError,
+    UsageError,
+    open_link,
+)
+from tactbench.rigs.parallel_manipulator.motor.codec import OperationStatus
+from tactbench.rigs.parallel_manipulator.motor.driver import build
+from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
+from tactbench.rigs.parallel_manipulator.motor.emulator import build as build_emulator
+from tactbench.rigs.parallel_manipulator.motor.errors import (
+    AnswerMissingError,
+    CommandNotAvailableError,
+    CommandUnknownError,
+    DriveTooHotError,
+    FlashDefectError,
+    MotorError,
+    MotorFaultError,
+    MotorNotReadyError,
+    MotorSilentError,
+    MotorStalledError,
+    ParameterInvalidError,
+    SettingNotKeptError,
+    WrongGenerationError,
+)
+from tactbench.rigs.parallel_manipulator.motor.exchange import IN_A_ROW, Exchange
+from tactbench.rigs.parallel_manipulator.motor.profile import MotorProfile
+from tests.rigs.parallel_manipulator.pumps import VirtualLink, on_pty
+
+STEP_M = 6e-6
+LIMITS = {"lower_m": -9e-3, "upper_m": 9e-3, "speed_m_s": 0.05, "acceleration_m_s2": 1.0, "corridor_m": 12e-6}
+
+
+def nothing(position_m, time_s):
+    return 0.0
+
+
+def wall(at_m, stiffness):
+    """Return a spring [N/m] that begins at a position."""
+    return lambda position_m, time_s: stiffness * max(0.0, position_m - at_m)
+
+
+def motor(load=nothing, **more):
+    return MotorEmulator(load, np.random.default_rng(15), **more)
+
+
+def driver_on(emulator, *, unplugged_s=math.inf, **options):
+    link = VirtualLink(emulator, unplugged_s=unplugged_s)
+    return build(DriverSettings(open_link=lambda: link, options=options, clock=link.clock)), link
+
+
+def ready(load=nothing, faults=(), unplugged_s=math.inf, **options):
+    """Return a driver that is homed where it stands and has power, and its link."""
+    emulator = motor(load, baud=options.get("baud", 9600), faults=faults)
+    driver, link = driver_on(emulator, unplugged_s=unplugged_s, **(LIMITS | options))
+    driver.start()
+    driver.home()
+    driver.enable()
+    return driver, link
+
+
+def finish(driver, link, seconds=5.0):
+    """Carry a move on to its end."""
+    end_s = link.now_s + seconds
+    while driver.moving:
+        assert link.now_s < end_s
+        driver.update(0.01)
+
+
+def settled(driver, link):
+    """Return what is known after the next whole turn of questions."""
+    driver.read(0.0)
+    begin_ns = link.clock()
+    while driver.state is None or driver.state.t_ns < begin_ns:
+        driver.update(0.01)
+    return driver.state
+
+
+def read_on(driver):
+    """Read until something is raised."""
+    while True:
+        driver.read(1.0)
+
+
+def place(link):
+    return link.emulator.drive.servo.position_m
+
+
+# As a device of a rig -------------------------------------------------------------------------------------------------
+
+
+def test_it_says_what_it_is():
+    driver, _ = driver_on(motor())
+    assert driver.identify() == {"firmware": "EMULATOR", "model": "linear motor, Faulhaber ASCII", "serial": "0"}
+    assert driver.counts == {}
+
+
+def test_it_is_watched_without_being_moved():
+    driver, link = driver_on(motor(lambda x, t: -0.05 if t > 101 else 0.0))
+    driver.start()
+    blocks = []
+    while link.now_s < 103.0:
+        blocks += driver.read(0.1)
+    data = np.concatenate([block.data for block in blocks])
+    t_ns = np.concatenate([block.t_ns for block in blocks])
+    (stream,) = driver.streams
+    assert [(c.name, c.unit) for c in stream.channels] == [("position", "m"), ("current", "A"), ("target", "m")]
+    # Without power it is pushed away, and nobody knows a target.
+    assert not driver.enabled
+    assert data[0, 0] == 0.0
+    assert data[-1, 0] == pytest.approx(place(link), abs=2e-3)
+    assert np.isnan(data[:, 2]).all()
+    assert all((block.quality[:, 2] == Quality.MISSING).all() for block in blocks)
+    assert all((block.quality[:, :2] == Quality.GOOD).all() for block in blocks)
+    # At 9600 baud three questions and their answers take 30 to 36 ms.
+    assert 0.028e9 < np.diff(t_ns).min() <= np.diff(t_ns).max() < 0.040e9
+    driver.stop()
+    driver.close()
+    driver.close()
+
+
+def test_a_faster_line_is_watched_faster():
+    driver, link = ready(baud=115200)
+    blocks, end_s = [], link.now_s + 1.0
+    while link.now_s < end_s:
+        blocks += driver.read(0.1)
+    assert 130 < sum(len(block.data) for block in blocks) < 250
+
+
+def test_asking_does_not_wait():
+    driver, link = ready()
+    begin_s = link.now_s
+    for _ in range(50):
+        driver.read(0.0)
+        driver.update()
+    assert link.now_s == begin_s
+
+
+def test_units_are_those_of_the_rig_file():
+    driver, link = ready(increment_m=1e-5, speed_unit_m_s=1e-4)
+    link.emulator.drive.profile = driver._profile  # The drive that these units are of.
+    assert driver.move_by(1.001e-3) == pytest.approx(1.00e-3)
+    finish(driver, link)
+    link.go(0.1)
+    state = settled(driver, link)
+    assert (state.position_m, state.target_m) == pytest.approx((1.00e-3, 1.00e-3))
+
+
+# Moves ----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_move_ends_at_its_target_while_it_is_watched():
+    driver, link = ready()
+    assert driver.move_to(3e-3) == pytest.approx(500 * STEP_M)
+    assert driver.moving
+    finish(driver, link)
+    assert place(link) == pytest.approx(3e-3, abs=STEP_M / 2)
+    (block,) = driver.read(0.0) or driver.read(1.0)
+    positions = block.data[:, 0]
+    assert len(positions) > 3
+    assert (np.diff(positions) >= 0).all()
+    assert driver.state.status & OperationStatus.POSITION_ATTAINED
+    assert driver.state.target_m == pytest.approx(3e-3)
+
+
+def test_increments_add_up_and_there_is_one_at_a_time():
+    driver, link = ready()
+    for n in range(20):
+        assert driver.move_by(-7 * STEP_M) == pytest.approx(-7 * (n + 1) * STEP_M)
+        with pytest.raises(MotorNotReadyError, match="is moving"):
+            driver.move_by(STEP_M)
+        finish(driver, link)
+    assert driver.locate() == pytest.approx(-140 * STEP_M)
+
+
+@pytest.mark.parametrize(("baud", "longest_s"), [(9600, 0.065), (115200, 0.03)])
+def test_an_increment_under_force_control_takes_so_long(baud, longest_s):
+    """From the call to the knowledge of its end: a question that is out, LR, M, TPOS, OST, and the motor's move."""
+    driver, link = ready(baud=baud)
+    times = []
+    for _ in range(10):
+        begin_s = link.now_s
+        driver.move_by(12 * STEP_M)
+        while driver.moving:
+            driver.update(0.002)
+        times.append(link.now_s - begin_s)
+    assert max(times) < longest_s
+
+
+def test_current_is_that_of_the_force():
+    driver, link = ready(wall(0.0, 10e3))
+    driver.move_to(0.5e-3)
+    finish(driver, link)
+    link.go(0.1)
+    assert settled(driver, link).current_a == pytest.approx(10e3 * place(link) / 6.5, abs=0.6e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "before", "message"),
+    [
+        ({}, [], "not homed"),
+        ({}, ["home"], "no power"),
+        ({}, ["home", "enable"], "beyond the ends of travel"),
+        ({"lower_m": None, "upper_m": None}, ["home", "enable"], "no ends of travel"),
+    ],
+)
+def test_moves_that_are_not_allowed(options, before, message):
+    driver, link = driver_on(motor(), **(LIMITS | options))
+    driver.start()
+    for step in before:
+        getattr(driver, step)()
+    with pytest.raises(MotorNotReadyError, match=message):
+        driver.move_to(9.1e-3)
+    assert place(link) == 0.0
+    assert not driver.moving
+
+
+def test_a_target_that_is_not_known_is_asked_for():
+    driver, _ = ready()
+    driver.disable()
+    driver._enabled = True
+    with pytest.raises(MotorNotReadyError, match=r"target is not known.*locate"):
+        driver.move_by(1e-3)
+
+
+def test_limits_and_currents_are_set_and_read_back():
+    _, link = ready(peak_current_a=0.8, continuous_current_a=0.4)
+    kept = link.emulator.drive.settings
+    assert (kept.speed, kept.acceleration, kept.braking) == (50, 1000, 1000)
+    assert (kept.peak_current, kept.continuous_current) == (800, 400)
+    assert (kept.positive_limit, kept.negative_limit, kept.limits_on) == (1500, -1500, True)
+
+
+def test_a_setting_that_the_drive_does_not_keep_is_told():
+    emulator = motor()
+    driver, _ = driver_on(emulator, **LIMITS)
+    emulator.drive._number, kept = lambda argument, largest, **more: min(argument, 40), emulator.drive._number
+    with pytest.raises(SettingNotKeptError, match=r"told SP50 and answers GSP with 40"):
+        driver.start()
+    emulator.drive._number = kept
+    with pytest.raises(RigError, match="is 20000 units; the drive takes at most 10000"):
+        driver_on(motor(), speed_m_s=20.0)
+
+
+# Homing ---------------------------------------------------------------------------------------------------------------
+
+
+def test_homing_where_it_stands_does_not_move_it():
+    driver, link = driver_on(motor(), **LIMITS, home_m=1e-3)
+    driver.start()
+    assert not driver.homed
+    driver.home()
+    driver.enable()
+    assert (driver.homed, place(link)) == (True, 0.0)
+    assert driver.locate() == pytest.approx(1e-3, abs=STEP_M / 2)
+
+
+def test_homing_on_the_switch():
+    emulator = build_emulator(
+        EmulatorSettings(senses=lambda t: {}, rng=np.random.default_rng(1), options=LIMITS | {"homing": "switch"})
+    )
+    driver, link = driver_on(emulator, **LIMITS, homing="switch", home_m=-8e-3)
+    driver.start()
+    driver.home()
+    assert (driver.homed, driver.enabled) == (True, True)
+    assert place(link) == pytest.approx(-8e-3, abs=STEP_M)
+    driver.move_to(0.0)
+    finish(driver, link)
+    assert place(link) == pytest.approx(0.0, abs=STEP_M)
+
+
+def test_homing_on_the_end_stop_with_little_current():
+    driver, link = driver_on(motor(), **LIMITS, homing="end-stop", homing_speed_m_s=-0.02, home_m=-10e-3)
+    largest = []
+    driver.start()
+    driver.home(lambda: largest.append(abs(link.emulator.drive.servo.current_a)) or False)
+    # The stop is beyond the ends of travel, so it has come back to them; its current is what it was.
+    assert place(link) == pytest.approx(-9e-3, abs=2 * STEP_M)
+    assert max(largest) <= 0.2 * (1 + 1e-9)
+    assert link.emulator.drive.settings.peak_current == 1600
+    driver.move_to(0.0)
+    finish(driver, link)
+    assert place(link) == pytest.approx(0.0, abs=2 * STEP_M)
+
+
+@pytest.mark.parametrize("homing", ["switch", "end-stop"])
+def test_homing_can_be_ended(homing):
+    emulator = motor(reference_switch_m=-8e-3)
+    driver, link = driver_on(emulator, **LIMITS, homing=homing, homing_speed_m_s=-0.005)
+    driver.start()
+    with pytest.raises(MotorStalledError, match="told to stand"):
+        driver.home(lambda: place(link) < -1e-3)
+    link.go(0.2)
+    stands_m = place(link)
+    link.go(1.0)
+    assert place(link) == pytest.approx(stands_m, abs=1e-9)
+    assert -1.5e-3 < stands_m < -1e-3
+    assert not driver.homed
+
+
+def test_no_switch_and_no_stop():
+    driver, link = driver_on(motor(), **LIMITS, homing="switch")
+    driver.start()
+    with pytest.raises(CommandNotAvailableError):
+        driver.home()
+    endless, link = driver_on(motor(), **LIMITS, homing="end-stop", homing_speed_m_s=0.001)
+    endless.start()
+    link.emulator.drive.servo.stops = (-1.0, 1.0)
+    with pytest.raises(MotorStalledError, match="an end stop within 60 s"):
+        endless.home()
+
+
+# Retreats -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_retreat_takes_the_place_of_any_move():
+    driver, link = ready(retreat_m=-5e-3, retreat_speed_m_s=0.2)
+    driver.move_to(5e-3)
+    for _ in range(20):
+        driver.update(0.002)
+    assert place(link) > 0.1e-3
+    begin_s = link.now_s
+    driver.retreat()
+    assert link.now_s == begin_s
+    finish(driver, link)
+    assert place(link) == pytest.approx(-5e-3, abs=STEP_M)
+    assert driver.state.target_m == pytest.approx(-5e-3, abs=STEP_M / 2)
+    # The next move has the speed of moves again.
+    driver.move_by(STEP_M)
+    finish(driver, link)
+    assert link.emulator.drive.settings.speed == 50
+
+
+@pytest.mark.parametrize("bytes_on_the_way", range(0, 40, 3))
+def test_a_retreat_at_any_moment_of_an_increment(bytes_on_the_way):
+    """Whatever answers are out: the increment's, or those to questions."""
+    driver, link = ready(retreat_m=-2e-3)
+    driver.move_by(100 * STEP_M)
+    for _ in range(bytes_on_the_way):
+        driver.update(0.002)
+    driver.retreat()
+    finish(driver, link)
+    assert place(link) == pytest.approx(-2e-3, abs=STEP_M)
+    assert driver.counts == {}
+
+
+def test_a_retreat_whose_answers_are_lost_is_repeated():
+    driver, link = ready(retreat_m=-2e-3)
+    link.emulator.faults = [MotorFault("late-answers", end_s=link.now_s + 0.1, delay_s=0.4)]
+    driver.retreat()
+    with pytest.raises(AnswerMissingError, match=r"did not answer (SP|LA|M)"):
+        finish(driver, link)
+    driver.retreat()
+    finish(driver, link)
+    assert place(link) == pytest.approx(-2e-3, abs=STEP_M)
+    assert driver.counts["time_outs"] == 2
+
+
+def test_no_place_to_retreat_to():
+    driver, _ = ready()
+    with pytest.raises(MotorNotReadyError, match="retreat_m"):
+        driver.retreat()
+
+
+# What goes wrong ------------------------------------------------------------------------------------------------------
+
+
+def test_notices_do_not_answer():
+    driver, link = ready()
+    # Place and speed reached, at once and often.
+    for text in (b"NP\r", b"NV1\r", b"NP10\r"):
+        link.send(text)
+        link.go(0.05)
+        link.arrived.clear()
+    driver.move_to(1e-3)
+    finish(driver, link)
+    assert place(link) == pytest.approx(1e-3, abs=STEP_M)
+    assert driver.counts == {}
+
+
+def test_a_few_late_answers_are_not_taken_for_others():
+    driver, link = ready()
+    driver.move_to(1e-3)
+    finish(driver, link)
+    driver.read(0.0)
+    link.emulator.faults = [MotorFault("late-answers", end_s=link.now_s + 0.05, delay_s=0.3)]
+    blocks, end_s = [], link.now_s + 3.0
+    while link.now_s < end_s:
+        blocks += driver.read(0.1)
+    data = np.concatenate([block.data for block in blocks])
+    # No current was read as a position, nor a status as a current.
+    assert np.abs(data[:, [0, 2]] - 1e-3).max() <= STEP_M
+    assert np.abs(data[:, 1]).max() < 0.01
+    assert driver.counts == {"time_outs": 1, "late": 1}
+
+
+def test_answers_that_stay_late_are_silence():
+    driver, link = ready(retreat_m=-2e-3)
+    link.emulator.faults = [MotorFault("late-answers", delay_s=0.25)]
+    with pytest.raises(MotorSilentError, match="3 answers in a row"):
+        read_on(driver)
+    link.emulator.faults = []
+    link.go(1.0)
+    assert driver.read(1.0)
+    driver.retreat()
+    finish(driver, link)
+
+
+def test_an_increment_that_is_not_answered():
+    driver, link = ready()
+    driver.update(0.1)
+    driver.move_by(100 * STEP_M)
+    link.emulator.faults = [MotorFault("late-answers", end_s=link.now_s + 0.08, delay_s=0.5)]
+    with pytest.raises(AnswerMissingError, match=r"did not answer (LR100|M) in time; whether"):
+        finish(driver, link)
+    link.emulator.faults = []
+    assert not driver.moving
+    with pytest.raises(MotorNotReadyError, match="locate"):
+        driver.move_by(STEP_M)
+    found_m = driver.locate()
+    assert found_m == pytest.approx(place(link), abs=STEP_M)
+    driver.move_by(STEP_M)
+    finish(driver, link)
+    link.go(0.1)
+    assert settled(driver, link).position_m == pytest.approx(found_m + STEP_M)
+
+
+def test_garbled_lines_cost_time_and_are_counted():
+    driver, link = ready(retreat_m=-5e-3)
+    link.emulator.faults = [MotorFault("garbled-line", every=9)]
+    moved = trouble = 0
+    rng = np.random.default_rng(2)
+    for _ in range(40):
+        try:
+            driver.move_to(rng.uniform(-8e-3, 8e-3))
+            finish(driver, link)
+            moved += 1
+            assert place(link) == pytest.approx(link.emulator.drive._target_m, abs=STEP_M)
+        except MotorError:
+            trouble += 1
+            driver.retreat()
+            while driver.moving:
+                try:
+                    finish(driver, link)
+                except MotorError:
+                    driver.retreat()
+            assert place(link) == pytest.approx(-5e-3, abs=STEP_M)
+    counts = driver.counts
+    assert moved + trouble == 40
+    assert moved > 10
+    # What was garbled was missed, and each move that failed has missed something.
+    assert counts["garbled"] > 0
+    assert counts["time_outs"] >= trouble > 0
+
+
+def test_a_motor_fault_is_raised_once_and_by_name():
+    driver, link = ready(faults=[MotorFault("motor-fault", 103.0, 104.0)])
+    driver.move_to(8e-3)
+    finish(driver, link)
+    with pytest.raises(MotorFaultError, match="overtemperature"):
+        read_on(driver)
+    assert link.now_s == pytest.approx(103.0, abs=0.1)
+    assert not driver.enabled
+    driver.read(0.5)
+    assert driver.state.status & OperationStatus.OVERTEMPERATURE
+    with pytest.raises(DriveTooHotError, match="Overtemperature - drive disabled"):
+        driver.enable()
+    with pytest.raises(MotorNotReadyError, match="no power"):
+        driver.move_to(0.0)
+    link.go(2.0)
+    driver.enable()
+    driver.move_to(0.0)
+    finish(driver, link)
+    assert driver.counts == {"faults": 1, "refusals": 1}
+
+
+def test_a_fault_during_a_move_ends_it():
+    driver, link = ready()
+    driver.move_to(8e-3)
+    link.emulator.faults = [MotorFault("motor-fault", link.now_s + 0.1)]
+    with pytest.raises(MotorFaultError):
+        finish(driver, link)
+    assert not driver.moving
+
+
+def test_a_wall_is_a_move_that_does_not_end():
+    driver, link = ready(wall(1e-3, 1e6), peak_current_a=0.3, continuous_current_a=0.3, retreat_m=-2e-3)
+    driver.move_to(2e-3)
+    with pytest.raises(MotorStalledError, match=r"at its current limit and has not reached 0\.00"):
+        finish(driver, link)
+    assert driver.state.status & OperationStatus.CURRENT_LIMITATION
+    driver.retreat()
+    finish(driver, link)
+    assert place(link) == pytest.approx(-2e-3, abs=STEP_M)
+
+
+def test_another_target_than_asked_for_is_noticed():
+    driver, link = ready()
+    driver.move_by(100 * STEP_M)
+    link.emulator.drive.profile = MotorProfile()
+    answer = link.emulator.drive.answer
+
+    def damaged(command):
+        """A digit turned on its way to the drive, which the protocol cannot notice."""
+        return answer(command._replace(argument=900) if command.name == "LR" else command)
+
+    link.emulator.drive.answer = damaged
+    with pytest.raises(MotorFaultError, match=r"target is 0\.0054 m, and 0\.0006 m was asked for"):
+        finish(driver, link)
+
+
+def test_a_motor_whose_target_is_elsewhere_is_not_left_with_power():
+    emulator = motor()
+    driver, _ = driver_on(emulator, **LIMITS)
+    driver.start()
+    driver.home()
+    answer = emulator.drive.answer
+
+    def remembers(command):
+        found = answer(command)
+        return "500" if command.name == "TPOS" else found
+
+    emulator.drive.answer = remembers
+    with pytest.raises(MotorFaultError, match="without power again"):
+        driver.enable()
+    assert not emulator.drive._enabled
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ("XYZ", CommandUnknownError),
+        ("LPC", ParameterInvalidError),
+        ("GOHOSEQ", CommandNotAvailableError),
+        ("SAVE", FlashDefectError),
+    ],
+)
+def test_refusals_have_names(text, kind):
+    link = VirtualLink(motor(faults=[MotorFault("flash-defect")]))
+    exchange = Exchange(link, link.clock, baud=9600)
+    assert exchange.greet() == "EMULATOR"
+    exchange.send(text)
+    answers = []
+    while not answers:
+        answers = exchange.pump(1.0)
+    with pytest.raises(kind, match=text) as found:
+        answers[0].checked()
+    assert found.value.hint
+
+
+def to_and_fro(driver, link):
+    driver.start()
+    driver.home()
+    driver.enable()
+    for _ in range(100):
+        driver.retreat()
+        finish(driver, link)
+        driver.move_to(1e-3)
+        finish(driver, link)
+
+
+def test_unplugged_at_any_time():
+    for seconds in (0.0, 0.3, 1.0, 2.5):
+        driver, link = driver_on(motor(), unplugged_s=100.0 + seconds, **LIMITS, retreat_m=-1e-3)
+        with pytest.raises(LinkUnplugged):
+            to_and_fro(driver, link)
+        driver.stop()
+        driver.close()
+
+
+def test_nobody_there():
+    silent, link = driver_on(motor(), node=7)
+    for ask in (silent.identify, silent.start):
+        with pytest.raises((LinkTimeout, MotorSilentError)):
+            ask()
+    assert link.now_s < 110.0
+    loop = build(DriverSettings(open_link=lambda: open_link("loop://")))
+    with loop, pytest.raises(LinkTimeout, match="No drive on loop://"):
+        loop.identify()
+
+
+def test_a_drive_of_several_on_a_line():
+    emulator = motor()
+    emulator.drive.settings.node = 7
+    driver, link = driver_on(emulator, **LIMITS, node=7)
+    assert driver.identify()["firmware"] == "EMULATOR"
+    driver.start()
+    driver.home()
+    driver.enable()
+    driver.move_to(1e-3)
+    finish(driver, link)
+
+
+class NewerDrive:
+    """It answers anything with a frame of the binary protocol."""
+
+    def __init__(self):
+        self.sent = []
+
+    def feed(self, piece, now_s):
+        self.sent.append((now_s + 1e-3, bytes.fromhex("5307010141600073 45")))
+        return []
+
+    def poll(self, now_s):
+        found = [piece for piece in self.sent if piece[0] <= now_s]
+        del self.sent[: len(found)]
+        return found
+
+    def next_s(self):
+        return self.sent[0][0] if self.sent else math.inf
+
+
+def test_the_newer_generation_is_refused():
+    driver, _ = driver_on(NewerDrive())
+    with pytest.raises(WrongGenerationError, match="newer Faulhaber generation"):
+        driver.identify()
+
+
+@given(st.lists(st.binary(max_size=30), max_size=12), st.integers(0, 2**31))
+@settings(max_examples=25)
+def test_any_bytes_from_the_drive_raise_named_errors_only(pieces, seed):
+    """And do not keep it from being read again."""
+    driver, link = ready()
+    rng = np.random.default_rng(seed)
+    for piece in pieces:
+        link.arrived.append((link.now_s, piece))
+        link.go(rng.uniform(0, 0.05))
+        try:
+            driver.read(0.05)
+        except MotorError:
+            driver._in_fault = False
+    link.go(0.5)
+    for _ in range(IN_A_ROW + 2):
+        try:
+            found = driver.read(1.0)
+        except MotorError:
+            found = []
+        if found:
+            break
+    else:
+        pytest.fail("it is not read again")
+
+
+def test_stamps_are_those_of_the_first_byte():
+    link = VirtualLink(motor())
+    exchange = Exchange(link, link.clock, baud=9600)
+    exchange.greet()
+    exchange.send("POS")
+    sent_s = link.now_s
+    answers = []
+    while not answers:
+        answers = exchange.pump(1.0)
+    # Four bytes out, the drive's millisecond, one byte in.
+    assert answers[0].t_ns / 1e9 == pytest.approx(sent_s + 5 * 10 / 9600 + 1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"baud": 9601}, "baud is one of"),
+        ({"lower_m": -1e-3}, "both lower_m and upper_m"),
+        ({"lower_m": 1e-3, "upper_m": 2e-3}, "'lower_m' of faulhaber"),
+        ({"homing": "there"}, "'homing' of faulhaber"),
+        ({"homing_speed_m_s": 0.0}, "not 0"),
+        (LIMITS | {"retreat_m": 0.1}, "retreat_m is between"),
+        ({"speed": 1}, "no option of faulhaber called 'speed'.*speed_m_s"),
+    ],
+)
+def test_options_that_are_refused(options, message):
+    with pytest.raises(UsageError, match=message):
+        driver_on(motor(), **options)
+
+
+def test_on_a_pseudo_terminal():
+    """In real time."""
+    options = LIMITS | {"baud": 115200, "retreat_m": -1e-3}
+    emulator = build_emulator(EmulatorSettings(senses=lambda t: {}, rng=np.random.default_rng(1), options=options))
+    with on_pty(emulator) as end:
+        address = f"serial://{end.name}?baud=115200"
+        with build(DriverSettings(open_link=lambda: open_link(address), options=options)) as driver:
+            end.opened()
+            assert driver.identify()["firmware"] == "EMULATOR"
+            driver.start()
+            driver.home()
+            driver.enable()
+            for target_m in (0.5e-3, 0.2e-3):
+                driver.move_to(target_m)
+                while driver.moving:
+                    driver.update(0.1)
+            driver.retreat()
+            while driver.moving:
+                driver.update(0.1)
+            assert driver.locate() == pytest.approx(-1e-3, abs=2 * STEP_M)
+            (block,) = driver.read(1.0)
+            assert len(block.data) > 5
+            end.unplug()
+            with pytest.raises(LinkUnplugged):
+                read_on(driver)
