@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, Protocol, TextIO
 
 from tactbench.core.cli.screen import remark
@@ -15,6 +15,9 @@ from tactbench.core.matrix.progress import Progress
 
 class Display(Progress, Protocol):
     """Progress, and what is known so far."""
+
+    def paused(self) -> AbstractContextManager[None]:
+        """Draw nothing meanwhile: somebody is asked something."""
 
     def show(self, text: Callable[[], str]) -> None:
         """Show what `text` returns while the rest is under way, in place of what was shown before; not in a log."""
@@ -94,6 +97,10 @@ class Lines:
     def show(self, text: Callable[[], str]) -> None:
         """Show nothing, and make nothing: only the last table is for a log."""
 
+    def paused(self) -> AbstractContextManager[None]:
+        """Nothing is drawn by itself."""
+        return nullcontext()
+
 
 class _Bar:
     """A bar a stage; its clock ticks by a thread where a thread is allowed, else with each step."""
@@ -149,6 +156,18 @@ class _Bar:
     def show(self, text: Callable[[], str]) -> None:
         """Show what `text` returns above the bars that follow."""
         self._text = text()
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Take the bar off the screen meanwhile."""
+        if self._shown is None:
+            yield
+            return
+        self._shown.stop()
+        try:
+            yield
+        finally:
+            self._shown.start()
 
     def end(self) -> None:
         if self._shown is not None:

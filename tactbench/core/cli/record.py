@@ -11,15 +11,17 @@ from tactbench.core.cli.scenes import press_options, scene_of
 from tactbench.core.cli.simulation import simulation_of, simulation_options
 
 if TYPE_CHECKING:
-    from tactbench.core.plugins.interfaces import Rig
+    from tactbench.core.plugins.interfaces import Operator, Rig
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.rig import SensorDescriptor
+    from tactbench.core.spec.rig_file import RigFile
     from tactbench.core.spec.scene import Scene
 
 
 @click.command(name="record")
 @click.option("--sensor", required=True, metavar="NAME", help="What is pressed on.")
-@click.option("--rig", default="twin", show_default=True, metavar="NAME", help="What presses.")
+@click.option("--rig", metavar="NAME", help="What presses; default: the rig file's rig, or else twin.")
+@click.option("--rig-file", metavar="FILE", help="Devices and links of a rig of real or emulated devices.")
 @press_options
 @click.option("--slide-mm-s", type=click.FloatRange(min=0, min_open=True), metavar="V",
               help="Slide towards the tip at this speed, from the middle on; vibration is recorded too.")  # fmt: skip
@@ -29,10 +31,12 @@ if TYPE_CHECKING:
     "--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="The recording, a .h5 file."
 )
 @click.option("--replace", is_flag=True, help="Replace the file if it is there already.")
+@click.option("--yes", is_flag=True, help="Ask nobody: what has to be done at the rig is done.")
 @click.option("--live", is_flag=True, help="Show taxels, force, rates and losses on stderr meanwhile.")
 def command(
     sensor: str,
-    rig: str,
+    rig: str | None,
+    rig_file: str | None,
     cap_mm: float | None,
     force_n: float | None,
     seconds: float | None,
@@ -40,6 +44,7 @@ def command(
     seed: int,
     out: Path,
     replace: bool,
+    yes: bool,
     live: bool,
     effects: str | None,
     rung: str | None,
@@ -48,41 +53,53 @@ def command(
 ) -> None:
     """Carry out one scene into one recording."""
     import time
-    from contextlib import ExitStack
+    from contextlib import ExitStack, nullcontext
 
     from tactbench.core.acquisition import acquire
-    from tactbench.core.errors import UsageError
+    from tactbench.core.cli.live import LiveView
+    from tactbench.core.cli.operator import TerminalOperator
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.errors import TactbenchError, UsageError
     from tactbench.core.matrix.provenance import gather
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.spec.rig_file import RigFile
+    from tactbench.core.spec.yaml_file import load_yaml
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
     scene = scene_of(out.stem, cap_mm, force_n, seconds, descriptor)
     if slide_mm_s is not None:
         scene = _sliding(scene, slide_mm_s, descriptor)
+    devices = load_yaml(Path(rig_file), RigFile) if rig_file else None
+    rig = rig or (devices.rig if devices else "twin")
     simulation = simulation_of(registry, rig, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario)
     if simulation is not None:
         scene = scene.model_copy(update={"simulation": simulation})
-    built = _built(registry, rig)
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
     provenance = gather()
     with ExitStack() as stack:
-        watch = None
+        watch, paused = None, nullcontext
         if live:
-            from tactbench.core.cli.live import LiveView
-
-            simulated = " (SIM)" if registry.rigs[rig].simulated else ""
-            view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{simulated}, {scene.indenter}"))
-            built, watch = view.beside(built), view.watch
-        made = acquire(
-            built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
-            provenance=provenance, watch=watch,
-        )  # fmt: skip
+            mark = " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if devices and devices.emulated else ""
+            view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
+            watch, paused = view.watch, view.paused
+        built = _built(registry, rig, devices, TerminalOperator(yes=yes, paused=paused))
+        if live:
+            built = view.beside(built)
+        try:
+            made = acquire(
+                built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
+                provenance=provenance, watch=watch, interrupted=out,
+            )  # fmt: skip
+        except (KeyboardInterrupt, TactbenchError):
+            if out.exists() and _interrupted(out):
+                remark(f"What was recorded until then is in {out}, and is left out of every evaluation.")
+            raise
     meta = made.meta
     spent = float(meta.provenance.get("sim_s", meta.provenance.get("acquisition_s", 0.0)))
-    simulated = " (SIM)" if meta.simulated else ""
-    click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{simulated}, {scene.indenter}, in {spent:.2f} s")
+    mark = " (EMULATED)" if meta.emulation else " (SIM)" if meta.simulated else ""
+    click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{mark}, {scene.indenter}, in {spent:.2f} s")
     for name, value in meta.assumptions.items():
         click.echo(f"  assumed: {name} = {value}", err=True)
     click.echo(f"See what is in it:  tactbench inspect {out}", err=True)
@@ -100,14 +117,19 @@ def _sliding(scene: Scene, speed_mm_s: float, sensor: SensorDescriptor) -> Scene
     return scene.model_copy(update={"slide": slide, "observe": (*scene.observe, *hears)})
 
 
-def _built(registry: Registry, name: str) -> Rig:
-    from tactbench.core.errors import UsageError
-    from tactbench.core.plugins.interfaces import RigContext
-    from tactbench.core.plugins.registry import load_object
+def _interrupted(path: Path) -> bool:
+    """Whether there is a recording that was cut short."""
+    from tactbench.core.recording.reader import read_meta
 
-    descriptor = registry.rigs[name]
+    return read_meta(path).excluded.startswith("interrupted")
+
+
+def _built(registry: Registry, name: str, devices: RigFile | None, operator: Operator) -> Rig:
+    from tactbench.core.errors import UsageError
+    from tactbench.core.matrix.installed import rig_of
+
     # A folder is given so that a shelf can be built, and then be told from a rig that presses.
-    rig: Rig = load_object(descriptor.where)(RigContext(effects=tuple(registry.effects), recordings=Path()))
+    rig: Rig = rig_of(name, registry, Path(), devices, operator)  # type: ignore[assignment]
     if not hasattr(rig, "open"):
         raise UsageError(
             f"The rig {name!r} cannot record: it hands out recordings that exist already.",

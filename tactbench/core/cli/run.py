@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 @engine_options
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
+@click.option("--yes", is_flag=True, help="Ask nobody: what has to be done at a rig of real devices is done.")
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
 @view_options
@@ -38,6 +39,7 @@ def command(
     ctx: click.Context,
     /,
     out: Path,
+    yes: bool,
     shape: str,
     wide: bool,
     notes: bool,
@@ -54,6 +56,7 @@ def command(
     """
     check_destination(shape)
     one_thread()
+    from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.files import table_of, write_tables
@@ -68,6 +71,7 @@ def command(
     with progress() as told:
         outcome = run_matrix(
             matrix, store, choice=choice, recordings=folder, progress=told,
+            operator=TerminalOperator(yes=yes, paused=told.paused) if matrix.rig_file else None,
             shown=lambda rows: told.show(lambda: _so_far(rows)),
         )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
