@@ -11,8 +11,12 @@ from tactbench.core.cli.scenes import press_options, scene_of
 from tactbench.core.cli.simulation import simulation_of, simulation_options
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
+
     from tactbench.core.plugins.interfaces import Operator, Rig
     from tactbench.core.plugins.registry import Registry
+    from tactbench.core.samples import Block
     from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.core.spec.rig_file import RigFile
     from tactbench.core.spec.scene import Scene
@@ -79,7 +83,8 @@ def command(
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
     provenance = gather()
     with ExitStack() as stack:
-        watch, paused = None, nullcontext
+        watch: Callable[[Block], None] | None = None
+        paused: Callable[[], AbstractContextManager[None]] = nullcontext
         if live:
             mark = " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if devices and devices.emulated else ""
             view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
