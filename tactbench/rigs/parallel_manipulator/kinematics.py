@@ -167,7 +167,9 @@ def solve_forward(delta: Delta, q: FloatArray, mode: int | None = None) -> Place
     normal = np.sqrt(safe)
     height = (mode or delta.mode) * np.where(in_line, 0.0, _root((L[0] - far) * (L[0] + far)))
     p = c1 + x + (height / normal)[..., None] * n
-    return PlaceSolution(p, normal * height / np.prod(L), np.where(in_line, 0.0, far - L[0]), in_line.astype(np.float64))
+    return PlaceSolution(
+        p, normal * height / np.prod(L), np.where(in_line, 0.0, far - L[0]), in_line.astype(np.float64)
+    )
 
 
 def forward(delta: Delta, q: FloatArray, mode: int | None = None) -> FloatArray:
@@ -202,4 +204,3 @@ def forward(delta: Delta, q: FloatArray, mode: int | None = None) -> FloatArray:
 def mode_of(delta: Delta, p_m: FloatArray, q: FloatArray) -> FloatArray:
     """Return +-1, or 0 at a parallel singularity, for places (..., 3) with joint values (..., 3)."""
     return np.asarray(np.sign(np.linalg.det(p_m[..., None, :] - delta.centre_m(q))))
-

@@ -131,20 +131,21 @@ class Workspace:
         start, end = np.asarray(start_m, dtype=np.float64), np.asarray(end_m, dtype=np.float64)
         where, margin = self._along(start, end)
         way_out = (margin[0] < 0) & ~_ALWAYS
-        for column in np.flatnonzero((margin < 0).any(axis=0)):
+        refused = []
+        for column in np.flatnonzero((margin < 0).any(axis=0)).tolist():
             kept = margin[:, column]
             bad = kept < 0
             if way_out[column]:
                 # Rounding of singular values and angles is some 1e-16; a move that stays as it is does not lead out.
                 bad &= np.diff(kept, prepend=kept[0]) < -ROUNDING
-                if kept[-1] <= kept[0] + ROUNDING:
-                    bad[-1] = True
+                bad[-1] |= kept[-1] <= kept[0] + ROUNDING
             if bad.any():
-                first = self._crossing(start, end, where, kept, int(np.argmax(bad)), int(column))
-                raise self._refusal(
-                    int(column), start + first * (end - start), float(kept.min()),
-                    f"ends the permitted way from {_text(start)} to {_text(end)}",
-                )  # fmt: skip
+                first = self._crossing(start, end, where, kept, int(np.argmax(bad)), column)
+                refused.append((first, column, float(kept.min())))
+        if refused:
+            first, column, worst = min(refused)
+            way = f"ends the permitted way from {_text(start)} to {_text(end)}"
+            raise self._refusal(column, start + first * (end - start), worst, way)
 
     def _along(self, start: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return fractions (n,) of the way and the margins (n, 18) there, which decide all that lies between."""
