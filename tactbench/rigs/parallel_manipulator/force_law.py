@@ -6,13 +6,13 @@ Of step length T, position positive into the skin, measured force m, filter y, i
     i_n = i_{n-1} + ki T e_n + T r_n/k                        c_n = kp e_n + i_n
 
 With kp = 0 it is the law of increments c += ki T e, and what a velocity in proportion to the missing force does; an
-admittance M x'' + D x' = e is ki = 1/D with a filter of time M/D. r is the slope of the wanted force, k the skin's assumed
-stiffness: the feed-forward of a ramp. Derived; the same discrete law as the twin's. The filter takes the time that has
-passed, so it is exact for steps of any length.
+admittance M x'' + D x' = e is ki = 1/D with a filter of time M/D. r is the slope of the wanted force, k the assumed
+stiffness of the skin: the feed-forward of a ramp. Derived; the same discrete law as the twin's. The filter takes the
+time that has passed, so it is exact for steps of any length.
 
-Three limits, in this order: c - c_{n-1} to the loop's speed, c to the measured position +- the way at that speed in the
-wind-up time, c to the travel. While one of them acts, the integral does not grow in its direction. A late sample moves and
-integrates nothing. Entering starts from the present force and position.
+Three limits, in this order: c - c_{n-1} to the loop's speed, c to the measured position +- the way at that speed in
+the wind-up time, c to the travel. While one of them acts, the integral does not grow in its direction. A late sample
+moves and integrates nothing. Entering starts from the present force and position.
 """
 
 from __future__ import annotations
@@ -147,9 +147,8 @@ class ForceController:
         target = min(max(wish, self.target_m - most), self.target_m + most)
         target = min(max(target, position_m - self._ahead), position_m + self._ahead)
         target = min(max(target, self._low), self._high)
-        # Rounding of the sums above is no limit.
         cut = wish - target
-        self.limited = abs(cut) > 1e-12
+        self.limited = cut != 0
         if not (self.limited and growth * cut > 0):
             self._integral += growth
         if self._kp == 0:  # increments: what was cut is forgotten

@@ -16,6 +16,7 @@ geometry: that it is a delta is this project's assumption, and so is every numbe
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
@@ -26,6 +27,9 @@ from tactbench.plugin import Source
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray
+
+
+_UP = np.array([0.0, 0.0, 1.0])
 
 
 def _for_each_leg(value: Any) -> Any:
@@ -77,7 +81,7 @@ class _Delta(BaseModel, ABC):
     def anchor_m(self) -> FloatArray:
         """The (3, 3) folded zeros or shafts A [m], a row per leg."""
         folded = np.subtract(self.base_radius_mm, self.platform_radius_mm)
-        return 1e-3 * (folded[:, None] * self.radial + np.asarray(self.offset_mm))
+        return np.asarray(1e-3 * (folded[:, None] * self.radial + np.asarray(self.offset_mm)))
 
     @cached_property
     def link_m(self) -> FloatArray:
@@ -96,6 +100,10 @@ class _Delta(BaseModel, ABC):
         if (self.joint_range[0] >= self.joint_range[1]).any():
             raise ValueError("a joint's lowest value is not below its highest")
         return self
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a changed copy, which is checked again and computes its arrays anew."""
+        return type(self).model_validate({**self.model_dump(), **(update or {})})
 
     @property
     @abstractmethod
@@ -122,7 +130,7 @@ class LinearDelta(_Delta):
         alpha = np.radians(self.inclination_deg)
         # Of a right angle, cos is to be 0 and not 6e-17: vertical rails are parallel.
         along = np.where(np.abs(np.asarray(self.inclination_deg)) == 90.0, 0.0, np.cos(alpha))
-        return along[:, None] * self.radial + np.sin(alpha)[:, None] * np.array([0.0, 0.0, 1.0])
+        return np.asarray(along[:, None] * self.radial + np.sin(alpha)[:, None] * _UP)
 
     @cached_property
     def gear_m(self) -> FloatArray:
@@ -198,7 +206,7 @@ class RotaryDelta(_Delta):
 
     def outwards(self, q: FloatArray) -> FloatArray:
         """Return the (..., 3 legs, 3) unit vectors from shaft to elbow."""
-        return np.cos(q)[..., None] * self.radial - np.sin(q)[..., None] * np.array([0.0, 0.0, 1.0])
+        return np.asarray(np.cos(q)[..., None] * self.radial - np.sin(q)[..., None] * _UP)
 
     def centre_m(self, q: FloatArray) -> FloatArray:
         """Return the (..., 3 legs, 3) elbows [m] of (..., 3) joint values."""
@@ -206,7 +214,7 @@ class RotaryDelta(_Delta):
 
     def direction(self, q: FloatArray) -> FloatArray:
         """Return the (..., 3 legs, 3) unit vectors along which elbows move with growing q."""
-        return -np.sin(q)[..., None] * self.radial - np.cos(q)[..., None] * np.array([0.0, 0.0, 1.0])
+        return np.asarray(-np.sin(q)[..., None] * self.radial - np.cos(q)[..., None] * _UP)
 
 
 Delta = LinearDelta | RotaryDelta

@@ -1,8 +1,8 @@
 """Speeds and accelerations of the joints, and the effort that holds a force: U p' = S q'.
 
-With links l_i = p - c_i, u_i = l_i/L_i (rows of U), c' = g tau (g: way of the joint centre per unit of the joint, tau: its
-direction), s_i = u_i.tau_i and S = diag(g_i s_i): differentiating |p - c(q)|^2 = L^2 once gives q' = u.p'/(g s), and once
-more
+With links l_i = p - c_i, u_i = l_i/L_i (rows of U), c' = g tau (g: way of the joint centre per unit of the joint, tau:
+its direction), s_i = u_i.tau_i and S = diag(g_i s_i): differentiating |p - c(q)|^2 = L^2 once gives q' = u.p'/(g s),
+and once more
 
     q'' = (|p' - g tau q'|^2/L + u.p'' + g^2 k q'^2 u.o)/(g s)
 

@@ -5,7 +5,8 @@ h = t.w, rho = hypot(u, v), m = sqrt((L - |h|)(L + |h|)), q = atan2(v, u) - 2 b 
 N = (m - l_a + rho)(m + l_a - rho) and D = (l_a + rho - m)(l_a + rho + m).
 
 Forward, three spheres. a = c2 - c1, b = c3 - c1, n = a x b, x = (A'(b x n) + B'(n x a))/|n|^2 with
-A' = (|a|^2 + L1^2 - L2^2)/2 and B' = (|b|^2 + L1^2 - L3^2)/2, h = sqrt((L1 - |x|)(L1 + |x|)), p = c1 + x + mode h n/|n|.
+A' = (|a|^2 + L1^2 - L2^2)/2 and B' = (|b|^2 + L1^2 - L3^2)/2, h = sqrt((L1 - |x|)(L1 + |x|)),
+p = c1 + x + mode h n/|n|.
 
 Both derived. Square roots are of products of sums and differences, cut at 0; a mask says where they were cut. `mode` is
 kept from homing and not chosen by the lower z, which is the wrong solution at some permitted places of a rotary delta.

@@ -4,8 +4,8 @@ The law is that of :mod:`force_law`; the motor goes a first-order way to targets
 
     x_{n+1} = b x_n + (1 - b) c_{n-d}    b = exp(-T/lag),  d = delay/T rounded up
 
-Only k kp and k ki count, so every limit is in proportion to 1/k. Without filter and lag the law of increments settles for
-k ki T < 2 sin(pi/(2 (2 d + 1))) (derived): 2, 1, 0.618, 0.445 for d = 0 ... 3.
+Only k kp and k ki count, so every limit is in proportion to 1/k. Without filter and lag the law of increments settles
+for k ki T < 2 sin(pi/(2 (2 d + 1))) (derived): 2, 1, 0.618, 0.445 for d = 0 ... 3.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A move along a way D from rest to rest, with limits v, a, j of speed, acceleration and jerk: the S-curve.
 
 Derived. Ta = v/a + a/j if v j >= a^2, else 2 sqrt(v/j), is the time of getting up to v. If D >= v Ta the move lasts
-D/v + Ta. Else it reaches v' only: if D >= 2 a^3/j^2, v' = (a/2)(sqrt((a/j)^2 + 4 D/a) - a/j) and it lasts 2 (v'/a + a/j);
-else v' = (D^2 j/4)^(1/3) and it lasts 4 (D/(2 j))^(1/3). With infinite jerk it is the trapezoid of speed.
+D/v + Ta. Else it reaches v' only: if D >= 2 a^3/j^2, v' = (a/2)(sqrt((a/j)^2 + 4 D/a) - a/j) and it lasts
+2 (v'/a + a/j); else v' = (D^2 j/4)^(1/3) and it lasts 4 (D/(2 j))^(1/3). With infinite jerk it is the trapezoid.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class MotionProfile:
 
     @cached_property
     def _pieces(self) -> tuple[FloatArray, FloatArray]:
-        """The (8,) times between the seven pieces of constant jerk, and (4, 7) way, speed, acceleration and jerk there."""
+        """Times (8,) between seven pieces of constant jerk, and (4, 7) way, speed, acceleration and jerk there."""
         v, a, j = self.peak_m_s, self.acceleration_m_s2, self.jerk_m_s3
         rise = min(a / j, math.sqrt(v / j))  # time of rising acceleration
         most = a if rise == a / j else j * rise

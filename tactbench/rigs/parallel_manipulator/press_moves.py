@@ -1,9 +1,9 @@
-"""How a place is gone to and left: a list of moves in an order that keeps the indenter off the sensor, tested as a whole.
+"""How a place is gone to: a list of moves in an order that keeps the indenter off the sensor, tested as a whole.
 
 Retract the linear motor; up to the clearance plane; sideways there; down to the stand-off. In contact only the motor
-moves: the manipulator's targets stay. A sideways move below the clearance plane, or with the motor not retracted, is not
-in the list, and `check_moves` refuses a list that has one. Everything is tested before the first move: a plan is refused
-as a whole, and not at its 37th press.
+moves: the manipulator's targets stay. `check_moves` refuses a list with a sideways move below the clearance plane, or
+with the motor not retracted. Everything is tested before the first move: a plan is refused as a whole, and not at its
+37th press.
 
 Heights are those of the manipulator's point p at which the tip of the retracted indenter would have that height.
 """
@@ -118,7 +118,7 @@ def check_moves(
     heights
         Of the surface, the stand-off and the clearance.
     motor_travel_m
-        The motor's retracted position and its farthest permitted one [m], positive towards the sensor: the fourth joint.
+        Retracted and farthest permitted position of the motor [m], positive towards the sensor: the fourth joint.
     moves
         As of `moves_to`, of one press or of many.
 
@@ -127,14 +127,14 @@ def check_moves(
     PlaceRefusedError
         With number, place and value of the first move that leaves the workspace.
     MoveOrderError
-        If the manipulator moves before the motor was retracted, sideways below the clearance plane, below the stand-off,
-        or not from where it is; or if the motor's travel is shorter than its stroke.
+        If the manipulator moves before the motor was retracted, sideways below the clearance plane, below the
+        stand-off, or not from where it is; or if the motor's travel is shorter than its stroke.
     """
     retracted, farthest = motor_travel_m
     if not heights.stroke_m <= farthest - retracted:
         raise MoveOrderError(
-            f"The motor's travel of {1e3 * (farthest - retracted):.2f} mm is shorter than stand-off and depth together, "
-            f"{1e3 * heights.stroke_m:.2f} mm.",
+            f"The motor's travel of {1e3 * (farthest - retracted):.2f} mm is shorter than stand-off and depth, "
+            f"{1e3 * heights.stroke_m:.2f} mm together.",
             hint="Lower the stand-off or the depth.",
         )
     here: Place | None = None

@@ -72,15 +72,19 @@ class Measures:
     """(...) det U; its sign is the assembly mode."""
 
 
+def _least(rows: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.svd(rows, compute_uv=False)[..., -1], dtype=np.float64)
+
+
 def measures(delta: Delta, p_m: FloatArray, q: FloatArray) -> Measures:
-    """Return the measures at places (..., 3) [m] with their joint values (..., 3), which a machine may or may not have."""
+    """Return the measures at places (..., 3) [m] with their joint values (..., 3)."""
     at = links(delta, p_m, q)
     across = np.cross(delta.sideways, at.unit)
     out = np.abs(np.einsum("...ij,ij->...i", at.unit, delta.sideways))
     return Measures(
         serial=np.abs(at.projection),
-        parallel=np.linalg.svd(at.unit, compute_uv=False)[..., -1],
-        constraint=np.linalg.svd(across, compute_uv=False)[..., -1],
+        parallel=_least(at.unit),
+        constraint=_least(across),
         sideways_rad=np.arcsin(np.minimum(out, 1.0)),
         det=np.linalg.det(at.unit),
     )
@@ -89,7 +93,7 @@ def measures(delta: Delta, p_m: FloatArray, q: FloatArray) -> Measures:
 def place_error_m(delta: Delta, p_m: FloatArray, q: FloatArray, joint_error_m: float) -> FloatArray:
     """Return the (...) bound sqrt(3) max(s) e/sigma_U [m] on the platform's error.
 
-    `joint_error_m` is the error e of each joint centre along its way [m]: of a rail its own, of an arm l_a times the angle.
+    `joint_error_m` is the error e of each joint centre along its way [m]; of an arm, l_a times that of its angle.
     """
     found = measures(delta, p_m, q)
     return np.asarray(np.sqrt(3.0) * found.serial.max(axis=-1) * joint_error_m / found.parallel)

@@ -212,7 +212,7 @@ class Workspace:
         w = start - self.delta.anchor_m
         w = w - np.einsum("ij,ij->i", w, rail)[:, None] * rail
         V = np.einsum("ij,ij->i", beside, beside)
-        V = np.where(V > (ROUNDING * link) ** 2, V, np.inf)  # along the rail: it does not turn
+        V = np.where((ROUNDING * link) ** 2 < V, V, np.inf)  # along the rail: it does not turn
         x0 = -np.einsum("ij,ij->i", w, beside) / V
         nearest = np.linalg.norm(w + x0[:, None] * beside, axis=1)
         C = np.maximum((link - nearest) * (link + nearest), 0.0)

@@ -1,7 +1,7 @@
 """The largest force there can be: at the first touch, and when the ceiling is exceeded.
 
-All derived: the indenter goes on at its speed v for the time until it is told to stop, then brakes with acceleration acc;
-the skin's stiffness k is its largest there.
+All derived: the indenter goes on at its speed v until it is told to stop, then brakes with acceleration acc; the
+stiffness k is the largest there is at that force.
 """
 
 from __future__ import annotations
