@@ -159,7 +159,9 @@ def solve_forward(delta: Delta, q: FloatArray, mode: int | None = None) -> Place
     a, b = centre[..., 1, :] - c1, centre[..., 2, :] - c1
     n = np.cross(a, b)
     aa, bb, nn = _dot(a, a), _dot(b, b), _dot(n, n)
-    in_line = nn <= 1e-24 * np.maximum(aa, bb) ** 2
+    longest = np.maximum(aa, bb)
+    # Two centres in one place are in line with the third; three in one place are so to rounding only.
+    in_line = (nn <= 1e-24 * longest**2) | (longest <= (ROUNDING * L[0]) ** 2)
     safe = np.where(in_line, 1.0, nn)
     first = (0.5 * (aa + (L[0] - L[1]) * (L[0] + L[1])) / safe)[..., None] * np.cross(b, n)
     second = (0.5 * (bb + (L[0] - L[2]) * (L[0] + L[2])) / safe)[..., None] * np.cross(n, a)
