@@ -34,7 +34,7 @@ from tactbench.rigs.parallel_manipulator.workspace import PlaceRefusedError, Wor
 from tactbench.rigs.parallel_manipulator.worst_case import check_largest_force, first_touch_n
 
 FREE = Source(tag="assumed", reference="to compute with")
-DRIVES = {"joint_speed_mm_s": 20.0, "joint_acceleration_mm_s2": 200.0}
+DRIVES = {"joint_speed_mm_s": 20.0, "joint_acceleration_mm_s2": 60.0}
 """So slow that moves must be stretched."""
 LV = LinearDelta(
     title="vertical rails", source=FREE, base_radius_mm=150.0, platform_radius_mm=30.0, link_mm=250.0,
@@ -46,7 +46,7 @@ LI = LinearDelta(
 )  # fmt: skip
 RD = RotaryDelta(
     title="arms", source=FREE, base_radius_mm=90.0, platform_radius_mm=30.0, link_mm=220.0, arm_mm=100.0,
-    joint_lowest_deg=-60.0, joint_highest_deg=100.0, joint_speed_deg_s=12.0, joint_acceleration_deg_s2=120.0,
+    joint_lowest_deg=-60.0, joint_highest_deg=100.0, joint_speed_deg_s=12.0, joint_acceleration_deg_s2=36.0,
 )  # fmt: skip
 MACHINES: dict[str, Delta] = {"LV": LV, "LI": LI, "RD": RD}
 MIDDLE_M = {"LV": -0.15, "LI": -0.12, "RD": -0.2}
@@ -241,12 +241,12 @@ def derivatives(rng: np.random.Generator, count: int) -> list[Row]:
         v /= np.linalg.norm(v, axis=1)[:, None]
         second = joint_motion(delta, p, q, v, np.zeros((count, 3)))[1]
         # Of four and five places, whose errors are some h^4 and rounding/h^2, times 1/s^9 where s is 0.15.
-        h = 1e-4 * delta.link_m[0]
+        h = 2e-5 * delta.link_m[0]
         far, near = (inverse(delta, p + n * h * v) - inverse(delta, p - n * h * v) for n in (2, 1))
         left = np.einsum("nij,nj->ni", at.unit, v)
         right = delta.gear_m * at.projection * (8 * near - far) / (12 * h)
         speed = max(speed, float(np.abs(left - right).max()))
-        h = 3e-4 * delta.link_m[0]
+        h = 5e-5 * delta.link_m[0]
         far, near = (inverse(delta, p + n * h * v) + inverse(delta, p - n * h * v) for n in (2, 1))
         found = delta.gear_m * (16 * near - far - 30 * q) / (12 * h**2)
         change = max(change, float(delta.link_m[0] * np.abs(found - delta.gear_m * second).max()))
@@ -297,7 +297,7 @@ def lines(rng: np.random.Generator, count: int) -> list[Row]:
     # Beside the shafts, the places too near to one of them lie between others.
     ends = rng.uniform([-0.2, -0.2, -0.14], [0.2, 0.2, -0.08], (400 * count, 3))
     ends = ends[work.permits(ends)]
-    ends = ends[: 20 * count].reshape(-1, 2, 3)
+    ends = ends[: 4 * count].reshape(-1, 2, 3)
     for start, end in ends:
         inner = start + np.linspace(0, 1, 201)[:, None] * (end - start)
         if (solve_inverse(wide, inner).shortfall_m <= 0).all():

@@ -123,14 +123,14 @@ def check_gains(loop: ForceLoop, stiffest_n_m: float) -> float:
 
 
 def advised_integral_m_n_s(loop: ForceLoop, stiffness_n_m: float) -> float:
-    """Return ki = 1/(2 k tau) [m/(N s)] of the law of increments, tau = filter's time + lag + delay + T/2.
+    """Return ki = 1/(2 k tau) [m/(N s)] of the law of increments, tau = filter's time + lag + d T + T/2.
 
     Derived for a slow loop; a step then overshoots by about 5 % (within 0.78 to 1.07 of that gain in twelve loops).
     """
     at = LinearLoop.of(loop)
     a = at.filter_kept
     filter_s = 0.0 if loop.cutoff is None else at.period_s * a / (1 - a)
-    tau = filter_s + loop.motor_lag.to("s") + loop.delay.to("s") + at.period_s / 2
+    tau = filter_s + loop.motor_lag.to("s") + (at.delay_periods + 0.5) * at.period_s
     return 1 / (2 * stiffness_n_m * tau)
 
 
