@@ -99,9 +99,9 @@ class ForceController:
         """Whether the last sample was late."""
         self._integral = position_m
         self._now = now_s
-        self._entered(force_n, position_m, now_s)
+        self._known(force_n, position_m, now_s)
 
-    def _entered(self, *numbers: float) -> None:
+    def _known(self, *numbers: float) -> None:
         if not all(map(math.isfinite, numbers)):
             raise RigError(
                 f"Force, position or time is not a number: {numbers}.",
@@ -129,7 +129,7 @@ class ForceController:
         UsageError
             If time does not go forwards.
         """
-        self._entered(force_n, position_m, now_s, wanted_n, slope_n_s)
+        self._known(force_n, position_m, now_s, wanted_n, slope_n_s)
         passed = now_s - self._now
         if passed <= 0:
             raise UsageError(f"The force loop was stepped at {now_s} s and at {self._now} s before.")

@@ -9,7 +9,7 @@ A' = (|a|^2 + L1^2 - L2^2)/2 and B' = (|b|^2 + L1^2 - L3^2)/2, h = sqrt((L1 - |x
 p = c1 + x + mode h n/|n|.
 
 x is corrected once for what rounding left of x.a = A', x.b = B', x.n = 0, so that the links keep their lengths to
-1.3e-15 of them also where two centres are near each other (without it 4e-14; measured over six million).
+1.1e-15 of them also where two centres are near each other (without it 4e-14; measured over six million).
 
 Both derived. Square roots are of products of sums and differences, cut at 0; a mask says where they were cut. `mode` is
 kept from homing and not chosen by the lower z, which is the wrong solution at some permitted places of a rotary delta.
