@@ -15,8 +15,8 @@ from tactbench.rigs.parallel_manipulator.workspace import PlaceRefusedError, Wor
 VERTICAL, ARMS = example_linear(), example_rotary()
 RAILS = Workspace(VERTICAL)
 ROTARY = Workspace(ARMS)
-side = st.floats(-0.1, 0.1)
-place = st.tuples(side, side, st.floats(-0.25, -0.15)).map(np.array)
+side = st.floats(-0.08, 0.08)
+place = st.tuples(side, side, st.floats(-0.23, -0.17)).map(np.array)
 beyond = st.tuples(side, side, st.floats(-0.5, -0.4)).map(np.array)
 
 
