@@ -73,9 +73,8 @@ def test_stored_times_are_the_hosts_within_the_bound(tmp_path, make_meta):
 
 @pytest.mark.parametrize(
     "fields",
-    [{"clock": "simulated"}, {"clocks": {"taxels": StreamClock(source="host")}},
-     {"clocks": {"taxels": StreamClock(source="simulated")}}],
-)  # fmt: skip
+    [{"clocks": {"taxels": StreamClock(source="host")}}, {"clocks": {"taxels": StreamClock(source="simulated")}}],
+)
 def test_where_the_device_is_not_the_clock_times_are_as_they_came(tmp_path, make_meta, fields):
     device, _, host = clocked(2)
     with open_recording(record(tmp_path / "x.h5", make_meta(**fields), device, host)) as recording:
