@@ -175,7 +175,7 @@ def test_the_next_batch_begins_when_the_last_is_over():
 )
 def test_the_bridge_says_why_it_refuses(frame, reason):
     emulator, _ = ready(largest_payload=100, select_lines=0x07)
-    assert replies(emulator.feed(encode_frame(frame), 0.0)) == [Frame(0xFF, 9, reason.encode_frame())]
+    assert replies(emulator.feed(encode_frame(frame), 0.0)) == [Frame(0xFF, 9, reason.encode())]
 
 
 def test_a_bridge_that_was_not_set_up_refuses_batches():
