@@ -6,6 +6,8 @@ beside it.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from tactbench.plugin import DeviceDescriptor, hookimpl
 
 TACTBENCH_API = 1
@@ -23,6 +25,7 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             driver=f"{here}.force_torque.net_ft.driver:build",
             emulator=f"{here}.force_torque.net_ft.emulator:build",
             emulated_link="datagram",
+            # Usual counts (sourced: netft/pyNetFT).
             emulated_options={"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6},
         ),
         DeviceDescriptor(
@@ -32,6 +35,7 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             driver=f"{here}.force_torque.nano17.driver:build",
             emulator=f"{here}.force_torque.nano17.emulator:build",
             emulated_link="bytes",
+            emulated_options={"calibration": str(Path(__file__).parent / "force_torque" / "nano17" / "FT8577.cal")},
         ),
         DeviceDescriptor(
             name="faulhaber",

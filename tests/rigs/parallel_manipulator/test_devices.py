@@ -9,7 +9,6 @@ import pytest
 
 from tactbench.plugin import DriverSettings, EmulatorSettings, load_object, load_registry
 from tests.rigs.parallel_manipulator.pumps import VirtualLink, joined, read_for
-from tests.rigs.parallel_manipulator.test_nano17 import FT8577
 
 POINT = EntryPoint("parallel-manipulator", "tactbench.rigs.parallel_manipulator", "tactbench")
 
@@ -34,15 +33,10 @@ def test_listing_them_imports_neither_numpy_nor_links():
 
 
 @pytest.mark.parametrize("name", ["net-ft", "nano17", "faulhaber"])
-def test_driver_and_emulator_take_the_same_options(name, tmp_path):
-    calibration = tmp_path / "FT8577.cal"
-    calibration.write_bytes(FT8577)
-    options = {
-        "net-ft": {"counts_per_newton": 1e6, "counts_per_newton_metre": 1e6, "bias": True},
-        "nano17": {"calibration": str(calibration), "bias_samples": 50},
-        "faulhaber": {"lower_m": -9e-3, "upper_m": 9e-3, "peak_current_a": 0.5},
-    }[name]
+def test_driver_and_emulator_take_the_same_options(name):
     descriptor = devices()[name]
+    own = {"net-ft": {"bias": True}, "nano17": {"bias_samples": 50}, "faulhaber": {"peak_current_a": 0.5}}
+    options = descriptor.emulated_options | own[name]
 
     def senses(time_s):
         return {} if time_s < 100.5 else {"fz": -2.0, "load": 1.0}
@@ -68,11 +62,9 @@ def test_driver_and_emulator_take_the_same_options(name, tmp_path):
         assert np.array_equal(getattr(first, attribute), getattr(again, attribute), equal_nan=attribute == "data")
 
 
-def test_blocks_of_any_size_hold_the_same_samples(tmp_path):
-    calibration = tmp_path / "FT8577.cal"
-    calibration.write_bytes(FT8577)
-    options = {"calibration": str(calibration)}
+def test_blocks_of_any_size_hold_the_same_samples():
     descriptor = devices()["nano17"]
+    options = descriptor.emulated_options
     found = []
     for wait_s in (0.002, 0.3):
         emulator = load_object(descriptor.emulator)(

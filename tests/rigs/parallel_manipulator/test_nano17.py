@@ -30,7 +30,11 @@ from tactbench.plugin import (
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import LARGEST_BYTES, AtiFileError, elements
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import read_calibration
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.driver import build
-from tactbench.rigs.parallel_manipulator.force_torque.nano17.emulator import GaugeEmulator, GaugeFault
+from tactbench.rigs.parallel_manipulator.force_torque.nano17.emulator import (
+    EMULATED_CALIBRATION,
+    GaugeEmulator,
+    GaugeFault,
+)
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.emulator import build as build_emulator
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
     About,
@@ -40,29 +44,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
 )
 from tests.rigs.parallel_manipulator.pumps import VirtualLink, joined, on_pty, read_for
 
-# The calibration of a Nano17 FT8577, as a public MATLAB script for ATI matrices quotes it.
-FT8577 = b"""<?xml version="1.0" encoding="utf-8"?>
-<!-- NOTE: use the "UserAxis" elements -->
-<FTSensor  Serial="FT8577" BodyStyle="Nano17" Family="DAQ" NumGages="6" CalFileVersion="1.1">
- <Calibration  PartNumber="SI-25-0.25" CalDate="3/5/2014" ForceUnits="N" TorqueUnits="N-mm" DistUnits="mm"
-   OutputMode="Ground Referenced Differential" OutputRange="20" HWTempComp="True" GainMultiplier="1"
-   CableLossDetection="False" OutputBipolar="True">
-  <Axis Name="Fx" values="-0.06744 -0.06253 0.34834 37.34247 1.90538 -37.39899" max="25" scale="11.3650042049178"/>
-  <Axis Name="Fy" values="0.55821 -45.57953 -0.51071 22.00831 -0.39426 21.28868" max="25" scale="11.3650042049178"/>
-  <Axis Name="Fz" values="22.07572 0.66524 22.64229 0.15088 21.81132 -0.64550" max="35" scale="5.89341666193018"/>
-  <Axis Name="Tx" values="0.25495 0.07335 38.61586 0.30585 -38.71584 1.08341" max="250" scale="1.82292883446332"/>
-  <Axis Name="Ty" values="-43.12768 -1.34402 23.17737 0.13073 21.67933 -0.58572" max="250" scale="1.82292883446332"/>
-  <Axis Name="Tz" values="0.23141 -23.28809 -0.53681 -22.47927 1.56779 -22.44391" max="250" scale="1.57420173377595"/>
-  <BasicTransform Dx="0" Dy="0" Dz="6.096" Rx="0" Ry="0" Rz="0"/>
-  <UserAxis Name="Fx" values=" -0.00593  -0.00550   0.03065   3.28574   0.16765  -3.29072 " max="25"/>
-  <UserAxis Name="Fy" values="  0.04912  -4.01052  -0.04494   1.93650  -0.03469   1.87318 " max="25"/>
-  <UserAxis Name="Fz" values="  3.74583   0.11288   3.84196   0.02560   3.70096  -0.10953 " max="35"/>
-  <UserAxis Name="Tx" values="  0.43927 -24.40787  20.90948  11.97267 -21.44973  12.01322 " max="250"/>
-  <UserAxis Name="Ty" values="-23.62228  -0.70375  12.52751 -19.95816  10.87057  19.73889 " max="250"/>
-  <UserAxis Name="Tz" values="  0.14700 -14.79358  -0.34100 -14.27979   0.99593 -14.25733 " max="250"/>
- </Calibration>
-</FTSensor>
-"""
+FT8577 = EMULATED_CALIBRATION.read_bytes()
 
 # AT-3: volts less bias, then N and N-mm.
 PRODUCTS = [

@@ -9,6 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -25,6 +26,8 @@ from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import wrench_of
 from tactbench.rigs.parallel_manipulator.options import read_file, read_options
 
+EMULATED_CALIBRATION = Path(__file__).with_name("FT8577.cal")
+"""Of a Nano17 SI-25-0.25 (sourced: a public MATLAB script for ATI matrices quotes it)."""
 BAUD = 921_600
 """Of the line (assumed): it carries 2880 samples a second."""
 OFFSET_V = 0.5

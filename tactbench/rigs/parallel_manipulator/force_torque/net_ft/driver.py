@@ -99,8 +99,11 @@ class NetFtDriver(Driver):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """``rejected`` datagrams; records with ``errors``, ``saturated`` ones among them, and with ``warnings``."""
-        return self._counts
+        """``rejected`` datagrams; records with ``errors``, ``saturated`` ones among them, and with ``warnings``.
+
+        Those that are 0 are left out.
+        """
+        return {name: count for name, count in self._counts.items() if count}
 
     def identify(self) -> Mapping[str, str]:
         """Ask for two records; return product, rate and status.
