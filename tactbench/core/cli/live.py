@@ -6,6 +6,7 @@ import os
 import sys
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -211,7 +212,7 @@ class LiveView:
         self._title = title
         self._states: dict[str, StreamState] = {}
         self.watched: Watched | None = None
-        self._drawing: _Screen | _Lines | None = None
+        self._drawing: _Drawing | None = None
 
     def beside(self, rig: Rig) -> Rig:
         """Return a rig that does what `rig` does, and tells this view of its streams once they are known."""
@@ -270,14 +271,41 @@ class _Told:
             yield acquisition
 
 
-def _drawing_of(watched: Watched) -> _Screen | _Lines:
+def _drawing_of(watched: Watched) -> _Drawing:
     """Return what fits stderr: a terminal that can move its cursor, or anything else."""
     if sys.stderr.isatty() and os.environ.get("TERM", "").lower() not in ("dumb", "unknown"):
         return _Screen(watched)
     return _Lines(watched)
 
 
-class _Screen:
+class _Drawing(ABC):
+    """Draws in a thread of its own: a slow terminal holds nothing back, and Ctrl-C comes amid no picture."""
+
+    def __init__(self) -> None:
+        self._over = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        self._over.clear()
+        self._thread = threading.Thread(target=self._draw, name="live view")
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Leave the terminal as it was; does nothing if that is done."""
+        self._over.set()
+        if self._thread is not None and self._thread.is_alive():
+            self._thread.join()
+
+    @abstractmethod
+    def _draw(self) -> None:
+        """Draw until it is over."""
+
+    @abstractmethod
+    def show_last(self) -> None:
+        """Leave the last state behind, once stopped; the last call."""
+
+
+class _Screen(_Drawing):
     """The terminal's second screen, which a change of its size leaves whole; the last state on the first one."""
 
     def __init__(self, watched: Watched) -> None:
@@ -285,50 +313,37 @@ class _Screen:
 
         from tactbench.core.cli.live_frame import Frame
 
+        super().__init__()
         # A way of its own to the terminal, whatever becomes of stderr meanwhile.
         self._terminal = os.fdopen(os.dup(sys.stderr.fileno()), "w", encoding="utf-8", errors="replace")
         self._console = Console(file=self._terminal, highlight=False)
         self._frame = Frame(watched)
-        self._live: Any = None
 
-    def start(self) -> None:
+    def _draw(self) -> None:
         from rich.live import Live
 
-        self._live = Live(
-            console=self._console, screen=True, get_renderable=lambda: self._frame, redirect_stdout=False,
-            redirect_stderr=False, refresh_per_second=REFRESHES_PER_S,
-        )  # fmt: skip
-        self._live.start()
-
-    def stop(self) -> None:
-        self._live.stop()
+        with Live(
+            self._frame, console=self._console, screen=True, auto_refresh=False, redirect_stdout=False,
+            redirect_stderr=False,
+        ) as live:  # fmt: skip
+            while not self._over.wait(1 / REFRESHES_PER_S):
+                live.refresh()
 
     def show_last(self) -> None:
         with self._terminal:
             self._console.print(self._frame)
 
 
-class _Lines:
-    """A line every few seconds, from a thread: who reads them may be slow."""
+class _Lines(_Drawing):
+    """A line every few seconds."""
 
     def __init__(self, watched: Watched) -> None:
+        super().__init__()
         self._watched = watched
-        self._over = threading.Event()
-        self._thread: threading.Thread | None = None
 
-    def start(self) -> None:
-        self._over.clear()
-        self._thread = threading.Thread(target=self._say, name="live lines", daemon=True)
-        self._thread.start()
-
-    def _say(self) -> None:
+    def _draw(self) -> None:
         while not self._over.wait(LINE_S):
             remark(one_line(self._watched))
-
-    def stop(self) -> None:
-        self._over.set()
-        if self._thread is not None:
-            self._thread.join()
 
     def show_last(self) -> None:
         remark(one_line(self._watched))

@@ -371,12 +371,13 @@ def _rates(watched: Watched, now_s: float) -> list[Text]:
     marks = "".join(f"{flag.name or '':>10}" for flag in COUNTED)
     lines = [Text(f"{'stream':<{names}}{'rows':>9}{'Hz/nominal':>13}{'lost':>6}{marks}", style="dim")]
     for state in watched.streams:
-        line = Text(f"{state.spec.name:<{names}}{state.rows:>9}{rate_text(state):>13}")
+        silent_s = 0.0 if state.seen_s is None or _over(watched) else now_s - state.seen_s
+        rate = f"silent {silent_s:.0f} s" if silent_s >= SILENT_S else rate_text(state)
+        line = Text(f"{state.spec.name:<{names}}{state.rows:>9}")
+        line.append(f"{rate:>13}", style=BAD if silent_s >= SILENT_S else "")
         line.append(f"{state.lost:>6}", style=BAD if state.lost else "")
         for flag in COUNTED:
             line.append(f"{state.counts[flag]:>10}", style=BAD if state.counts[flag] else "")
-        if state.seen_s is not None and now_s - state.seen_s > SILENT_S and not _over(watched):
-            line.append(f"  nothing for {now_s - state.seen_s:.0f} s", style=BAD)
         lines.append(line)
     return lines
 
