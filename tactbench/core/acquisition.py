@@ -112,11 +112,20 @@ def _conclude(
         remarks=(*remarks, f"Interrupted, and not whole: {why}") if why else remarks,
         excluded=f"interrupted: {why}" if why else "",
         provenance=provenance,
-        **_of_devices(acquisition, descriptor, writer.rows),
+        **_of_devices(acquisition, descriptor, writer.rows, cut_short=bool(why)),
     )
 
 
-def _of_devices(acquisition: Acquisition, descriptor: RigDescriptor, rows: Mapping[str, int]) -> dict[str, Any]:
+def _settled(counts: StreamCounts, written: int, cut_short: bool) -> StreamCounts:
+    """Return counts with what is written; rows that were on their way when it was cut short are dropped."""
+    left = counts.received - written - counts.dropped - counts.duplicates - counts.late
+    dropped = counts.dropped + max(0, left) if cut_short else counts.dropped
+    return counts.model_copy(update={"written": written, "dropped": dropped})
+
+
+def _of_devices(
+    acquisition: Acquisition, descriptor: RigDescriptor, rows: Mapping[str, int], *, cut_short: bool = False
+) -> dict[str, Any]:
     """Return the fields of the meta that an acquisition of devices knows; of another one, whose clock it is."""
     emulation: Emulation | None = getattr(acquisition, "emulation", None)
     clocks: Mapping[str, StreamClock] = getattr(acquisition, "clocks", {})
@@ -128,7 +137,7 @@ def _of_devices(acquisition: Acquisition, descriptor: RigDescriptor, rows: Mappi
         "emulation": emulation,
         "clock": "simulated" if simulated else "device" if sources == {"device"} else "host",
         "clocks": dict(clocks),
-        "streams": {name: one.model_copy(update={"written": rows.get(name, 0)}) for name, one in counts.items()},
+        "streams": {name: _settled(one, rows.get(name, 0), cut_short) for name, one in counts.items()},
         "counts": dict(getattr(acquisition, "counts", {})),
     }
 

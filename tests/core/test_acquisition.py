@@ -189,15 +189,15 @@ def test_what_devices_say_is_recorded_and_times_are_the_hosts(tmp_path):
     assert np.array_equal(force.t_ns, true)
 
 
-def test_virtual_time_is_not_fitted(tmp_path):
+def test_in_virtual_time_the_devices_clocks_are_fitted_too(tmp_path):
     emulation = Emulation(time="virtual", seed=3, physics="twin", devices=("pad",))
     meta, _ = run(tmp_path / "r.h5", Devices(emulation=emulation), simulated=False)
     assert (meta.clock, meta.simulated, meta.emulation) == ("simulated", True, emulation)
-    assert meta.clocks["taxels"] == StreamClock(source="simulated", delay_ns=(200_000, 300_000), wraps=2)
+    clock = meta.clocks["taxels"]
+    assert (clock.source, clock.method, clock.delay_ns, clock.wraps) == ("device", "hull-1way", (200_000, 300_000), 2)
     with open_recording(tmp_path / "r.h5") as recording:
         taxels = recording.read("taxels")
-    assert taxels.host_ns is None
-    assert len(taxels.device_ns) == 200
+    assert len(taxels.device_ns) == len(taxels.host_ns) == 200
 
 
 def test_emulated_devices_in_real_time_have_their_clocks_fitted(tmp_path):

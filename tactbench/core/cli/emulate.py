@@ -260,7 +260,9 @@ def _say_where(
     from tactbench.core.leaderboard.text import command_line
 
     found: dict[str, Any] = {
-        name: entry.model_copy(update={"link": emulated.addresses.get(name, entry.link), "faults": ()})
+        name: entry.model_copy(update={"link": emulated.addresses[name], "faults": (), "emulator": True})
+        if name in emulated.addresses
+        else entry
         for name, entry in entries.items()
     }
     sensors = [name for name, entry in found.items() if not hasattr(entry, "device")]

@@ -22,6 +22,8 @@ class DeviceEntry(Frozen):
     """What its driver needs to know beside the link."""
     faults: tuple[str, ...] = ()
     """Faults of its emulator: ``name`` or ``name:key=value,…``."""
+    emulator: bool = False
+    """Whether an emulator that runs already is at the far end of `link`: what is recorded is then marked EMULATED."""
 
     @property
     def emulated(self) -> bool:

@@ -154,6 +154,14 @@ class Bench:
             about = {
                 f"{name} {key}": value for name, driver in drivers.items() for key, value in driver.identify().items()
             }
+            # An emulator says that it is one; a rig file may forget to.
+            emulated_names = tuple(
+                name
+                for name, entry in file.entries().items()
+                if entry.emulated
+                or entry.emulator
+                or any("emulat" in text.lower() for key, text in about.items() if key.startswith(f"{name} "))
+            )
             self._prompt(file, sensor, scene)
             advance = emulated.advance if emulated is not None and file.emulation.time == "virtual" else None
             zero = _zero_of(drivers[FORCE], file.force.zero_s, clock) if file.force is not None else {}
@@ -174,7 +182,7 @@ class Bench:
                     **self._mounting(file.force),
                 },
                 clocks={},
-                emulation=self._emulation(file, tuple(emulators)) if emulators else None,
+                emulation=_emulation(file, emulated_names),
                 reading=reading,
                 duration_s=duration_s,
                 pressed=pressed,
@@ -244,15 +252,21 @@ class Bench:
             return {}
         return {"normal force": f"{'-' if entry.sign < 0 else ''}{entry.channel} of {entry.device}"}
 
-    def _emulation(self, file: RigFile, names: tuple[str, ...]) -> Emulation:
-        entries = file.entries()
-        return Emulation(
-            time=file.emulation.time,
-            seed=file.emulation.seed,
-            physics=file.emulation.physics,
-            devices=names,
-            faults=tuple(f"{name}: {fault}" for name in names for fault in entries[name].faults),
-        )
+
+def _emulation(file: RigFile, names: tuple[str, ...]) -> Emulation | None:
+    """Return how the devices called `names` are emulated; None: none is."""
+    if not names:
+        return None
+    entries = file.entries()
+    if not file.emulated:  # they were there before, and run by the clock
+        return Emulation(time="real", devices=names)
+    return Emulation(
+        time=file.emulation.time,
+        seed=file.emulation.seed,
+        physics=file.emulation.physics,
+        devices=names,
+        faults=tuple(f"{name}: {fault}" for name in names for fault in entries[name].faults),
+    )
 
 
 def _zero_of(driver: Driver, seconds: float, clock: Clock) -> dict[str, FloatArray]:

@@ -54,6 +54,7 @@ from tactbench.plugin import (
     LinkTimeout,
     RigError,
     Source,
+    SpiBridge,
     SpiLink,
     SpiReply,
     SpiStep,
@@ -174,6 +175,8 @@ class BioTacDriver(Driver):
                     hint="Check supply, wiring and the option select.",
                 )
             found[name] = raw.hex(" ") if text is None else text
+        if isinstance(self._link, SpiBridge):
+            found["adapter"] = self._link.name
         return found
 
     def _property(self, name: str) -> bytes:

@@ -36,7 +36,12 @@ from tests.links.ends import serving
 
 COLUMN = {channel.name: column for stream in SPEC.streams for column, channel in enumerate(stream.channels)}
 MISSING, SUSPECT = int(Quality.MISSING), int(Quality.SUSPECT)
-SERIAL = {"serial number": "BT-2P-02.2.0-B-11-E-0004", "flex version": "B.D", "software version": "2.38"}
+SERIAL = {
+    "serial number": "BT-2P-02.2.0-B-11-E-0004",
+    "flex version": "B.D",
+    "software version": "2.38",
+    "adapter": "tactbench emulator",
+}
 
 
 class Sensed:
