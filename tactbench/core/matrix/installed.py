@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tactbench.core.errors import RigError, TactbenchError, UsageError
+from tactbench.core.errors import RigError, TactbenchError
 from tactbench.core.plugins.interfaces import Operator, Rig, RigContext, Shelf
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.spec.rig_file import RigFile
@@ -21,11 +21,8 @@ def rig_of(
 ) -> Rig | Shelf:
     """Build the rig called `name`; raises UsageError if the rig file is for another one."""
     descriptor = registry.rigs[name]
-    if rig_file is not None and rig_file.rig != name:
-        raise UsageError(
-            f"The rig file is for the rig {rig_file.rig!r}, asked for is {name!r}.",
-            hint=f"Use --rig {rig_file.rig}, or another rig file.",
-        )
+    if rig_file is not None:
+        rig_file.checked_for(name)
     context = RigContext(effects=tuple(registry.effects), recordings=recordings, rig_file=rig_file, operator=operator)
     built = load_object(descriptor.where)(context)
     if not (hasattr(built, "open") or hasattr(built, "recordings")):

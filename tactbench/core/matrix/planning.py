@@ -82,7 +82,7 @@ def plan(
         If the matrix asks for something that is not there.
     """
     chosen = choice or EngineChoice()
-    rig_file = load_yaml(Path(matrix.rig_file), RigFile) if matrix.rig_file else None
+    rig_file = load_yaml(Path(matrix.rig_file), RigFile).checked_for(matrix.rig) if matrix.rig_file else None
     if not registry.rigs[matrix.rig].simulated:  # a simulated one is no shelf: it is built when it has to record
         rig = _greeted(lambda: built(matrix.rig, registry, recordings, rig_file), chosen)
         if isinstance(rig, BaseException):

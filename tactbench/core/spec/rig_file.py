@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
+from tactbench.core.errors import UsageError
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.recording import Scalar
 
@@ -89,6 +90,15 @@ class RigFile(Frozen):
     def emulated(self) -> bool:
         """Whether any device is emulated."""
         return any(entry.emulated for entry in self.entries().values())
+
+    def checked_for(self, rig: str) -> RigFile:
+        """Return this file; raise UsageError if it is for another rig."""
+        if self.rig != rig:
+            raise UsageError(
+                f"The rig file is for the rig {self.rig!r}, asked for is {rig!r}.",
+                hint=f"Use --rig {self.rig}, or another rig file.",
+            )
+        return self
 
     def entries(self) -> dict[str, DeviceEntry]:
         """Return every device by its name in messages: the sensor's name, ``force``, or its part in the rig."""

@@ -1,0 +1,233 @@
+"""The bench: what emulated devices sense arrives in the recording by their bytes, and whatever goes wrong is marked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactbench.core.acquisition import acquire
+from tactbench.core.errors import RigError, UsageError
+from tactbench.core.recording.health import examine
+from tactbench.core.recording.reader import open_recording
+from tactbench.core.spec.quantity import assumed
+from tactbench.plugin import (
+    DeviceEntry,
+    EmulationSettings,
+    ForceEntry,
+    ForceRamp,
+    Quality,
+    RigContext,
+    RigFile,
+    Scene,
+    load_object,
+    load_registry,
+)
+
+REGISTRY = load_registry()
+SECONDS = 2.0
+SCENE = Scene(
+    name="press",
+    profile=ForceRamp(
+        duration=assumed(SECONDS, "s", "short"), hold=assumed(0.5, "s", "short"), samples=round(100 * SECONDS)
+    ),
+)
+
+
+def rig_file(sensor="icub", faults=(), force_faults=(), time="virtual", seed=1, **force) -> RigFile:
+    return RigFile(
+        rig="bench",
+        sensors={sensor: DeviceEntry(link="emulated", faults=faults)},
+        force=ForceEntry(device="net-ft", link="emulated", faults=force_faults, **{"zero_s": 0.5, **force}),
+        emulation=EmulationSettings(time=time, seed=seed),
+    )
+
+
+def bench(file, operator=None):
+    context = RigContext(effects=tuple(REGISTRY.effects), rig_file=file, operator=operator)
+    return load_object(REGISTRY.rigs["bench"].where)(context)
+
+
+def press(path, file, sensor="icub", scene=SCENE, operator=None):
+    """Record one scene; return its path and the error that ended it, if one did."""
+    error = None
+    try:
+        acquire(
+            bench(file, operator), REGISTRY.sensors[sensor], REGISTRY.rigs["bench"], scene, role=None, seed=7,
+            path=path, clock=lambda: 0.0, provenance={}, interrupted=path,
+        )  # fmt: skip
+    except RigError as raised:
+        error = raised
+    return error
+
+
+def read(path):
+    """Return a recording's meta and streams; it is whole, whatever happened."""
+    with open_recording(path) as recording:
+        recording.verify()
+        return recording.meta, {name: recording.read(name) for name in recording.stream_names}
+
+
+def simulated(sensor="icub"):
+    """Return what the twin says of the same scene: by stream times [ns], data and channels."""
+    twin = load_object(REGISTRY.rigs["twin"].where)(RigContext(effects=tuple(REGISTRY.effects)))
+    with twin.open(REGISTRY.sensors[sensor], SCENE, seed=7) as acquisition:
+        blocks = list(acquisition)
+        specs = {spec.name: spec for spec in (*acquisition.streams, *acquisition.reference)}
+    return {
+        name: (
+            np.concatenate([block.t_ns for block in blocks if block.stream == name]),
+            np.concatenate([block.data for block in blocks if block.stream == name]),
+            [channel.name for channel in spec.channels],
+        )
+        for name, spec in specs.items()
+    }
+
+
+@pytest.mark.parametrize("sensor", ["icub", "biotac"])
+def test_the_bytes_carry_what_the_twin_computed(tmp_path, sensor):
+    """Every row is a sample of the twin, not later than the row and at most a sample's distance before it."""
+    assert press(tmp_path / "p.h5", rig_file(sensor), sensor) is None
+    meta, streams = read(tmp_path / "p.h5")
+    assert (meta.simulated, meta.emulation.time, meta.clock) == (True, "virtual", "simulated")
+    assert set(meta.emulation.devices) == {sensor, "force"}
+    name = "taxels" if sensor == "icub" else "electrodes"
+    times, data, channels = simulated(sensor)[name]
+    stream = streams[name]
+    mine = [[channel.name for channel in stream.spec.channels].index(channel) for channel in channels]
+    rows = stream.data[:, mine].astype(float)
+    # When the scene began on the recording's clock is not written down; the force tells it to a sample.
+    begin = stream.t_ns[0]
+    steps = np.diff(times).max()
+    found = 0
+    for t, row in zip(stream.t_ns - begin, rows, strict=True):
+        near = (times > t - 3 * steps) & (times < t + 3 * steps)
+        found += bool((data[near] == row).all(axis=1).any()) if sensor == "icub" else 1
+        assert (np.abs(data[near] - row).min(axis=0) <= 0.5).all()
+    assert found > 0.9 * len(rows)
+    pressing = streams["force_torque"].data[:, 2]
+    # 5 N at the end, .7 N of noise held for a hundredth of a second: a tenth of a second has ten samples.
+    assert pressing[-150:-50].mean() == pytest.approx(4.7, abs=1.0)
+    assert meta.streams[name].received == meta.streams[name].written == len(rows)
+
+
+def test_the_same_seed_gives_the_same_recording_and_another_does_not(tmp_path):
+    for name, seed in (("a", 1), ("b", 1)):
+        assert press(tmp_path / f"{name}.h5", rig_file(seed=seed, faults=("late-answer:every=7",))) is None
+    (_, first), (_, second) = read(tmp_path / "a.h5"), read(tmp_path / "b.h5")
+    for name, stream in first.items():
+        assert np.array_equal(stream.data, second[name].data)
+        assert np.array_equal(stream.t_ns, second[name].t_ns)
+
+
+def marked(stream, quality):
+    return int((stream.quality & quality).any(axis=1).sum()) if stream.quality is not None else 0
+
+
+FAULTS = [
+    ("icub", "dropped-frame:half=tail,every=10", "taxels", Quality.MISSING),
+    ("icub", "doubled-frame:half=head,every=10", "taxels", Quality.SUSPECT),
+    ("icub", "not-connected:start_s=1.5", "taxels", Quality.MISSING),
+    ("icub", "no-ack:channels=T2,start_s=1.5,end_s=1.55", "taxels", Quality.SUSPECT),
+    ("biotac", "parity:every=51", "electrodes", Quality.SUSPECT),
+    ("biotac", "dropped-reply:every=51", "electrodes", Quality.MISSING),
+    ("biotac", "not-connected:start_s=1.5", "electrodes", Quality.MISSING),
+    ("biotac", "error-reply:every=51", "electrodes", Quality.MISSING),
+]
+
+
+@pytest.mark.parametrize(("sensor", "fault", "stream", "quality"), FAULTS)
+def test_faults_of_a_sensor_are_marked_and_counted_and_the_recording_is_valid(tmp_path, sensor, fault, stream, quality):
+    assert press(tmp_path / "p.h5", rig_file(sensor, faults=(fault,)), sensor) is None
+    meta, streams = read(tmp_path / "p.h5")
+    assert 0 < marked(streams[stream], quality) < len(streams[stream].data)
+    assert any(name.startswith(f"{sensor}: ") and count for name, count in meta.counts.items())
+    assert meta.emulation.faults == (f"{sensor}: {fault}",)
+    assert not meta.excluded
+
+
+def test_a_lost_sample_of_a_board_without_numbers_is_a_longer_interval(tmp_path):
+    assert press(tmp_path / "p.h5", rig_file(faults=("dropped-frame:start_s=1.5,end_s=1.6",))) is None
+    meta, streams = read(tmp_path / "p.h5")
+    assert np.diff(streams["taxels"].t_ns).max() > 90_000_000
+    assert meta.counts["icub: long intervals"] == 1
+
+
+def test_a_stuck_taxel_is_seen_by_nobody_but_as_a_constant_channel(tmp_path):
+    scene = SCENE.model_copy(update={"name": "stuck"})
+    assert press(tmp_path / "p.h5", rig_file(faults=("stuck-taxel:channels=T8",)), scene=scene) is None
+    _, streams = read(tmp_path / "p.h5")
+    taxels = streams["taxels"].data
+    assert len(np.unique(taxels[:, 7])) == 1 < len(np.unique(taxels[:, 6]))
+    with open_recording(tmp_path / "p.h5") as recording:
+        assert any("T8" in finding.channels and "constant" in finding.message for finding in examine(recording))
+
+
+@pytest.mark.parametrize(
+    ("fault", "field"),
+    [("dropped:every=100", "gaps"), ("doubled:every=100", "duplicates"), ("out-of-order:every=100", "late")],
+)
+def test_losses_of_the_force_sensor_are_counted_and_gaps_marked(tmp_path, fault, field):
+    assert press(tmp_path / "p.h5", rig_file(force_faults=(fault,))) is None
+    meta, streams = read(tmp_path / "p.h5")
+    counts, force = meta.streams["force_torque"], streams["force_torque"]
+    assert getattr(counts, field) == pytest.approx(10 * SECONDS, abs=2)
+    assert counts.received == counts.written + counts.dropped + counts.duplicates + counts.late
+    assert counts.written == len(force.data)
+    assert marked(force, Quality.GAP) == counts.gaps
+    assert np.all(np.diff(force.sequence) > 0)
+
+
+def test_a_saturated_force_sensor_marks_every_channel(tmp_path):
+    assert press(tmp_path / "p.h5", rig_file(force_faults=("saturated:start_s=2.0",))) is None
+    _, streams = read(tmp_path / "p.h5")
+    assert 0 < marked(streams["force_torque"], Quality.SATURATED) < len(streams["force_torque"].data)
+
+
+@pytest.mark.parametrize("part", ["sensor", "force"])
+def test_a_pulled_cable_ends_the_scene_and_keeps_what_there_is(tmp_path, part):
+    faults = {"faults" if part == "sensor" else "force_faults": ("unplug:start_s=2.0",)}
+    error = press(tmp_path / "p.h5", rig_file(**faults))
+    assert error is not None
+    assert "is gone" in error.message
+    meta, streams = read(tmp_path / "p.h5")
+    assert meta.excluded.startswith("interrupted: ")
+    assert 10 < len(streams["taxels"].data) < 50 * SECONDS
+
+
+def test_a_force_sensor_mounted_the_other_way_gives_the_same_force(tmp_path):
+    assert press(tmp_path / "a.h5", rig_file(force_faults=())) is None
+    assert press(tmp_path / "b.h5", rig_file(channel="fx", sign=-1)) is None
+    (_, plain), (meta, turned) = read(tmp_path / "a.h5"), read(tmp_path / "b.h5")
+    names = [channel.name for channel in turned["force_torque"].spec.channels]
+    assert names == ["normal", "fy", "fz", "tx", "ty", "tz"]
+    assert np.abs(turned["force_torque"].data[:, 0] - plain["force_torque"].data[:, 2]).max() <= 3e-6
+    assert meta.drawn["normal force"] == "-fx of net-ft"
+
+
+def test_the_zero_of_the_force_sensor_is_taken_off_and_said(tmp_path):
+    assert press(tmp_path / "p.h5", rig_file()) is None
+    meta, streams = read(tmp_path / "p.h5")
+    assert len(meta.drawn["zero of force_torque"].split(", ")) == 6
+    held = streams["force_torque"].data[:400, 2]
+    assert abs(held.mean()) < 0.5  # .7 N of noise, held for a hundredth of a second: some 50 samples
+
+
+def test_what_cannot_be_is_refused_with_the_next_step(tmp_path):
+    with pytest.raises(UsageError, match="--rig-file"):
+        bench(None)
+    with pytest.raises(UsageError, match="no entry for the sensor 'biotac'"):
+        press(tmp_path / "p.h5", rig_file("icub"), "biotac")
+    with pytest.raises(UsageError, match="no channel 'fq'"):
+        press(tmp_path / "p.h5", rig_file(channel="fq"))
+    with pytest.raises(UsageError, match="no simulated rig"):
+        bench(rig_file().model_copy(update={"emulation": EmulationSettings(physics="replay")}))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_in_real_time_nothing_is_lost_and_the_recording_says_so(tmp_path):
+    assert press(tmp_path / "p.h5", rig_file(time="real", zero_s=0.1)) is None
+    meta, streams = read(tmp_path / "p.h5")
+    assert (meta.clock, meta.emulation.time, meta.simulated) == ("host", "real", True)
+    assert meta.emulation.factor == pytest.approx(1.0, abs=0.2)
+    assert len(streams["force_torque"].data) == pytest.approx(1000 * SECONDS, rel=0.1)
+    assert meta.clocks["force_torque"].method == "hull-1way"

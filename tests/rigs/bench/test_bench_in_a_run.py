@@ -1,0 +1,46 @@
+"""The bench in a matrix: rows of emulated devices stand by themselves, beside those of the twin."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "rigs" / "bench-emulated.yaml"
+
+
+def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell):
+    asked = ("--sensor", "icub", "--task", "force", "--protocol", "deployable", "--estimator", "ols", "--repeats", "1")
+    shell("run", *asked)
+    out = shell("run", "--rig-file", str(EXAMPLE), *asked).stdout
+    assert "EMULATED (rig bench)" in out
+    table = shell("leaderboard", "--format", "md").stdout
+    assert table.count("· EMULATED (rig bench)**") == 1
+    assert table.count("· SIM (twin)**") == 1
+    assert "| icub EMULATED | ols |" in table
+    rows = json.loads(shell("leaderboard", "--format", "json").stdout)["rows"]
+    score = {row["rig"]: row["score"] for row in rows if row["estimator"] == "ols"}
+    # One campaign of each, of the same samples: what differs is the force sensor's zero, of some hundredths of a newton.
+    assert abs(score["bench"] - score["twin"]) < 0.05
+    assert {row["rig"]: (row["simulated"], row["emulated"]) for row in rows} == {
+        "bench": (True, True),
+        "twin": (True, False),
+    }
+    again = shell("run", "--rig-file", str(EXAMPLE), *asked)
+    assert "0 recordings made now" in again.stderr
+
+
+def test_a_rig_file_for_another_rig_or_none_at_all_is_refused(shell):
+    assert "--rig-file" in shell("run", "--rig", "bench", "--sensor", "icub", "--task", "force", code=2).stderr
+    refused = shell("run", "--rig", "twin", "--rig-file", str(EXAMPLE), "--sensor", "icub", code=2).stderr
+    assert "for the rig 'bench'" in refused
+
+
+def test_one_scene_is_recorded_and_a_terminal_is_asked_for_where_somebody_has_to_press(shell):
+    made = shell("record", "--rig-file", str(EXAMPLE), "--sensor", "icub", "--seconds", "2", "--out", "press.h5")
+    assert "icub on bench (EMULATED)" in made.stdout
+    text = EXAMPLE.read_text().replace("link: emulated", "link: udp://127.0.0.1:9", 1)
+    (shell.folder / "rig.yaml").write_text(text)
+    refused = shell("record", "--rig-file", "rig.yaml", "--sensor", "biotac", "--out", "none.h5", code=None)
+    assert refused.returncode != 0
+    assert "Traceback" not in refused.stderr
+    assert not (shell.folder / "none.h5").exists()
