@@ -22,7 +22,9 @@ READ_S = 0.25
 """Longest wait of one read, so that the end is not missed by more."""
 RATE_TOLERANCE = 0.02
 """A rate further from its nominal one is a problem. Assumed: quartz is a hundred times better, a timer of whole
-milliseconds at 50 Hz is not; what the ends of the reading cut off is allowed on top."""
+milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
+HELD_S = 0.016
+"""How long a usual USB serial adapter may hold back what has come (FTDI's latency timer as delivered) [s]."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,7 @@ def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> N
         for name, came in blocks.items():
             if came:
                 check.streams.append(_stream_check(specs[name], came))
-                check.problems += _problems(check.streams[-1], came)
+                check.problems += _problems(check.streams[-1])
             else:
                 check.problems.append(
                     f"Nothing came of its stream {name} within {seconds:g} s. "
@@ -258,11 +260,10 @@ _MEANING = {
 }
 
 
-def _problems(found: StreamCheck, came: Sequence[Block]) -> list[str]:
+def _problems(found: StreamCheck) -> list[str]:
     said = []
     if found.rate_hz is not None and found.nominal_hz is not None:
-        largest = max(len(block.data) for block in came)
-        allowed = RATE_TOLERANCE + 2 * largest / found.rows
+        allowed = RATE_TOLERANCE + 2 / found.rows + 2 * HELD_S * found.rate_hz / found.rows
         if abs(found.rate_hz / found.nominal_hz - 1) > allowed:
             said.append(
                 f"Stream {found.stream} came at {found.rate_hz:.4g} Hz, stated are {found.nominal_hz:.4g} Hz. "

@@ -198,7 +198,7 @@ def _noise(check: DeviceCheck, stream: StreamCheck) -> Iterator[tuple[str, ...]]
         yield check.name, stream.stream, f"{one.channels} {one.kind}", mean, sd, largest, constant
 
 
-def _table(title: str, head: tuple[str, ...], rows: Rows) -> None:
+def _table(title: str, head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     from rich import box
     from rich.table import Table
     from rich.text import Text
