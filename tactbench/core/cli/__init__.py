@@ -111,7 +111,9 @@ def _interrupted(arguments: list[str] | None) -> int:
         kept = "Recordings and scores are kept, times are not: the same command measures them anew."
     elif words[:1] == ["emulate"]:
         kept = "The emulated devices and their links are gone."
-    click.echo(f"Interrupted. {kept}", err=True)
+    elif words[:1] == ["record"]:
+        kept = ""  # it has said so itself
+    click.echo(f"Interrupted. {kept}".strip(), err=True)
     return 130
 
 

@@ -16,7 +16,6 @@ from serial.tools.list_ports import comports
 
 from tactbench.core.cli.device_check import check_devices
 from tactbench.core.cli.host_devices import extras, look_at_host
-from tactbench.core.errors import LinkError
 from tactbench.core.plugins.registry import Owned, Registry
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
@@ -150,9 +149,11 @@ def test_a_rig_on_lines_is_opened_asked_and_read(tmp_path):
     assert fz["means"]["fz"] == pytest.approx(0.25)
     assert fz["sd_median"] == pytest.approx(0.01 * np.sqrt(40 / 39))
     assert motor["emulated"]
-    assert "emulated" in motor["remarks"][0]
+    assert "wired-motor has no emulator" in motor["problems"][0]
     problems = [text for text in about["problems"] if text.startswith("wired-pad")]
-    assert problems == ["wired-pad: Of stream taxels, 10 rows are lost by its numbers: is the host too busy?"]
+    assert [problem.partition(":")[2] for problem in problems] == [
+        " Of stream taxels, 10 rows are lost by its numbers: is the host or the bus too busy?"
+    ]
     for text in ("model pad-3000", "fz +0.25", "0.0101 N", "10 rows are lost"):
         assert text in shown
 
@@ -220,7 +221,10 @@ class Paced(Driver):
             quality[list(rows).index(25)] = Quality.MISSING
             data[list(rows).index(25)] = 1e9
         times = np.round(rows / self.options.get("rate_hz", 100) * 1e9).astype(np.int64)
-        return [Block("taxels", times, data, quality)]
+        if self.options.get("twice") and 25 in rows:
+            again = np.insert(np.arange(len(rows)), list(rows).index(25), list(rows).index(25))
+            rows, times, data, quality = rows[again], times[again], data[again], quality[again]
+        return [Block("taxels", times, data, quality, sequence=rows)]
 
     def stop(self):
         log.append("stop")
@@ -296,18 +300,53 @@ def test_a_driver_of_others_that_raises_anything_is_closed_and_told():
     assert motor.identity == {"model": "paced"}
 
 
-def test_an_emulated_device_is_opened_where_its_emulator_runs():
-    where = f"{__name__}:Paced"
-    registry = Registry()
-    registry.devices.add(Owned(DeviceDescriptor(name="axis", title="a", kind="force", driver=where), "m", "d", "1"))
-    rig = RigFile.model_validate(
-        {"rig": "b", "sensors": {"x": {"link": "emulated"}}, "force": {"device": "axis", "link": "emulated"}}
-    )
+EMULATED = """
+rig: bench
+sensors:
+  icub: {{link: emulated{icub}}}
+  biotac: {{link: emulated}}
+force: {{device: net-ft, link: emulated{force}}}
+devices: {{motor: {{device: faulhaber, link: emulated}}}}
+"""
 
-    def opener():
-        raise LinkError("not asked for by this driver")
 
-    for links, rows in (({}, 0), ({"force": opener}, 300)):
-        (force,) = check_devices(rig, registry, [], seconds=3, clock=VirtualClock(), open_links=links)
-        assert force.emulated
-        assert sum(stream.rows for stream in force.streams) == rows
+def of_emulated(tmp_path, *arguments, code, icub="", force=""):
+    (tmp_path / "rig.yaml").write_text(EMULATED.format(icub=icub, force=force))
+    done = doctor(tmp_path, "--rig-file", "rig.yaml", "--format", "json", *arguments, code=code)
+    return json.loads(done.stdout)
+
+
+def test_emulated_devices_at_rest_are_read_and_said_to_be_emulated(tmp_path):
+    icub, biotac, force, motor = of_emulated(tmp_path, code=host_code())["devices"]
+    rates = {stream["stream"]: stream["rate_hz"] for one in (icub, biotac, force) for stream in one["streams"]}
+    assert rates == pytest.approx({"taxels": 50, "electrodes": 100, "vibration": 2200, "force_torque": 1000}, rel=0.01)
+    assert all("emulated" in one["remarks"] for one in (icub, biotac, force, motor))
+    (clock,) = [stream["clock"] for stream in force["streams"]]
+    assert abs(clock["drift_ppm"]) <= 1, "in virtual time both clocks are one"
+    assert clock["bound_us"] is not None
+    assert icub["streams"][0]["clock"] is None, "its board sends no time"
+    assert "a motor: not started" in motor["remarks"]
+    assert motor["identity"] != {}
+    assert motor["streams"] == []
+
+
+def test_one_sensor_of_a_rig_alone(tmp_path):
+    about = of_emulated(tmp_path, "--sensor", "biotac", "--seconds", "0.5", code=host_code())
+    assert [one["name"] for one in about["devices"]] == ["biotac", "force", "motor"]
+
+
+def test_faults_of_emulated_devices_are_found(tmp_path):
+    about = of_emulated(
+        tmp_path, "--sensor", "icub", code=1,
+        icub=', faults: ["not-connected:start_s=2"]', force=', faults: ["unplug:start_s=1"]',
+    )  # fmt: skip
+    icub, force, _ = about["devices"]
+    assert any("channel without a sample" in text for text in icub["problems"])
+    assert any("is gone" in text for text in force["problems"])
+
+
+def test_samples_that_come_twice_are_told():
+    pad, _ = checked(twice=True)
+    assert pad.streams[0].unordered == 1
+    assert pad.streams[0].rows == 300
+    assert "1 rows came twice or late" in pad.problems[0]
