@@ -113,7 +113,9 @@ def _interrupted(arguments: list[str] | None) -> int:
         kept = "What real or emulated devices had given is kept, as said above; of a simulation nothing is."
     elif words[:1] == ["emulate"]:
         kept = "The emulated devices and their links are gone."
-    click.echo(f"Interrupted. {kept}", err=True)
+    elif words[:1] == ["record"]:
+        kept = ""  # it has said so itself
+    click.echo(f"Interrupted. {kept}".strip(), err=True)
     return 130
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -16,13 +17,17 @@ if TYPE_CHECKING:
     from tactbench.core.spec.rig_file import DeviceEntry, RigFile
     from tactbench.core.spec.sensor import StreamSpec
     from tactbench.devices.driver import Driver
+    from tactbench.devices.emulator import Senses
+    from tactbench.devices.sequence import SequenceCheck
     from tactbench.links.link import Clock, Link
 
 READ_S = 0.25
 """Longest wait of one read, so that the end is not missed by more."""
 RATE_TOLERANCE = 0.02
 """A rate further from its nominal one is a problem. Assumed: quartz is a hundred times better, a timer of whole
-milliseconds at 50 Hz is not; what the ends of the reading cut off is allowed on top."""
+milliseconds at 50 Hz is not. A sample and :data:`HELD_S` at either end are allowed on top."""
+HELD_S = 0.016
+"""How long a usual USB serial adapter may hold back what has come (FTDI's latency timer as delivered) [s]."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,20 @@ class Noise:
 
 
 @dataclass(frozen=True)
+class DeviceClock:
+    """A device's own clock against the host's, as a recording would be put on it."""
+
+    offset_s: float
+    """Host's clock minus device's in the middle of the reading."""
+    drift_ppm: float
+    """By how much the host's clock runs faster."""
+    bound_us: float | None
+    """The error of the line between them; None: too few samples to tell."""
+    breaks: int
+    """How often its times went back."""
+
+
+@dataclass(frozen=True)
 class StreamCheck:
     """What came of one stream."""
 
@@ -52,10 +71,14 @@ class StreamCheck:
     rate_hz: float | None
     nominal_hz: float | None
     lost: int
-    """Rows that never came, by the device's numbers."""
+    """Rows that did not come where they were due, by the device's numbers."""
+    unordered: int
+    """Rows left out because they came twice or late."""
     marks: dict[str, int]
     """Rows with each mark of quality."""
     noise: tuple[Noise, ...]
+    clock: DeviceClock | None
+    """None: the stream's times are the host's."""
 
 
 @dataclass
@@ -84,7 +107,7 @@ def check_devices(
     *,
     seconds: float,
     clock: Clock,
-    open_links: Mapping[str, Callable[[], Link]] | None = None,
+    senses: Callable[[str], Senses] | None = None,
 ) -> list[DeviceCheck]:
     """Open, ask and read each device in turn; what is wrong with one is in its check and ends no other.
 
@@ -95,29 +118,37 @@ def check_devices(
     seconds
         How long each device is read.
     clock
-        The links'.
-    open_links
-        By an emulated device's name: opens a link to its emulator. Emulated devices that are not here are not opened.
+        The host's.
+    senses
+        By a device's name: what an emulated one senses while nothing touches it. Each runs alone, on its own clock.
+        None: they are not opened.
 
     Notes
     -----
     A motor is opened and asked who it is; it is never started.
     """
+    from tactbench.core.plugins.rig_devices import descriptor_of, emulated_device
+    from tactbench.devices.emulation.emulated_devices import EmulatedDevices
     from tactbench.links.address import open_link
 
     checks = []
     for name, entry in rig_file.entries().items():
         if name in rig_file.sensors and name not in sensors:
             continue
-        device = str(getattr(entry, "device", name))
-        check = DeviceCheck(name, device, entry.link, entry.emulated)
+        check = DeviceCheck(name, str(getattr(entry, "device", name)), entry.link, entry.emulated)
         checks.append(check)
-        opener = (open_links or {}).get(name) if entry.emulated else partial(open_link, entry.link, clock)
-        if opener is None:
-            check.remarks.append("emulated: there is no device to look at")
-            continue
+        if entry.emulated:
+            check.remarks.append("emulated")
         try:
-            _check(check, registry, name in rig_file.sensors, entry, opener, seconds, clock)
+            with ExitStack() as stack:
+                if not entry.emulated:
+                    _check(check, registry, entry, partial(open_link, entry.link, clock), seconds, clock)
+                elif senses is not None:
+                    descriptor = descriptor_of(registry, name, entry)
+                    how = rig_file.emulation
+                    device = emulated_device(descriptor, name, entry, senses(name), how.seed)
+                    devices = stack.enter_context(EmulatedDevices({name: device}, time=how.time))
+                    _check(check, registry, entry, partial(devices.open_link, name), seconds, devices.clock)
         except TactbenchError as error:
             check.problems.append(str(error))
         except Exception as error:  # a driver of others may raise anything
@@ -128,7 +159,6 @@ def check_devices(
 def _check(
     check: DeviceCheck,
     registry: Registry,
-    is_sensor: bool,
     entry: DeviceEntry,
     opener: Callable[[], Link],
     seconds: float,
@@ -136,24 +166,19 @@ def _check(
 ) -> None:
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_object
+    from tactbench.core.plugins.rig_devices import descriptor_of, options_of
+    from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.devices.driver import DriverSettings
 
-    where: str | None
-    streams: tuple[StreamSpec, ...] = ()
-    moves = False
-    if is_sensor:
-        sensor = registry.sensors[check.device]
-        where, streams = sensor.driver, sensor.spec.streams
-    else:
-        device = registry.devices[check.device]
-        where, moves = device.driver, device.kind == "motor"
-    if where is None:
+    descriptor = descriptor_of(registry, check.name, entry)
+    if descriptor.driver is None:
         raise UsageError(f"{check.device} has no driver.", hint="docs/plugins.md says how a sensor names one.")
-    settings = DriverSettings(opener, streams, entry.options, clock)
-    with load_object(where)(settings) as driver:
+    streams = descriptor.spec.streams if isinstance(descriptor, SensorDescriptor) else ()
+    settings = DriverSettings(opener, streams, options_of(descriptor, entry), clock)
+    with load_object(descriptor.driver)(settings) as driver:
         try:
             check.identity = dict(driver.identify())
-            if moves:
+            if not isinstance(descriptor, SensorDescriptor) and descriptor.kind == "motor":
                 check.remarks.append("a motor: not started")
                 return
             _read(check, driver, seconds, clock)
@@ -162,33 +187,37 @@ def _check(
 
 
 def _read(check: DeviceCheck, driver: Driver, seconds: float, clock: Clock) -> None:
+    from tactbench.devices.sequence import SequenceCheck
+
     driver.start()
     blocks: dict[str, list[Block]] = {stream.name: [] for stream in driver.streams}
+    ordered = {name: SequenceCheck() for name in blocks}
     until_ns = clock() + round(seconds * 1e9)
     try:
         while (left_s := (until_ns - clock()) * 1e-9) > 0:
             for block in driver.read(min(READ_S, left_s)):
-                if len(block.data):
-                    blocks.setdefault(block.stream, []).append(block)
+                kept = ordered[block.stream](block)
+                if kept is not None:
+                    blocks[block.stream].append(kept)
     finally:
         driver.stop()
-        specs = {stream.name: stream for stream in driver.streams}
-        for name, came in blocks.items():
+        for stream in driver.streams:
+            came = blocks[stream.name]
             if came:
-                check.streams.append(_stream_check(specs[name], came))
-                check.problems += _problems(check.streams[-1], came)
+                found = _stream_check(stream, came, ordered[stream.name])
+                check.streams.append(found)
+                check.problems += _problems(found)
             else:
                 check.problems.append(
-                    f"Nothing came of its stream {name} within {seconds:g} s. "
+                    f"Nothing came of its stream {stream.name} within {seconds:g} s. "
                     "Is it on, connected to this port, and set to the same speed?"
                 )
 
 
-def _stream_check(spec: StreamSpec, came: Sequence[Block]) -> StreamCheck:
+def _stream_check(spec: StreamSpec, came: Sequence[Block], ordered: SequenceCheck) -> StreamCheck:
     import numpy as np
 
     rows = sum(len(block.data) for block in came)
-    numbers = [block.sequence for block in came if block.sequence is not None]
     quality = [np.zeros(block.data.shape, np.uint8) if block.quality is None else block.quality for block in came]
     every = np.concatenate(quality)
     values = np.concatenate([block.data for block in came]).astype(np.float64)
@@ -200,10 +229,25 @@ def _stream_check(spec: StreamSpec, came: Sequence[Block]) -> StreamCheck:
         rows=rows,
         rate_hz=_rate(came),
         nominal_hz=spec.rate_hz,
-        lost=max(0, int(numbers[-1][-1] - numbers[0][0]) + 1 - rows) if len(numbers) == len(came) else 0,
+        lost=ordered.gaps,
+        unordered=ordered.duplicates + ordered.late,
         marks={str(flag.name): int(np.count_nonzero(marked & flag)) for flag in flags},
         noise=_noise(spec, values),
+        clock=_clock(came),
     )
+
+
+def _clock(came: Sequence[Block]) -> DeviceClock | None:
+    from tactbench.core.recording.clock_fit import ClockFit
+
+    fit = ClockFit()
+    for block in came:
+        if block.device_ns is None or block.t_ns is None:
+            return None
+        fit.add(block.device_ns, block.t_ns)
+    line = fit.segments()[-1]
+    bound_us = None if line.bound_ns is None else line.bound_ns * 1e-3
+    return DeviceClock(line.offset_ns * 1e-9, line.drift * 1e6, bound_us, fit.breaks)
 
 
 def _rate(came: Sequence[Block]) -> float | None:
@@ -251,29 +295,32 @@ def _noise(spec: StreamSpec, values: FloatArray) -> tuple[Noise, ...]:
 
 
 _MEANING = {
-    "GAP": "came after rows that were lost: is the host or the bus too busy?",
+    "GAP": "come after rows that were lost: is the host or the bus too busy?",
     "MISSING": "have a channel without a sample: is every part of the device connected?",
     "SUSPECT": "have a sample that failed its check: look at the cable, its shield and its ground.",
     "SATURATED": "have a channel at its converter's end, with nothing touching it: is something touching it?",
 }
 
 
-def _problems(found: StreamCheck, came: Sequence[Block]) -> list[str]:
+def _problems(found: StreamCheck) -> list[str]:
     said = []
     if found.rate_hz is not None and found.nominal_hz is not None:
-        largest = max(len(block.data) for block in came)
-        allowed = RATE_TOLERANCE + 2 * largest / found.rows
+        allowed = RATE_TOLERANCE + 2 / found.rows + 2 * HELD_S * found.rate_hz / found.rows
         if abs(found.rate_hz / found.nominal_hz - 1) > allowed:
             said.append(
                 f"Stream {found.stream} came at {found.rate_hz:.4g} Hz, stated are {found.nominal_hz:.4g} Hz. "
                 "Is the device set up for another rate, or the link too slow for it?"
             )
     if found.lost:
-        said.append(f"Of stream {found.stream}, {found.lost} rows are lost by its numbers: is the host too busy?")
+        said.append(
+            f"Of stream {found.stream}, {found.lost} rows are lost by its numbers: is the host or the bus too busy?"
+        )
+    if found.unordered:
+        said.append(f"Of stream {found.stream}, {found.unordered} rows came twice or late: what lies between?")
     said += [
         f"Of stream {found.stream}, {number} of {found.rows} rows {_MEANING[mark]}"
         for mark, number in found.marks.items()
-        if number
+        if number and not (mark == "GAP" and found.lost)
     ]
     return said
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
-    from tactbench.core.cli.device_check import DeviceCheck, StreamCheck
+    from tactbench.core.cli.device_check import DeviceCheck, DeviceClock, StreamCheck
     from tactbench.core.cli.host_devices import DeviceFile, Host
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.rig_file import RigFile
+    from tactbench.devices.emulator import Senses
 
 Rows = list[tuple[str, ...]]
 
@@ -52,7 +53,8 @@ def command(ctx: click.Context, rig_file: Path | None, sensor: str | None, secon
     checks: list[DeviceCheck] = []
     if rig is not None:
         remark(f"Reading each device for {seconds:g} s; nothing may touch them.")
-        checks = check_devices(rig, registry, sensors, seconds=seconds, clock=time.monotonic_ns)
+        senses = _at_rest(rig, sensors, registry) if rig.emulated else None
+        checks = check_devices(rig, registry, sensors, seconds=seconds, clock=time.monotonic_ns, senses=senses)
     problems = [*host.problems, *(f"{check.name}: {text}" for check in checks for text in check.problems)]
     if shape == "json":
         about = {
@@ -84,6 +86,19 @@ def _sensors(rig: RigFile | None, sensor: str | None, registry: Registry) -> tup
         if name not in rig.sensors:
             registry.devices[str(getattr(entry, "device", name))]
     return asked
+
+
+def _at_rest(rig: RigFile, sensors: Sequence[str], registry: Registry) -> Callable[[str], Senses]:
+    """Return by name what the rig's emulated devices sense at rest: a scene that never begins."""
+    from tactbench.core.cli.emulate import Presser
+    from tactbench.core.cli.scenes import scene_of
+
+    pressed = [name for name in sensors if rig.sensors[name].emulated]
+    scenes = {name: scene_of("rest", None, None, None, registry.sensors[name]) for name in pressed}
+    how = rig.emulation
+    presser = Presser(registry, how.physics, scenes, scene_of("rest", None, None, None, None), how.seed)
+    presser.draw(1)
+    return presser.senses
 
 
 def _drivers(registry: Registry) -> Rows:
@@ -161,9 +176,29 @@ def _print_rig(checks: Sequence[DeviceCheck]) -> None:
     if streams:
         _table(
             "streams",
-            ("device", "stream", "rows", "Hz", "stated", "lost", "GAP", "MISSING", "SUSPECT", "SATURATED"),
+            (
+                "device",
+                "stream",
+                "rows",
+                "Hz",
+                "stated",
+                "lost",
+                "twice or late",
+                "GAP",
+                "MISSING",
+                "SUSPECT",
+                "SATURATED",
+            ),
             streams,
         )
+    clocks = [
+        (check.name, stream.stream, *_clock(stream.clock))
+        for check in checks
+        for stream in check.streams
+        if stream.clock
+    ]
+    if clocks:
+        _table("clocks of devices", ("device", "stream", "host - device", "drift", "error at most"), clocks)
     noise = [row for check in checks for stream in check.streams for row in _noise(check, stream)]
     if noise:
         _table("unloaded", ("device", "stream", "channels", "mean", "standard deviation", "largest", "constant"), noise)
@@ -181,7 +216,20 @@ def _counts(check: DeviceCheck) -> list[str]:
 
 def _stream(stream: StreamCheck) -> tuple[str, ...]:
     rates = ("-" if rate is None else f"{rate:.5g}" for rate in (stream.rate_hz, stream.nominal_hz))
-    return (stream.stream, str(stream.rows), *rates, str(stream.lost), *map(str, stream.marks.values()))
+    return (
+        stream.stream,
+        str(stream.rows),
+        *rates,
+        str(stream.lost),
+        str(stream.unordered),
+        *map(str, stream.marks.values()),
+    )
+
+
+def _clock(clock: DeviceClock) -> tuple[str, str, str]:
+    bound = "not known: too few samples" if clock.bound_us is None else f"{clock.bound_us:.3g} us"
+    broken = f"; went back {clock.breaks} times" if clock.breaks else ""
+    return f"{clock.offset_s:+.6f} s", f"{clock.drift_ppm:+.3g} ppm", bound + broken
 
 
 def _noise(check: DeviceCheck, stream: StreamCheck) -> Iterator[tuple[str, ...]]:
@@ -198,7 +246,7 @@ def _noise(check: DeviceCheck, stream: StreamCheck) -> Iterator[tuple[str, ...]]
         yield check.name, stream.stream, f"{one.channels} {one.kind}", mean, sd, largest, constant
 
 
-def _table(title: str, head: tuple[str, ...], rows: Rows) -> None:
+def _table(title: str, head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     from rich import box
     from rich.table import Table
     from rich.text import Text

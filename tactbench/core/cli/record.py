@@ -82,25 +82,29 @@ def command(
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
     provenance = gather()
-    with ExitStack() as stack:
-        watch: Callable[[Block], None] | None = None
-        paused: Callable[[], AbstractContextManager[None]] = nullcontext
-        if live:
-            mark = " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if devices and devices.emulated else ""
-            view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
-            watch, paused = view.watch, view.paused
-        built = _built(registry, rig, devices, TerminalOperator(yes=yes, paused=paused))
-        if live:
-            built = view.beside(built)
-        try:
+    try:
+        with ExitStack() as stack:
+            watch: Callable[[Block], None] | None = None
+            paused: Callable[[], AbstractContextManager[None]] = nullcontext
+            if live:
+                mark = (
+                    " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if devices and devices.emulated else ""
+                )
+                view = stack.enter_context(LiveView(scene, f"{sensor} on {rig}{mark}, {scene.indenter}"))
+                watch, paused = view.watch, view.paused
+            built = _built(registry, rig, devices, TerminalOperator(yes=yes, paused=paused))
+            if live:
+                built = view.beside(built)
             made = acquire(
                 built, descriptor, registry.rigs[rig], scene, role=None, seed=seed, path=out, clock=time.perf_counter,
                 provenance=provenance, watch=watch, interrupted=out,
             )  # fmt: skip
-        except (KeyboardInterrupt, TactbenchError):
-            if out.exists() and _interrupted(out):
-                remark(f"What was recorded until then is in {out}, and is left out of every evaluation.")
-            raise
+    except (KeyboardInterrupt, TactbenchError) as error:
+        if out.exists() and _interrupted(out):
+            remark(f"What was recorded until then is in {out}, and is left out of every evaluation.")
+        elif isinstance(error, KeyboardInterrupt):
+            remark("Nothing is kept.")
+        raise
     meta = made.meta
     spent = float(meta.provenance.get("sim_s", meta.provenance.get("acquisition_s", 0.0)))
     mark = " (EMULATED)" if meta.emulation else " (SIM)" if meta.simulated else ""

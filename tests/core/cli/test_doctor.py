@@ -1,0 +1,352 @@
+"""What this machine has for devices, and whether those of a rig answer."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from serial.tools.list_ports import comports
+
+from tactbench.core.cli.device_check import check_devices
+from tactbench.core.cli.host_devices import extras, look_at_host
+from tactbench.core.plugins.registry import Owned, Registry
+from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
+from tactbench.core.spec.rig_file import RigFile
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, Source, StreamSpec
+from tactbench.plugin import Driver
+from tests.core.cli.terminals import ROOT
+from tests.links.ends import pty
+
+WIRED = ROOT / "tests" / "third_party" / "wired"
+AS_NOBODY = """
+import grp, os, sys
+sys.path.insert(0, sys.argv[1])
+from tactbench.core.cli.host_devices import serial_ports
+serial_ports()  # imports what it needs while that can be read
+os.setgroups([]), os.setgid(65534), os.setuid(65534)
+for port in serial_ports():
+    print(port.path, port.allowed, port.hint)
+"""
+RIG = """
+rig: bench
+sensors:
+  wired-pad: {{link: "serial://{pad}?baud=115200"}}
+force: {{device: wired-scale, link: "serial://{scale}?baud=115200"}}
+devices:
+  motor: {{device: wired-motor, link: emulated}}
+"""
+
+
+def doctor(folder, *arguments, code=0, **options):
+    env = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{WIRED}", "COLUMNS": "200", "PYTHONWARNINGS": "error"}
+    done = subprocess.run(
+        [sys.executable, "-m", "tactbench", "doctor", *arguments], cwd=folder, env=env, capture_output=True, text=True,
+        timeout=100, stdin=subprocess.DEVNULL, **options,
+    )  # fmt: skip
+    assert done.returncode == code, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done
+
+
+@contextmanager
+def talking(samples):
+    """The far end of a line: a device that says who it is, and sends its samples once it is started."""
+    with pty() as line:
+        stop = threading.Event()
+
+        def talk():
+            while not stop.is_set():
+                try:
+                    for word in line.read(0.05).split():
+                        line.write({b"id": b"pad-3000 0815\n", b"go": samples, b"stop": b""}[word])
+                except OSError:  # nobody has the line open, or no longer
+                    continue
+
+        thread = threading.Thread(target=talk)
+        thread.start()
+        try:
+            yield line
+        finally:
+            stop.set()
+            thread.join()
+
+
+def test_this_machine(tmp_path):
+    about = json.loads(doctor(tmp_path, "--format", "json", code=host_code()).stdout)
+    host = about["host"]
+    assert [one["path"] for one in host["serial"]] == sorted(port.device for port in comports())
+    assert [one["path"] for one in host["spi"]] == sorted(map(str, Path("/dev").glob("spidev*")))
+    assert host["clock"]["sleeps"] > 10
+    assert 0 <= host["clock"]["late_median_us"] <= host["clock"]["late_largest_us"]
+    assert host["clock"]["step_ns"] > 0
+    assert {one["name"] for one in host["extras"]} == {"dask", "fast", "multicast", "parquet", "spi", "xlsx"}
+    assert {"name": "wired-pad", "kind": "sensor", "driver": "wired_tactile.driver:build", "emulator": ""} in about[
+        "drivers"
+    ]
+    assert about["devices"] == []
+
+
+def host_code():
+    """What this machine's own ports make of the exit code."""
+    return 1 if look_at_host().problems else 0
+
+
+def test_it_reads_as_tables(tmp_path):
+    said = doctor(tmp_path, code=host_code()).stdout
+    for text in ("serial ports", "AF_CAN", "multicast", "sleep of 5 ms", "wired-scale"):
+        assert text in said
+
+
+def test_a_missing_extra_comes_with_its_command():
+    for extra in extras():
+        assert extra.command == f"pip install 'tactbench[{extra.name}]'"
+        for name in extra.missing:
+            with pytest.raises(metadata.PackageNotFoundError):
+                metadata.version(name)
+    (spi,) = [extra for extra in extras() if extra.name == "spi"]
+    assert spi.requires[0].startswith("spidev>=")
+    assert "extra ==" not in spi.requires[0]
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.getuid() != 0, reason="needs root, to be somebody else")
+def test_a_port_that_this_user_may_not_open_says_how_to():
+    closed = [port.device for port in comports() if not Path(port.device).stat().st_mode & 0o006]
+    if not closed:
+        pytest.skip("anybody may open every serial port of this machine")
+    done = subprocess.run(
+        [sys.executable, "-c", AS_NOBODY, ROOT], capture_output=True, text=True, check=True, timeout=60
+    )
+    for path in closed:
+        assert f"{path} False " in done.stdout
+        assert "sudo usermod -aG" in done.stdout or "udev rule" in done.stdout
+
+
+def test_a_rig_on_lines_is_opened_asked_and_read(tmp_path):
+    pad = b"".join(b"%d %d 500\n" % (n, 100 + n % 2) for n in range(50)) + b"nonsense here\n60 100 500\n"
+    scale = b"".join(b"%d %.2f\n" % (n, 0.25 + 0.01 * (-1) ** n) for n in range(40))
+    with talking(pad) as one, talking(scale) as other:
+        (tmp_path / "rig.yaml").write_text(RIG.format(pad=one.name, scale=other.name))
+        done = doctor(tmp_path, "--rig-file", "rig.yaml", "--seconds", "0.5", "--format", "json", code=1)
+        shown = doctor(tmp_path, "--rig-file", "rig.yaml", "--seconds", "0.5", code=1).stdout
+    about = json.loads(done.stdout)
+    sensor, force, motor = about["devices"]
+    assert "nothing may touch them" in done.stderr
+    assert sensor["identity"] == force["identity"] == {"model": "pad-3000", "serial": "0815"}
+    (taxels,) = sensor["streams"]
+    assert (taxels["rows"], taxels["lost"]) == (51, 10)
+    assert taxels["noise"][0]["constant"] == ["t2"]
+    assert taxels["noise"][0]["means"]["t2"] == 500
+    assert sensor["counts"] == {"lines that are no samples": 1}
+    (fz,) = force["streams"][0]["noise"]
+    assert (fz["kind"], fz["unit"]) == ("force", "N")
+    assert fz["means"]["fz"] == pytest.approx(0.25)
+    assert fz["sd_median"] == pytest.approx(0.01 * np.sqrt(40 / 39))
+    assert motor["emulated"]
+    assert "wired-motor has no emulator" in motor["problems"][0]
+    problems = [text for text in about["problems"] if text.startswith("wired-pad")]
+    assert [problem.partition(":")[2] for problem in problems] == [
+        " Of stream taxels, 10 rows are lost by its numbers: is the host or the bus too busy?"
+    ]
+    for text in ("model pad-3000", "fz +0.25", "0.0101 N", "10 rows are lost"):
+        assert text in shown
+
+
+def test_one_device_that_fails_ends_no_other(tmp_path):
+    with talking(b"1 100 500\n2 100 500\n") as line:
+        (tmp_path / "rig.yaml").write_text(RIG.format(pad="/dev/is-not-there", scale=line.name))
+        about = json.loads(
+            doctor(tmp_path, "--rig-file", "rig.yaml", "--seconds", "0.3", "--format", "json", code=1).stdout
+        )
+    sensor, force, _ = about["devices"]
+    assert "cannot be opened" in sensor["problems"][0]
+    assert "Check the name and the cable" in sensor["problems"][0]
+    assert force["identity"]["model"] == "pad-3000"
+    assert force["streams"][0]["rows"] == 2
+
+
+def test_a_wrong_rig_file_or_sensor_is_a_usage_error(tmp_path):
+    (tmp_path / "rig.yaml").write_text(RIG.format(pad="/dev/null", scale="/dev/null"))
+    assert "no sensor in this rig file called 'icub'" in doctor(
+        tmp_path, "--rig-file", "rig.yaml", "--sensor", "icub", code=2
+    ).stderr  # fmt: skip
+    assert "--rig-file" in doctor(tmp_path, "--sensor", "icub", code=2).stderr
+    (tmp_path / "rig.yaml").write_text("rig: bench\nsensors: {no-such: {link: emulated}}\n")
+    assert "no-such" in doctor(tmp_path, "--rig-file", "rig.yaml", code=2).stderr
+    (tmp_path / "rig.yaml").write_text("rig: bench\nsensor: {}\n")
+    assert "rig.yaml:2" in doctor(tmp_path, "--rig-file", "rig.yaml", code=2).stderr
+
+
+PAD = StreamSpec(
+    name="taxels", rate_hz=100, channels=tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(3))
+)
+log: list[str] = []
+
+
+class Paced(Driver):
+    """A pad in virtual time: its clock is its own."""
+
+    streams = (PAD,)
+    counts: ClassVar = {}
+
+    def __init__(self, settings):
+        self.options, self.clock, self.sent = settings.options, settings.clock, 0
+        self.rng = np.random.default_rng(1)
+
+    def identify(self):
+        log.append("identify")
+        if self.options.get("raises"):
+            raise ValueError("of somebody else")
+        return {"model": "paced"}
+
+    def start(self):
+        log.append("start")
+
+    def read(self, timeout_s):
+        self.clock.now_ns += round(timeout_s * 1e9)
+        due = int(self.clock.now_ns * 1e-9 * self.options.get("rate_hz", 100))
+        if self.options.get("mute") or due == self.sent:
+            return []
+        rows = np.arange(self.sent, due)
+        self.sent = due
+        data = 1000 + self.rng.normal(size=(len(rows), 3)) * [1, 2, 0]
+        quality = np.zeros(data.shape, np.uint8)
+        if 25 in rows and self.options.get("bad"):
+            quality[list(rows).index(25)] = Quality.MISSING
+            data[list(rows).index(25)] = 1e9
+        times = np.round(rows / self.options.get("rate_hz", 100) * 1e9).astype(np.int64)
+        if self.options.get("twice") and 25 in rows:
+            again = np.insert(np.arange(len(rows)), list(rows).index(25), list(rows).index(25))
+            rows, times, data, quality = rows[again], times[again], data[again], quality[again]
+        return [Block("taxels", times, data, quality, sequence=rows)]
+
+    def stop(self):
+        log.append("stop")
+
+    def close(self):
+        log.append("close")
+
+
+class VirtualClock:
+    now_ns = 0
+
+    def __call__(self):
+        return self.now_ns
+
+
+def checked(**options):
+    """Return the check of a pad with these options, and what was done to it."""
+    log.clear()
+    where = f"{__name__}:Paced"
+    source = Source(tag="assumed", reference="test")
+    spec = SensorSpec(name="pad", title="p", principle="p", principle_source=source, streams=(PAD,))
+    registry = Registry()
+    registry.sensors.add(Owned(SensorDescriptor(spec=spec, driver=where), "m", "d", "1"))
+    registry.devices.add(Owned(DeviceDescriptor(name="axis", title="a", kind="motor", driver=where), "m", "d", "1"))
+    rig = RigFile.model_validate(
+        {
+            "rig": "bench",
+            "sensors": {"pad": {"link": "loop://", "options": options}},
+            "devices": {"motor": {"device": "axis", "link": "loop://"}},
+        }
+    )
+    return check_devices(rig, registry, ["pad"], seconds=3, clock=VirtualClock())
+
+
+def test_noise_and_rate_in_virtual_time():
+    pad, motor = checked()
+    (stream,) = pad.streams
+    assert stream.rows == 300
+    assert stream.rate_hz == pytest.approx(100)
+    (noise,) = stream.noise
+    assert noise.sd_median == pytest.approx(1, rel=0.15), "300 values: a standard error of 4 %"
+    assert noise.sd_largest == pytest.approx(2, rel=0.15)
+    assert (noise.noisiest, noise.constant) == ("t1", ("t2",))
+    assert pad.problems == []
+    assert log == ["identify", "start", "stop", "close", "identify", "close"], "a motor is not started"
+    assert motor.remarks == ["a motor: not started"]
+
+
+def test_another_rate_than_stated_is_a_problem():
+    pad, _ = checked(rate_hz=90)
+    assert pad.streams[0].rate_hz == pytest.approx(90)
+    assert "came at 90 Hz, stated are 100 Hz" in pad.problems[0]
+    assert checked(rate_hz=99)[0].problems == []
+
+
+def test_samples_that_are_missing_are_told_and_in_no_noise():
+    pad, _ = checked(bad=True)
+    assert pad.streams[0].marks == {"GAP": 0, "MISSING": 1, "SUSPECT": 0, "SATURATED": 0}
+    assert pad.streams[0].noise[0].sd_largest < 3
+    assert "1 of 300 rows have a channel without a sample" in pad.problems[0]
+
+
+def test_a_device_that_sends_nothing_is_a_problem():
+    pad, _ = checked(mute=True)
+    assert "Nothing came of its stream taxels within 3 s" in pad.problems[0]
+    assert log[:4] == ["identify", "start", "stop", "close"]
+
+
+def test_a_driver_of_others_that_raises_anything_is_closed_and_told():
+    pad, motor = checked(raises=True)
+    assert "raised ValueError: of somebody else" in pad.problems[0]
+    assert log[:2] == ["identify", "close"]
+    assert motor.identity == {"model": "paced"}
+
+
+EMULATED = """
+rig: bench
+sensors:
+  icub: {{link: emulated{icub}}}
+  biotac: {{link: emulated}}
+force: {{device: net-ft, link: emulated{force}}}
+devices: {{motor: {{device: faulhaber, link: emulated}}}}
+"""
+
+
+def of_emulated(tmp_path, *arguments, code, icub="", force=""):
+    (tmp_path / "rig.yaml").write_text(EMULATED.format(icub=icub, force=force))
+    done = doctor(tmp_path, "--rig-file", "rig.yaml", "--format", "json", *arguments, code=code)
+    return json.loads(done.stdout)
+
+
+def test_emulated_devices_at_rest_are_read_and_said_to_be_emulated(tmp_path):
+    icub, biotac, force, motor = of_emulated(tmp_path, code=host_code())["devices"]
+    rates = {stream["stream"]: stream["rate_hz"] for one in (icub, biotac, force) for stream in one["streams"]}
+    assert rates == pytest.approx({"taxels": 50, "electrodes": 100, "vibration": 2200, "force_torque": 1000}, rel=0.01)
+    assert all("emulated" in one["remarks"] for one in (icub, biotac, force, motor))
+    (clock,) = [stream["clock"] for stream in force["streams"]]
+    assert abs(clock["drift_ppm"]) <= 1, "in virtual time both clocks are one"
+    assert clock["bound_us"] is not None
+    assert icub["streams"][0]["clock"] is None, "its board sends no time"
+    assert "a motor: not started" in motor["remarks"]
+    assert motor["identity"] != {}
+    assert motor["streams"] == []
+
+
+def test_one_sensor_of_a_rig_alone(tmp_path):
+    about = of_emulated(tmp_path, "--sensor", "biotac", "--seconds", "0.5", code=host_code())
+    assert [one["name"] for one in about["devices"]] == ["biotac", "force", "motor"]
+
+
+def test_faults_of_emulated_devices_are_found(tmp_path):
+    about = of_emulated(
+        tmp_path, "--sensor", "icub", code=1,
+        icub=', faults: ["not-connected:start_s=2"]', force=', faults: ["unplug:start_s=1"]',
+    )  # fmt: skip
+    icub, force, _ = about["devices"]
+    assert any("channel without a sample" in text for text in icub["problems"])
+    assert any("is gone" in text for text in force["problems"])
+
+
+def test_samples_that_come_twice_are_told():
+    pad, _ = checked(twice=True)
+    assert pad.streams[0].unordered == 1
+    assert pad.streams[0].rows == 300
+    assert "1 rows came twice or late" in pad.problems[0]
