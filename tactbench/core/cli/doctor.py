@@ -118,7 +118,7 @@ def _print(
         (one.name, ", ".join(one.requires), *(("missing", one.command) if one.missing else ("installed", "")))
         for one in host.extras
     ]
-    _table("extras", ("extra", "requires", "state", "install it with"), extras)
+    _table("extras", ("extra", "requires", "state", "install it with"), extras, whole="install it with")
     drivers = [
         (name, kind, "yes" if driver else "no", "yes" if made else "no")
         for name, kind, driver, made in _drivers(registry)
@@ -174,23 +174,7 @@ def _print_rig(checks: Sequence[DeviceCheck]) -> None:
     _table("the rig's devices", ("name", "device", "link", "says", "remarks"), said)
     streams = [(check.name, *_stream(stream)) for check in checks for stream in check.streams]
     if streams:
-        _table(
-            "streams",
-            (
-                "device",
-                "stream",
-                "rows",
-                "Hz",
-                "stated",
-                "lost",
-                "twice or late",
-                "GAP",
-                "MISSING",
-                "SUSPECT",
-                "SATURATED",
-            ),
-            streams,
-        )
+        _table("streams", ("device", "stream", "rows", "Hz", "stated", "lost or marked"), streams)
     clocks = [
         (check.name, stream.stream, *_clock(stream.clock))
         for check in checks
@@ -201,7 +185,7 @@ def _print_rig(checks: Sequence[DeviceCheck]) -> None:
         _table("clocks of devices", ("device", "stream", "host - device", "drift", "error at most"), clocks)
     noise = [row for check in checks for stream in check.streams for row in _noise(check, stream)]
     if noise:
-        _table("unloaded", ("device", "stream", "channels", "mean", "standard deviation", "largest", "constant"), noise)
+        _table("unloaded", ("device", "channels", "mean", "sd (median)", "sd (largest)", "constant"), noise)
 
 
 def _identity(check: DeviceCheck) -> str:
@@ -216,14 +200,9 @@ def _counts(check: DeviceCheck) -> list[str]:
 
 def _stream(stream: StreamCheck) -> tuple[str, ...]:
     rates = ("-" if rate is None else f"{rate:.5g}" for rate in (stream.rate_hz, stream.nominal_hz))
-    return (
-        stream.stream,
-        str(stream.rows),
-        *rates,
-        str(stream.lost),
-        str(stream.unordered),
-        *map(str, stream.marks.values()),
-    )
+    counts = {"lost": stream.lost, "twice or late": stream.unordered, **stream.marks}
+    marked = ", ".join(f"{number} {name}" for name, number in counts.items() if number)
+    return stream.stream, str(stream.rows), *rates, marked or "none"
 
 
 def _clock(clock: DeviceClock) -> tuple[str, str, str]:
@@ -243,10 +222,12 @@ def _noise(check: DeviceCheck, stream: StreamCheck) -> Iterator[tuple[str, ...]]
         sd = "-" if one.sd_median is None else f"{one.sd_median:.3g} {one.unit}"
         largest = "-" if one.sd_largest is None else f"{one.sd_largest:.3g} ({one.noisiest})"
         constant = ", ".join(one.constant) if len(one.constant) <= 4 else f"{len(one.constant)} channels"
-        yield check.name, stream.stream, f"{one.channels} {one.kind}", mean, sd, largest, constant
+        channels = next(iter(one.means)) if len(one.means) == one.channels == 1 else f"{one.channels} {one.kind}"
+        yield check.name, channels, mean, sd, largest, constant
 
 
-def _table(title: str, head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+def _table(title: str, head: tuple[str, ...], rows: Sequence[tuple[str, ...]], whole: str = "") -> None:
+    """Print a table; the column `whole` is not broken: it holds commands to copy."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -260,7 +241,7 @@ def _table(title: str, head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -
         return
     table: Any = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in head:
-        table.add_column(Text(name), overflow="fold")
+        table.add_column(Text(name), overflow="fold", no_wrap=name == whole)
     for row in rows:
         table.add_row(*map(Text, row))
     screen.print(table)

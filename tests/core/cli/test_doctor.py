@@ -154,7 +154,7 @@ def test_a_rig_on_lines_is_opened_asked_and_read(tmp_path):
     assert [problem.partition(":")[2] for problem in problems] == [
         " Of stream taxels, 10 rows are lost by its numbers: is the host or the bus too busy?"
     ]
-    for text in ("model pad-3000", "fz +0.25", "0.0101 N", "10 rows are lost"):
+    for text in ("model pad-3000", "fz +0.25", "0.0101 N", "10 lost", "10 rows are lost"):
         assert text in shown
 
 
