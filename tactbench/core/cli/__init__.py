@@ -109,8 +109,6 @@ def _interrupted(arguments: list[str] | None) -> int:
         kept = "What was finished is kept; the same command goes on from there."
     elif words[:1] == ["cost"] and "--twin" not in words:
         kept = "Recordings and scores are kept, times are not: the same command measures them anew."
-    elif words[:1] == ["record"]:
-        kept = "What real or emulated devices had given is kept, as said above; of a simulation nothing is."
     elif words[:1] == ["emulate"]:
         kept = "The emulated devices and their links are gone."
     elif words[:1] == ["record"]:

@@ -16,6 +16,7 @@ VERBS = {
     "show": ("biotac", "icub", "force"),
     "choose": ("--task", "force"),
     "inspect": ("ideal.h5",),
+    "doctor": (),
     "leaderboard": (),
     "report": (),
     "compare": ("ols", "mean"),
@@ -59,7 +60,8 @@ def _verbs(command, words):
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_what_is_printed_is_json(shell, verb):
-    found = json.loads(shell(*verb.split(), *VERBS[verb], "--format", "json").stdout)
+    code = None if verb == "doctor" else 0  # something may be wrong with this machine's ports
+    found = json.loads(shell(*verb.split(), *VERBS[verb], "--format", "json", code=code).stdout)
     assert found, "and it says something"
 
 

@@ -17,7 +17,7 @@ def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell):
     assert table.count("· EMULATED (rig bench)\n") == 1
     assert table.count("· SIM (twin)\n") == 1
     assert "| icub EMULATED | ols |" in table
-    rows = json.loads(shell("leaderboard", "--format", "json").stdout)["rows"]
+    rows = json.loads(shell("leaderboard", "--format", "json").stdout)
     score = {row["rig"]: row["score"] for row in rows if row["estimator"] == "ols"}
     # One campaign of each, of the same samples; what differs is the zero of the force, some hundredths of a newton.
     assert abs(score["bench"] - score["twin"]) < 0.05
