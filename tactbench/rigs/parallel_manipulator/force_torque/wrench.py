@@ -7,16 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import ChannelSpec, RigError, StreamSpec
+from tactbench.plugin import ChannelSpec, RigError, StreamSpec, Unwrap
 
 IntArray = npt.NDArray[np.int64]
 
 AXES = ("fx", "fy", "fz", "tx", "ty", "tz")
 STREAM = "force_torque"
 
-RESTART_RUN = 4
-"""Samples behind the newest, each next after the other, that mean a counter begun anew and not late datagrams
-(assumed)."""
+RESTART_RUN = 41
+"""Samples behind the newest, each next after the other, that mean a counter begun anew (derived: a late datagram of a
+Net F/T box has up to 40)."""
 
 
 def stream(rate_hz: float | None) -> StreamSpec:
@@ -38,46 +38,25 @@ def wrench_of(senses: Mapping[str, float]) -> tuple[float, ...]:
     return tuple(senses.get(name, 0.0) for name in AXES)
 
 
-class Counter:
-    """A counter of 32 bits, counted on over its wraps.
-
-    A difference from one number to the next is that of the least magnitude modulo 2^32, so that a number that comes
-    late is below those before it: 0 a duplicate, 1 in order, more a gap, below 0 late (as pyNetFT, sequence.cpp, tells
-    them apart, sourced). Half a wrap without a sample is beyond it: 3.5 days at 7 kHz, 36 minutes of microseconds.
-    """
-
-    def __init__(self) -> None:
-        self._last: int | None = None
-
-    def counted_on(self, numbers: npt.ArrayLike) -> IntArray:
-        """Return (n,) numbers counted on, of (n,) numbers in the order in which they came."""
-        given = np.asarray(numbers, dtype=np.int64)
-        last = int(given[0]) if self._last is None else self._last
-        steps = np.diff(given, prepend=last)
-        found: IntArray = last + np.cumsum((steps + (1 << 31)) % (1 << 32) - (1 << 31))
-        self._last = int(found[-1])
-        return found
-
-
-class SampleCounter(Counter):
-    """A counter of samples, which must not begin anew."""
+class SampleCounter:
+    """A counter of samples of 32 bits, which must not begin anew."""
 
     def __init__(self, device: str) -> None:
-        super().__init__()
+        self._unwrap = Unwrap(32)
         self._device = device
         self._newest: int | None = None
         self._previous = 0
         self._behind = 0
 
     def counted_on(self, numbers: npt.ArrayLike) -> IntArray:
-        """Return as :class:`Counter`.
+        """Return (n,) numbers counted on over wraps, of (n,) numbers in the order in which they came.
 
         Raises
         ------
         RigError
             If the device has begun to count anew: it was without power, or another host commands it.
         """
-        found = super().counted_on(numbers)
+        found = self._unwrap(numbers)
         if self._newest is None or (np.diff(found, prepend=self._newest) <= 0).any() or self._behind:
             self._look_back(found)
         else:

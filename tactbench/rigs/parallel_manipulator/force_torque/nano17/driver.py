@@ -19,6 +19,7 @@ from tactbench.plugin import (
     Quality,
     RigError,
     StreamSpec,
+    Unwrap,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import GAUGES, read_calibration
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
@@ -27,7 +28,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
     GaugeSamples,
     Nano17Options,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.wrench import STREAM, Counter, SampleCounter, stream
+from tactbench.rigs.parallel_manipulator.force_torque.wrench import STREAM, SampleCounter, stream
 from tactbench.rigs.parallel_manipulator.options import open_for, read_file, read_options
 
 if TYPE_CHECKING:
@@ -170,7 +171,7 @@ class Nano17Driver(Driver):
         self._link.close()
 
     def _restart(self) -> None:
-        self._samples, self._micros = SampleCounter("The Nano17's microcontroller"), Counter()
+        self._samples, self._micros = SampleCounter("The Nano17's microcontroller"), Unwrap(32)
 
     def _time_s(self, samples: int) -> float:
         return ANSWER_S + 1.1 * samples / self._options.rate_hz
@@ -217,7 +218,7 @@ class Nano17Driver(Driver):
             data=data,
             quality=marks if marks.any() else None,
             sequence=self._samples.counted_on(samples.counter),
-            device_ns=1000 * self._micros.counted_on(samples.micros),
+            device_ns=1000 * self._micros(samples.micros),
         )
 
 

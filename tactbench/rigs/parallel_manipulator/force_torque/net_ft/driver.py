@@ -23,6 +23,7 @@ from tactbench.plugin import (
     Received,
     RigError,
     StreamSpec,
+    Unwrap,
     UsageError,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import LARGEST_BYTES
@@ -41,7 +42,7 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     quality,
     status_text,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, STREAM, Counter, SampleCounter, stream
+from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, STREAM, SampleCounter, stream
 from tactbench.rigs.parallel_manipulator.options import open_for, read_file, read_options
 
 ANSWER_S = 0.5
@@ -191,7 +192,7 @@ class NetFtDriver(Driver):
         self._link.close()
 
     def _restart(self) -> None:
-        self._samples, self._ticks = SampleCounter("The Net F/T box"), Counter()
+        self._samples, self._ticks = SampleCounter("The Net F/T box"), Unwrap(32)
 
     def _send(self, command: Command, records: int = 0) -> None:
         self._link.send(encode_request(Request(command, records)))
@@ -224,7 +225,7 @@ class NetFtDriver(Driver):
             self._counts["errors"] += int((each != 0).sum())
             self._counts["saturated"] += int(((each & Quality.SATURATED) != 0).sum())
             self._counts["warnings"] += int(((records["status"] != 0) & (each == 0)).sum())
-        ticks = self._ticks.counted_on(records["ft_sequence"])
+        ticks = self._ticks(records["ft_sequence"])
         return Block(
             stream=STREAM,
             t_ns=np.repeat(
