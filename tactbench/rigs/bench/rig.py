@@ -196,7 +196,14 @@ class Bench:
                 f"The rig file has no entry for the sensor {sensor.name!r}; it has {', '.join(self._file.sensors)}.",
                 hint=f"Add `{sensor.name}:` with its link under `sensors:`.",
             )
-        return self._file.model_copy(update={"sensors": {sensor.name: self._file.sensors[sensor.name]}})
+        file = self._file.model_copy(update={"sensors": {sensor.name: self._file.sensors[sensor.name]}})
+        real = [name for name, entry in file.entries().items() if not entry.emulated]
+        if file.emulated and real and file.emulation.time == "virtual":
+            raise UsageError(
+                f"{', '.join(real)} is a real device and runs by the clock, the emulated ones in virtual time.",
+                hint="Write `time: real` under `emulation:`.",
+            )
+        return file
 
     @contextmanager
     def _simulated(

@@ -221,6 +221,12 @@ def test_what_cannot_be_is_refused_with_the_next_step(tmp_path):
         press(tmp_path / "p.h5", rig_file(channel="fq"))
     with pytest.raises(UsageError, match="no simulated rig"):
         bench(rig_file().model_copy(update={"emulation": EmulationSettings(physics="replay")}))
+    mixed = rig_file()
+    with pytest.raises(UsageError, match="time: real"):
+        press(
+            tmp_path / "p.h5",
+            mixed.model_copy(update={"sensors": {"icub": DeviceEntry(link="can://virtual/mixed")}}),
+        )
     assert list(tmp_path.iterdir()) == []
 
 
