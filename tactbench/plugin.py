@@ -22,7 +22,7 @@ from tactbench.core.errors import (
     UnknownNameError,
     UsageError,
 )
-from tactbench.core.plugins.checks import Check, Verdict
+from tactbench.core.plugins.checks import Check, CheckTable, RigCheck, Verdict
 from tactbench.core.plugins.cost import CostJob, CostPoint, CostStudy
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import (
@@ -35,6 +35,7 @@ from tactbench.core.plugins.interfaces import (
     Rig,
     RigContext,
     Shelf,
+    SimulatedPress,
     Transducer,
     TransducerFactory,
 )
@@ -125,6 +126,7 @@ __all__ = [
     "ChannelSpec",
     "ChannelTarget",
     "Check",
+    "CheckTable",
     "Clock",
     "CostJob",
     "CostPoint",
@@ -191,6 +193,7 @@ __all__ = [
     "Received",
     "Recording",
     "Rig",
+    "RigCheck",
     "RigContext",
     "RigDescriptor",
     "RigError",
@@ -207,6 +210,7 @@ __all__ = [
     "SerialLink",
     "SheetTable",
     "Shelf",
+    "SimulatedPress",
     "Simulation",
     "Skin",
     "SkinGrid",
