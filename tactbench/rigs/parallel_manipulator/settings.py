@@ -54,6 +54,8 @@ class SafetyLimits(_Part):
     """What the weakest part bears: skin, sensor, force sensor, cap. By its data sheet."""
     travel_mm: Range
     """Least and greatest position of the motor; 0 lies between them, where the drive keeps them."""
+    homing_force_n: Positive = 0.2
+    """Norm of the raw force that ends homing and retracting: above noise and drift, well below a press (assumed)."""
     heartbeat_ms: Positive
     """The motor retreats if nobody has told it for so long to go on."""
     retreat_mm: FiniteFloat
@@ -391,6 +393,8 @@ def with_limits(file: RigFile, settings: RigSettings) -> RigFile:
         "acceleration_m_s2": 1e-3 * settings.touch.acceleration_mm_s2,
     }
     entry = file.devices[MOTOR]
+    if entry.options.get("homing", "here") == "here":  # it stands at the place to which it retreats
+        own["home_m"] = own["retreat_m"]
     for name, value in own.items():
         if name in entry.options and not math.isclose(float(entry.options[name]), value, rel_tol=1e-9):
             raise UsageError(
