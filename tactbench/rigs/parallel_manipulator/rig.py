@@ -91,8 +91,10 @@ class PressAcquisition:
     clock: Clock = field(repr=False)
     begin_ns: int
     duration_s: float
-    left_out: dict[str, int] = field(default_factory=dict)
-    """By stream: rows of before and after the scene."""
+    gaps: Mapping[str, int]
+    """By stream: rows that were missing before the scene."""
+    rows: dict[str, int] = field(default_factory=dict)
+    """By stream: rows of the scene."""
     said: list[Event] = field(default_factory=list)
 
     def __iter__(self) -> Iterator[Block]:
@@ -116,8 +118,8 @@ class PressAcquisition:
         for block in blocks:
             assert block.t_ns is not None
             first, last = np.searchsorted(block.t_ns, (self.begin_ns, end_ns)).tolist()
-            self.left_out[block.stream] = self.left_out.get(block.stream, 0) + len(block.t_ns) - (last - first)
             if last > first:
+                self.rows[block.stream] = self.rows.get(block.stream, 0) + last - first
                 yield self.force.turned(_rows(block, slice(first, last)), self.zero)
 
     @property
@@ -142,11 +144,18 @@ class PressAcquisition:
 
     @property
     def stream_counts(self) -> Mapping[str, StreamCounts]:
-        """By stream of the sensor: what became of its rows, those of before and after the scene left out."""
-        return {
-            name: counts.model_copy(update={"received": counts.received - self.left_out.get(name, 0)})
-            for name, counts in self.reading.stream_counts.items()
-        }
+        """By stream of the sensor: what became of the scene's rows; those of before and after are not counted."""
+        found = {}
+        for name, one in self.reading.stream_counts.items():
+            rows = self.rows.get(name, 0)
+            found[name] = one.model_copy(
+                update={
+                    "received": rows + one.dropped + one.duplicates + one.late,
+                    "written": rows,
+                    "gaps": one.gaps - self.gaps[name],
+                }
+            )
+        return found
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -246,7 +255,8 @@ class ParallelManipulator:
             if not virtual:
                 control.start()
             blocks = reading.blocks(math.inf)
-            left_out, events = self._find_surface(control, blocks)
+            events = self._find_surface(control, blocks)
+            gaps = {name: one.gaps for name, one in reading.stream_counts.items()}
             begin_ns = clock()
             if senses is not None:
                 senses[1].start(1e-9 * begin_ns)
@@ -277,7 +287,7 @@ class ParallelManipulator:
                 clock=clock,
                 begin_ns=begin_ns,
                 duration_s=scene.profile.duration.to("s"),
-                left_out=left_out,
+                gaps=gaps,
                 said=events,
             )
 
@@ -419,14 +429,13 @@ class ParallelManipulator:
             end_s=end_s,
         )
 
-    def _find_surface(self, control: Control, blocks: Iterator[Block]) -> tuple[dict[str, int], list[Event]]:
-        """Let the press find the surface; return the rows of each stream that came meanwhile, and what happened."""
+    def _find_surface(self, control: Control, blocks: Iterator[Block]) -> list[Event]:
+        """Let the press find the surface; return what happened meanwhile, whose rows nobody keeps."""
         press = control.press
         press.go()
-        left_out: dict[str, int] = {}
-        for block in blocks:
-            for one in chain((block,), control.blocks()):
-                left_out[one.stream] = left_out.get(one.stream, 0) + len(one.data)
+        for _ in blocks:
+            for _ in control.blocks():
+                pass
             if press.ready or press.over:
                 break
         events = list(control.events())
@@ -436,7 +445,7 @@ class ParallelManipulator:
                 f"The surface was not found: {press.ended or 'the sensor has ended'}{f' ({said})' if said else ''}.",
                 hint="Look at the rig: sensor, cap, heights in the rig file.",
             )
-        return left_out, events
+        return events
 
 
 def _rows(block: Block, rows: slice) -> Block:

@@ -79,6 +79,8 @@ class Stiffness(_Part):
 
     least_n_mm: Positive
     """At the first touch of the softest cap."""
+    at_touch_n_mm: Positive
+    """The greatest up to the force that a first touch may have."""
     greatest_n_mm: Positive
     """At the largest commanded force on the stiffest cap: what the loop must settle at."""
     at_ceiling_n_mm: Positive
@@ -86,8 +88,8 @@ class Stiffness(_Part):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        if not self.least_n_mm <= self.greatest_n_mm <= self.at_ceiling_n_mm:
-            raise ValueError("least, greatest and at the ceiling stand in this order")
+        if not self.least_n_mm <= self.at_touch_n_mm <= self.greatest_n_mm <= self.at_ceiling_n_mm:
+            raise ValueError("least, at a touch, greatest and at the ceiling rise in this order")
         return self
 
 
