@@ -124,6 +124,7 @@ class Press:
         self._step_m = loop.step_m
         self._raw: deque[tuple[float, float]] = deque()
         self._sum_n = 0.0
+        self._force_n = math.nan
         self._controller: ForceController | None = None
         self._goal: Command | None = None
         self._asked_s: float | None = None
@@ -205,10 +206,11 @@ class Press:
         return self._asking(report, now_s)
 
     def _take(self, raw: Sequence[tuple[float, float]], now_s: float) -> None:
-        """Keep the raw forces of the last moment, and the largest of a touch."""
+        """Keep the raw forces of the last moment, the newest, and the largest of a touch."""
         for sample in raw:
             self._raw.append(sample)
             self._sum_n += sample[1]
+            self._force_n = sample[1]
             if self.state in (PressState.APPROACH, PressState.CONTACT):
                 self.touch_n = max(self.touch_n, sample[1])
         oldest = now_s - 1e-3 * self._settings.touch.mean_ms
@@ -302,7 +304,7 @@ class Press:
                     self.fail(f"{self.mean_n:.2f} N are left after unloading")
             case _:
                 self._enter(PressState.RAMP, now_s)
-                self._controller = ForceController(self._law, report.force_n, report.position_m, now_s)
+                self._controller = ForceController(self._law, self._force_n, report.position_m, now_s)
 
     def _duration_of_unloading(self) -> float:
         heights = self._settings.heights
@@ -313,7 +315,7 @@ class Press:
     def _close_loop(self, report: Report, now_s: float) -> None:
         """Begin to regulate after a touch: the small force, or where the ramp was when contact was lost."""
         self._enter(PressState.RAMP if self._lost else PressState.CONTACT, now_s)
-        self._controller = ForceController(self._law, report.force_n, report.position_m, now_s)
+        self._controller = ForceController(self._law, self._force_n, report.position_m, now_s)
         if self._lost:
             self._paused_s += now_s - self._waiting_s
 
@@ -331,7 +333,7 @@ class Press:
         controller = self._controller
         assert controller is not None
         self.wanted_n, slope = self._wanted(now_s)
-        controller.step(report.force_n, report.position_m, now_s, self.wanted_n, slope)
+        controller.step(self._force_n, report.position_m, now_s, self.wanted_n, slope)
         self.error_n = controller.filtered_n - self.wanted_n
         if self.state is PressState.CONTACT:
             if now_s - self._since_s >= self._settings.touch.settle_s:
