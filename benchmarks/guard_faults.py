@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -66,6 +66,7 @@ class Setting:
     ceiling_n: float = 6.0
     wanted_n: float = 5.0
     seed: int = 1
+    force_age_s: float = 13e-3
     time: Literal["virtual", "real"] = "virtual"
 
     @property
@@ -81,7 +82,7 @@ class Setting:
             retreat_m=RETREAT_M,
             retreat_speed_m_s=0.05,
             heartbeat_s=max(3 * self.period_s, 30e-3),
-            force_age_s=13e-3,
+            force_age_s=self.force_age_s,
             channel=2,
             sign=1,
             zero=(0.0,) * 6,
@@ -101,8 +102,6 @@ class Pressed:
     ----------
     largest_n
         That the spring has seen, at each tick of the motor.
-    moved_m
-        The place where the motor was at each force sample, by virtual second.
     sensed
         Changes what the force sensor reads: called with (six numbers, second).
     """
@@ -110,6 +109,7 @@ class Pressed:
     def __init__(self, setting: Setting, **faults: list[Any]) -> None:
         self.setting = setting
         self.largest_n = 0.0
+        self._places: deque[tuple[float, float]] = deque(maxlen=20_000)
         self.sensed: Callable[[list[float], float], list[float]] = lambda wrench, at_s: wrench
         rng = np.random.default_rng(setting.seed)
         self.motor = MotorEmulator(
@@ -119,10 +119,14 @@ class Pressed:
             baud=setting.baud,
             faults=faults.get("motor", []),
         )
+
+        def wrench(at_s: float) -> list[float]:
+            self._places.append((at_s, self.position_m))
+            pressing = self.force_n + rng.normal(0, NOISE_N)
+            return self.sensed([*rng.normal(0, NOISE_N, 2), pressing, *rng.normal(0, 1e-4, 3)], at_s)
+
         self.force = RdtEmulator(
-            lambda at_s: self.sensed(
-                [*rng.normal(0, NOISE_N, 2), self.force_n + rng.normal(0, NOISE_N), *rng.normal(0, 1e-4, 3)], at_s
-            ),
+            wrench,
             faults=faults.get("force", []),
         )
         self.devices = EmulatedDevices(
@@ -146,6 +150,10 @@ class Pressed:
         force = self.setting.stiffness_n_m * max(0.0, self.position_m - SKIN_M)
         self.largest_n = max(self.largest_n, force)
         return force
+
+    def deepest_m(self, since_s: float) -> float:
+        """Return the deepest place of the motor at any force sample since a second of the clock."""
+        return max((place for at_s, place in self._places if at_s >= since_s), default=-math.inf)
 
     def _load(self, place_m: float, at_s: float) -> float:
         return self.setting.stiffness_n_m * max(0.0, place_m + RETREAT_M - SKIN_M)
