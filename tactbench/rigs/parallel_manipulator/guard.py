@@ -5,8 +5,9 @@ docs/hardware.md, Safety. What it promises, of a motor that does as its driver a
 
 - *Steps.* One increment is out at a time, and the next is sent only if a force sample that was taken after the end of
   the one before is below the ceiling. So the force never exceeds F_c + k (step_m + corridor_m) and the noise of one
-  sample, whatever the line's rate and whoever hangs (derived; k the largest stiffness at the ceiling F_c, corridor_m
-  how near to its target the drive calls a move ended). A line that falls silent lets the motor end one increment.
+  sample, whatever the line's rate and whoever hangs (derived; k the largest stiffness at the ceiling F_c, step_m
+  rounded to increments of the drive, corridor_m how near to its target the drive calls a move ended). A line that falls
+  silent lets the motor end one increment.
 - *Moves at a speed v* (approach): F_max = F_c + k v t_r + k v^2/(2 acc) of :mod:`worst_case`, with t_r of
   :func:`reaction`: age of the force, one look of the guard and its scheduling, the bytes ahead of the retreat and the
   retreat itself on the line, the motor's lag.
@@ -287,6 +288,11 @@ class LocalGuard:
         self._limits, self.trigger = None, None
         return self._report(0, _Verdict(True))
 
+    def abandon(self) -> None:
+        """Close the motor's link and send nothing more: for whoever goes on without this guard."""
+        self._motor.close()
+        self._motor_gone, self.state = True, GuardState.FAULT
+
     def close(self) -> None:
         """Disarm, and close both devices; once closed, this does nothing."""
         if self._closed:
@@ -404,11 +410,11 @@ class LocalGuard:
         target_m = state.target_m + beat.distance_m if is_step else beat.position_m
         low, high = limits.travel_m
         into_skin = target_m > state.target_m
-        rounding = 1 + 1e-9
+        rounding, most = 1 + 1e-9, self._steps(limits.step_m)
         for wrong, reason in (
             (not low <= target_m <= high, f"the target {target_m:g} m is outside the travel {low:g} to {high:g} m"),
             (
-                is_step and not abs(beat.distance_m) <= limits.step_m * rounding,
+                is_step and not (math.isfinite(beat.distance_m) and self._steps(beat.distance_m) <= most),
                 f"a step of {beat.distance_m:g} m is longer than {limits.step_m:g} m",
             ),
             (
@@ -436,6 +442,10 @@ class LocalGuard:
             return _Verdict(False, error.message)
         self._into_skin, self._touched = into_skin and not is_step, False
         return _Verdict(True)
+
+    def _steps(self, distance_m: float) -> int:
+        """Return the whole increments of the drive that a distance is rounded to."""
+        return abs(self._motor.options.profile().increments(distance_m))
 
     def _send(self, order: Callable[[], None]) -> None:
         """Give the motor an order of several commands at once; what fails of it becomes a retreat."""
@@ -520,6 +530,7 @@ class LocalGuard:
             (options.retreat_m != limits.retreat_m, "retreat_m is not the drive's"),
             (options.retreat_speed_m_s != limits.retreat_speed_m_s, "retreat_speed_m_s is not the drive's"),
             (options.speed_m_s > limits.speed_m_s, "the drive's speed is above the limit"),
+            (self._steps(limits.step_m) == 0, "a step is shorter than half an increment of the drive"),
             (options.corridor_m > limits.step_m, "the drive's corridor is longer than a step"),
             (abs(here_m - limits.retreat_m) > options.corridor_m, "homed here, the motor must stand at retreat_m"),
             (len(limits.zero) != len(channels), f"the force has {len(channels)} channels and {len(limits.zero)} zeros"),

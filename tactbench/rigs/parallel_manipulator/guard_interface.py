@@ -124,7 +124,7 @@ class Limits(_Message):
     travel_m: tuple[float, float]
     """Least and greatest target."""
     step_m: float
-    """Largest increment: loop speed times control period."""
+    """Largest increment: loop speed times control period; rounded to increments of the drive, as each step is."""
     speed_m_s: float
     """Largest speed of any move."""
     retreat_m: float
@@ -181,7 +181,7 @@ class Beat(_Message):
     """Of the press, for the log."""
     command: CommandKind = CommandKind.NONE
     distance_m: float = 0.0
-    """Of a step."""
+    """Of a step, from `Report.target_m`; rounded to increments of the drive, so remainders must be kept by the rig."""
     position_m: float = math.nan
     """Of MOVE_TO."""
     speed_m_s: float = math.nan

@@ -117,3 +117,15 @@ def _opened(open_link: Callable[[], Link], clock: Clock, until_ns: int) -> ByteL
             link.close()
             raise UsageError(f"The motor cannot be spoken to through {link.address}.")
         return link
+
+
+def stand_blind(open_link: Callable[[], Link], options: FaulhaberOptions, clock: Clock) -> None:
+    """Open the motor's line and let it stand, under control of its speed: for a motor whose place is not known.
+
+    Raises
+    ------
+    LinkError
+        If the line cannot be opened, or does not take it.
+    """
+    with _opened(open_link, clock, clock() + round(1e9 * OPEN_S)) as link:
+        link.write(b"\r" + encode("V", 0, node=options.node))
