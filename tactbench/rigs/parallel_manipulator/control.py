@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from tactbench.plugin import Block, Driver, StreamSpec, TactbenchError
@@ -105,6 +106,7 @@ class Control:
         self._events: deque[Event] = deque()
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
+        self._counts: Mapping[str, Mapping[str, int]] | None = None
 
     @property
     def report(self) -> Report:
@@ -138,7 +140,13 @@ class Control:
         self._over.set()
         if self._thread is not None:
             self._thread.join(STOP_S)
-        self._gather()
+        with suppress(TactbenchError):  # a guard that is lost has nothing more to say
+            self._gather()
+            self._counts = self._guard.counts()
+
+    def counts(self) -> Mapping[str, Mapping[str, int]]:
+        """Return what guard, motor and force sensor have counted; once stopped, until then."""
+        return self._guard.counts() if self._counts is None else self._counts
 
     def _run(self) -> None:
         try:

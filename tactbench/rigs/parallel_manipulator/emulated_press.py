@@ -141,7 +141,7 @@ def _tracks(simulated: SimulatedPress) -> list[_Track]:
             blocks[block.stream].append(block)
     return [
         (
-            np.concatenate([block.t_ns for block in blocks[stream.name]]).tolist(),  # type: ignore[misc]
+            np.concatenate([block.t_ns for block in blocks[stream.name]]).tolist(),
             tuple(channel.name for channel in stream.channels),
             np.concatenate([block.data for block in blocks[stream.name]]).tolist(),
         )
@@ -156,7 +156,7 @@ def _force_noise(simulated: SimulatedPress, scene: Scene) -> tuple[list[int], li
         names = [channel.name for channel in stream.channels]
         if FORCE in names:
             own = [block for block in simulated if block.stream == stream.name and block.t_ns is not None]
-            t_ns = np.concatenate([block.t_ns for block in own])  # type: ignore[misc]
+            t_ns = np.concatenate([block.t_ns for block in own])
             measured: FloatArray = np.concatenate([block.data[:, names.index(FORCE)] for block in own])
             load = np.interp(1e-9 * t_ns, *scene.profile.corners)
             return t_ns.tolist(), (measured - load).tolist()

@@ -25,9 +25,9 @@ from tactbench.rigs.parallel_manipulator.force_law import ForceController, Force
 from tactbench.rigs.parallel_manipulator.guard_interface import CommandKind, GuardState, Report
 from tactbench.rigs.parallel_manipulator.settings import RigSettings
 
-SWINGS = 3
-"""Half swings of the error, each larger than the one before, after which the loop is said to swing (derived: noise
-makes such a run above the band with a probability below 1e-3 a swing)."""
+SWINGS = 6
+"""Half swings of the error in a row, each above the band of errors, after which the loop is said to swing (assumed:
+three whole swings)."""
 SLOW = 1.5
 """How many times as long as its way takes a move may last, and `SLACK_S` longer."""
 SLACK_S = 2.0
@@ -128,13 +128,12 @@ class Press:
         self._controller: ForceController | None = None
         self._goal: Command | None = None
         self._asked_s: float | None = None
-        self._since_s = 0.0
+        self._since_s = self._due_s = 0.0
         self._began_s: float | None = None
         self._paused_s = 0.0
         self._waiting_s = math.nan
         self._band_since_s = self._error_since_s = math.nan
-        self._swings: list[float] = []
-        self._swing_n = 0.0
+        self._swings, self._peak_n = 0, 0.0
         self._lost = False
         self._go = False
 
@@ -235,7 +234,7 @@ class Press:
         self.state, self._since_s = state, now_s
         self._goal = self._asked_s = None
         self._band_since_s = self._error_since_s = math.nan
-        self._swings, self._swing_n = [], 0.0
+        self._swings, self._peak_n = 0, 0.0
 
     # Moves ------------------------------------------------------------------------------------------------------------
 
@@ -250,6 +249,9 @@ class Press:
         if report.moving and self._goal.kind is not CommandKind.STOP:
             return Command()
         self._asked_s = now_s
+        if self._goal.kind is CommandKind.MOVE_TO:
+            way_m = abs(self._goal.position_m - report.position_m)
+            self._due_s = now_s + SLOW * way_m / self._goal.speed_m_s + SLACK_S
         return self._goal
 
     def _arrived(self, report: Report, now_s: float) -> bool:
@@ -260,8 +262,7 @@ class Press:
             self._asked_s = None
             return False
         if report.moving:
-            way = abs(self._goal.position_m - report.position_m) + self._settings.heights.stand_off_mm * 1e-3
-            if now_s - self._asked_s > SLOW * way / self._goal.speed_m_s + SLACK_S:
+            if now_s > self._due_s:
                 self.fail(f"the motor did not arrive at {1e3 * self._goal.position_m:.3f} mm in its time")
             return False
         return True
@@ -382,19 +383,12 @@ class Press:
         if now_s - self._error_since_s >= 1.0:
             self.fail(f"the force was off by more than {rules.error_band_n:g} N for a second, at {self.wanted_n:.2f} N")
             return False
-        if self.error_n * self._swing_n < 0:
-            self._swings = [*self._swings[1 - SWINGS :], abs(self._swing_n)]
-            self._swing_n = 0.0
-        if abs(self.error_n) > abs(self._swing_n):
-            self._swing_n = self.error_n
-        growing = [*self._swings, abs(self._swing_n)][-SWINGS:]
-        if (
-            len(growing) == SWINGS
-            and sorted(set(growing)) == growing
-            and growing[0] > rules.band_n
-            and (growing[-1] > rules.error_band_n)
-        ):
-            self.fail(f"the force swings, by {growing[-1]:.2f} N now: lower the loop's gains")
+        if self.error_n * self._peak_n < 0:
+            self._swings = self._swings + 1 if abs(self._peak_n) > rules.error_band_n else 0
+            self._peak_n = 0.0
+        self._peak_n = max(self._peak_n, self.error_n, key=abs)
+        if self._swings >= SWINGS:
+            self.fail(f"the force swings by more than {rules.error_band_n:g} N: lower the loop's gains")
             return False
         return True
 

@@ -13,6 +13,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,8 @@ from tactbench.plugin import (
     Driver,
     EmulatedDevices,
     Emulation,
+    ForceEntry,
+    NamedDevice,
     NotApplicable,
     Operator,
     PlanEntry,
@@ -51,6 +54,8 @@ from tactbench.rigs.parallel_manipulator.control import Control, WatchedDriver
 from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress, quiet
 from tactbench.rigs.parallel_manipulator.guard import LocalGuard
 from tactbench.rigs.parallel_manipulator.guard_interface import Event, Guard, GuardState, Limits, Report
+from tactbench.rigs.parallel_manipulator.guard_messages import DeviceSettings, ProcessSettings
+from tactbench.rigs.parallel_manipulator.guard_process import GuardProcess
 from tactbench.rigs.parallel_manipulator.joints import Joints, check_places
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
@@ -87,7 +92,6 @@ class PressAcquisition:
     reading: Reading = field(repr=False)
     blocks: Iterator[Block] = field(repr=False)
     """The sensor's, from before the scene on."""
-    guard: Guard = field(repr=False)
     clock: Clock = field(repr=False)
     begin_ns: int
     duration_s: float
@@ -160,7 +164,7 @@ class PressAcquisition:
     @property
     def counts(self) -> Mapping[str, int]:
         """What drivers and guard have counted."""
-        guard = {f"{name}: {what}": n for name, counts in self.guard.counts().items() for what, n in counts.items()}
+        guard = {f"{name}: {what}": n for name, counts in self.control.counts().items() for what, n in counts.items()}
         return {**self.reading.counts, **guard}
 
     @property
@@ -227,7 +231,7 @@ class ParallelManipulator:
                 return [drivers[name] for name in names]
 
             virtual = emulated is not None and file.emulation.time == "virtual"
-            guard = self._guard(stack, opened, clock, emulated)
+            guard = self._guard(stack, file, opened, clock, emulated)
             said = guard.start()
             own, force, zero, limits = self._limits(file, guard, clock)
             guard.arm(limits)
@@ -283,7 +287,6 @@ class ParallelManipulator:
                 control=control,
                 reading=reading,
                 blocks=blocks,
-                guard=guard,
                 clock=clock,
                 begin_ns=begin_ns,
                 duration_s=scene.profile.duration.to("s"),
@@ -342,16 +345,36 @@ class ParallelManipulator:
             senses.pressed_by(emulator.drive)
         return found
 
-    def _guard(self, stack: ExitStack, opened: Any, clock: Clock, emulated: EmulatedDevices | None) -> Guard:
+    def _guard(
+        self, stack: ExitStack, file: RigFile, opened: Any, clock: Clock, emulated: EmulatedDevices | None
+    ) -> Guard:
         """Return the guard of motor and force sensor; it is disarmed and closed at the end."""
-        if emulated is None:
-            raise RigError("Real devices need the guard's process.", hint="Use emulated devices.")
-        motor, force = opened(MOTOR, FORCE)
-        if not isinstance(motor, FaulhaberDriver):
-            raise UsageError(f"The {MOTOR} is no faulhaber device.", hint="This rig moves one.")
-        guard = LocalGuard(motor, force, clock, emulated.advance)
+        guard: LocalGuard | GuardProcess
+        if emulated is not None and file.emulation.time == "virtual":
+            motor, force = opened(MOTOR, FORCE)
+            if not isinstance(motor, FaulhaberDriver):
+                raise UsageError(f"The {MOTOR} is no faulhaber device.", hint="This rig moves one.")
+            guard = LocalGuard(motor, force, clock, emulated.advance)
+        else:
+            addresses = {} if emulated is None else emulated.addresses
+            guard = GuardProcess(
+                ProcessSettings(
+                    motor=self._device(file, MOTOR, addresses),
+                    force=self._device(file, FORCE, addresses),
+                    log=str(Path(self.settings.guard_log).expanduser().resolve()),
+                    clock_zero_ns=time.monotonic_ns() - clock(),
+                )
+            )
         stack.callback(guard.close)
         return guard
+
+    def _device(self, file: RigFile, name: str, addresses: Mapping[str, str]) -> DeviceSettings:
+        """Return what the guard's process is told of a device."""
+        entry = file.entries()[name]
+        assert isinstance(entry, ForceEntry | NamedDevice)
+        descriptor = load_registry().devices[entry.device]
+        options = {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
+        return DeviceSettings(driver=descriptor.driver, link=addresses.get(name, entry.link), options=options)
 
     def _limits(
         self, file: RigFile, guard: Guard, clock: Clock

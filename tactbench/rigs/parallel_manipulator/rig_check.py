@@ -263,7 +263,7 @@ def _places(found: _Findings, settings: RigSettings) -> None:
 
 def _first_bytes(found: _Findings, file: RigFile) -> None:
     """Say what each device would be sent first: who it is, and its settings; of motors nothing that moves."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for sensor in file.sensors:
         entries = file.entries()
         names = [sensor] if rows else [sensor, "force", MOTOR, *(name for name in JOINTS if name in entries)]

@@ -300,6 +300,8 @@ class RigSettings(_Part):
     force_loop: ForceControl
     touch: Touch
     press: PressRules
+    guard_log: str = "tactbench-guard.log"
+    """File to which the guard's process adds a line an event, also when the rig's own process is lost."""
 
     @model_validator(mode="after")
     def _together(self) -> Self:

@@ -1,5 +1,6 @@
 """A simulated rig whose skin is a spring, and the example's rig file changed here and there."""
 
+import json
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import yaml
 
 from tactbench.plugin import Block, ChannelSpec, ForceRamp, RigFile, Scene, StreamSpec, assumed, load_registry
+from tactbench.rigs.parallel_manipulator.geometry import example_linear
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "rigs" / "emulated.yaml"
@@ -79,6 +81,27 @@ def example(**changes):
         else:
             at[last] = value
     return said
+
+
+JOINT = {
+    "device": "faulhaber",
+    "link": "emulated",
+    "options": {
+        "baud": 115200, "increment_m": 1e-6, "corridor_m": 10e-6, "home_m": 0.069317121994613, "lower_m": -0.05,
+        "upper_m": 0.25, "speed_m_s": 0.05, "acceleration_m_s2": 0.5,
+    },
+}  # fmt: skip
+DELTA = json.loads(example_linear().model_dump_json())
+
+
+def with_joints(**changes):
+    """Return the example on a linear delta whose platform is homed at (0, 0, -150) mm."""
+    heights = {"settings__heights__surface_mm": -152.0}
+    return example(
+        devices__motor=example()["devices"]["motor"],
+        **{f"devices__joint-{n}": JOINT for n in (1, 2, 3)},
+        settings__manipulator=DELTA, **heights, **changes,
+    )  # fmt: skip
 
 
 def file_of(**changes):

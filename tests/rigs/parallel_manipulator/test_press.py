@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from tactbench.plugin import NotApplicable, RigError, Slide, assumed, load_registry
+from tactbench.plugin import NotApplicable, RigError, RigFile, Slide, assumed
 from tactbench.rigs.parallel_manipulator.loop_stability import ramp_error_n
 from tactbench.rigs.parallel_manipulator.press import PressState
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.settings import settings_of
 from tactbench.rigs.parallel_manipulator.worst_case import first_touch_n
-from tests.rigs.parallel_manipulator.spring import SpringRig, file_of, on_spring, pressed, ramp
+from tests.rigs.parallel_manipulator.spring import SpringRig, file_of, on_spring, pressed, ramp, with_joints
 
 QUICK = {
     "settings__force_loop__rate_hz": 100.0,
@@ -126,3 +126,20 @@ def test_the_same_seed_gives_the_same_bytes():
     for name in first.data:
         assert np.array_equal(first.data[name], second.data[name])
         assert np.array_equal(first.t_s[name], second.t_s[name])
+
+
+def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
+    said = with_joints(settings__places__reach_x_mm=[-15.0, 15.0], settings__places__scatter_mm=0.5, **QUICK)
+    rig = ParallelManipulator(RigFile.model_validate(said), None, SpringRig(5.0))
+    scene = ramp(1.0, 0.3, 1.5)
+    place = scene.placement.model_copy(update={"x": assumed(12.0, "mm", "a test")})
+    found = pressed(rig, scene.model_copy(update={"placement": place}))
+    assert found.acquisition.ended == ""
+    drawn = found.acquisition.drawn
+    x, y, z = (float(text) for text in drawn["platform mm"].split(", "))
+    assert np.hypot(drawn["scatter x mm"], drawn["scatter s mm"]) <= 0.5
+    # Three joints, each within its corridor of 10 um.
+    assert (x, y, z) == pytest.approx((12.0 + drawn["scatter x mm"], drawn["scatter s mm"], -150.0), abs=0.05)
+    # Home, retreat, and only then anything else: the guard was not armed while the platform moved.
+    events = [text for name, text in drawn.items() if name.startswith("event")]
+    assert [text.split(": ")[1] for text in events][:5] == ["started", "homing", "armed", "disarmed", "armed"]
