@@ -56,12 +56,13 @@ from tactbench.rigs.parallel_manipulator.guard import LocalGuard
 from tactbench.rigs.parallel_manipulator.guard_interface import Event, Guard, GuardState, Limits, Report
 from tactbench.rigs.parallel_manipulator.guard_messages import DeviceSettings, ProcessSettings
 from tactbench.rigs.parallel_manipulator.guard_process import GuardProcess
-from tactbench.rigs.parallel_manipulator.joints import Joints, check_places
+from tactbench.rigs.parallel_manipulator.joints import Joints
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.options import read_options
 from tactbench.rigs.parallel_manipulator.press import Course, Press
+from tactbench.rigs.parallel_manipulator.rig_check import refuse
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, settings_of, with_limits
 
 if TYPE_CHECKING:
@@ -188,16 +189,13 @@ class ParallelManipulator:
     Raises
     ------
     UsageError
-        If the settings lack something, or contradict each other.
-    PlaceRefusedError, MoveOrderError
-        If a place that scenes may ask for is not permitted.
+        If the settings lack something, or contradict each other. What `rig check` refuses is :func:`build`'s business.
     """
 
     def __init__(self, file: RigFile, operator: Operator | None, physics: Rig | None) -> None:
         self.settings = settings_of(file)
         self._file = with_limits(file, self.settings)
         self._operator, self._physics = operator, physics
-        check_places(self.settings)
 
     @contextmanager
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[PressAcquisition]:
@@ -499,13 +497,14 @@ def build(context: RigContext) -> ParallelManipulator:
     Raises
     ------
     UsageError
-        If there is no rig file, it lacks something, or it names a simulation that is none.
+        If there is no rig file, it lacks something, `rig check` refuses it, or it names a simulation that is none.
     """
     if context.rig_file is None:
         raise UsageError(
             "The rig 'parallel-manipulator' needs to know its devices and its limits.",
             hint="Name a rig file with --rig-file FILE; `tactbench rig check FILE` says what it would do.",
         )
+    refuse(context.rig_file)
     physics: Rig | None = None
     if context.rig_file.emulated:
         descriptor = load_registry().rigs[context.rig_file.emulation.physics]

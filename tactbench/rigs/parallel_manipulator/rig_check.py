@@ -82,6 +82,21 @@ def check(file: RigFile) -> RigCheck:
     UsageError, UnknownNameError
         If the file lacks something, or names what is not installed.
     """
+    found = _found(file)
+    _first_bytes(found, with_limits(file, settings_of(file)))
+    return RigCheck(tuple(found.tables), tuple(found.problems))
+
+
+def refuse(file: RigFile) -> None:
+    """Raise UsageError if a rig file is refused for what it says; raises as :func:`check` as well."""
+    problems = _found(file).problems
+    if problems:
+        raise UsageError(
+            f"The rig file is refused: {problems[0]}", hint="`tactbench rig check FILE` says all that it would do."
+        )
+
+
+def _found(file: RigFile) -> _Findings:
     settings = settings_of(file)
     file = with_limits(file, settings)
     options = read_options(FaulhaberOptions, file.devices[MOTOR].options, "faulhaber")
@@ -92,8 +107,7 @@ def check(file: RigFile) -> RigCheck:
     _loop(found, settings)
     _forces(found, settings, react)
     _places(found, settings)
-    _first_bytes(found, file)
-    return RigCheck(tuple(found.tables), tuple(found.problems))
+    return found
 
 
 def _limits(found: _Findings, settings: RigSettings) -> None:

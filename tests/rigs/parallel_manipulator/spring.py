@@ -1,6 +1,5 @@
 """A simulated rig whose skin is a spring, and the example's rig file changed here and there."""
 
-import json
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -8,8 +7,8 @@ import numpy as np
 import yaml
 
 from tactbench.plugin import Block, ChannelSpec, ForceRamp, RigFile, Scene, StreamSpec, assumed, load_registry
-from tactbench.rigs.parallel_manipulator.geometry import example_linear
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
+from tactbench.rigs.parallel_manipulator.settings import JOINTS
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "rigs" / "emulated.yaml"
 RATE_HZ = 1000.0
@@ -70,6 +69,10 @@ def example(**changes):
         "settings__press__error_band_n": 1.0,
         "settings__press__lost_s": 0.2,
         "settings__force_loop__feed_forward_n_mm": None,
+        "settings__manipulator": "fixed",
+        "settings__heights__surface_mm": 0.0,
+        "settings__places": {},
+        **{f"devices__{name}": ... for name in JOINTS},
     }
     for path, value in (quiet | changes).items():
         *parents, last = path.split("__")
@@ -83,25 +86,11 @@ def example(**changes):
     return said
 
 
-JOINT = {
-    "device": "faulhaber",
-    "link": "emulated",
-    "options": {
-        "baud": 115200, "increment_m": 1e-6, "corridor_m": 10e-6, "home_m": 0.069317121994613, "lower_m": -0.05,
-        "upper_m": 0.25, "speed_m_s": 0.05, "acceleration_m_s2": 0.5,
-    },
-}  # fmt: skip
-DELTA = json.loads(example_linear().model_dump_json())
-
-
 def with_joints(**changes):
-    """Return the example on a linear delta whose platform is homed at (0, 0, -150) mm."""
-    heights = {"settings__heights__surface_mm": -152.0}
-    return example(
-        devices__motor=example()["devices"]["motor"],
-        **{f"devices__joint-{n}": JOINT for n in (1, 2, 3)},
-        settings__manipulator=DELTA, **heights, **changes,
-    )  # fmt: skip
+    """Return the example with its joints: a linear delta whose platform is homed at (0, 0, -150) mm."""
+    own = yaml.safe_load(EXAMPLE.read_text(encoding="utf-8"))
+    kept = {"settings__manipulator": own["settings"]["manipulator"], "settings__heights__surface_mm": -152.0}
+    return example(**{f"devices__{name}": own["devices"][name] for name in JOINTS}, **(kept | changes))
 
 
 def file_of(**changes):

@@ -8,8 +8,7 @@ from tactbench.plugin import RigContext, RigFile, UsageError
 from tactbench.rigs.parallel_manipulator.rig import build
 from tactbench.rigs.parallel_manipulator.rig_check import check
 from tactbench.rigs.parallel_manipulator.settings import settings_of, with_limits
-from tactbench.rigs.parallel_manipulator.workspace import PlaceRefusedError
-from tests.rigs.parallel_manipulator.spring import DELTA, EXAMPLE, example, file_of, with_joints
+from tests.rigs.parallel_manipulator.spring import EXAMPLE, example, file_of, with_joints
 
 
 def run(arguments, capsys):
@@ -124,13 +123,13 @@ def test_contradictions_are_refused(changes, said):
 
 def test_a_delta_without_joints_is_refused():
     with pytest.raises(UsageError, match="no joint-1, joint-2, joint-3"):
-        settings_of(RigFile.model_validate(example(settings__manipulator=DELTA)))
+        settings_of(RigFile.model_validate(example(settings__manipulator=with_joints()["settings"]["manipulator"])))
 
 
 def test_places_out_of_the_workspace_are_refused_before_anything_moves():
     file = RigFile.model_validate(with_joints(settings__places__reach_x_mm=[-200.0, 200.0]))
     assert any("is refused" in text for text in check(file).problems)
-    with pytest.raises(PlaceRefusedError, match="is refused"):
+    with pytest.raises(UsageError, match="is refused"):
         build(RigContext(rig_file=file))
 
 
