@@ -95,6 +95,8 @@ def draw_limits(axes, law: str, unit: str) -> float:
         for rate, one, other in zip(RATES_HZ, theory, found, strict=True):
             worst = max(worst, abs(other / one - 1))
             print(f"{law:>2}, {named(cutoff):>11}, {rate:3.0f} Hz: theory {one:7.4f}, stepped {other:7.4f} {unit}")
+    axes.set_xticks(RATES_HZ, [f"{rate:g}" for rate in RATES_HZ])
+    axes.minorticks_off()
     axes.set(xlabel="control rate, Hz", ylabel=f"largest gain that settles, {unit}")
     axes.legend(fontsize=7)
     return worst
@@ -112,17 +114,19 @@ def main() -> None:
     print(f"largest difference: {100 * worst:.2f} %")
     proportional.set(title=f"PI, ki = kp/{RESET_S:g} s")
     closed = [2 * np.sin(np.pi / 6) * rate / STIFFNESS_N_MM for rate in RATES_HZ]
-    increments.loglog(RATES_HZ, closed, ":", color="0.4", label="no filter, no lag: k K T = 1")
+    increments.loglog(RATES_HZ, closed, ":", color="0.4", label="no filter, no lag: k K T = 1", lw=3)
     increments.legend(fontsize=7)
+    increments.set_xticks(RATES_HZ, [f"{rate:g}" for rate in RATES_HZ])
+    increments.minorticks_off()
     increments.set(title="increments, K")
 
     limit = largest_gain_factor(loop(50.0, None, 1.0, "PI"), 1e3 * STIFFNESS_N_MM)
-    for part, cutoff, colour in ((0.95, None, "tab:blue"), (1.05, None, "tab:red"), (1.05, 1.0, "tab:green")):
-        force = stepped(loop(50.0, cutoff, part * limit, "PI"), 3.0)
-        label = f"{part:g} of the limit without filter, {named(cutoff)}"
+    for part, cutoff, colour in ((1.05, None, "tab:red"), (0.95, None, "tab:orange"), (1.05, 1.0, "tab:green")):
+        force = stepped(loop(50.0, cutoff, part * limit, "PI"), 1.6)
+        label = f"{part:g} of the limit without filter; {named(cutoff)}"
         swings.plot(np.arange(force.size) / 50.0, force, color=colour, lw=0.8, label=label)
-    swings.set(xlabel="s", ylabel="force, N", ylim=(-4, 8), title="PI, 50 Hz, a step of 1 N")
-    swings.legend(fontsize=7)
+    swings.set(xlabel="s", ylabel="force, N", ylim=(-4, 9), title="PI, 50 Hz, a step of 1 N")
+    swings.legend(fontsize=7, loc="upper left")
     for law, gain in (("PI", 0.5 * limit), ("I", 0.5)):
         for cutoff in CUTOFFS_HZ:
             moved = float(np.std(stepped(loop(50.0, cutoff, gain, law), 200.0, NOISE_N)[2500:]))

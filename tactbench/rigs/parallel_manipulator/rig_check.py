@@ -214,9 +214,10 @@ def _loop(found: _Findings, settings: RigSettings) -> None:
          f"{stiffness.at_touch_n_mm:g} at a touch, {stiffness.at_ceiling_n_mm:g} at the ceiling"),
         ("largest stable gains at the stiffest", f"{factor:.2f} times those stated"),
         ("share used", f"{1 / factor:.2f}, at most 0.50"),
-        ("gain that overshoots by 5 %", f"{advised[0]:.3g} mm/(N s) at the stiffest, {advised[1]:.3g} at the softest; "
-         f"stated {stated:g}"),
     ]  # fmt: skip
+    if settings.force_loop.proportional_mm_n == 0:
+        text = f"{advised[0]:.3g} mm/(N s) at the stiffest, {advised[1]:.3g} at the softest; stated {stated:g}"
+        rows.append(("gain that overshoots by 5 %", text))
     if settings.force_loop.integral_mm_n_s > 0 and settings.force_loop.feed_forward_n_mm is None:
         errors = [ramp_error_n(loop, _PAPER_RAMP_N_S, k) for k in (least, greatest)]
         text = f"{1e3 * errors[0]:.0f} mN at the softest, {1e3 * errors[1]:.0f} at the stiffest"
