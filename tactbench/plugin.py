@@ -22,7 +22,7 @@ from tactbench.core.errors import (
     UnknownNameError,
     UsageError,
 )
-from tactbench.core.plugins.checks import Check, Verdict
+from tactbench.core.plugins.checks import Check, CheckTable, RigCheck, Verdict
 from tactbench.core.plugins.cost import CostJob, CostPoint, CostStudy
 from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import (
@@ -35,6 +35,7 @@ from tactbench.core.plugins.interfaces import (
     Rig,
     RigContext,
     Shelf,
+    SimulatedPress,
     Transducer,
     TransducerFactory,
 )
@@ -80,7 +81,13 @@ from tactbench.core.spec.skin import BondedLayer, Dome, FluidBackedShell, FoamPa
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
 
 if TYPE_CHECKING:
-    from tactbench.core.plugins.rig_devices import drivers_of, emulators_of
+    from tactbench.core.plugins.rig_devices import (
+        PressingForce,
+        drivers_of,
+        emulation_of,
+        emulators_of,
+        with_sensor,
+    )
     from tactbench.core.recording.reader import Recording, open_recording
     from tactbench.core.samples import FloatArray
     from tactbench.devices.driver import Driver, DriverFactory, DriverSettings
@@ -125,6 +132,7 @@ __all__ = [
     "ChannelSpec",
     "ChannelTarget",
     "Check",
+    "CheckTable",
     "Clock",
     "CostJob",
     "CostPoint",
@@ -182,6 +190,7 @@ __all__ = [
     "PlanEntry",
     "PlannedScene",
     "PluginContractError",
+    "PressingForce",
     "Published",
     "Quality",
     "Quantity",
@@ -191,6 +200,7 @@ __all__ = [
     "Received",
     "Recording",
     "Rig",
+    "RigCheck",
     "RigContext",
     "RigDescriptor",
     "RigError",
@@ -207,6 +217,7 @@ __all__ = [
     "SerialLink",
     "SheetTable",
     "Shelf",
+    "SimulatedPress",
     "Simulation",
     "Skin",
     "SkinGrid",
@@ -238,6 +249,7 @@ __all__ = [
     "assumed",
     "derived",
     "drivers_of",
+    "emulation_of",
     "emulators_of",
     "encode_frame",
     "fault_concerns",
@@ -248,6 +260,7 @@ __all__ = [
     "open_link",
     "open_recording",
     "sourced",
+    "with_sensor",
 ]
 
 _ON_DEMAND = {
@@ -276,6 +289,7 @@ _ON_DEMAND = {
     "LinkAddress": "tactbench.links.address",
     "LogReader": "tactbench.devices.log",
     "Reading": "tactbench.devices.reading",
+    "PressingForce": "tactbench.core.plugins.rig_devices",
     "Received": "tactbench.links.link",
     "Recording": "tactbench.core.recording.reader",
     "SceneSamples": "tactbench.devices.emulation.scene_samples",
@@ -291,11 +305,13 @@ _ON_DEMAND = {
     "UdpLink": "tactbench.links.datagram_link",
     "Unwrap": "tactbench.devices.sequence",
     "drivers_of": "tactbench.core.plugins.rig_devices",
+    "emulation_of": "tactbench.core.plugins.rig_devices",
     "emulators_of": "tactbench.core.plugins.rig_devices",
     "encode_frame": "tactbench.links.bridge_frame",
     "fault_concerns": "tactbench.devices.fault",
     "open_link": "tactbench.links.address",
     "open_recording": "tactbench.core.recording.reader",
+    "with_sensor": "tactbench.core.plugins.rig_devices",
 }
 
 

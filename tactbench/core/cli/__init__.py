@@ -21,6 +21,7 @@ VERBS = {
     "record": ("record", "Carry out one scene into one recording."),
     "emulate": ("emulate", "Start emulated sensors and devices on links of this machine, pressed by a simulated rig."),
     "doctor": ("doctor", "Show ports, permissions, extras and clocks, and whether a rig's devices answer."),
+    "rig": ("rig", "Say what a rig would do by its file: limits, reaction times, first bytes; moves nothing."),
     "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
     "import": ("import_", "Turn foreign tables, or a log of a sensor's own tools, into recordings."),
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -41,13 +41,12 @@ def command(ctx: click.Context, rig_file: Path | None, sensor: str | None, secon
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.spec.rig_file import RigFile
-    from tactbench.core.spec.yaml_file import load_yaml
+    from tactbench.core.plugins.rig_files import load_rig_file
 
     if sensor is not None and rig_file is None:
         raise UsageError("--sensor picks one of a rig's sensors.", hint="Give the rig with --rig-file FILE.")
     registry = load_registry()
-    rig = None if rig_file is None else load_yaml(rig_file, RigFile)
+    rig = None if rig_file is None else load_rig_file(rig_file, registry)
     sensors = _sensors(rig, sensor, registry)
     host = look_at_host()
     checks: list[DeviceCheck] = []
@@ -111,19 +110,21 @@ def _drivers(registry: Registry) -> Rows:
 def _print(
     host: Host, registry: Registry, rig: RigFile | None, checks: Sequence[DeviceCheck], problems: Sequence[str]
 ) -> None:
+    from tactbench.core.cli.screen import print_table
+
     ports = [_port(one) for one in host.serial]
-    _table("serial ports", ("port", "what", "usb", "may open", "name that stays"), ports)
-    _table("buses, network, clock", ("", "here", "next step"), list(_machine(host)))
+    print_table("serial ports", ("port", "what", "usb", "may open", "name that stays"), ports)
+    print_table("buses, network, clock", ("", "here", "next step"), list(_machine(host)))
     extras = [
         (one.name, ", ".join(one.requires), *(("missing", one.command) if one.missing else ("installed", "")))
         for one in host.extras
     ]
-    _table("extras", ("extra", "requires", "state", "install it with"), extras, whole="install it with")
+    print_table("extras", ("extra", "requires", "state", "install it with"), extras, whole="install it with")
     drivers = [
         (name, kind, "yes" if driver else "no", "yes" if made else "no")
         for name, kind, driver, made in _drivers(registry)
     ]
-    _table("devices that can be connected", ("name", "kind", "driver", "emulator"), drivers)
+    print_table("devices that can be connected", ("name", "kind", "driver", "emulator"), drivers)
     if rig is not None:
         _print_rig(checks)
     for text in problems:
@@ -167,14 +168,16 @@ def _machine(host: Host) -> Iterator[tuple[str, ...]]:
 
 
 def _print_rig(checks: Sequence[DeviceCheck]) -> None:
+    from tactbench.core.cli.screen import print_table
+
     said = [
         (check.name, check.device, check.link, _identity(check), "; ".join([*check.remarks, *_counts(check)]))
         for check in checks
     ]
-    _table("the rig's devices", ("name", "device", "link", "says", "remarks"), said)
+    print_table("the rig's devices", ("name", "device", "link", "says", "remarks"), said)
     streams = [(check.name, *_stream(stream)) for check in checks for stream in check.streams]
     if streams:
-        _table("streams", ("device", "stream", "rows", "Hz", "stated", "lost or marked"), streams)
+        print_table("streams", ("device", "stream", "rows", "Hz", "stated", "lost or marked"), streams)
     clocks = [
         (check.name, stream.stream, *_clock(stream.clock))
         for check in checks
@@ -182,10 +185,10 @@ def _print_rig(checks: Sequence[DeviceCheck]) -> None:
         if stream.clock
     ]
     if clocks:
-        _table("clocks of devices", ("device", "stream", "host - device", "drift", "error at most"), clocks)
+        print_table("clocks of devices", ("device", "stream", "host - device", "drift", "error at most"), clocks)
     noise = [row for check in checks for stream in check.streams for row in _noise(check, stream)]
     if noise:
-        _table("unloaded", ("device", "channels", "mean", "sd (median)", "sd (largest)", "constant"), noise)
+        print_table("unloaded", ("device", "channels", "mean", "sd (median)", "sd (largest)", "constant"), noise)
 
 
 def _identity(check: DeviceCheck) -> str:
@@ -224,24 +227,3 @@ def _noise(check: DeviceCheck, stream: StreamCheck) -> Iterator[tuple[str, ...]]
         constant = ", ".join(one.constant) if len(one.constant) <= 4 else f"{len(one.constant)} channels"
         channels = next(iter(one.means)) if len(one.means) == one.channels == 1 else f"{one.channels} {one.kind}"
         yield check.name, channels, mean, sd, largest, constant
-
-
-def _table(title: str, head: tuple[str, ...], rows: Sequence[tuple[str, ...]], whole: str = "") -> None:
-    """Print a table; the column `whole` is not broken: it holds commands to copy."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    from tactbench.core.cli.screen import console
-
-    screen = console()
-    screen.print(Text(title, style="bold"))
-    if not rows:
-        screen.print("  none\n")
-        return
-    table: Any = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in head:
-        table.add_column(Text(name), overflow="fold", no_wrap=name == whole)
-    for row in rows:
-        table.add_row(*map(Text, row))
-    screen.print(table)

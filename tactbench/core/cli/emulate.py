@@ -63,8 +63,7 @@ def command(
     """
     from tactbench.core.errors import UsageError
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.spec.rig_file import RigFile
-    from tactbench.core.spec.yaml_file import load_yaml
+    from tactbench.core.plugins.rig_files import load_rig_file
 
     if bool(names) == (rig_file is not None):
         raise UsageError(
@@ -72,7 +71,7 @@ def command(
             hint="For example: tactbench emulate biotac net-ft; `tactbench list devices` names more.",
         )
     registry = load_registry()
-    file = load_yaml(rig_file, RigFile) if rig_file is not None else None
+    file = load_rig_file(rig_file, registry) if rig_file is not None else None
     entries = _named(registry, names) if file is None else file.entries()
     settings = {} if file is None else dict(file.emulation)
     presser = Presser(

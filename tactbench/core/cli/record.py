@@ -66,15 +66,14 @@ def command(
     from tactbench.core.errors import TactbenchError, UsageError
     from tactbench.core.matrix.provenance import gather
     from tactbench.core.plugins.registry import load_registry
-    from tactbench.core.spec.rig_file import RigFile
-    from tactbench.core.spec.yaml_file import load_yaml
+    from tactbench.core.plugins.rig_files import load_rig_file
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
     scene = scene_of(out.stem, cap_mm, force_n, seconds, descriptor)
     if slide_mm_s is not None:
         scene = _sliding(scene, slide_mm_s, descriptor)
-    devices = load_yaml(Path(rig_file), RigFile) if rig_file else None
+    devices = load_rig_file(Path(rig_file), registry) if rig_file else None
     rig = rig or (devices.rig if devices else "twin")
     simulation = simulation_of(registry, rig, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario)
     if simulation is not None:

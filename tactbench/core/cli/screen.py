@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -33,3 +34,25 @@ def width_without_terminal() -> int:
 def remark(text: str) -> None:
     """Say something beside the results."""
     click.echo(text, err=True)
+
+
+def print_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], *, whole: str = "") -> None:
+    """Print a table under a title to stdout; without rows it says that there are none.
+
+    The column `whole` is not broken: it holds commands to copy.
+    """
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    screen = console()
+    screen.print(Text(title, style="bold"))
+    if not rows:
+        screen.print("  none\n")
+        return
+    table: Any = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in head:
+        table.add_column(Text(name), overflow="fold", no_wrap=name == whole)
+    for row in rows:
+        table.add_row(*map(Text, row))
+    screen.print(table)

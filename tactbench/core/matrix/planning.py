@@ -19,10 +19,9 @@ from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.spec.matrix import MatrixSpec
-from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.task import TaskSpec
-from tactbench.core.spec.yaml_file import load_yaml
 
 R = TypeVar("R")
 ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuffled")
@@ -82,7 +81,7 @@ def plan(
         If the matrix asks for something that is not there.
     """
     chosen = choice or EngineChoice()
-    rig_file = load_yaml(Path(matrix.rig_file), RigFile).checked_for(matrix.rig) if matrix.rig_file else None
+    rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     if not registry.rigs[matrix.rig].simulated:  # a simulated one is no shelf: it is built when it has to record
         rig = _greeted(lambda: built(matrix.rig, registry, recordings, rig_file), chosen)
         if isinstance(rig, BaseException):

@@ -1,4 +1,8 @@
-"""What a simulated rig lets people check: named checks that yield verdicts, each a number held against a range."""
+"""What rigs let people check.
+
+A simulated rig offers named checks that yield verdicts, each a number held against a range; a rig of real devices says
+what a rig file would let it do.
+"""
 
 from __future__ import annotations
 
@@ -47,3 +51,22 @@ class Check:
     """One line: what is compared with what."""
     run: Callable[[], Sequence[Verdict]]
     """Carries it out; may take seconds."""
+
+
+@dataclass(frozen=True)
+class CheckTable:
+    """Some of what a rig would do by its file."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    """As many texts each as there are in `head`."""
+
+
+@dataclass(frozen=True)
+class RigCheck:
+    """What a rig would do by its file, and why it would not."""
+
+    tables: tuple[CheckTable, ...]
+    problems: tuple[str, ...]
+    """Each a reason to refuse the file, with the next step; empty: it may be used."""

@@ -50,6 +50,16 @@ class Acquisition(Protocol):
     def __iter__(self) -> Iterator[Block]: ...
 
 
+class SimulatedPress(Acquisition, Protocol):
+    """A simulated acquisition that also says how the skin answers to being pressed: what an emulated motor feels."""
+
+    def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:
+        """Return the indenter's ascending depths (n,) [m] from the first touch, and the force (n,) [N] at each.
+
+        The last force is `largest_n`. The curve is that of a slow press: the same on the way in and out.
+        """
+
+
 class DeviceAcquisition(Acquisition, Protocol):
     """An acquisition from devices says more, once it is over."""
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import PluginContractError, TactbenchError, UsageError
 from tactbench.core.plugins.registry import Registry, load_object
-from tactbench.core.spec.recording import Scalar
+from tactbench.core.spec.recording import Emulation, Scalar
 from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import DeviceEntry, ForceEntry, NamedDevice, RigFile
+from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
 if TYPE_CHECKING:
+    from tactbench.core.samples import Block, FloatArray
     from tactbench.devices.driver import Driver
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice
     from tactbench.devices.emulator import Senses
@@ -21,6 +24,105 @@ if TYPE_CHECKING:
 
 FORCE = "force"
 """Name of the force sensor's entry among the devices of a rig file."""
+_PRESSED = "normal"
+"""What the channel along which the sensor is pressed is called where it is not plain `fz`; tasks look for either."""
+
+
+class PressingForce:
+    """The force sensor of a rig as it is recorded: the pressing force has a name and a sign of its own.
+
+    Parameters
+    ----------
+    entry
+        Of the rig file.
+    streams
+        Of the force sensor.
+
+    Attributes
+    ----------
+    streams
+        The same, the pressing channel with sign 1, and called `normal` where it is not plain `fz`.
+    stream, column, sign
+        Where the pressing force is, and 1 or -1: pressing makes the device's channel rise or fall.
+    mounting
+        What of this is worth recording.
+
+    Raises
+    ------
+    UsageError
+        If there is no such channel.
+    """
+
+    def __init__(self, entry: ForceEntry, streams: tuple[StreamSpec, ...]) -> None:
+        plain = (entry.channel, entry.sign) == ("fz", 1)
+        self.sign = entry.sign
+        self.mounting: dict[str, Scalar] = (
+            {} if plain else {"normal force": f"{'-' if entry.sign < 0 else ''}{entry.channel} of {entry.device}"}
+        )
+        for stream in streams:
+            names = [channel.name for channel in stream.channels]
+            if entry.channel not in names:
+                continue
+            self.stream, self.column = stream.name, names.index(entry.channel)
+            channels = list(stream.channels)
+            update = {"sign": 1} if plain else {"sign": 1, "name": _PRESSED}
+            channels[self.column] = ChannelSpec.model_validate({**dict(channels[self.column]), **update})
+            pressed = stream.model_copy(update={"channels": tuple(channels)})
+            self.streams = tuple(pressed if one is stream else one for one in streams)
+            return
+        known = ", ".join(channel.name for stream in streams for channel in stream.channels)
+        raise UsageError(
+            f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {known}.",
+            hint="Correct `channel:` under `force:` in the rig file.",
+        )
+
+    def turned(self, block: Block, zero: Mapping[str, FloatArray]) -> Block:
+        """Return a block with forces from the unloaded sensor's `zero`, by stream, and positive when pressing."""
+        if block.stream not in zero:
+            return block
+        data = block.data - zero[block.stream]
+        if block.stream == self.stream:
+            data[:, self.column] *= self.sign
+        return replace(block, data=data)
+
+
+def with_sensor(file: RigFile, sensor: str) -> RigFile:
+    """Return a rig file with one of its sensors.
+
+    Raises
+    ------
+    UsageError
+        If it has no entry for it, or emulated devices are to run in virtual time beside real ones.
+    """
+    if sensor not in file.sensors:
+        raise UsageError(
+            f"The rig file has no entry for the sensor {sensor!r}; it has {', '.join(file.sensors)}.",
+            hint=f"Add `{sensor}:` with its link under `sensors:`.",
+        )
+    used = file.model_copy(update={"sensors": {sensor: file.sensors[sensor]}})
+    real = [name for name, entry in used.entries().items() if not entry.emulated]
+    if used.emulated and real and used.emulation.time == "virtual":
+        raise UsageError(
+            f"{', '.join(real)} is a real device and runs by the clock, the emulated ones in virtual time.",
+            hint="Write `time: real` under `emulation:`.",
+        )
+    return used
+
+
+def emulation_of(file: RigFile, names: tuple[str, ...]) -> Emulation | None:
+    """Return what a recording says of the emulated devices of these names; None: there are none."""
+    if not names:
+        return None
+    entries = file.entries()
+    if not file.emulated:  # they were there before, and run by the clock
+        return Emulation(time="real", devices=names)
+    return Emulation(
+        time=file.emulation.time,
+        seed=file.emulation.seed,
+        physics=file.emulation.physics,
+        devices=names,
+        faults=tuple(f"{name}: {fault}" for name in names for fault in entries[name].faults),
+    )
 
 
 def emulators_of(file: RigFile, registry: Registry, sensor: str, senses: Senses) -> dict[str, EmulatedDevice]:
@@ -92,9 +194,14 @@ def emulated_device(
 
 
 def drivers_of(
-    file: RigFile, registry: Registry, sensor: str, links: Mapping[str, Callable[[], Link]], clock: Clock
+    file: RigFile,
+    registry: Registry,
+    sensor: str,
+    links: Mapping[str, Callable[[], Link]],
+    clock: Clock,
+    names: Collection[str] | None = None,
 ) -> dict[str, Driver]:
-    """Open the sensor and the force sensor of a rig; its other devices are the rig's own business.
+    """Open devices of a rig; which of its further ones, is its own business.
 
     Parameters
     ----------
@@ -102,11 +209,13 @@ def drivers_of(
         By name: what opens the links of emulated devices. The others are opened by the file's addresses.
     clock
         The host's.
+    names
+        Which ones; None: the sensor, and the force sensor if the file has one.
 
     Returns
     -------
     dict
-        By the names of :meth:`RigFile.entries`: the sensor's name, and ``force`` if the file has one. Close each.
+        By the names of :meth:`RigFile.entries`. Close each.
 
     Raises
     ------
@@ -123,7 +232,7 @@ def drivers_of(
     drivers: dict[str, Driver] = {}
     with ExitStack() as opened:
         for name, (entry, descriptor) in _used(file, registry, sensor).items():
-            if name not in (sensor, FORCE):
+            if name not in ((sensor, FORCE) if names is None else names):
                 continue
             with _entry(name):
                 if descriptor.driver is None:
@@ -153,11 +262,7 @@ def _used(
     file: RigFile, registry: Registry, sensor: str
 ) -> dict[str, tuple[DeviceEntry, SensorDescriptor | DeviceDescriptor]]:
     """Return the entries of a rig with one sensor, each with what is installed for it."""
-    if sensor not in file.sensors:
-        raise UsageError(
-            f"The rig file has no entry for the sensor {sensor!r}; it has {', '.join(file.sensors)}.",
-            hint=f"Add `{sensor}:` with its link under `sensors:`.",
-        )
+    with_sensor(file, sensor)
     used: dict[str, tuple[DeviceEntry, SensorDescriptor | DeviceDescriptor]] = {}
     for name, entry in file.entries().items():
         if name == sensor or isinstance(entry, ForceEntry | NamedDevice):

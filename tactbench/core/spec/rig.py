@@ -88,6 +88,11 @@ class RigDescriptor(Frozen):
     likeness: str | None = Field(default=None, pattern=_WHERE)
     """``module:callable``, called with (SensorDescriptor, folder of recordings or None): Checks of the simulated
     sensor against what was measured on real ones, or of recordings against the same ranges."""
+    file: str | None = Field(default=None, pattern=_WHERE)
+    """``module:class``, a RigFile that also checks the rig's own settings: complaints about them then name their
+    line."""
+    check: str | None = Field(default=None, pattern=_WHERE)
+    """``module:callable``, called with a RigFile: a RigCheck of what the rig would do, with nothing opened or moved."""
 
 
 class EstimatorDescriptor(Frozen):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -18,13 +18,12 @@ import numpy as np
 from tactbench.plugin import (
     Acquisition,
     Block,
-    ChannelSpec,
     Driver,
     EmulatedDevices,
     Emulation,
-    ForceEntry,
     Operator,
     PlanEntry,
+    PressingForce,
     Reading,
     Rig,
     RigContext,
@@ -39,9 +38,11 @@ from tactbench.plugin import (
     StreamSpec,
     UsageError,
     drivers_of,
+    emulation_of,
     emulators_of,
     load_object,
     load_registry,
+    with_sensor,
 )
 
 if TYPE_CHECKING:
@@ -51,8 +52,6 @@ if TYPE_CHECKING:
 
 FORCE = "force"
 """Name of the force sensor's entry among the drivers."""
-_PRESSED = "normal"
-"""What the channel along which the sensor is pressed is called where it is not plain `fz`; tasks look for either."""
 
 
 @dataclass
@@ -68,8 +67,7 @@ class BenchAcquisition:
     emulation: Emulation | None
     reading: Reading = field(repr=False)
     duration_s: float
-    pressed: tuple[str, int, int] | None
-    """Stream, column and sign of the force along which the sensor is pressed."""
+    force: PressingForce | None
     zero: Mapping[str, FloatArray]
     """By stream of the force sensor: (channels,) what it read without load, taken off."""
 
@@ -77,7 +75,7 @@ class BenchAcquisition:
         """Yield blocks until the scene is over, or a device is gone."""
         began_s = time.perf_counter()
         for block in self.reading.blocks(self.duration_s):
-            yield self._turned(block)
+            yield block if self.force is None else self.force.turned(block, self.zero)
         spent_s = time.perf_counter() - began_s
         if self.emulation is not None and spent_s > 0:
             self.emulation = self.emulation.model_copy(update={"factor": self.duration_s / spent_s})
@@ -96,15 +94,6 @@ class BenchAcquisition:
     def ended(self) -> str:
         """Why it ended before its time; empty: it did not."""
         return self.reading.ended
-
-    def _turned(self, block: Block) -> Block:
-        """Return the block with forces from the unloaded sensor's, and positive when pressing."""
-        if block.stream not in self.zero:
-            return block
-        data = block.data - self.zero[block.stream]
-        if self.pressed is not None and self.pressed[0] == block.stream:
-            data[:, self.pressed[1]] *= self.pressed[2]
-        return replace(block, data=data)
 
 
 class Bench:
@@ -138,7 +127,7 @@ class Bench:
         LinkError
             If a link cannot be opened, or a device does not answer.
         """
-        file = self._used(sensor)
+        file = with_sensor(self._file, sensor.name)
         with ExitStack() as stack:
             simulated = stack.enter_context(self._simulated(file, sensor, scene, seed))
             profile = scene.profile
@@ -167,43 +156,27 @@ class Bench:
             zero = _zero_of(drivers[FORCE], file.force.zero_s, clock) if file.force is not None else {}
             reading = stack.enter_context(Reading(drivers, clock=clock, advance=advance))
             own = drivers[sensor.name].streams
-            reference, pressed = self._reference(file.force, drivers[FORCE].streams if FORCE in drivers else ())
+            force = None if file.force is None else PressingForce(file.force, drivers[FORCE].streams)
             if senses is not None:
                 senses.start(clock() * 1e-9)
             yield BenchAcquisition(
                 streams=own,
-                reference=reference,
+                reference=() if force is None else force.streams,
                 plan=simulated.plan if simulated is not None else (),
                 assumptions=simulated.assumptions if simulated is not None else {},
                 drawn={
                     **(simulated.drawn if simulated is not None else {}),
                     **about,
                     **{f"zero of {stream}": ", ".join(f"{value:.6g}" for value in zero[stream]) for stream in zero},
-                    **self._mounting(file.force),
+                    **({} if force is None else force.mounting),
                 },
                 clocks={},
-                emulation=_emulation(file, emulated_names),
+                emulation=emulation_of(file, emulated_names),
                 reading=reading,
                 duration_s=duration_s,
-                pressed=pressed,
+                force=force,
                 zero=zero,
             )
-
-    def _used(self, sensor: SensorDescriptor) -> RigFile:
-        """Return the file with the one sensor that is asked for."""
-        if sensor.name not in self._file.sensors:
-            raise UsageError(
-                f"The rig file has no entry for the sensor {sensor.name!r}; it has {', '.join(self._file.sensors)}.",
-                hint=f"Add `{sensor.name}:` with its link under `sensors:`.",
-            )
-        file = self._file.model_copy(update={"sensors": {sensor.name: self._file.sensors[sensor.name]}})
-        real = [name for name, entry in file.entries().items() if not entry.emulated]
-        if file.emulated and real and file.emulation.time == "virtual":
-            raise UsageError(
-                f"{', '.join(real)} is a real device and runs by the clock, the emulated ones in virtual time.",
-                hint="Write `time: real` under `emulation:`.",
-            )
-        return file
 
     @contextmanager
     def _simulated(
@@ -230,50 +203,6 @@ class Bench:
                 hint="Start it at a terminal, or use a rig file with emulated devices.",
             )
         self._operator.asked(text)
-
-    def _reference(
-        self, entry: ForceEntry | None, streams: tuple[StreamSpec, ...]
-    ) -> tuple[tuple[StreamSpec, ...], tuple[str, int, int] | None]:
-        """Return the force sensor's streams with the pressed channel named, and where it is."""
-        if entry is None:
-            return (), None
-        for stream in streams:
-            names = [channel.name for channel in stream.channels]
-            if entry.channel not in names:
-                continue
-            column = names.index(entry.channel)
-            channels = list(stream.channels)
-            plain = (entry.channel, entry.sign) == ("fz", 1)
-            update = {"sign": 1} if plain else {"sign": 1, "name": _PRESSED}
-            channels[column] = ChannelSpec.model_validate({**dict(channels[column]), **update})
-            pressed = stream.model_copy(update={"channels": tuple(channels)})
-            return tuple(pressed if one is stream else one for one in streams), (stream.name, column, entry.sign)
-        known = ", ".join(channel.name for stream in streams for channel in stream.channels)
-        raise UsageError(
-            f"The force sensor {entry.device!r} has no channel {entry.channel!r}; it has {known}.",
-            hint="Correct `channel:` under `force:` in the rig file.",
-        )
-
-    def _mounting(self, entry: ForceEntry | None) -> dict[str, Scalar]:
-        if entry is None or (entry.channel, entry.sign) == ("fz", 1):
-            return {}
-        return {"normal force": f"{'-' if entry.sign < 0 else ''}{entry.channel} of {entry.device}"}
-
-
-def _emulation(file: RigFile, names: tuple[str, ...]) -> Emulation | None:
-    """Return how the devices called `names` are emulated; None: none is."""
-    if not names:
-        return None
-    entries = file.entries()
-    if not file.emulated:  # they were there before, and run by the clock
-        return Emulation(time="real", devices=names)
-    return Emulation(
-        time=file.emulation.time,
-        seed=file.emulation.seed,
-        physics=file.emulation.physics,
-        devices=names,
-        faults=tuple(f"{name}: {fault}" for name in names for fault in entries[name].faults),
-    )
 
 
 def _zero_of(driver: Driver, seconds: float, clock: Clock) -> dict[str, FloatArray]:

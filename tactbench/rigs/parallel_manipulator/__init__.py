@@ -1,4 +1,4 @@
-"""Devices of the rig with a linear motor and a force-torque sensor: drivers and emulators, no rig yet.
+"""The rig with a linear motor on a parallel manipulator and a force-torque sensor, and their drivers and emulators.
 
 Nothing here has met a real device: each codec is tested against public descriptions, each driver against the emulator
 beside it.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tactbench.plugin import DeviceDescriptor, hookimpl
+from tactbench.plugin import DeviceDescriptor, RigDescriptor, hookimpl
 
 TACTBENCH_API = 1
 
@@ -45,4 +45,19 @@ def tactbench_devices() -> list[DeviceDescriptor]:
             emulator=f"{here}.motor.emulator:build",
             emulated_link="bytes",
         ),
+    ]
+
+
+@hookimpl
+def tactbench_rigs() -> list[RigDescriptor]:
+    """Offer the rig."""
+    here = __name__
+    return [
+        RigDescriptor(
+            name="parallel-manipulator",
+            title="a linear motor on a delta manipulator presses under force control, guarded",
+            where=f"{here}.rig:build",
+            file=f"{here}.settings:ManipulatorFile",
+            check=f"{here}.rig_check:check",
+        )
     ]

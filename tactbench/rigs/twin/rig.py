@@ -26,12 +26,15 @@ from tactbench.plugin import (
     Source,
     StreamSpec,
 )
+from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
 from tactbench.rigs.twin.synthesis import Synthesis
 
 ROWS_PER_BLOCK = 1000
+_CURVE_POINTS = 4001
+"""Of a press curve; straight between them, the force is off by less than 1e-4 of the largest, as in force_loop."""
 REFERENCE_STREAM = "force_torque"
 _ONE_CLOCK = Source(
     tag="assumed",
@@ -62,6 +65,15 @@ class TwinAcquisition:
     drawn: Mapping[str, Scalar]
     samples: Mapping[str, Samples] = field(repr=False)
     """By name of the stream."""
+    run: Synthesis = field(repr=False)
+
+    def press_curve(self, largest_n: float) -> tuple[FloatArray, FloatArray]:
+        """Return depths (n,) [m] and forces (n,) [N] of the indenter up to a force; see SimulatedPress."""
+        table = bare_skin(self.run, largest_n)
+        forces_n: FloatArray = np.linspace(0.0, largest_n, _CURVE_POINTS)
+        # Ties and dips by rounding would leave a depth without its force.
+        depths_mm = np.maximum.accumulate(table.skin(forces_n).depth_mm)
+        return 1e-3 * (depths_mm - depths_mm[0]), forces_n
 
     def __iter__(self) -> Iterator[Block]:
         """Yield blocks, the streams in turn, each up to the same moment, as samples taken at once would arrive."""
@@ -181,6 +193,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         },
         drawn=dict(run.drawn),
         samples=samples,
+        run=run,
     )
 
 

@@ -308,3 +308,13 @@ def test_listing_the_twin_imports_no_numerics():
     )
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert answer.strip() == ""
+
+
+def test_a_press_curve_ends_where_it_is_asked_to_and_agrees_with_the_scenes_own_depth(rig, sensors):
+    with rig.open(sensors["biotac"], _scene(), seed=1) as acquisition:
+        depths_m, forces_n = acquisition.press_curve(8.0)
+        deepest_mm = acquisition.drawn["depth_mm"]
+    assert (depths_m[0], forces_n[0], forces_n[-1]) == (0.0, 0.0, 8.0)
+    assert (np.diff(depths_m) >= 0).all()
+    # 0.01 mm is what a table without channels keeps; the scene's own is of 5 N.
+    assert 1e3 * np.interp(5.0, forces_n, depths_m) == pytest.approx(deepest_mm, abs=0.02)

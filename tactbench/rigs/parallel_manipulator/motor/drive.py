@@ -97,7 +97,9 @@ class Drive:
     def _power_on(self) -> None:
         self.settings = replace(self._saved)
         self._enabled = False
-        self._origin_m = self.servo.position_m  # Positions are lost without power (assumed: incremental).
+        self.origin_m = self.servo.position_m
+        """Where the drive counts from, as the servo does [m]."""
+        # Positions are lost without power (assumed: incremental).
         self._reference = Profile(self.servo.position_m)
         self._loaded_m: float | None = None
         self._target_m = self.servo.position_m
@@ -151,10 +153,10 @@ class Drive:
         return self.servo.limit_a(peak, self.profile.current_a(self.settings.continuous_current))
 
     def _place_m(self, increments: float) -> float:
-        return self._origin_m + self.profile.position_m(increments)
+        return self.origin_m + self.profile.position_m(increments)
 
     def _increments(self, position_m: float) -> int:
-        return round((position_m - self._origin_m) / self.profile.position_m(1.0))
+        return round((position_m - self.origin_m) / self.profile.position_m(1.0))
 
     def _notify(self, before_m: float, before_m_s: float) -> list[str]:
         notices = []
@@ -164,7 +166,7 @@ class Drive:
         if attained and self._homing:
             # The switch defines zero (assumed: GOHOSEQ as its programming by the maker's tools has it).
             self._homing = False
-            self._origin_m = self._target_m
+            self.origin_m = self._target_m
         if self._notify_end and attained and not self._attained:
             self._notify_end = False
             notices.append("p")
@@ -227,7 +229,7 @@ class Drive:
                 self._attained = self._homing = False
             case "HO":
                 wanted = 0 if argument is None else self._number(argument, self.profile.largest_position, signed=True)
-                self._origin_m = self.servo.position_m - self.profile.position_m(wanted)
+                self.origin_m = self.servo.position_m - self.profile.position_m(wanted)
             case "GOHOSEQ":
                 if self._reference_switch_m is None:
                     raise Refused(NOT_AVAILABLE)

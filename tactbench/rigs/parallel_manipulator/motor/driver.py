@@ -261,6 +261,11 @@ class FaulhaberDriver(Driver):
         """Whether positions mean anything, and limits hold."""
         return self._homed
 
+    @property
+    def options(self) -> FaulhaberOptions:
+        """What the rig file says of it."""
+        return self._options
+
     def update(self, timeout_s: float = 0.0) -> MotorState | None:
         """Carry on what is under way, waiting at most `timeout_s` for the next byte; return what was last read.
 
@@ -366,6 +371,27 @@ class FaulhaberDriver(Driver):
             while self.moving:
                 self._go(self._exchange.answer_s)
 
+    def confirm(self) -> None:
+        """Read back every setting and the ends of travel that the options state; nothing is set.
+
+        Raises
+        ------
+        SettingNotKeptError
+            If the drive has another one: it was set by somebody else, or has been without power.
+        AnswerMissingError, MotorSilentError, MotorRefusalError, LinkUnplugged
+            If it does not answer.
+        """
+        speed = ("SP", self._speed_now, "GSP")
+        for command, argument, query in [speed, *(one for one in self._settings if one[0] != "SP"), *self._limits]:
+            found = self._commands.sure(query)
+            if found != argument:
+                raise SettingNotKeptError(
+                    f"The motor's drive was told {command}{argument} and answers {query} with {found}.",
+                    hint="Was it without power, or set by another program? Start it anew and home it.",
+                )
+        if self._limits and not self._commands.configuration() & Configuration.POSITION_LIMITS:
+            raise SettingNotKeptError("The motor's drive does not hold the ends of travel any more.")
+
     def move_by(self, distance_m: float) -> float:
         """Begin to move from the last target by a distance, to the nearest increment; return the new target [m].
 
@@ -379,9 +405,24 @@ class FaulhaberDriver(Driver):
             raise MotorNotReadyError("The motor's target is not known.", hint="Use locate() once it is at rest.")
         return self._begin("LR", self._target + self._profile.increments(distance_m))
 
-    def move_to(self, position_m: float) -> float:
-        """Begin to move to a position, to the nearest increment; return it [m]. Raises as :meth:`move_by`."""
-        return self._begin("LA", self._profile.increments(position_m))
+    def move_to(self, position_m: float, speed_m_s: float | None = None) -> float:
+        """Begin to move to a position, to the nearest increment; return it [m].
+
+        `speed_m_s` is of this move, rounded down; None: that of the options. Raises as :meth:`move_by`, and RigError
+        for a speed that the drive does not have.
+        """
+        speed = None if speed_m_s is None else self._profile.speed(speed_m_s)
+        return self._begin("LA", self._profile.increments(position_m), speed)
+
+    def halt(self) -> None:
+        """Begin to move to the position that was last read, whatever is under way: the motor brakes and holds there.
+
+        Two commands are sent at once, without waiting for answers that are out; it stays under position control. Raises
+        as :meth:`retreat`, and MotorNotReadyError if no position was read yet.
+        """
+        if self._state is None or not self._homed:
+            raise MotorNotReadyError("The motor's position is not known.", hint="Home it, and read it.")
+        self._at_once(self._profile.increments(self._state.position_m), None)
 
     def retreat(self) -> None:
         """Begin to move to the place that the options state as away from the sensor, whatever is under way.
@@ -398,17 +439,21 @@ class FaulhaberDriver(Driver):
         """
         if self._away is None or not self._homed:
             raise MotorNotReadyError("The motor has no place to retreat to.", hint="Give retreat_m, and home it.")
+        self._at_once(self._away, self._away_speed)
+
+    def _at_once(self, target: int, speed: int | None) -> None:
         self._abort()
-        self._move = move = _Move(self._away, self._seconds(self._travel_m))
-        if self._away_speed is not None:
-            self._speed_now = self._away_speed
-            self._exchange.send("SP", self._away_speed, move)
-        self._exchange.send("LA", self._away, move)
+        self._speed_now = speed or self._speed_now
+        self._move = move = _Move(target, self._seconds(self._travel_m, self._speed_now or self._speed))
+        if speed is not None:
+            self._exchange.send("SP", speed, move)
+        self._exchange.send("LA", target, move)
         self._exchange.send("M", None, move)
         self._queue.append(("TPOS", None))
 
-    def _begin(self, command: Literal["LA", "LR"], target: int) -> float:
+    def _begin(self, command: Literal["LA", "LR"], target: int, speed: int | None = None) -> float:
         position_m = self._profile.position_m(target)
+        speed = speed or self._speed
         for wrong, problem, hint in (
             (self.moving, "The motor is moving.", "Wait for the end of its move, or let it retreat."),
             (not self._homed, "The motor is not homed.", "Use home()."),
@@ -425,12 +470,11 @@ class FaulhaberDriver(Driver):
                 hint="Ask for less.",
             )
         distance = target - self._target if self._target is not None else None
-        self._move = _Move(
-            target, self._seconds(self._travel_m if distance is None else abs(self._profile.position_m(distance)))
-        )
-        if self._speed_now != self._speed:
-            self._queue.append(("SP", self._speed))
-            self._speed_now = self._speed
+        distance_m = self._travel_m if distance is None else abs(self._profile.position_m(distance))
+        self._move = _Move(target, self._seconds(distance_m, speed))
+        if self._speed_now != speed:
+            self._queue.append(("SP", speed))
+            self._speed_now = speed
         self._queue += [
             ("LA", target) if command == "LA" or distance is None else ("LR", distance),
             ("M", None),
@@ -438,9 +482,9 @@ class FaulhaberDriver(Driver):
         ]
         return position_m
 
-    def _seconds(self, distance_m: float) -> float:
+    def _seconds(self, distance_m: float, speed: int) -> float:
         """Return how long a move takes at most."""
-        speed_m_s = self._profile.speed_m_s(max(1, min(self._speed, self._away_speed or self._speed)))
+        speed_m_s = self._profile.speed_m_s(max(1, speed))
         ramps_s = 2.0 * speed_m_s / self._acceleration_m_s2
         return distance_m / speed_m_s + ramps_s + SETTLE_S + 4.0 * self._exchange.answer_s
 
@@ -450,6 +494,8 @@ class FaulhaberDriver(Driver):
 
     def _abort(self) -> None:
         """Send no more of what is under way."""
+        if any(name == "SP" for name, _ in self._queue):
+            self._speed_now = 0  # Not sent: the next move sends one.
         self._queue.clear()
         self._move, self._target = None, None
 

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tactbench.plugin import CanFrame, EmulatorSettings, Fault, Sent, fault_concerns
+from tactbench.plugin import CanFrame, EmulatorSettings, Fault, Sent, fault_concerns, sourced
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
@@ -35,6 +35,8 @@ class MotorFault(Fault):
     """Seven times the longest answer at 9600 baud."""
 
 
+BEYOND_M = 2e-3
+"""How far an emulated motor goes beyond the ends of travel that its options state (assumed)."""
 SWITCH_M = -8e-3
 """Where an emulated drive of a rig file has its reference switch, 2 mm from its end stop (assumed)."""
 
@@ -195,10 +197,18 @@ def build(settings: EmulatorSettings) -> MotorEmulator:
         For options or faults that are not known.
     """
     options = read_options(FaulhaberOptions, settings.options, "faulhaber")
+    model = MotorModel()
+    if options.homing == "here" and options.lower_m is not None and options.upper_m is not None:
+        # It has the travel that is stated, counted from where it stands now, and a little more.
+        ends_m = (options.lower_m - options.home_m - BEYOND_M, options.upper_m - options.home_m + BEYOND_M)
+        first, last = (end.to("m") for end in model.travel)
+        travel = (sourced(min(ends_m[0], first), "m", "its options"), sourced(max(ends_m[1], last), "m", "its options"))
+        model = model.model_copy(update={"travel": travel})
     return MotorEmulator(
         lambda _position_m, at_s: settings.senses(at_s).get("load", 0.0),
         settings.rng,
         profile=options.profile(),
+        model=model,
         reference_switch_m=SWITCH_M if options.homing == "switch" else None,
         baud=options.baud,
         faults=[MotorFault.parse(text) for text in settings.faults],

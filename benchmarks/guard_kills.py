@@ -1,0 +1,265 @@
+"""Rig and guard killed in the middle of a press, in real time: how soon the retreat is on the motor's line.
+
+    python benchmarks/guard_kills.py [TIMES [SCENARIO …]]
+
+Emulated motor and force sensor run here, on a pseudo-terminal and UDP; the rig is a process of its own, and the guard a
+process of that one. Times are from the signal to the first byte of the retreat on the motor's line. Numbers depend on
+how busy the machine is: it is said at the end.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from tactbench.plugin import TactbenchError
+from tactbench.rigs.parallel_manipulator.guard import reaction
+from tactbench.rigs.parallel_manipulator.guard_interface import GuardLostError
+from tactbench.rigs.parallel_manipulator.guard_messages import DeviceSettings, ProcessSettings
+from tactbench.rigs.parallel_manipulator.guard_process import GuardProcess
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
+from tactbench.rigs.parallel_manipulator.motor.retreat import retreat_command
+
+if TYPE_CHECKING:
+    import guard_faults as faults
+else:
+    _spec = importlib.util.spec_from_file_location("guard_faults", Path(__file__).with_name("guard_faults.py"))
+    faults = sys.modules.get("guard_faults") or importlib.util.module_from_spec(_spec)
+    if "guard_faults" not in sys.modules:
+        sys.modules["guard_faults"] = faults
+        _spec.loader.exec_module(faults)
+
+PACKAGE = "tactbench.rigs.parallel_manipulator"
+PERIODS_S = {115200: 10e-3, 9600: 30e-3}
+FORCE_AGE_S = 0.2
+"""Longer than a rig's: emulators in Python are late by tens of milliseconds on a busy machine."""
+
+
+# The rig's process ----------------------------------------------------------------------------------------------------
+
+
+def rig(text: str) -> None:
+    """Press and hold until something ends it; say on stdout what happens."""
+    given = json.loads(text)
+    setting = faults.Setting(**given["setting"])
+    guard = GuardProcess(ProcessSettings.of(given["process"]))
+    sibling = 0
+    if given["sibling"]:
+        # It has a copy of every socket, and no idea of it.
+        sibling = os.fork()
+        if sibling == 0:
+            time.sleep(8.0)
+            os._exit(0)
+
+    def say(**values: Any) -> None:
+        print(json.dumps(values), flush=True)
+
+    def clock() -> int:
+        return time.monotonic_ns() - given["process"]["clock_zero_ns"]
+
+    said = ""
+
+    def change(beat: Any, _since_s: float) -> Any:
+        nonlocal said
+        if press.phase != said:
+            said = press.phase
+            say(phase=said)
+        return beat
+
+    press = faults.Press(guard, setting, clock, change, hold_s=20.0)
+    try:
+        guard.start()
+        say(guard=guard.pid, sibling=sibling)
+        last = press.run(20.0)
+        say(ended=str(last.trigger))
+    except GuardLostError as error:
+        say(lost=error.message)
+    except TactbenchError as error:
+        say(error=error.message)
+    finally:
+        guard.close()
+
+
+# Scenarios ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Who gets which signal, and how soon the retreat must be there."""
+
+    who: tuple[str, ...]
+    number: int = signal.SIGKILL
+    sibling: bool = False
+    retreats: bool = True
+    within: Callable[[float, float], float] = lambda dead_s, reaction_s: dead_s + reaction_s
+
+
+SCENARIOS = {
+    "kill rig": Scenario(("rig",)),
+    "kill rig, a sibling alive": Scenario(("rig",), sibling=True),
+    "stop rig": Scenario(("rig",), signal.SIGSTOP, sibling=True),
+    "terminate guard": Scenario(("guard",), signal.SIGTERM),
+    "kill guard": Scenario(("guard",), within=lambda dead_s, reaction_s: 2 * dead_s),
+    "stop guard": Scenario(("guard",), signal.SIGSTOP, within=lambda dead_s, reaction_s: 2 * dead_s),
+    "kill both": Scenario(("rig", "guard"), retreats=False),
+}
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of one."""
+
+    late_s: float
+    """From the signal to the first byte of the retreat; not a number: there was none."""
+    allowed_s: float
+    host_late_s: float
+    """By how much the longest of many short sleeps here was longer than asked for."""
+    out: bool
+    moved_m: float
+    """By how much the motor went on into the skin after the signal, at most."""
+    step_m: float
+    largest_n: float
+    log: tuple[dict[str, Any], ...]
+    said: tuple[dict[str, Any], ...]
+
+
+def run(name: str, baud: int, seed: int) -> Result | None:
+    """Carry a scenario out; None: the press ended by itself before, on a machine too busy."""
+    scenario, rng = SCENARIOS[name], random.Random(seed)
+    setting = faults.Setting(baud=baud, period_s=PERIODS_S[baud], force_age_s=FORCE_AGE_S, time="real", seed=seed)
+    world = faults.Pressed(setting)
+    zero_ns = time.monotonic_ns() - world.clock()
+    options, addresses = world.settings(), world.devices.addresses
+    limits = setting.limits
+    with world.devices, tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "guard.log"
+        settings = ProcessSettings(
+            DeviceSettings(f"{PACKAGE}.motor.driver:build", addresses["motor"], options["motor"]),
+            DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:build", addresses["force"], options["force"]),
+            str(log),
+            zero_ns,
+        )
+        given = {"setting": asdict(setting), "process": settings.body(), "sibling": scenario.sibling}
+        process = subprocess.Popen(
+            [sys.executable, __file__, "--rig", json.dumps(given)], stdout=subprocess.PIPE, text=True
+        )
+        assert process.stdout is not None
+        said: list[dict[str, Any]] = []
+        numbers = {"rig": process.pid}
+        try:
+            if not _until(process.stdout, said, "ramp"):
+                return None
+            numbers |= {who: said[0][who] for who in ("guard", "sibling")}
+            time.sleep(rng.uniform(0.0, 0.4))
+            now_s, deepest_m = 1e-9 * world.clock(), world.position_m
+            target_m = world.motor.drive._target_m + faults.RETREAT_M
+            for who in scenario.who:
+                os.kill(numbers[who], scenario.number)
+            late_s, host_late_s, out = _watched(world, now_s, 3.0 if scenario.retreats else 0.5)
+            deepest_m = max(deepest_m, world.deepest_m(now_s))
+            if name == "stop rig":
+                os.kill(process.pid, signal.SIGCONT)
+            if process.poll() is None and "guard" in scenario.who:
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(5.0)
+                said += [json.loads(line) for line in process.stdout]
+            _ended(log)
+            lines = log.read_text(encoding="utf-8").splitlines()
+        finally:
+            for who in numbers:
+                with suppress(ProcessLookupError):
+                    if numbers[who]:
+                        os.kill(numbers[who], signal.SIGKILL)
+            process.wait()
+            process.stdout.close()
+    dead_s = limits.heartbeat_s
+    allowed_s = scenario.within(dead_s, reaction(FaulhaberOptions(**options["motor"])).time_s)
+    entries = tuple(json.loads(line) for line in lines if line.startswith("{"))
+    return Result(
+        late_s, allowed_s, host_late_s, out, deepest_m - target_m, limits.step_m, world.largest_n, entries, tuple(said)
+    )
+
+
+def _until(lines: IO[str], said: list[dict[str, Any]], phase: str) -> bool:
+    for line in lines:
+        said.append(json.loads(line))
+        if said[-1].get("phase") == phase:
+            return True
+    return False
+
+
+def _watched(world: Any, since_s: float, most_s: float) -> tuple[float, float, bool]:
+    """Return when the retreat began on the motor's line, how late the host was, and whether the motor came out."""
+    command = retreat_command(FaulhaberOptions(**world.settings()["motor"]))
+    until_s = since_s + most_s
+    late_s, host_late_s, out = float("nan"), 0.0, False
+    while 1e-9 * world.clock() < until_s and not out:
+        asked_s = time.perf_counter()
+        time.sleep(2e-3)
+        host_late_s = max(host_late_s, time.perf_counter() - asked_s - 2e-3)
+        out = abs(world.position_m - faults.RETREAT_M) < 10e-6
+    sent = b""
+    for passed in world.devices.log_of("motor"):
+        if passed.sender == "host" and passed.t_s >= since_s:
+            sent += passed.piece
+            if command.split(b"\r")[0] + b"\r" in sent:
+                late_s = passed.t_s - since_s
+                break
+    return late_s, host_late_s, out
+
+
+def _ended(log: Path) -> None:
+    """Wait until the guard has written that it leaves, a second at most."""
+    for _ in range(100):
+        if '"left"' in log.read_text(encoding="utf-8"):
+            return
+        time.sleep(0.01)
+
+
+def main() -> None:
+    """Run scenarios and print a table."""
+    if sys.argv[1:2] == ["--rig"]:
+        rig(sys.argv[2])
+        return
+    times = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    wrong = 0
+    for name in sys.argv[2:] or SCENARIOS:
+        for baud in PERIODS_S:
+            found: list[Result] = []
+            seed = missed = 0
+            while len(found) < times and missed < 3 * times:
+                seed += 1
+                result = run(name, baud, seed)
+                missed += result is None
+                found += [] if result is None else [result]
+            late = sorted(1e3 * result.late_s for result in found)
+            over = sum(not result.late_s <= result.allowed_s for result in found) if SCENARIOS[name].retreats else 0
+            not_out = sum(not result.out for result in found) if SCENARIOS[name].retreats else 0
+            wrong += over + not_out
+            print(
+                f"{name:28s} {baud:6d}  {len(found)} times, {missed} ended before: "
+                f"retreat after {late[len(late) // 2]:5.1f} ms median, {late[-1]:5.1f} ms worst, "
+                f"{1e3 * found[0].allowed_s:5.1f} ms allowed, {over} over, {not_out} not out; "
+                f"went on {1e6 * max(result.moved_m for result in found):.0f} um at most, "
+                f"a step is {1e6 * found[0].step_m:.0f} um; "
+                f"sleeps late by {1e3 * max(result.host_late_s for result in found):.0f} ms at most",
+                flush=True,
+            )
+    print(f"load average {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    sys.exit(wrong > 0)
+
+
+if __name__ == "__main__":
+    main()

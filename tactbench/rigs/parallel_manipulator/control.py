@@ -1,0 +1,202 @@
+"""The loop that beats the guard: a control period at a time, in virtual time or in a thread of its own.
+
+A beat is a step of the press, so a controller that hangs is a beat that does not come, and the guard retreats.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from tactbench.plugin import Block, Driver, StreamSpec, TactbenchError
+from tactbench.rigs.parallel_manipulator.guard_interface import Beat, Event, Guard, Limits, Report
+from tactbench.rigs.parallel_manipulator.press import Press
+
+if TYPE_CHECKING:
+    from tactbench.plugin import Clock
+
+STOP_S = 10.0
+"""The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""
+
+
+class WatchedDriver(Driver):
+    """The sensor's driver, and when its last rows came."""
+
+    def __init__(self, driver: Driver, clock: Clock) -> None:
+        self._driver, self._clock = driver, clock
+        self.last_ns = 0
+        """On the rig's clock; 0: none came yet."""
+
+    @property
+    def streams(self) -> tuple[StreamSpec, ...]:  # noqa: D102  (inherited)
+        return self._driver.streams
+
+    @property
+    def counts(self) -> Mapping[str, int]:  # noqa: D102  (inherited)
+        return self._driver.counts
+
+    def identify(self) -> Mapping[str, str]:  # noqa: D102  (inherited)
+        return self._driver.identify()
+
+    def start(self) -> None:  # noqa: D102  (inherited)
+        self._driver.start()
+
+    def read(self, timeout_s: float) -> list[Block]:  # noqa: D102  (inherited)
+        blocks = self._driver.read(timeout_s)
+        if blocks:
+            self.last_ns = self._clock()
+        return blocks
+
+    def stop(self) -> None:  # noqa: D102  (inherited)
+        self._driver.stop()
+
+    def close(self) -> None:  # noqa: D102  (inherited)
+        self._driver.close()
+
+
+class Control:
+    """Beats a guard with the steps of a press.
+
+    Parameters
+    ----------
+    guard
+        Armed right before :meth:`carry` or :meth:`start` is called.
+    limits
+        What it was armed with.
+    armed
+        What it answered.
+    press
+        What is done.
+    sensor
+        Whose rows may not become old.
+    clock
+        The rig's.
+    period_s
+        Control period.
+    stale_s
+        How old the sensor's rows may be.
+    """
+
+    def __init__(
+        self,
+        guard: Guard,
+        limits: Limits,
+        armed: Report,
+        press: Press,
+        sensor: WatchedDriver,
+        clock: Clock,
+        *,
+        period_s: float,
+        stale_s: float,
+    ) -> None:
+        self.press = press
+        self.late = 0
+        """Control periods that began more than one period late."""
+        self._guard, self._limits, self._sensor, self._clock = guard, limits, sensor, clock
+        self._period_ns, self._stale_ns = round(1e9 * period_s), round(1e9 * stale_s)
+        self._report = armed
+        self._beats = 0
+        self._began_ns = clock()
+        self._next_ns = self._began_ns + self._period_ns
+        self._raw: list[tuple[float, float]] = []
+        self._blocks: deque[Block] = deque()
+        self._events: deque[Event] = deque()
+        self._over = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._counts: Mapping[str, Mapping[str, int]] | None = None
+
+    @property
+    def report(self) -> Report:
+        """What the guard answered last."""
+        return self._report
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield what force sensor and motor have sent and was not yet yielded."""
+        while self._blocks:
+            yield self._blocks.popleft()
+
+    def events(self) -> Iterator[Event]:
+        """Yield what has happened and was not yet yielded."""
+        while self._events:
+            yield self._events.popleft()
+
+    def carry(self, until_ns: int) -> None:
+        """Let time go on until a nanosecond of the clock, beating whenever it is due: for virtual time."""
+        while self._next_ns <= until_ns:
+            self._guard.advance(self._next_ns)
+            self._period()
+        self._guard.advance(until_ns)
+
+    def start(self) -> None:
+        """Beat from a thread of its own, until :meth:`stop`: for real time."""
+        self._thread = threading.Thread(target=self._run, name="force control", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread, if there is one; the guard may be used by the caller then."""
+        self._over.set()
+        if self._thread is not None:
+            self._thread.join(STOP_S)
+        with suppress(TactbenchError):  # a guard that is lost has nothing more to say
+            self._gather()
+            self._counts = self._guard.counts()
+
+    def counts(self) -> Mapping[str, Mapping[str, int]]:
+        """Return what guard, motor and force sensor have counted; once stopped, until then."""
+        return self._guard.counts() if self._counts is None else self._counts
+
+    def _run(self) -> None:
+        try:
+            while not self._over.is_set():
+                self._guard.advance(self._next_ns)
+                self._period()
+        except Exception as error:
+            self.press.fail(_said(error))
+            self.press.abandon()
+
+    def _gather(self) -> None:
+        """Take what the guard has for the recording."""
+        for block in self._guard.force_blocks():
+            self._blocks.append(block)
+            self._raw += self._pressing(block)
+        self._blocks.extend(self._guard.motor_blocks())
+        self._events.extend(self._guard.events())
+
+    def _pressing(self, block: Block) -> list[tuple[float, float]]:
+        assert block.t_ns is not None
+        limits = self._limits
+        force = (block.data[:, limits.channel] - limits.zero[limits.channel]) * limits.sign
+        return list(zip((1e-9 * block.t_ns).tolist(), force.tolist(), strict=True))
+
+    def _period(self) -> None:
+        now_ns = self._clock()
+        self.late += now_ns - self._next_ns > self._period_ns
+        self._next_ns = max(self._next_ns + self._period_ns, now_ns + self._period_ns // 2)
+        self._gather()
+        raw, self._raw = self._raw, []
+        press, last_ns = self.press, max(self._sensor.last_ns, self._began_ns)
+        if now_ns - last_ns > self._stale_ns:
+            press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - last_ns):.0f} ms")
+        try:
+            command = press.step(self._report, raw, 1e-9 * now_ns)
+        except TactbenchError as error:
+            press.fail(_said(error))
+            command = press.step(self._report, (), 1e-9 * now_ns)
+        self._beats += 1
+        asked: dict[str, Any] = {
+            "command": command.kind,
+            "distance_m": command.distance_m,
+            "position_m": command.position_m,
+            "speed_m_s": command.speed_m_s,
+        }
+        self._report = self._guard.beat(
+            Beat(self._beats, now_ns, str(press.state), force_sequence=self._report.force_sequence, **asked)
+        )
+
+
+def _said(error: Exception) -> str:
+    text = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    return text.rstrip(".")

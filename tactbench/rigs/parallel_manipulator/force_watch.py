@@ -1,0 +1,157 @@
+"""What is wrong with a stream of forces: too large, not known, or too old. No input or output; a clock's numbers only.
+
+An unknown force counts as too large a force.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tactbench.plugin import Block, Quality, StreamSpec
+from tactbench.rigs.parallel_manipulator.guard_interface import Limits, Trigger
+
+if TYPE_CHECKING:
+    from tactbench.plugin import FloatArray
+
+DELAY_WINDOW_NS = 1_000_000_000
+"""The least delay of a device's samples is looked for in this one and the one before (assumed: clocks that differ by
+100 ppm move apart by 0.2 ms meanwhile)."""
+_LOOKED_AT = 3
+"""Samples of which two are a touch."""
+
+Problem = tuple[Trigger, str]
+
+
+class ForceWatch:
+    """Watches one force stream.
+
+    The age of a sample is the time since its receipt and, where the device has a clock of its own, its delay on the way
+    beyond the least of the last second or two: a stream that is held up somewhere is old although it keeps coming. A
+    constant delay cannot be seen.
+
+    Parameters
+    ----------
+    stream
+        Channels of kind ``force`` and ``torque`` are looked at.
+
+    Attributes
+    ----------
+    force_n, norm_n
+        Pressing force and norm of the force, less the zero, of the newest sample; NaN: none yet, or no limits.
+    sequence, t_ns
+        Number and receipt of that sample; -1 and 0: none yet.
+    received
+        Samples so far.
+    """
+
+    def __init__(self, stream: StreamSpec) -> None:
+        kinds = [channel.kind for channel in stream.channels]
+        self._forces = [n for n, kind in enumerate(kinds) if kind == "force"]
+        self._torques = [n for n, kind in enumerate(kinds) if kind == "torque"]
+        self.force_n = self.norm_n = np.nan
+        self.sequence, self.t_ns, self.received = -1, 0, 0
+        self._delay_ns = 0
+        self._offsets: deque[tuple[int, int]] = deque(maxlen=2)
+        self._last: FloatArray | None = None
+        self._same = 0
+        self._pressing: deque[float] = deque(maxlen=_LOOKED_AT)
+
+    def touched(self, touch_n: float) -> bool:
+        """Return whether two of the last three samples are above a force [N]."""
+        return sum(force > touch_n for force in self._pressing) >= _LOOKED_AT - 1
+
+    def age_s(self, now_ns: int) -> float:
+        """Return the age of the newest sample [s]; infinite: there is none."""
+        return 1e-9 * (now_ns - self.t_ns + self._delay_ns) if self.received else np.inf
+
+    def old(self, now_ns: int, limits: Limits) -> Problem | None:
+        """Return what is wrong if nothing newer has come by now."""
+        age_s = self.age_s(now_ns)
+        if age_s <= limits.force_age_s:
+            return None
+        return Trigger.FORCE_OLD, f"the newest force is {1e3 * age_s:.1f} ms old, {1e3 * limits.force_age_s:.1f} may be"
+
+    def take(self, block: Block, limits: Limits | None) -> Problem | None:
+        """Take samples in the order in which they came; return the first thing that is wrong with them.
+
+        Without limits only what needs none is kept up: numbers, times, equal samples.
+        """
+        data = np.asarray(block.data, dtype=np.float64)
+        n = len(data)
+        if not n:
+            return None
+        first = self.sequence + 1
+        numbers = np.arange(first, first + n) if block.sequence is None else block.sequence
+        before = self.sequence if self.received else int(numbers[0]) - 1
+        ahead = np.maximum.accumulate(np.concatenate(([before], numbers)))
+        lost = numbers - ahead[:-1] - 1
+        same = self._same_in_a_row(data[lost != -1])
+        newest = int(np.argmax(ahead[1:]))
+        self.received += n
+        if ahead[-1] > before:
+            self.sequence = int(ahead[-1])
+            self.t_ns = 0 if block.t_ns is None else int(block.t_ns[newest])
+            if block.device_ns is not None:
+                self._delay_ns = self._delayed(self.t_ns, int(block.device_ns[newest]))
+        if limits is None:
+            return None
+        wrench = data - np.asarray(limits.zero)
+        pressing = limits.sign * wrench[:, limits.channel]
+        self._pressing.extend(pressing[-_LOOKED_AT:].tolist())
+        forces = np.linalg.norm(wrench[:, self._forces], axis=1)
+        if ahead[-1] > before:
+            self.force_n, self.norm_n = float(pressing[newest]), float(forces[newest])
+        return (
+            self._unknown(data, block.quality)
+            or self._too_large(wrench, forces, limits)
+            or self._irregular(int(lost.max()), same, limits)
+        )
+
+    def _unknown(self, data: FloatArray, quality: np.typing.NDArray[np.uint8] | None) -> Problem | None:
+        if not np.isfinite(data).all():
+            return Trigger.FORCE_NOT_A_NUMBER, "a sample of the force sensor is not a number"
+        marks = 0 if quality is None else int(np.bitwise_or.reduce(quality, axis=None))
+        if marks & Quality.SATURATED:
+            return Trigger.FORCE_SATURATED, "the force sensor says that it is at an end of its range"
+        if marks & (Quality.MISSING | Quality.SUSPECT):
+            return Trigger.FORCE_FLAGGED, "a sample of the force sensor is flagged as missing or suspect"
+        return None
+
+    def _too_large(self, wrench: FloatArray, forces: FloatArray, limits: Limits) -> Problem | None:
+        largest = float(forces.max())
+        if largest >= limits.force_ceiling_n:
+            return Trigger.FORCE_CEILING, f"{largest:.3f} N, the ceiling is {limits.force_ceiling_n:g} N"
+        if limits.torque_ceiling_nm is not None and self._torques:
+            torque = float(np.linalg.norm(wrench[:, self._torques], axis=1).max())
+            if torque >= limits.torque_ceiling_nm:
+                return Trigger.TORQUE_CEILING, f"{torque:.4f} N m, the ceiling is {limits.torque_ceiling_nm:g} N m"
+        return None
+
+    def _irregular(self, lost: int, same: int, limits: Limits) -> Problem | None:
+        if lost > limits.lost_samples:
+            return Trigger.FORCE_GAP, f"{lost} force samples were lost in a row, {limits.lost_samples} may be"
+        if same >= limits.same_samples:
+            return Trigger.FORCE_STUCK, f"{same} force samples in a row are the same in every channel"
+        return None
+
+    def _same_in_a_row(self, data: FloatArray) -> int:
+        """Return the longest run of equal samples that ends in these; 1: each is another one than that before."""
+        if not len(data):
+            return self._same
+        before = data[:1] + 1.0 if self._last is None else self._last
+        differs = np.flatnonzero((np.concatenate((before, data[:-1])) != data).any(axis=1))
+        runs = np.diff(np.concatenate(([-self._same], differs, [len(data)])))
+        self._last, self._same = data[-1:].copy(), int(runs[-1])
+        return int(runs.max())
+
+    def _delayed(self, t_ns: int, device_ns: int) -> int:
+        """Return by how much a sample took longer than the quickest of late [ns]."""
+        offset = t_ns - device_ns
+        if not self._offsets or t_ns - self._offsets[-1][0] > DELAY_WINDOW_NS:
+            self._offsets.append((t_ns, offset))
+        elif offset < self._offsets[-1][1]:
+            self._offsets[-1] = (self._offsets[-1][0], offset)
+        return offset - min(least for _, least in self._offsets)

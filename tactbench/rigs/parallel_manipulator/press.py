@@ -1,0 +1,400 @@
+"""One press as a state machine, stepped once a control period with the guard's report; it waits for nothing.
+
+::
+
+    standoff -> approach -> contact -> lift -> unloaded -> return -> ramp -> hold -> unload -> done
+                    ^                                                  |       |
+                    +------------- again, once: contact lost ----------+-------+
+    any of them -> retreat -> failed
+
+The surface is found first: a quick way to where it cannot be yet, a slow one until the raw force says that it is
+touched, a small force kept for a while. From there the motor lifts the indenter off for the scene's unloaded hold, goes
+back, and follows the scene's profile. Touch is found on the raw force; the force is regulated on the filtered one. The
+guard looks at the raw force by itself, and retreats by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from tactbench.rigs.parallel_manipulator.force_law import ForceController, ForceLaw
+from tactbench.rigs.parallel_manipulator.guard_interface import CommandKind, GuardState, Report
+from tactbench.rigs.parallel_manipulator.settings import RigSettings
+
+SWINGS = 6
+"""Half swings of the error in a row, each above the band of errors, after which the loop is said to swing (assumed:
+three whole swings)."""
+SLOW = 1.5
+"""How many times as long as its way takes a move may last, and `SLACK_S` longer."""
+SLACK_S = 2.0
+
+
+class PressState(StrEnum):
+    """Where a press is."""
+
+    STANDOFF = "standoff"
+    """The motor is retracted, nothing touches."""
+    APPROACH = "approach"
+    CONTACT = "contact"
+    """A small force is kept."""
+    LIFT = "lift"
+    UNLOADED = "unloaded"
+    """Just above the skin, for the scene's unloaded hold."""
+    RETURN = "return"
+    RAMP = "ramp"
+    HOLD = "hold"
+    UNLOAD = "unload"
+    DONE = "done"
+    """Just above the skin again."""
+    RETREAT = "retreat"
+    FAILED = "failed"
+    """The motor is out, and :attr:`Press.ended` says why."""
+
+
+_REGULATED = (PressState.CONTACT, PressState.RAMP, PressState.HOLD)
+
+
+@dataclass(frozen=True)
+class Command:
+    """What the guard is asked for in the next beat."""
+
+    kind: CommandKind = CommandKind.NONE
+    distance_m: float = 0.0
+    position_m: float = math.nan
+    speed_m_s: float = math.nan
+
+
+@dataclass(frozen=True)
+class Course:
+    """What a scene asks for."""
+
+    wanted_n: Callable[[float], float]
+    """Force at a second since its first sample."""
+    slope_n_s: float
+    """Of the ramp."""
+    ramp_s: float
+    """When the ramp begins."""
+    end_s: float
+    """When it ends."""
+
+
+class Press:
+    """One press of one scene.
+
+    Parameters
+    ----------
+    settings
+        Of the rig.
+    course
+        Of the scene.
+    increment_m
+        The motor's: shorter steps are not sent, and kept for later ones.
+
+    Attributes
+    ----------
+    state
+        Where it is.
+    ended
+        Why it failed; empty: it has not.
+    remarks
+        What happened on the way that did not end it.
+    contact_m
+        Position of the motor at which the small force was kept; NaN: not yet.
+    touch_n
+        Largest raw force from the first touch until the small force was kept.
+    error_n
+        Filtered minus wanted force of the last regulated step.
+    """
+
+    def __init__(self, settings: RigSettings, course: Course, increment_m: float) -> None:
+        self.state = PressState.STANDOFF
+        self.ended = ""
+        self.remarks: list[str] = []
+        self.contact_m = math.nan
+        self.touch_n = 0.0
+        self.error_n = math.nan
+        self.wanted_n = 0.0
+        self._settings, self._course, self._increment_m = settings, course, increment_m
+        limits, loop = settings.limits, settings.force_loop
+        self._law: ForceLaw = loop.law(limits.travel_mm)
+        self._step_m = loop.step_m
+        self._raw: deque[tuple[float, float]] = deque()
+        self._sum_n = 0.0
+        self._force_n = math.nan
+        self._controller: ForceController | None = None
+        self._goal: Command | None = None
+        self._asked_s: float | None = None
+        self._since_s = self._due_s = 0.0
+        self._began_s: float | None = None
+        self._paused_s = 0.0
+        self._waiting_s = math.nan
+        self._band_since_s = self._error_since_s = math.nan
+        self._swings, self._peak_n = 0, 0.0
+        self._lost = False
+        self._go = False
+
+    # What a rig says --------------------------------------------------------------------------------------------------
+
+    @property
+    def ready(self) -> bool:
+        """Whether the surface is found, and the scene may begin."""
+        return self.state is PressState.UNLOADED
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing more will happen."""
+        return self.state in (PressState.DONE, PressState.FAILED)
+
+    def go(self) -> None:
+        """Leave the standoff."""
+        self._go = True
+
+    def begin(self, now_s: float) -> None:
+        """Let the scene begin: from now on its seconds count."""
+        self._began_s = now_s
+
+    def fail(self, why: str) -> None:
+        """Let the motor retreat, for a reason from outside; the first one stands."""
+        if not self.over and self.state is not PressState.RETREAT:
+            self.ended = why
+            self._enter(PressState.RETREAT, self._since_s)
+
+    def abandon(self) -> None:
+        """Do nothing more: nobody steps it any longer."""
+        if not self.over:
+            self._enter(PressState.FAILED, self._since_s)
+
+    # Stepping ---------------------------------------------------------------------------------------------------------
+
+    def step(self, report: Report, raw: Sequence[tuple[float, float]], now_s: float) -> Command:
+        """Go on by one control period.
+
+        Parameters
+        ----------
+        report
+            What the guard answered last.
+        raw
+            Seconds and raw pressing forces [N] that have come since the last step, the zero subtracted.
+        now_s
+            On the rig's clock.
+        """
+        self._take(raw, now_s)
+        if report.state in (GuardState.RETREATING, GuardState.RETREATED, GuardState.FAULT):
+            return self._guarded(report, now_s)
+        match self.state:
+            case PressState.STANDOFF:
+                if self._go:
+                    self._enter(PressState.APPROACH, now_s)
+                    self._move(self._settings.near_m, self._settings.touch.speed_mm_s)
+            case PressState.APPROACH:
+                self._approach(report, now_s)
+            case PressState.LIFT | PressState.RETURN | PressState.UNLOAD:
+                self._on_the_way(report, now_s)
+            case PressState.UNLOADED:
+                if self._began_s is not None and now_s - self._began_s >= self._course.ramp_s:
+                    self._enter(PressState.RETURN, now_s)
+                    self._move(self.contact_m, self._settings.touch.touch_speed_mm_s)
+            case PressState.CONTACT | PressState.RAMP | PressState.HOLD:
+                return self._regulated(report, now_s)
+            case PressState.RETREAT:
+                return Command(CommandKind.RETREAT)
+        return self._asking(report, now_s)
+
+    def _take(self, raw: Sequence[tuple[float, float]], now_s: float) -> None:
+        """Keep the raw forces of the last moment, the newest, and the largest of a touch."""
+        for sample in raw:
+            self._raw.append(sample)
+            self._sum_n += sample[1]
+            self._force_n = sample[1]
+            if self.state in (PressState.APPROACH, PressState.CONTACT):
+                self.touch_n = max(self.touch_n, sample[1])
+        oldest = now_s - 1e-3 * self._settings.touch.mean_ms
+        while self._raw and self._raw[0][0] < oldest:
+            self._sum_n -= self._raw.popleft()[1]
+
+    @property
+    def mean_n(self) -> float:
+        """Mean of the raw forces of the last `mean_ms` [N]; NaN: there are none."""
+        return self._sum_n / len(self._raw) if self._raw else math.nan
+
+    def _guarded(self, report: Report, now_s: float) -> Command:
+        """Note that the guard retreats, or has retreated."""
+        if self.state is not PressState.RETREAT and not self.over:
+            self.ended = f"in {self.state}: {report.trigger or report.state}"
+            self._enter(PressState.RETREAT, now_s)
+        if report.state is not GuardState.RETREATING and not self.over:
+            self._enter(PressState.FAILED, now_s)
+        return Command()
+
+    def _enter(self, state: PressState, now_s: float) -> None:
+        self.state, self._since_s = state, now_s
+        self._goal = self._asked_s = None
+        self._band_since_s = self._error_since_s = math.nan
+        self._swings, self._peak_n = 0, 0.0
+
+    # Moves ------------------------------------------------------------------------------------------------------------
+
+    def _move(self, position_m: float, speed_mm_s: float) -> None:
+        self._goal = Command(CommandKind.MOVE_TO, position_m=position_m, speed_m_s=1e-3 * speed_mm_s)
+        self._asked_s = None
+
+    def _asking(self, report: Report, now_s: float) -> Command:
+        """Return the move that is to be begun, until the guard has accepted it; a stop at once."""
+        if self._goal is None or self._asked_s is not None:
+            return Command()
+        if report.moving and self._goal.kind is not CommandKind.STOP:
+            return Command()
+        self._asked_s = now_s
+        if self._goal.kind is CommandKind.MOVE_TO:
+            way_m = abs(self._goal.position_m - report.position_m)
+            self._due_s = now_s + SLOW * way_m / self._goal.speed_m_s + SLACK_S
+        return self._goal
+
+    def _arrived(self, report: Report, now_s: float) -> bool:
+        """Return whether the last move is over; asks for it again if it was not accepted."""
+        if self._goal is None or self._asked_s is None or now_s <= self._asked_s:
+            return False
+        if not report.accepted:
+            self._asked_s = None
+            return False
+        if report.moving:
+            if now_s > self._due_s:
+                self.fail(f"the motor did not arrive at {1e3 * self._goal.position_m:.3f} mm in its time")
+            return False
+        return True
+
+    def _approach(self, report: Report, now_s: float) -> None:
+        touch, settings = self._settings.touch, self._settings
+        if self._goal is None:  # standing after a touch
+            if not report.moving:
+                self._close_loop(report, now_s)
+            return
+        slowly = self._goal.position_m == settings.deepest_m
+        if slowly and self._asked_s is not None and (report.touched or self.mean_n > touch.mean_n):
+            # The guard has stopped it at a single touch; a mean that is reached is stopped here.
+            self._goal = None if report.touched else Command(CommandKind.STOP)
+            self._asked_s = None
+            return
+        if self._goal.kind is CommandKind.STOP:
+            if self._asked_s is not None and not report.moving:
+                self._goal = None
+            return
+        if self._arrived(report, now_s):
+            if not slowly:
+                self._move(settings.deepest_m, touch.touch_speed_mm_s)
+            elif not report.touched:
+                self.fail(f"no contact down to {1e3 * report.position_m:.3f} mm")
+
+    def _on_the_way(self, report: Report, now_s: float) -> None:
+        """Go over to the next state where a move ends; on the way back to the skin also at a touch."""
+        if not (self._arrived(report, now_s) or (self.state is PressState.RETURN and report.touched)):
+            return
+        if report.moving:
+            return
+        match self.state:
+            case PressState.LIFT:
+                self._enter(PressState.UNLOADED, now_s)
+            case PressState.UNLOAD:
+                if self.mean_n < self._settings.press.band_n:
+                    self._enter(PressState.DONE, now_s)
+                elif now_s - self._since_s > SLACK_S + self._duration_of_unloading():
+                    self.fail(f"{self.mean_n:.2f} N are left after unloading")
+            case _:
+                self._enter(PressState.RAMP, now_s)
+                self._controller = ForceController(self._law, self._force_n, report.position_m, now_s)
+
+    def _duration_of_unloading(self) -> float:
+        heights = self._settings.heights
+        return (heights.depth_mm + heights.stand_off_mm) / self._settings.press.unload_speed_mm_s
+
+    # Under force ------------------------------------------------------------------------------------------------------
+
+    def _close_loop(self, report: Report, now_s: float) -> None:
+        """Begin to regulate after a touch: the small force, or where the ramp was when contact was lost."""
+        self._enter(PressState.RAMP if self._lost else PressState.CONTACT, now_s)
+        self._controller = ForceController(self._law, self._force_n, report.position_m, now_s)
+        if self._lost:
+            self._paused_s += now_s - self._waiting_s
+
+    def _wanted(self, now_s: float) -> tuple[float, float]:
+        """Return the wanted force and its slope."""
+        least = self._settings.touch.contact_n
+        if self.state is PressState.CONTACT or self._began_s is None:
+            return least, 0.0
+        scene_s = now_s - self._began_s - self._paused_s
+        wanted = self._course.wanted_n(scene_s)
+        rising = self.state is PressState.RAMP and wanted > least and scene_s < self._course.end_s
+        return max(least, wanted), self._course.slope_n_s if rising else 0.0
+
+    def _regulated(self, report: Report, now_s: float) -> Command:
+        controller = self._controller
+        assert controller is not None
+        self.wanted_n, slope = self._wanted(now_s)
+        controller.step(self._force_n, report.position_m, now_s, self.wanted_n, slope)
+        self.error_n = controller.filtered_n - self.wanted_n
+        if self.state is PressState.CONTACT:
+            if now_s - self._since_s >= self._settings.touch.settle_s:
+                self.contact_m = controller.target_m
+                self._enter(PressState.LIFT, now_s)
+                lift = 1e-3 * self._settings.touch.lift_mm
+                self._move(self.contact_m - lift, self._settings.touch.touch_speed_mm_s)
+                return self._asking(report, now_s)
+        elif self._kept(controller, now_s):
+            self._end_of(now_s)
+        if self.state not in _REGULATED:
+            return self._asking(report, now_s) if self.state is not PressState.RETREAT else Command(CommandKind.RETREAT)
+        if report.moving:
+            return Command()
+        way = controller.target_m - report.target_m
+        if abs(way) < 0.5 * self._increment_m:
+            return Command()
+        return Command(CommandKind.STEP, distance_m=min(max(way, -self._step_m), self._step_m))
+
+    def _end_of(self, now_s: float) -> None:
+        """Go over from ramp to hold, and from hold to unloading."""
+        assert self._began_s is not None
+        scene_s = now_s - self._began_s - self._paused_s
+        if self.state is PressState.RAMP and scene_s >= self._course.end_s:
+            self._enter(PressState.HOLD, now_s)
+        if self.state is PressState.HOLD and scene_s >= self._course.end_s + self._settings.press.hold_s:
+            self._enter(PressState.UNLOAD, now_s)
+            lift = 1e-3 * self._settings.touch.lift_mm
+            self._move(self.contact_m - lift, self._settings.press.unload_speed_mm_s)
+
+    def _kept(self, controller: ForceController, now_s: float) -> bool:
+        """Return whether force and contact are as they should be; else see to what follows."""
+        rules = self._settings.press
+        in_band = controller.filtered_n < rules.band_n and self.wanted_n > 2 * rules.band_n
+        self._band_since_s = _since(self._band_since_s, in_band, now_s)
+        if now_s - self._band_since_s >= rules.lost_s:
+            if self._lost:
+                self.fail(f"contact lost a second time, at {self.wanted_n:.2f} N")
+                return False
+            self._lost, self._waiting_s = True, self._band_since_s
+            self.remarks.append(f"contact lost at {self.wanted_n:.2f} N, and approached again")
+            self._enter(PressState.APPROACH, now_s)
+            self._move(self._settings.deepest_m, self._settings.touch.touch_speed_mm_s)
+            return False
+        self._error_since_s = _since(self._error_since_s, abs(self.error_n) > rules.error_band_n, now_s)
+        if now_s - self._error_since_s >= 1.0:
+            self.fail(f"the force was off by more than {rules.error_band_n:g} N for a second, at {self.wanted_n:.2f} N")
+            return False
+        if self.error_n * self._peak_n < 0:
+            self._swings = self._swings + 1 if abs(self._peak_n) > rules.error_band_n else 0
+            self._peak_n = 0.0
+        self._peak_n = max(self._peak_n, self.error_n, key=abs)
+        if self._swings >= SWINGS:
+            self.fail(f"the force swings by more than {rules.error_band_n:g} N: lower the loop's gains")
+            return False
+        return True
+
+
+def _since(since_s: float, holds: bool, now_s: float) -> float:
+    """Return since when something holds; NaN: it does not."""
+    if not holds:
+        return math.nan
+    return now_s if math.isnan(since_s) else since_s

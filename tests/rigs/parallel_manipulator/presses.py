@@ -1,0 +1,86 @@
+"""Presses of ``benchmarks/guard_faults.py``, through a guard in this process or in one of its own."""
+
+import importlib.util
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+from tactbench.rigs.parallel_manipulator.guard_messages import DeviceSettings, ProcessSettings
+from tactbench.rigs.parallel_manipulator.guard_process import GuardProcess
+
+
+def load(name):
+    if name not in sys.modules:
+        path = Path(__file__).parents[3] / "benchmarks" / f"{name}.py"
+        spec = importlib.util.spec_from_file_location(name, path)
+        sys.modules[name] = module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    return sys.modules[name]
+
+
+FAULTS = load("guard_faults")
+PACKAGE = "tactbench.rigs.parallel_manipulator"
+# In real time, emulators and rig share a process and a busy machine: a force may be old, a beat late.
+PATIENT = {"time": "real", "force_age_s": 0.3, "period_s": 0.05}
+
+
+class Rig:
+    """A guard, emulated devices and what presses."""
+
+    def __init__(self, kind, tmp_path, setting, **faults):
+        self.setting = setting
+        self.world = FAULTS.Pressed(setting, **faults)
+        self.clock = self.world.clock
+        if kind == "local":
+            self.guard = self.world.guard()
+        else:
+            addresses, options = self.world.devices.addresses, self.world.settings()
+            self.log = tmp_path / "guard.log"
+            self.guard = GuardProcess(
+                ProcessSettings(
+                    DeviceSettings(f"{PACKAGE}.motor.driver:build", addresses["motor"], options["motor"]),
+                    DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:build", addresses["force"], options["force"]),
+                    str(self.log),
+                    time.monotonic_ns() - self.clock(),
+                )
+            )
+
+    def press(self, change=lambda beat, since_s: beat, hold_s=0.1):
+        """Press until it is over or the guard is no longer armed; return the press."""
+        press = FAULTS.Press(self.guard, self.setting, self.clock, change, hold_s=hold_s)
+        press.run(15.0)
+        return press
+
+    def ended(self, seconds=3.0):
+        """Return the first report that is neither of an armed nor of a retreating guard."""
+        until_ns = self.clock() + round(1e9 * seconds)
+        number = 1000
+        while self.clock() < until_ns:
+            number += 1
+            report = self.guard.beat(FAULTS.Beat(number, self.clock()))
+            if report.state not in (FAULTS.GuardState.ARMED, FAULTS.GuardState.RETREATING):
+                return report
+            self.guard.advance(self.clock() + 10_000_000)
+        return report
+
+    @property
+    def out(self):
+        return abs(self.world.position_m - FAULTS.RETREAT_M) < 20e-6
+
+
+@contextmanager
+def rig(kind, tmp_path, setting=None, **faults):
+    """Yield a rig whose guard is started; `setting` of a guard in a process is made patient."""
+    setting = setting or FAULTS.Setting()
+    if kind == "process":
+        setting = FAULTS.replace(setting, **PATIENT)
+    made = Rig(kind, tmp_path, setting, **faults)
+    try:
+        made.guard.start()
+        yield made
+    finally:
+        try:
+            made.guard.close()
+        finally:
+            made.world.devices.close()

@@ -1,0 +1,379 @@
+"""The guard of the linear motor: the same rules in this process and in one of its own, against emulated devices."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import UsageError
+from tactbench.rigs.parallel_manipulator.guard_interface import (
+    Beat,
+    CommandKind,
+    Event,
+    GuardRefusesError,
+    GuardState,
+    Limits,
+    Report,
+    Trigger,
+)
+from tests.rigs.parallel_manipulator.presses import FAULTS, rig
+
+BOTH = pytest.mark.parametrize("kind", ["local", "process"])
+
+
+def in_phase(name, change):
+    """Return what changes beats once a press has come to a phase."""
+    return lambda beat, since_s: change(beat) if beat.state == name else beat
+
+
+def after(seconds, change):
+    return lambda beat, since_s: change(beat) if since_s > seconds else beat
+
+
+# Both -----------------------------------------------------------------------------------------------------------------
+
+
+@BOTH
+def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
+    with rig(kind, tmp_path) as made:
+        press = made.press()
+        assert press.phase == "over"
+        assert press.reports[-1].state is GuardState.ARMED
+        assert made.world.largest_n == pytest.approx(5.0, abs=0.3)
+        blocks, moved = made.guard.force_blocks(), made.guard.motor_blocks()
+        numbers = np.concatenate([block.sequence for block in blocks])
+        forces = np.concatenate([block.data for block in blocks])
+        # Raw and whole: every sample since the start, in order, as the sensor gave them.
+        assert (np.diff(numbers) == 1).all()
+        assert forces.shape[1] == 6
+        assert forces[:, 2].max() == pytest.approx(made.world.largest_n, abs=0.05)
+        assert np.concatenate([block.data for block in moved])[:, 0].max() == pytest.approx(
+            made.world.largest_n / made.setting.stiffness_n_m, abs=5e-6
+        )
+        assert [event.text for event in made.guard.events()] == ["started", "homing", "armed"]
+        assert made.guard.disarm().state is GuardState.IDLE
+        assert made.out
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("name", "trigger"),
+    [
+        ("rig hangs", Trigger.BEAT_OLD),
+        ("rig skips a beat's number", Trigger.BEAT_SEQUENCE),
+        ("steps too long", Trigger.COMMANDS_REFUSED),
+        ("steps not numbers", Trigger.COMMANDS_REFUSED),
+    ],
+)
+def test_a_rig_that_goes_wrong(kind, name, trigger, tmp_path):
+    with rig(kind, tmp_path) as made:
+        begins = {}
+
+        def change(beat, since_s):
+            if beat.state == "ramp":
+                begins.setdefault(name, 0.0)
+            return FAULTS.changed(begins, made.setting, made.clock)(beat, since_s)
+
+        def beats(beat, since_s):
+            changed = change(beat, since_s)
+            if changed is None:
+                # Nothing is said for longer than is allowed; then the rig is back.
+                made.guard.advance(made.clock() + round(1.5e9 * made.setting.limits.heartbeat_s))
+                return beat
+            return changed
+
+        made.press(beats)
+        report = made.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
+        assert made.out
+        assert made.world.largest_n < made.setting.allowed_n
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("name", "trigger"),
+    [("one sample above the ceiling", Trigger.FORCE_CEILING), ("force stuck", Trigger.FORCE_STUCK)],
+)
+def test_a_force_that_is_wrong(kind, name, trigger, tmp_path):
+    with rig(kind, tmp_path) as made:
+
+        def begin(beat):
+            made.world.sensed = FAULTS.sensed({name: 0.0})
+            return beat
+
+        once = []
+        made.press(in_phase("ramp", lambda beat: beat if once else once.append(1) or begin(beat)))
+        report = made.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
+        assert made.out
+
+
+@BOTH
+def test_a_fault_stays_until_the_guard_is_disarmed_and_armed(kind, tmp_path):
+    with rig(kind, tmp_path) as made:
+        made.press(after(0.2, lambda beat: replace(beat, sequence=beat.sequence + 5)))
+        assert made.ended().state is GuardState.FAULT
+        with pytest.raises(GuardRefusesError, match="state fault"):
+            made.guard.arm(made.setting.limits)
+        again = made.guard.beat(Beat(1, made.clock(), command=CommandKind.STEP, distance_m=1e-6))
+        assert (again.accepted, again.state) == (False, GuardState.FAULT)
+        assert made.guard.disarm().state is GuardState.IDLE
+        assert made.press().phase == "over"
+
+
+@BOTH
+def test_a_retreat_that_is_commanded_is_no_fault(kind, tmp_path):
+    with rig(kind, tmp_path) as made:
+        made.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.RETREAT)))
+        report = made.ended()
+        assert (report.state, report.trigger) == (GuardState.RETREATED, Trigger.COMMANDED)
+        assert made.out
+
+
+@BOTH
+def test_what_is_wrong_before_the_first_motion_is_refused(kind, tmp_path):
+    with rig(kind, tmp_path) as made:
+        limits = made.setting.limits
+        for wrong, message in (
+            ({"retreat_m": -4e-3}, "retreat_m is not the drive's"),
+            ({"travel_m": (-7e-3, 2e-3)}, "not within the drive's ends"),
+            ({"speed_m_s": 0.01}, "drive's speed is above the limit"),
+            ({"step_m": 1e-6}, "corridor is longer than a step"),
+            ({"zero": (0.0,) * 3}, "6 channels and 3 zeros"),
+            ({"zero": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "force ceiling"),
+        ):
+            with pytest.raises(GuardRefusesError, match=message):
+                made.guard.arm(replace(limits, **wrong))
+        assert made.world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=1e-9)
+        assert made.guard.arm(limits).state is GuardState.ARMED
+
+
+# In virtual time ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def made(tmp_path):
+    with rig("local", tmp_path) as one:
+        yield one
+
+
+@pytest.mark.parametrize("baud", [9600, 115200])
+def test_steps_are_sent_one_at_a_time_and_after_a_fresh_force(baud, tmp_path):
+    """The step rule, on the motor's line: no increment before the drive has said that the one before has ended."""
+    with rig("local", tmp_path, FAULTS.Setting(baud=baud, period_s=5e-3)) as made:
+        press = made.press()
+        assert press.phase == "over"
+        assert any(report.early for report in press.reports)
+        accepted = [report for report in press.reports if report.accepted and report.moving]
+        line = b"".join(p.piece for p in made.world.devices.log_of("motor") if p.sender == "host")
+        words = line.split(b"\r")
+        moves = [n for n, word in enumerate(words) if word == b"M"]
+        assert len(moves) > 20
+        # Between two starts the status is asked for: that is how the end of a move is known.
+        assert all(b"OST" in words[a:b] for a, b in itertools.pairwise(moves))
+        assert len(accepted) >= len(moves) - 2
+
+
+def test_the_ceiling_is_exceeded_by_a_step_at_most(tmp_path):
+    setting = FAULTS.Setting(stiffness_n_m=80e3)
+    with rig("local", tmp_path, setting) as made:
+        made.press(FAULTS.changed({"rig wants 30 N": 0.0}, setting, made.clock), hold_s=2.0)
+        report = made.ended()
+        assert report.trigger is Trigger.FORCE_CEILING
+        assert setting.ceiling_n < made.world.largest_n < setting.allowed_n
+
+
+def test_a_touch_on_a_fast_approach_ends_it(made):
+    def fast(beat):
+        return replace(beat, command=CommandKind.MOVE_TO, position_m=1e-3, speed_m_s=5e-3)
+
+    press = made.press(lambda beat, since_s: fast(beat) if since_s < 0.1 else replace(beat, command=CommandKind.NONE))
+    assert press.reports[-1].touched
+    assert press.reports[-1].state is GuardState.ARMED
+    # Two of three samples above 0.1 N, then a look, the line and the braking, all at 5 mm/s and 20 N/mm.
+    assert 0.1 < made.world.largest_n < 0.1 + 20e3 * 5e-3 * 30e-3
+    refused = made.guard.beat(replace(fast(Beat(press.sequence + 1, made.clock())), force_sequence=10))
+    assert not refused.accepted
+    assert "in contact" in refused.reason
+
+
+@pytest.mark.parametrize(
+    ("where", "text", "trigger"),
+    [
+        ("force", "saturated:start_s={0}", Trigger.FORCE_SATURATED),
+        ("force", "dropped:start_s={0},end_s={1}", Trigger.FORCE_GAP),
+        ("force_link", "late:start_s={0},delay_s=0.014", Trigger.FORCE_OLD),
+        ("force_link", "unplug:start_s={0}", Trigger.FORCE_LOST),
+        ("motor_link", "unplug:start_s={0}", Trigger.MOTOR_GONE),
+        ("motor", "motor-fault:start_s={0}", Trigger.MOTOR_FAULT),
+        ("motor", "late-answers:start_s={0},delay_s=9", Trigger.MOTOR_SILENT),
+    ],
+)
+def test_what_goes_wrong_in_devices_leads_to_a_fault(where, text, trigger, tmp_path):
+    from tactbench.devices.emulation.line import LinkFault
+
+    parse = {"force": FAULTS.DatagramFault, "motor": FAULTS.MotorFault}.get(where, LinkFault).parse
+    # The press begins at 0.5 s and lasts for two seconds and a half; five samples are lost.
+    with rig("local", tmp_path, **{where: [parse(text.format(1.5, 1.5053))]}) as made:
+        made.press()
+        report = made.ended(20.0)
+        assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
+        assert made.out is (where.startswith("force"))
+        events = made.guard.events()
+        (first,) = [event for event in events if event.trigger is trigger][:1]
+        assert 1.5 <= 1e-9 * first.t_ns < 4.0
+        assert math.isfinite(first.force_n)
+        assert math.isfinite(first.position_m)
+
+
+@pytest.mark.parametrize("text", ["out-of-order:every=3", "doubled:every=2"])
+def test_samples_that_come_late_alone_or_twice_are_no_fault(text, tmp_path):
+    with rig("local", tmp_path, force=[FAULTS.DatagramFault.parse(text)]) as made:
+        assert made.press().phase == "over"
+
+
+def test_one_late_sample_alone_is_no_fault(tmp_path):
+    from tactbench.devices.emulation.line import LinkFault
+
+    # Held up by 5 ms, and those behind it with it: late, and not too old.
+    with rig("local", tmp_path, force_link=[LinkFault.parse("late:start_s=1.5,every=400,delay_s=0.005")]) as made:
+        assert made.press().phase == "over"
+
+
+def test_a_force_that_is_not_a_number(tmp_path):
+    from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
+
+    class Broken(NetFtDriver):
+        """A driver of somebody else's."""
+
+        broken = False
+
+        def read(self, timeout_s):
+            blocks = super().read(timeout_s)
+            return [replace(block, data=block.data * np.nan) for block in blocks] if self.broken else blocks
+
+    world = FAULTS.Pressed(FAULTS.Setting())
+    drivers = []
+
+    def build(settings):
+        drivers.append(Broken(settings))
+        return drivers[0]
+
+    guard = world.guard(build)
+    guard.start()
+    once = []
+
+    def change(beat, since_s):
+        if beat.state == "ramp" and not once:
+            once.append(1)
+            drivers[0].broken = True
+        return beat
+
+    last = FAULTS.Press(guard, world.setting, world.clock, change).run()
+    guard.advance(world.clock() + 10**9)
+    assert (guard.state, guard.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
+    assert last.trigger is Trigger.FORCE_NOT_A_NUMBER
+    guard.close()
+
+
+def test_a_drive_that_has_forgotten_its_limits_is_not_armed(made):
+    made.press()
+    made.guard.disarm()
+    made.world.motor.drive.settings.positive_limit = 9999
+    with pytest.raises(GuardRefusesError, match="LL3000 and answers GPL with 9999"):
+        made.guard.arm(made.setting.limits)
+
+
+@pytest.mark.parametrize("name", ["lower_m", "peak_current_a", "retreat_m", "acceleration_m_s2", "corridor_m"])
+def test_a_rig_file_without_a_limit_is_not_armed(name, tmp_path, monkeypatch):
+    left_out = {name, "upper_m"} if name == "lower_m" else {name}
+    if name == "lower_m":
+        left_out |= {"retreat_m"}
+    monkeypatch.setattr(FAULTS, "STATED", {key: value for key, value in FAULTS.STATED.items() if key not in left_out})
+    with (
+        rig("local", tmp_path) as made,
+        pytest.raises(GuardRefusesError, match=rf"does not state the motor's .*{name}"),
+    ):
+        made.guard.arm(made.setting.limits)
+
+
+def test_a_motor_that_cannot_come_out_loses_its_power_loudly(made):
+    def block(beat):
+        # Something holds it where it is.
+        here = made.world.motor.drive.servo.position_m
+        made.world.motor.drive.servo.stops = (here - 1e-9, here + 1e-9)
+        return replace(beat, sequence=0)
+
+    made.press(in_phase("ramp", block))
+    report = made.ended(5.0)
+    assert report.state is GuardState.FAULT
+    texts = [event.text for event in made.guard.events() if event.trigger is Trigger.RETREAT_FAILED]
+    assert len(texts) == 1
+    assert "stand clear" in texts[0]
+    assert not made.world.motor.drive._enabled
+
+
+def test_force_while_homing_stops_the_motor(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        FAULTS, "STATED", FAULTS.STATED | {"homing": "end-stop", "homing_speed_m_s": 0.02, "home_m": 5.5e-3}
+    )
+    # The end stop is 10 mm away, 5 mm behind the skin.
+    with rig("local", tmp_path) as made:
+        with pytest.raises(GuardRefusesError, match="force ceiling"):
+            made.guard.arm(made.setting.limits)
+        assert made.world.largest_n < 0.2 + 20e3 * 0.02 * 20e-3
+        assert made.guard.disarm().state is GuardState.IDLE
+        here_m = made.world.position_m
+        made.guard.advance(made.clock() + 10**9)
+        assert made.world.position_m == pytest.approx(here_m, abs=1e-5)
+
+
+def test_another_zero_is_taken_while_the_motor_is_out(made):
+    made.press()
+    limits = replace(made.setting.limits, zero=(0.0, 0.0, 0.05, 0.0, 0.0, 0.0))
+    report = made.guard.arm(limits)
+    assert report.state is GuardState.ARMED
+    assert made.guard.beat(Beat(1, made.clock())).force_n == pytest.approx(-0.05, abs=0.03)
+
+
+# Schedules ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_faults_end_as_they_must(seed):
+    for outcome in FAULTS.schedules(4, 100 + seed):
+        assert outcome.wrong == (), outcome
+
+
+# Messages -------------------------------------------------------------------------------------------------------------
+
+
+def test_messages_are_what_they_were():
+    limits = FAULTS.Setting().limits
+    assert Limits.from_json(limits.to_json()) == limits
+    beat = Beat(3, 5, "ramp", CommandKind.STEP, distance_m=1e-6, position_m=0.0, speed_m_s=0.0, force_sequence=7)
+    assert Beat.from_json(beat.to_json()) == beat
+    report = Report(1, 2, GuardState.FAULT, accepted=False, trigger=Trigger.FORCE_OLD)
+    assert Report.from_json(report.to_json()).trigger is Trigger.FORCE_OLD
+    assert math.isnan(Report.from_json(report.to_json()).force_n)
+    event = Event(1, GuardState.IDLE, None, 0.0, 0.0, "started", {"a_n": 1.0})
+    assert Event.from_json(event.to_json()) == event
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"force_ceiling_n": 0.0}, "not positive"),
+        ({"force_ceiling_n": math.inf}, "not finite"),
+        ({"touch_n": 7.0}, "not below the ceiling"),
+        ({"travel_m": (1e-3, 1e-3)}, "ends before it begins"),
+        ({"retreat_m": 1.0}, "away from its end"),
+        ({"channel": 6}, "no zero"),
+        ({"sign": 0}, "neither 1 nor -1"),
+    ],
+)
+def test_limits_that_contradict_each_other(change, message):
+    with pytest.raises(UsageError, match=message):
+        replace(FAULTS.Setting().limits, **change)

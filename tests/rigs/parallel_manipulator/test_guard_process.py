@@ -1,0 +1,164 @@
+"""Rig and guard that are killed or hang, and what stands in their logs; the line of a motor with nobody at it."""
+
+import json
+import signal
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import Block, LinkTimeout, Quality
+from tactbench.rigs.parallel_manipulator.guard_interface import Beat, GuardLostError
+from tactbench.rigs.parallel_manipulator.guard_messages import (
+    FORCE,
+    MOTOR,
+    BlockReader,
+    MessageReader,
+    encode_block,
+    encode_message,
+)
+from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
+from tactbench.rigs.parallel_manipulator.motor.retreat import retreat_blind, retreat_command
+from tests.rigs.parallel_manipulator.presses import FAULTS, load, rig
+
+KILLS = load("guard_kills")
+
+
+@pytest.mark.parametrize(
+    ("name", "baud"),
+    [
+        ("kill rig, a sibling alive", 115200),
+        ("kill rig, a sibling alive", 9600),
+        ("stop rig", 115200),
+        ("kill guard", 9600),
+        ("stop guard", 115200),
+        ("kill both", 115200),
+        ("terminate guard", 115200),
+    ],
+)
+def test_who_is_left_lets_the_motor_retreat(name, baud):
+    # A press that a busy machine has ended before the signal says nothing.
+    result = next(filter(None, (KILLS.run(name, baud, seed) for seed in range(1, 5))))
+    # At most the increment that was accepted goes on, and the swing of the motor about its target.
+    assert result.moved_m <= 1.5 * result.step_m
+    if name == "kill both":
+        assert not result.out
+        return
+    # What this host was late by beyond an ordinary one is not the guard's.
+    assert result.late_s <= result.allowed_s + result.host_late_s
+    assert result.out
+    triggers = [entry["trigger"] for entry in result.log if entry.get("trigger")]
+    expected = {
+        "kill rig, a sibling alive": ["the rig's end of the pipe is closed"],
+        "stop rig": ["no beat in time"],
+        "terminate guard": ["SIGTERM"],
+    }.get(name, [])
+    assert triggers == expected
+    if "guard" in KILLS.SCENARIOS[name].who:
+        (lost,) = [line["lost"] for line in result.said if "lost" in line]
+        assert "the motor has retreated to -0.005 m" in lost
+    else:
+        assert "left" in result.log[-1]
+
+
+def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
+    with rig("process", tmp_path) as made:
+        made.guard.arm(made.setting.limits)
+        made.guard._process.send_signal(signal.SIGINT)
+        made.guard._process.send_signal(signal.SIGHUP)
+        assert made.guard.beat(Beat(1, made.clock())).accepted
+        made.guard._process.kill()
+        for _ in range(2):
+            with pytest.raises(GuardLostError, match="has retreated"):
+                made.guard.advance(made.clock() + 10**9)
+        (event,) = [event for event in made.guard.events() if event.trigger]
+        assert event.trigger == "guard is gone"
+        assert made.out
+
+
+def test_a_rig_that_takes_no_samples_loses_them_and_nothing_else(tmp_path, monkeypatch):
+    with rig("process", tmp_path) as made:
+        # The rig beats and takes reports, and no samples: the socket is full after some seconds of them.
+        made.guard._selector.unregister(made.guard._data)
+        made.guard.arm(made.setting.limits)
+        for number in range(1, 20):
+            assert made.guard.beat(Beat(number, made.clock())).accepted
+            made.guard.advance(made.clock() + 20_000_000)
+        assert made.guard.counts()["guard"]["rows_dropped"] == 0
+        assert sum(len(block.data) for block in made.guard.force_blocks()) == 0
+
+
+def test_the_log_says_when_and_what(tmp_path):
+    with rig("process", tmp_path) as made:
+        made.press(lambda beat, since_s: FAULTS.replace(beat, sequence=0))
+        made.ended()
+        log = made.log
+    entries = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
+    assert entries[0].keys() == {"started", "unix_ns", "pid"}
+    texts = [entry["text"] for entry in entries if "text" in entry]
+    assert texts[:3] == ["started", "homing", "armed"]
+    assert texts[3] == "beat 0 came, 1 was expected"
+    assert texts[4].startswith("out after ")
+    assert texts[-1] == "disarmed"
+
+
+# The line with nobody at it -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("half", [b"", b"LA12", b"TPOS\r", b"POS\rGRC\rOST\r"])
+def test_a_blind_retreat_whatever_stands_on_the_line(half):
+    setting = FAULTS.Setting(baud=9600)
+    world = FAULTS.Pressed(setting)
+    guard = world.guard()
+    guard.start()
+    FAULTS.Press(guard, setting, world.clock).run(2.5)
+    assert world.position_m > -1e-3
+    guard.abandon()
+    link = world.devices.open_link("motor")
+    link.write(half)
+    link.close()
+    options = FaulhaberOptions(**world.settings()["motor"])
+    position_m = retreat_blind(world.devices.opener("motor"), options, world.clock, 2.0)
+    assert position_m == pytest.approx(FAULTS.RETREAT_M, abs=5e-6)
+    assert world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=20e-6)
+
+
+def test_a_blind_retreat_that_ends_elsewhere_says_where():
+    world = FAULTS.Pressed(FAULTS.Setting())
+    options = FaulhaberOptions(**world.settings()["motor"])
+    # Never switched on: it answers, and stays.
+    with pytest.raises(LinkTimeout, match=r"is at 0 m 0.5 s later"):
+        retreat_blind(world.devices.opener("motor"), options, world.clock, 0.5)
+    assert retreat_command(options) == b"SP50\rLA-5000\rM\r"
+
+
+# Messages -------------------------------------------------------------------------------------------------------------
+
+
+def test_blocks_are_what_they_were_however_they_are_cut():
+    rng = np.random.default_rng(3)
+    blocks = [
+        (FORCE, Block("f", rng.integers(0, 9, 4), rng.normal(size=(4, 6)), None, np.arange(4), np.arange(4) * 7)),
+        (MOTOR, Block("m", rng.integers(0, 9, 2), rng.normal(size=(2, 3)), np.full((2, 3), Quality.GAP, np.uint8))),
+        (FORCE, Block("f", None, np.zeros((0, 6)))),
+    ]
+    data = b"".join(encode_block(device, block) for device, block in blocks)
+    reader, found, at = BlockReader(("f", "m")), [], 0
+    while at < len(data):
+        size = int(rng.integers(1, 40))
+        found += reader.feed(data[at : at + size])
+        at += size
+    assert len(found) == len(blocks)
+    for (device, block), (sent_to, sent) in zip(found, blocks, strict=True):
+        assert (device, block.stream) == (sent_to, sent.stream)
+        for name in ("t_ns", "data", "quality", "sequence", "device_ns"):
+            had, has = getattr(sent, name), getattr(block, name)
+            assert (had is None) == (has is None)
+            assert had is None or np.array_equal(had, has)
+
+
+def test_messages_are_what_they_were_however_they_are_cut():
+    sent = [("beat", {"a": 1.5}), ("close", {}), ("event", {"text": "näher\nals"})]
+    data = b"".join(encode_message(kind, body) for kind, body in sent)
+    reader = MessageReader()
+    found = [message for n in range(len(data)) for message in reader.feed(data[n : n + 1])]
+    assert found == sent

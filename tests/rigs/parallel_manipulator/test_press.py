@@ -1,0 +1,145 @@
+"""A press through real bytes in virtual time: emulated motor, force sensor and fingertip on a spring."""
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import NotApplicable, RigError, RigFile, Slide, assumed
+from tactbench.rigs.parallel_manipulator.loop_stability import ramp_error_n
+from tactbench.rigs.parallel_manipulator.press import PressState
+from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
+from tactbench.rigs.parallel_manipulator.settings import settings_of
+from tactbench.rigs.parallel_manipulator.worst_case import first_touch_n
+from tests.rigs.parallel_manipulator.spring import SpringRig, file_of, on_spring, pressed, ramp, with_joints
+
+QUICK = {
+    "settings__force_loop__rate_hz": 100.0,
+    "settings__force_loop__cutoff_hz": 5.0,
+    "settings__force_loop__delay_ms": 10.0,
+    "settings__force_loop__integral_mm_n_s": 2.0,
+    "settings__force_loop__speed_mm_s": 2.0,
+    "settings__limits__heartbeat_ms": 40.0,
+    "settings__touch__settle_s": 0.3,
+}
+"""k K = 10 at 5 N/mm."""
+
+
+@pytest.fixture(scope="module")
+def five_newtons():
+    return on_spring(5.0, ramp(5.0, 0.5, 5.0), settings__press__hold_s=0.3, **QUICK)
+
+
+def test_presses_to_the_profiles_end_and_back(five_newtons):
+    found = five_newtons
+    assert found.acquisition.ended == ""
+    assert found.press.state is PressState.DONE
+    force, t_s = found.force_n, found.t_s["force_torque"]
+    assert np.abs(force[t_s < 0.5]).max() < 0.03  # five times the noise, and the zero's
+    # 5 N less what the ramp of 1.1 N/s is behind.
+    assert force[t_s > 4.9].mean() == pytest.approx(4.89, abs=0.05)
+    wanted = np.interp(t_s, *ramp(5.0, 0.5, 5.0).profile.corners)
+    on_ramp = t_s > 2
+    slope = 5.0 / 4.5
+    settings = settings_of(file_of(**QUICK))
+    behind = ramp_error_n(settings.force_loop.loop(), slope, 5e3)
+    # The newest sample of a control period is up to 1 ms old, and the motor's increments are 5 mN.
+    assert (force - wanted)[on_ramp].mean() == pytest.approx(behind, abs=0.01)
+
+
+def test_the_scene_has_its_time_and_every_stream_all_of_it(five_newtons):
+    found = five_newtons
+    assert len(found.t_s["force_torque"]) == pytest.approx(5000, abs=2)
+    assert len(found.t_s["taxels"]) == pytest.approx(250, abs=2)
+    for t_s in found.t_s.values():
+        assert 0 <= t_s[0] < 0.05
+        assert 4.95 < t_s[-1] < 5.0
+        assert (np.diff(t_s) >= 0).all()
+    for name, counts in found.acquisition.stream_counts.items():
+        assert counts.received == counts.written == len(found.t_s[name])
+        assert counts.gaps == counts.dropped == 0
+
+
+def test_what_is_recorded_is_the_raw_force(five_newtons):
+    # A filter of 5 Hz would leave a tenth of the noise of 5 mN from sample to sample.
+    t_s, force = five_newtons.t_s["force_torque"], five_newtons.force_n
+    rest = force[t_s < 0.5]
+    assert rest.std() == pytest.approx(0.005, rel=0.15)
+    assert np.diff(rest).std() == pytest.approx(0.005 * np.sqrt(2), rel=0.15)
+
+
+def test_the_recording_says_what_happened(five_newtons):
+    drawn = five_newtons.acquisition.drawn
+    assert drawn["press state"] == "done"
+    events = [text for name, text in drawn.items() if name.startswith("event")]
+    assert any("touch: the motor holds" in text for text in events)
+    assert five_newtons.acquisition.emulation.time == "virtual"
+    assert set(five_newtons.acquisition.emulation.devices) == {"icub", "force", "motor"}
+    assert abs(five_newtons.press.contact_m - 1e-3 * drawn["skin mm"]) < 30e-6  # 0.05 N on 5 N/mm, and its noise
+
+
+def test_follows_a_slow_ramp_as_theory_says():
+    # Of a ramp of 5 N in 60 s the first 20 s, with the loop's gains of k K = 10: 6.1 mN behind, whatever the stiffness.
+    scene = ramp(1.625, 0.5, 20.0)
+    found = on_spring(20.0, scene, noise_n=0.01, **(QUICK | {"settings__force_loop__integral_mm_n_s": 0.5}))
+    t_s = found.t_s["force_torque"]
+    on_ramp = t_s > 4
+    off = (found.force_n - np.interp(t_s, *scene.profile.corners))[on_ramp]
+    # 1600 samples of 10 mN move the mean by 0.25 mN.
+    assert off.mean() == pytest.approx(-6.1e-3, abs=0.75e-3)
+    motor_s, motor_m = found.t_s["motor"], found.data["motor"][:, 0]
+    true = 20e3 * (motor_m - 1e-3 * found.acquisition.drawn["skin mm"])
+    true_off = (true - np.interp(motor_s, *scene.profile.corners))[motor_s > 4]
+    assert true_off.std() <= 10e-3
+
+
+@pytest.mark.parametrize("stiffness", [5.0, 20.0])
+def test_a_first_touch_stays_within_its_bound(stiffness):
+    # 0.31 N at 20 N/mm, 0.5 mm/s with a control period of 10 ms; the guard looks every millisecond.
+    found = on_spring(
+        stiffness, ramp(1.0, 0.3, 2.0), settings__touch__touch_speed_mm_s=0.5,
+        **(QUICK | {"settings__force_loop__integral_mm_n_s": 10.0 / stiffness}),
+    )  # fmt: skip
+    bound = first_touch_n(0.1, 1e3 * stiffness, 0.5e-3, 1.0, 0.01, 0.01)
+    assert 0.1 < found.press.touch_n <= bound
+    if stiffness == 20.0:
+        assert bound <= 0.31
+
+
+def test_no_contact_ends_with_a_retreat():
+    # The skin of this seed is lower than the motor may go.
+    heights = {"settings__heights__surface_spread_mm": 0.4, "settings__heights__depth_mm": 0.01}
+    with pytest.raises(RigError, match="no contact down to"):
+        on_spring(5.0, **{**QUICK, **heights}, seed=2)
+
+
+def test_scenes_that_the_rig_cannot_press_are_refused():
+    rig = ParallelManipulator(file_of(**QUICK), None, SpringRig(5.0))
+    slide = ramp().model_copy(update={"slide": Slide(speed=assumed(1.0, "mm/s", "a test"))})
+    with pytest.raises(NotApplicable, match="slides"):
+        pressed(rig, slide)
+    off = ramp().placement.model_copy(update={"x": assumed(5.0, "mm", "a test")})
+    with pytest.raises(NotApplicable, match="reach"):
+        pressed(rig, ramp().model_copy(update={"placement": off}))
+
+
+def test_the_same_seed_gives_the_same_bytes():
+    first, second = (on_spring(5.0, ramp(1.0, 0.3, 1.5), **QUICK) for _ in range(2))
+    for name in first.data:
+        assert np.array_equal(first.data[name], second.data[name])
+        assert np.array_equal(first.t_s[name], second.t_s[name])
+
+
+def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
+    said = with_joints(settings__places__reach_x_mm=[-15.0, 15.0], settings__places__scatter_mm=0.5, **QUICK)
+    rig = ParallelManipulator(RigFile.model_validate(said), None, SpringRig(5.0))
+    scene = ramp(1.0, 0.3, 1.5)
+    place = scene.placement.model_copy(update={"x": assumed(12.0, "mm", "a test")})
+    found = pressed(rig, scene.model_copy(update={"placement": place}))
+    assert found.acquisition.ended == ""
+    drawn = found.acquisition.drawn
+    x, y, z = (float(text) for text in drawn["platform mm"].split(", "))
+    assert np.hypot(drawn["scatter x mm"], drawn["scatter s mm"]) <= 0.5
+    # Three joints, each within its corridor of 10 um.
+    assert (x, y, z) == pytest.approx((12.0 + drawn["scatter x mm"], drawn["scatter s mm"], -150.0), abs=0.05)
+    # Home, retreat, and only then anything else: the guard was not armed while the platform moved.
+    events = [text for name, text in drawn.items() if name.startswith("event")]
+    assert [text.split(": ")[1] for text in events][:5] == ["started", "homing", "armed", "disarmed", "armed"]

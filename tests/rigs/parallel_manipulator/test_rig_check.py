@@ -1,0 +1,148 @@
+"""What a rig file is refused for, with the line or the reason, and what is said of one that is not."""
+
+import pytest
+import yaml
+
+from tactbench.core.cli import main
+from tactbench.plugin import RigContext, RigFile, UsageError
+from tactbench.rigs.parallel_manipulator.rig import build
+from tactbench.rigs.parallel_manipulator.rig_check import check
+from tactbench.rigs.parallel_manipulator.settings import settings_of, with_limits
+from tests.rigs.parallel_manipulator.spring import EXAMPLE, example, file_of, with_joints
+
+
+def run(arguments, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    captured = capsys.readouterr()
+    return ended.value.code, captured.out, captured.err
+
+
+def written(tmp_path, said):
+    path = tmp_path / "rig.yaml"
+    path.write_text(yaml.safe_dump(said, sort_keys=False), encoding="utf-8")
+    return path
+
+
+def test_the_example_is_not_refused_and_nothing_moves(capsys):
+    code, out, _ = run(["rig", "check", str(EXAMPLE)], capsys)
+    assert code == 0
+    for text in ("force ceiling", "Nothing was opened", "share used", "reaction", "sent first", "VER", "ASSUMED"):
+        assert text in out
+    assert "EN" not in out.split("sent first")[1].split()
+
+
+def test_a_file_without_a_ceiling_is_refused_with_its_line(tmp_path, capsys):
+    path = written(tmp_path, example(settings__limits__force_ceiling_n=...))
+    line = next(n for n, text in enumerate(path.read_text().splitlines(), start=1) if text.strip() == "limits:")
+    code, _, err = run(["rig", "check", str(path)], capsys)
+    assert code == 2
+    assert f"rig.yaml:{line}: the key 'force_ceiling_n' is missing" in err
+
+
+@pytest.mark.parametrize("name", ["travel_mm", "heartbeat_ms", "retreat_mm", "retreat_speed_mm_s", "rated_force_n"])
+def test_every_limit_is_mandatory(name):
+    with pytest.raises(UsageError, match=f"settings.limits.{name} in the rig file: is missing"):
+        settings_of(RigFile.model_validate(example(**{f"settings__limits__{name}": ...})))
+
+
+@pytest.mark.parametrize(
+    "command", [["record", "--sensor", "icub", "--out", "none.h5", "--rig-file"], ["doctor", "--rig-file"]]
+)
+def test_other_commands_refuse_it_as_well(tmp_path, capsys, command):
+    path = written(tmp_path, example(settings__limits__force_ceiling_n=...))
+    code, _, err = run([*command, str(path)], capsys)
+    assert code == 2
+    assert "force_ceiling_n" in err
+
+
+def problems(**changes):
+    return check(RigFile.model_validate(example(**changes))).problems
+
+
+def test_gains_above_half_of_the_limit_are_refused(capsys):
+    (problem,) = problems(settings__force_loop__integral_mm_n_s=1.2)
+    assert "0.67 of those that no longer settle at 25 N/mm" in problem
+
+
+def test_forces_above_the_rating_are_refused():
+    found = problems(settings__limits__rated_force_n=8.5)
+    assert any("under force control, the weakest part is rated for 8.50 N" in text for text in found)
+    assert any("in the approach, the weakest part is rated for 8.50 N" in text for text in found)
+
+
+def test_a_quick_touch_is_refused():
+    # 80 N/mm at 5 mm/s: several newtons.
+    stiff = {"settings__stiffness__at_touch_n_mm": 80.0, "settings__stiffness__greatest_n_mm": 80.0}
+    found = problems(
+        settings__touch__touch_speed_mm_s=5.0, settings__touch__allowed_n=1.0,
+        settings__force_loop__integral_mm_n_s=0.2, **stiff,
+    )  # fmt: skip
+    assert any("The first touch may come to" in text for text in found)
+
+
+def test_a_speed_that_the_drive_does_not_have_is_refused():
+    found = problems(devices__motor__options__speed_unit_m_s=1e-3)
+    assert any("0.0005 m/s is below the drive's unit" in text for text in found)
+
+
+def test_a_slow_line_is_refused_for_a_quick_loop():
+    found = problems(devices__motor__options__baud=9600)
+    assert any("One increment takes" in text for text in found)
+
+
+def test_options_that_the_guard_needs_are_missed():
+    found = problems(devices__motor__options__corridor_m=...)
+    assert any("lack corridor_m" in text for text in found)
+
+
+def test_limits_are_stated_once():
+    file = file_of(devices__motor__options__upper_m=0.004)
+    settings = settings_of(file)
+    with pytest.raises(UsageError, match=r"upper_m is 0\.004"):
+        with_limits(file, settings)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"settings__limits__heartbeat_ms": 30.0}, "heartbeat below 60 ms"),
+        ({"settings__limits__travel_mm": [-4.0, 2.0]}, "beyond the motor's travel"),
+        ({"settings__limits__retreat_mm": -5.0}, "outside its travel"),
+        ({"settings__limits__rated_force_n": 7.0}, "ceiling is not below the rated force"),
+        ({"settings__touch__single_n": 9.0}, "a touch is not below the ceiling"),
+        ({"settings__heights__stand_off_mm": 0.3}, "stand-off is less than 3 spreads"),
+        ({"settings__stiffness__least_n_mm": 30.0}, "rise in this order"),
+        ({"force": ...}, "has no force"),
+    ],
+)
+def test_contradictions_are_refused(changes, said):
+    with pytest.raises(UsageError, match=said):
+        settings_of(RigFile.model_validate(example(**changes)))
+
+
+def test_a_delta_without_joints_is_refused():
+    with pytest.raises(UsageError, match="no joint-1, joint-2, joint-3"):
+        settings_of(RigFile.model_validate(example(settings__manipulator=with_joints()["settings"]["manipulator"])))
+
+
+def test_places_out_of_the_workspace_are_refused_before_anything_moves():
+    file = RigFile.model_validate(with_joints(settings__places__reach_x_mm=[-200.0, 200.0]))
+    assert any("is refused" in text for text in check(file).problems)
+    with pytest.raises(UsageError, match="is refused"):
+        build(RigContext(rig_file=file))
+
+
+def test_places_within_it_are_told():
+    found = check(RigFile.model_validate(with_joints(settings__places__reach_x_mm=[-5.0, 5.0])))
+    assert found.problems == ()
+    (places,) = (table for table in found.tables if table.title == "places")
+    assert ("all moves between them", "permitted") in places.rows
+    (first,) = (table for table in found.tables if table.title.startswith("sent first"))
+    assert {"joint-1", "joint-2", "joint-3", "motor", "force", "icub", "biotac"} == {row[0] for row in first.rows}
+
+
+def test_rigs_that_move_nothing_have_nothing_to_check(capsys):
+    code, _, err = run(["rig", "check", str(EXAMPLE.parent / "bench-emulated.yaml")], capsys)
+    assert code == 2
+    assert "moves nothing" in err
