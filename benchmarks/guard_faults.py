@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tactbench.plugin import DriverSettings, EmulatedDevice, EmulatedDevices
+from tactbench.plugin import DriverSettings, EmulatedDevice, EmulatedDevices, assumed
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
 from tactbench.rigs.parallel_manipulator.guard import LocalGuard
@@ -35,6 +35,7 @@ from tactbench.rigs.parallel_manipulator.guard_interface import (
 )
 from tactbench.rigs.parallel_manipulator.motor.driver import build as build_motor
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault
+from tactbench.rigs.parallel_manipulator.motor.servo import MotorModel
 
 RETREAT_M, SKIN_M = -5e-3, 0.0
 """The motor stands at the first when it is switched on; the spring begins at the second."""
@@ -67,6 +68,8 @@ class Setting:
     wanted_n: float = 5.0
     seed: int = 1
     force_age_s: float = 13e-3
+    heartbeat_s: float | None = None
+    """None: three periods, and 30 ms at least."""
     time: Literal["virtual", "real"] = "virtual"
 
     @property
@@ -81,7 +84,7 @@ class Setting:
             speed_m_s=0.02,
             retreat_m=RETREAT_M,
             retreat_speed_m_s=0.05,
-            heartbeat_s=max(3 * self.period_s, 30e-3),
+            heartbeat_s=self.heartbeat_s or max(3 * self.period_s, 30e-3),
             force_age_s=self.force_age_s,
             channel=2,
             sign=1,
@@ -110,6 +113,8 @@ class Pressed:
         if setting.time == "real":
             # The emulated motor needs it at the first touch; an import then would hold everything up.
             import scipy.optimize  # noqa: F401
+        # Emulators share the machine with whom they serve: in real time they are coarser, so as not to be late.
+        tick, self.rate_hz = (4.0, 250.0) if setting.time == "real" else (None, 1000.0)
         self.setting = setting
         self.largest_n = 0.0
         self._places: deque[tuple[float, float]] = deque(maxlen=20_000)
@@ -119,6 +124,7 @@ class Pressed:
             self._load,
             np.random.default_rng(setting.seed + 1),
             profile=build_profile(),
+            model=MotorModel() if tick is None else MotorModel(tick=assumed(tick, "ms", "a press in real time")),
             baud=setting.baud,
             faults=faults.get("motor", []),
         )
@@ -130,6 +136,7 @@ class Pressed:
 
         self.force = RdtEmulator(
             wrench,
+            rate_hz=self.rate_hz,
             faults=faults.get("force", []),
         )
         self.devices = EmulatedDevices(
@@ -145,7 +152,7 @@ class Pressed:
     @property
     def position_m(self) -> float:
         """Of the motor, as its drive counts it."""
-        return self.motor.drive.servo.position_m + RETREAT_M
+        return float(self.motor.drive.servo.position_m) + RETREAT_M
 
     @property
     def force_n(self) -> float:
@@ -163,7 +170,7 @@ class Pressed:
 
     def settings(self) -> dict[str, dict[str, Any]]:
         """Return the options of both devices."""
-        return {"motor": {**STATED, "baud": self.setting.baud}, "force": dict(COUNTS)}
+        return {"motor": {**STATED, "baud": self.setting.baud}, "force": {**COUNTS, "rate_hz": self.rate_hz}}
 
     def guard(self, force_driver: Callable[[DriverSettings], Any] = build_force) -> LocalGuard:
         """Return a guard over drivers of both, in this process."""
@@ -367,7 +374,12 @@ def schedule(setting: Setting, faults: tuple[tuple[str, float], ...]) -> Outcome
 
     at = dict(faults)
     texts: dict[str, list[Any]] = {"motor": [], "force": [], "motor_link": [], "force_link": []}
-    parsers = {"motor": MotorFault, "force": DatagramFault, "motor_link": LinkFault, "force_link": LinkFault}
+    parsers: dict[str, Any] = {
+        "motor": MotorFault,
+        "force": DatagramFault,
+        "motor_link": LinkFault,
+        "force_link": LinkFault,
+    }
     for name, second in faults:
         kind = KINDS[name]
         if kind.text:

@@ -44,7 +44,7 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         press = made.press()
         assert press.phase == "over", press.reports[-1]
         assert press.reports[-1].state is GuardState.ARMED
-        assert made.world.largest_n == pytest.approx(5.0, abs=0.3)
+        assert made.world.largest_n == pytest.approx(made.setting.wanted_n, abs=0.3)
         blocks, moved = made.guard.force_blocks(), made.guard.motor_blocks()
         numbers = np.concatenate([block.sequence for block in blocks])
         forces = np.concatenate([block.data for block in blocks])
