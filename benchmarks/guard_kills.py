@@ -67,7 +67,7 @@ def rig(text: str) -> None:
         print(json.dumps(values), flush=True)
 
     def clock() -> int:
-        return time.monotonic_ns() - given["process"]["clock_zero_ns"]
+        return time.monotonic_ns() - int(given["process"]["clock_zero_ns"])
 
     said = ""
 
@@ -135,10 +135,20 @@ class Result:
     said: tuple[dict[str, Any], ...]
 
 
-def run(name: str, baud: int, seed: int) -> Result | None:
-    """Carry a scenario out; None: the press ended by itself before, on a machine too busy."""
+def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Result | None:
+    """Carry a scenario out; None: the press ended by itself before, on a machine too busy.
+
+    `heartbeat_s` is T_dead; None: three periods.
+    """
     scenario, rng = SCENARIOS[name], random.Random(seed)
-    setting = faults.Setting(baud=baud, period_s=PERIODS_S[baud], force_age_s=FORCE_AGE_S, time="real", seed=seed)
+    setting = faults.Setting(
+        baud=baud,
+        period_s=PERIODS_S[baud],
+        force_age_s=max(FORCE_AGE_S, heartbeat_s or 0.0),
+        time="real",
+        seed=seed,
+        heartbeat_s=heartbeat_s,
+    )
     world = faults.Pressed(setting)
     zero_ns = time.monotonic_ns() - world.clock()
     options, addresses = world.settings(), world.devices.addresses

@@ -363,6 +363,7 @@ class _Server:
         """Serve until the rig says `close` or is gone, or SIGTERM."""
         while not self._over:
             self._hear()
+            self._flush()
             guard = self._guard
             if guard is None:
                 if self._left():
@@ -371,7 +372,6 @@ class _Server:
                 continue
             guard.look(LOOK_S)
             self._forward(guard)
-            self._flush()
             if self._left():
                 self._tell_why(guard)
                 if guard.state not in (GuardState.ARMED, GuardState.RETREATING):
@@ -513,7 +513,6 @@ class _Server:
 
     def _answer_report(self, report: Report) -> None:
         self._answer("report", json.loads(report.to_json()))
-        self._flush()
 
     def _answer(self, kind: str, body: dict[str, Any]) -> None:
         line = encode_message(kind, body)
@@ -521,6 +520,7 @@ class _Server:
             self._dropped_reports += 1
         else:
             self._out += line
+        self._flush()
 
     def _forward(self, guard: LocalGuard) -> None:
         for device, blocks in ((FORCE, guard.force_blocks()), (MOTOR, guard.motor_blocks())):

@@ -21,14 +21,17 @@ def load(name):
 
 FAULTS = load("guard_faults")
 PACKAGE = "tactbench.rigs.parallel_manipulator"
-# In real time, emulators and rig share a process and a busy machine: a force may be old, a beat late.
-PATIENT = {"time": "real", "force_age_s": 0.3, "period_s": 0.05}
+# In real time, emulators and rig share a process and perhaps a busy machine: a force may be old, a beat late, and an
+# answer of the motor, which has three times as long at 9600 baud.
+PATIENT = {
+    "time": "real", "force_age_s": 1.0, "heartbeat_s": 1.0, "period_s": 0.05, "baud": 9600, "wanted_n": 2.0,
+}  # fmt: skip
 
 
 class Rig:
     """A guard, emulated devices and what presses."""
 
-    def __init__(self, kind, tmp_path, setting, **faults):
+    def __init__(self, kind, tmp_path, setting, address, **faults):
         self.setting = setting
         self.world = FAULTS.Pressed(setting, **faults)
         self.clock = self.world.clock
@@ -39,7 +42,7 @@ class Rig:
             self.log = tmp_path / "guard.log"
             self.guard = GuardProcess(
                 ProcessSettings(
-                    DeviceSettings(f"{PACKAGE}.motor.driver:build", addresses["motor"], options["motor"]),
+                    DeviceSettings(f"{PACKAGE}.motor.driver:build", address or addresses["motor"], options["motor"]),
                     DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:build", addresses["force"], options["force"]),
                     str(self.log),
                     time.monotonic_ns() - self.clock(),
@@ -70,12 +73,12 @@ class Rig:
 
 
 @contextmanager
-def rig(kind, tmp_path, setting=None, **faults):
+def rig(kind, tmp_path, setting=None, address=None, **faults):
     """Yield a rig whose guard is started; `setting` of a guard in a process is made patient."""
     setting = setting or FAULTS.Setting()
     if kind == "process":
         setting = FAULTS.replace(setting, **PATIENT)
-    made = Rig(kind, tmp_path, setting, **faults)
+    made = Rig(kind, tmp_path, setting, address, **faults)
     try:
         made.guard.start()
         yield made

@@ -6,7 +6,7 @@ import signal
 import numpy as np
 import pytest
 
-from tactbench.plugin import Block, LinkTimeout, Quality
+from tactbench.plugin import Block, LinkError, LinkTimeout, Quality
 from tactbench.rigs.parallel_manipulator.guard_interface import Beat, GuardLostError
 from tactbench.rigs.parallel_manipulator.guard_messages import (
     FORCE,
@@ -18,7 +18,7 @@ from tactbench.rigs.parallel_manipulator.guard_messages import (
 )
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.motor.retreat import retreat_blind, retreat_command
-from tests.rigs.parallel_manipulator.presses import FAULTS, load, rig
+from tests.rigs.parallel_manipulator.presses import FAULTS, PATIENT, load, rig
 
 KILLS = load("guard_kills")
 
@@ -37,7 +37,7 @@ KILLS = load("guard_kills")
 )
 def test_who_is_left_lets_the_motor_retreat(name, baud):
     # A press that a busy machine has ended before the signal says nothing.
-    result = next(filter(None, (KILLS.run(name, baud, seed) for seed in range(1, 5))))
+    result = next(filter(None, (KILLS.run(name, baud, seed, PATIENT["heartbeat_s"]) for seed in range(1, 5))))
     # At most the increment that was accepted goes on, and the swing of the motor about its target.
     assert result.moved_m <= 1.5 * result.step_m
     if name == "kill both":
@@ -53,7 +53,7 @@ def test_who_is_left_lets_the_motor_retreat(name, baud):
         "terminate guard": ["SIGTERM"],
     }.get(name, [])
     assert triggers == expected
-    if "guard" in KILLS.SCENARIOS[name].who:
+    if name in ("kill guard", "stop guard"):
         (lost,) = [line["lost"] for line in result.said if "lost" in line]
         assert "the motor has retreated to -0.005 m" in lost
     else:
@@ -85,6 +85,12 @@ def test_a_rig_that_takes_no_samples_loses_them_and_nothing_else(tmp_path, monke
             made.guard.advance(made.clock() + 20_000_000)
         assert made.guard.counts()["guard"]["rows_dropped"] == 0
         assert sum(len(block.data) for block in made.guard.force_blocks()) == 0
+
+
+def test_what_goes_wrong_at_the_start_is_told(tmp_path):
+    with pytest.raises(LinkError, match="cannot be opened"):  # noqa: SIM117
+        with rig("process", tmp_path, address="serial:///dev/nothing-there?baud=9600"):
+            pass
 
 
 def test_the_log_says_when_and_what(tmp_path):
