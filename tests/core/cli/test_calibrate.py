@@ -8,13 +8,14 @@ import sys
 
 import pytest
 
+from tests.conftest import Shell, Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
 from tests.core.matrix.engines.patience import ending
 
 PROCEDURE = """
 title: Small
 seed: 3
-draws: 14
+draws: 8
 rig: twin
 protocol: karl2016
 nuisances:
@@ -38,8 +39,6 @@ CALIBRATE = ("calibrate", "--config", "small.yaml", "--format", "json")
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
-    from tests.conftest import Shell
-
     shell = Shell(tmp_path_factory.mktemp("calibrate"))
     (shell.folder / "small.yaml").write_text(PROCEDURE)
     return shell, shell(*CALIBRATE, "--out", "whole", "--jobs", "2")
@@ -64,8 +63,8 @@ def test_the_files_of_a_calibration(calibrated):
         *("draws.jsonl", "draws.csv", "run.json", "ranges.json", "findings.json", "sensitivity.json"),
         *("draws.png", "draws.pdf", "sensitivity.png", "sensitivity.pdf"),
     }
-    assert json.loads((folder / "ranges.json").read_text())["draws"] == 14
-    assert len((folder / "draws.csv").read_text().splitlines()) == 15
+    assert json.loads((folder / "ranges.json").read_text())["draws"] == 8
+    assert len((folder / "draws.csv").read_text().splitlines()) == 9
     assert json.loads((folder / "run.json").read_text())["made_by"]["numpy"]
 
 
@@ -78,16 +77,16 @@ def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
         cwd=shell.folder, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as running:  # fmt: skip
         # Its progress tells when the first draws are down: no clock and no busy waiting.
-        first = next(line for line in running.stderr if "/14" in line)
+        first = next(line for line in running.stderr if "/8" in line)
         assert "done" in first
         running.send_signal(signal.SIGINT)
         _, said = running.communicate(timeout=60)
     assert running.returncode == 130, said
     assert "goes on from there" in said
     kept = journal.read_text().count("\n") - 1
-    assert 1 <= kept < 14
+    assert 1 <= kept < 8
     rest = shell(*CALIBRATE, "--out", "cut")
-    assert f"{kept} of 14 draws were found finished" in rest.stderr
+    assert f"{kept} of 8 draws were found finished" in rest.stderr
     whole = shell.folder / "whole" / "calibration"
     for name in ("draws.csv", "ranges.json", "findings.json", "sensitivity.json"):
         assert (journal.parent / name).read_bytes() == (whole / name).read_bytes()
@@ -95,9 +94,9 @@ def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
 
 def test_what_is_there_is_shown_again_as_a_table(calibrated):
     shell, _ = calibrated
-    shown = shell("calibrate", "--show", "--out", "whole")
+    shown = Verbs(shell.folder)("calibrate", "--show", "--out", "whole")
     assert "the calibration in whole/calibration" in shown.stderr
-    for text in ("Small (SIM)", "held out", "Time is the bound", "Partial rank correlations", "14 draws"):
+    for text in ("Small (SIM)", "held out", "Time is the bound", "Partial rank correlations", "8 draws"):
         assert text in shown.stdout
 
 
@@ -111,10 +110,10 @@ def test_what_is_there_is_shown_again_as_a_table(calibrated):
 )
 def test_wrong_words_are_answered_with_the_next_step(calibrated, arguments, says):
     shell, _ = calibrated
-    assert_one_clear_screen(shell("calibrate", *arguments, code=2), says)
+    assert_one_clear_screen(Verbs(shell.folder)("calibrate", *arguments, code=2), says)
 
 
 def test_a_misspelt_procedure_is_answered_with_its_line(calibrated):
     shell, _ = calibrated
     (shell.folder / "wrong.yaml").write_text(PROCEDURE.replace("below: ramp", "below: rampe"))
-    assert_one_clear_screen(shell("calibrate", "--config", "wrong.yaml", code=2), "did you mean 'ramp'")
+    assert_one_clear_screen(Verbs(shell.folder)("calibrate", "--config", "wrong.yaml", code=2), "did you mean 'ramp'")
