@@ -15,7 +15,7 @@ from tests.core.matrix.engines.patience import ending
 PROCEDURE = """
 title: Small
 seed: 3
-draws: 8
+draws: 14
 rig: twin
 protocol: karl2016
 nuisances:
@@ -63,8 +63,8 @@ def test_the_files_of_a_calibration(calibrated):
         *("draws.jsonl", "draws.csv", "run.json", "ranges.json", "findings.json", "sensitivity.json"),
         *("draws.png", "draws.pdf", "sensitivity.png", "sensitivity.pdf"),
     }
-    assert json.loads((folder / "ranges.json").read_text())["draws"] == 8
-    assert len((folder / "draws.csv").read_text().splitlines()) == 9
+    assert json.loads((folder / "ranges.json").read_text())["draws"] == 14
+    assert len((folder / "draws.csv").read_text().splitlines()) == 15
     assert json.loads((folder / "run.json").read_text())["made_by"]["numpy"]
 
 
@@ -77,16 +77,16 @@ def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
         cwd=shell.folder, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as running:  # fmt: skip
         # Its progress tells when the first draws are down: no clock and no busy waiting.
-        first = next(line for line in running.stderr if "/8" in line)
+        first = next(line for line in running.stderr if "/14" in line)
         assert "done" in first
         running.send_signal(signal.SIGINT)
         _, said = running.communicate(timeout=60)
     assert running.returncode == 130, said
     assert "goes on from there" in said
     kept = journal.read_text().count("\n") - 1
-    assert 1 <= kept < 8
+    assert 1 <= kept < 14
     rest = shell(*CALIBRATE, "--out", "cut")
-    assert f"{kept} of 8 draws were found finished" in rest.stderr
+    assert f"{kept} of 14 draws were found finished" in rest.stderr
     whole = shell.folder / "whole" / "calibration"
     for name in ("draws.csv", "ranges.json", "findings.json", "sensitivity.json"):
         assert (journal.parent / name).read_bytes() == (whole / name).read_bytes()
@@ -96,7 +96,7 @@ def test_what_is_there_is_shown_again_as_a_table(calibrated):
     shell, _ = calibrated
     shown = Verbs(shell.folder)("calibrate", "--show", "--out", "whole")
     assert "the calibration in whole/calibration" in shown.stderr
-    for text in ("Small (SIM)", "held out", "Time is the bound", "Partial rank correlations", "8 draws"):
+    for text in ("Small (SIM)", "held out", "Time is the bound", "Partial rank correlations", "14 draws"):
         assert text in shown.stdout
 
 
