@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
+import io
 import os
 import signal
 import subprocess
@@ -60,7 +63,7 @@ class Shell:
         module: str = "tactbench",
         timeout=100,
     ) -> subprocess.CompletedProcess[str]:
-        path = os.pathsep.join(str(THIRD_PARTY / name) for name in plugins)
+        path = os.pathsep.join([str(ROOT), *(str(THIRD_PARTY / name) for name in plugins)])
         env = {**os.environ, "PYTHONPATH": path, "COLUMNS": "200", "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}
         done = subprocess.run(
             [sys.executable, "-m", "tactbench", *arguments],
@@ -69,6 +72,43 @@ class Shell:
         if code is not None:
             assert done.returncode == code, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
         return done
+
+
+class Verbs:
+    """Calls the command line in this process, for what needs no fresh interpreter: no plugin, no run of cells."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __call__(self, *arguments: str, code: int | None = 0) -> subprocess.CompletedProcess[str]:
+        from tactbench.core.cli import main
+
+        thresholds = gc.get_threshold()
+        out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+        with (
+            contextlib.chdir(self.folder),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+            pytest.MonkeyPatch.context() as patch,
+            Path(os.devnull).open() as nothing,
+        ):
+            patch.setenv("COLUMNS", "200")
+            patch.setattr(sys, "stdin", nothing)
+            try:
+                with pytest.raises(SystemExit) as ended:
+                    main(list(arguments))
+            finally:
+                gc.set_threshold(*thresholds)
+        said, told = (stream.buffer.getvalue().decode() for stream in (out, err))  # type: ignore[attr-defined]
+        if code is not None:
+            assert ended.value.code == code, f"exit {ended.value.code}\n{said}\n{told}"
+        return subprocess.CompletedProcess(arguments, ended.value.code, said, told)
+
+
+@pytest.fixture
+def verbs(tmp_path: Path) -> Verbs:
+    """The command line in this process, in an empty folder."""
+    return Verbs(tmp_path)
 
 
 @pytest.fixture

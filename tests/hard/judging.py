@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.rigs.twin.verification.hard_cases import Family, judge
+from tests.hard.cases import Family, judge
 
 
 def never_fails(name: str, family: Family, examples: int) -> None:

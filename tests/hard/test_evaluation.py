@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 
-import hard_evaluation
 import numpy as np
 import pytest
 
@@ -15,10 +14,11 @@ from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.plugin import load_registry
 from tests.core.evaluation.made import force_task, label_task, record
 
+from .families import evaluation
 from .judging import never_fails
 
 ESTIMATORS = load_registry().estimators
-PAIRS = list(hard_evaluation.families())
+PAIRS = list(evaluation.families())
 ROLES = ("train", "validation", "test")
 RANKED = [name for name, protocol in PROTOCOLS.items() if not protocol.probe]
 """Protocols that answer where a force changes within a recording."""
@@ -34,7 +34,7 @@ def test_every_protocol_meets_every_estimator_that_can_answer_here():
 
 @pytest.mark.parametrize("name", PAIRS)
 def test_no_case_of_the_family_fails(name):
-    never_fails(name, hard_evaluation.families()[name], 3)
+    never_fails(name, evaluation.families()[name], 3)
 
 
 def _score(task, estimator, protocol, paths, params=None):

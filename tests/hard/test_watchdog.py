@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 
 from tactbench.plugin import RigError
-from tactbench.rigs.twin.verification.hard_cases import checks, judge
+
+from .cases import judge
+from .families import twin_families
+from .many import judged
 
 
 def test_a_case_that_does_not_come_back_is_a_hang_and_the_next_is_judged():
-    import hard_cases
-
     jobs = [("contact: any load", 1, 0), ("memory: no time constant", 1, 0)]
     # No contact is solved within a microsecond, its worker's first imports of sensors included.
-    first = list(hard_cases.judged(iter(jobs[:1]), 1, 1e-6))
+    first = list(judged(iter(jobs[:1]), 1, 1e-6))
     assert [(verdict, detail.split(":")[0]) for _, verdict, detail, _, _ in first] == [("failed", "hangs")]
-    second = list(hard_cases.judged(iter(jobs[1:]), 1, 60.0))
+    second = list(judged(iter(jobs[1:]), 1, 60.0))
     assert [verdict for _, verdict, _, _, _ in second] == ["refused"]
 
 
@@ -75,18 +76,7 @@ def test_the_judge(family, verdict):
 
 
 def test_the_same_numbers_give_the_same_case():
-    from tactbench.rigs.twin.verification.hard_cases import families
-
     name = "contact: any radius"
-    family = families()[name]
+    family = twin_families()[name]
     assert judge(name, family, 3, 5) == judge(name, family, 3, 5)
     assert judge(name, family, 3, 5).drawn != judge(name, family, 3, 6).drawn
-
-
-def test_checks_hold_their_numbers_against_none_failed():
-    found = [check for check in checks(cases=1) if check.group == "memory"]
-    assert len(found) >= 8
-    for check in found:
-        (verdict,) = check.run()
-        assert verdict.met, verdict.note
-        assert (verdict.low, verdict.high) == (0.0, 0.0)

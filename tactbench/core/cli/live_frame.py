@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tactbench.core.cli.live import COUNTED, StreamState, Watched, channel_of
+from tactbench.core.cli.stream_state import COUNTED, StreamState, Watched, channel_of
 from tactbench.core.samples import Quality
 
 if TYPE_CHECKING:

@@ -227,8 +227,12 @@ def _ask(point: EntryPoint) -> dict[str, list[Any]]:
     offered: dict[str, list[Any]] = {}
     for caller in callers:
         family = caller.name.removeprefix("tactbench_")
-        (answer,) = caller()
-        descriptors = list(answer)
+        answers = caller()  # pluggy leaves None out
+        if not answers:
+            raise PluginContractError(
+                f"{caller.name} of {point.value} returned None.", hint="Return a list of descriptors, if an empty one."
+            )
+        descriptors = list(answers[0])
         for descriptor in descriptors:
             if not isinstance(descriptor, _KINDS[family]):
                 raise PluginContractError(

@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from tests.conftest import Shell, Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
 from tests.core.matrix.engines.patience import ending
 
@@ -38,8 +39,6 @@ CALIBRATE = ("calibrate", "--config", "small.yaml", "--format", "json")
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
-    from tests.conftest import Shell
-
     shell = Shell(tmp_path_factory.mktemp("calibrate"))
     (shell.folder / "small.yaml").write_text(PROCEDURE)
     return shell, shell(*CALIBRATE, "--out", "whole", "--jobs", "2")
@@ -95,7 +94,7 @@ def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
 
 def test_what_is_there_is_shown_again_as_a_table(calibrated):
     shell, _ = calibrated
-    shown = shell("calibrate", "--show", "--out", "whole")
+    shown = Verbs(shell.folder)("calibrate", "--show", "--out", "whole")
     assert "the calibration in whole/calibration" in shown.stderr
     for text in ("Small (SIM)", "held out", "Time is the bound", "Partial rank correlations", "14 draws"):
         assert text in shown.stdout
@@ -111,10 +110,10 @@ def test_what_is_there_is_shown_again_as_a_table(calibrated):
 )
 def test_wrong_words_are_answered_with_the_next_step(calibrated, arguments, says):
     shell, _ = calibrated
-    assert_one_clear_screen(shell("calibrate", *arguments, code=2), says)
+    assert_one_clear_screen(Verbs(shell.folder)("calibrate", *arguments, code=2), says)
 
 
 def test_a_misspelt_procedure_is_answered_with_its_line(calibrated):
     shell, _ = calibrated
     (shell.folder / "wrong.yaml").write_text(PROCEDURE.replace("below: ramp", "below: rampe"))
-    assert_one_clear_screen(shell("calibrate", "--config", "wrong.yaml", code=2), "did you mean 'ramp'")
+    assert_one_clear_screen(Verbs(shell.folder)("calibrate", "--config", "wrong.yaml", code=2), "did you mean 'ramp'")

@@ -16,6 +16,7 @@ from tactbench.core.cli.config import shipped_results
 from tactbench.core.leaderboard.datasheet import OF_DEVICES
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.plugin import DataSheet, PhysicalRange, Source, UsageError, load_registry, sourced
+from tests.conftest import Shell, Verbs
 
 ROOT = Path(__file__).parents[3]
 WISH = ("--task", "force", "--max-delay-ms", "2", "--range-n", "5", "--rate-hz", "10")
@@ -23,11 +24,10 @@ WISH = ("--task", "force", "--max-delay-ms", "2", "--range-n", "5", "--rate-hz",
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    from tests.conftest import Shell
-
     shell = Shell(tmp_path_factory.mktemp("ran"))
-    shell("run", "--sensor", "icub", "--task", "force", "--estimator", "ols", "--protocol", "karl2016")
-    return shell
+    asked = ("--sensor", "icub", "--task", "force", "--estimator", "ols", "--protocol", "karl2016")
+    shell("run", *asked, "--repeats", "5")
+    return Verbs(shell.folder)
 
 
 def on_a_terminal(folder, *arguments, columns=80):
@@ -50,14 +50,14 @@ def on_a_terminal(folder, *arguments, columns=80):
     return seen.decode().replace("\r\n", "\n")
 
 
-def test_without_results_it_answers_from_those_that_came_along(shell):
-    shown = shell("choose", *WISH).stdout
+def test_without_results_it_answers_from_those_that_came_along(verbs):
+    shown = verbs("choose", *WISH).stdout
     verdict = shown.splitlines()[0]
     assert verdict.startswith(("None meets all: nearest is", "Cannot say:", "biotac SIM /", "icub SIM /"))
     assert "From the results that came with tactbench" in shown
     assert "unknown: the force range of icub: not stated" in shown
     assert "how a real unit scores" in shown
-    assert shell("choose", *WISH).stderr == ""
+    assert verbs("choose", *WISH).stderr == ""
 
 
 def test_results_of_ones_own_come_first_and_say_what_they_lack(ran):
@@ -74,8 +74,8 @@ def test_results_of_ones_own_come_first_and_say_what_they_lack(ran):
     ).stderr  # fmt: skip
 
 
-def test_json_has_the_wish_the_criteria_and_what_is_unknown(shell):
-    told = json.loads(shell("choose", *WISH, "--max-error", "0.2", "--format", "json").stdout)
+def test_json_has_the_wish_the_criteria_and_what_is_unknown(verbs):
+    told = json.loads(verbs("choose", *WISH, "--max-error", "0.2", "--format", "json").stdout)
     assert told["wish"] == {"max_delay_ms": 2, "range_n": 5, "rate_hz": 10, "max_error": 0.2, "min_score": None}
     assert (told["protocol"], told["split"]) == ("deployable", "roles")
     (choice,) = told["choices"]
@@ -96,10 +96,10 @@ PAGES = (
 
 
 @pytest.mark.parametrize("arguments", PAGES)
-def test_eighty_columns_break_no_word(tmp_path, shell, arguments):
+def test_eighty_columns_break_no_word(tmp_path, verbs, arguments):
     narrow = on_a_terminal(tmp_path, *arguments)
     assert max(map(len, (line.rstrip() for line in narrow.splitlines() if "See them all" not in line))) <= 80
-    told = {word for word in shell(*arguments).stdout.split() if "─" not in word}
+    told = {word for word in verbs(*arguments).stdout.split() if "─" not in word}
     assert {word for word in narrow.split() if "─" not in word} == told
 
 
@@ -118,8 +118,8 @@ def test_eighty_columns_break_no_word(tmp_path, shell, arguments):
         (("--task", "shear-force"), "tactbench run --task shear-force"),
     ],
 )
-def test_wrong_arguments_are_answered_with_the_next_step(shell, arguments, says):
-    done = shell("choose", *arguments, code=2)
+def test_wrong_arguments_are_answered_with_the_next_step(verbs, arguments, says):
+    done = verbs("choose", *arguments, code=2)
     assert done.stdout == ""
     assert says in done.stderr
     assert "Traceback" not in done.stderr
@@ -135,28 +135,28 @@ def test_the_shipped_results_are_of_a_run_and_travel_in_the_wheel():
     assert '"examples/results" = "tactbench/results"' in (ROOT / "pyproject.toml").read_text()
 
 
-def test_a_task_is_a_page(tmp_path, shell):
+def test_a_task_is_a_page(tmp_path, verbs):
     page = on_a_terminal(tmp_path, "show", "force")
     assert len(page.splitlines()) < 60
     for said in ("How large is the normal force?", "RMSE N, lower is better", "0.05 N", "validation", "flat", "60 s",
                  "mean, time-index", "deployable-untared", "few-shot-10", "0.7307 N", "section III-A"):  # fmt: skip
         assert said in page
-    whole = json.loads(shell("show", "force", "--format", "json").stdout)
+    whole = json.loads(verbs("show", "force", "--format", "json").stdout)
     assert len(whole["spec"]["scenes"]) == 3
-    assert "--rig replay" in shell("show", "shear-force").stdout
+    assert "--rig replay" in verbs("show", "shear-force").stdout
 
 
-def test_data_sheets_are_shown_with_their_sources_and_kept_in_json(shell):
-    shown = shell("show", "biotac", "icub", "--all").stdout
+def test_data_sheets_are_shown_with_their_sources_and_kept_in_json(verbs):
+    shown = verbs("show", "biotac", "icub", "--all").stdout
     assert "Wettels" in shown
-    lines = {line[:15].strip(): line for line in shell("show", "biotac", "icub").stdout.splitlines()}
+    lines = {line[:15].strip(): line for line in verbs("show", "biotac", "icub").stdout.splitlines()}
     assert "0.1–30 N" in lines["force range"]
     assert "unknown" in lines["force range"]
     assert lines["mass"].count("unknown") == 2
-    biotac, icub = json.loads(shell("show", "biotac", "icub", "--format", "json").stdout)
+    biotac, icub = json.loads(verbs("show", "biotac", "icub", "--format", "json").stdout)
     assert biotac["data_sheet"]["force_range"]["upper"] == 30
     assert icub["data_sheet"]["length"]["value"] == 14.5
-    mixed = json.loads(shell("show", "icub", "force", "--format", "json").stdout)
+    mixed = json.loads(verbs("show", "icub", "force", "--format", "json").stdout)
     assert mixed[0]["spec"]["data_sheet"]["width"]["unit"] == "mm"
 
 

@@ -6,55 +6,55 @@ import json
 
 import pytest
 
+from tests.conftest import Shell, Verbs
+
 ASKED = ("run", "--repeats", "5", "--sensor", "biotac", "--sensor", "icub", "--task", "force",
          "--protocol", "deployable",
-         "--estimator", "ols", "--estimator", "lasso")  # fmt: skip
+         "--estimator", "ols", "--estimator", "lasso", "--no-latency")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def shell(tmp_path_factory):
-    from tests.conftest import Shell
-
+def verbs(tmp_path_factory):
     shell = Shell(tmp_path_factory.mktemp("compared"))
     shell(*ASKED, "--out", "here")
-    return shell
+    return Verbs(shell.folder)
 
 
-def test_two_sensors_in_every_format(shell):
+def test_two_sensors_in_every_format(verbs):
     asked = ("compare", "biotac", "icub", "--out", "here")
-    shown = shell(*asked)
+    shown = verbs(*asked)
     assert "A = biotac, B = icub · force · RMSE [N] · deployable" in shown.stdout
     assert "paired over 5 replicates" in shown.stderr
-    records = json.loads(shell(*asked, "--format", "json").stdout)
+    records = json.loads(verbs(*asked, "--format", "json").stdout)
     assert {record["of"] for record in records} == {"ols", "lasso"}
     assert all(record["low"] <= record["difference"] <= record["high"] for record in records)
-    lines = list(csv.DictReader(io.StringIO(shell(*asked, "--format", "csv").stdout)))
+    lines = list(csv.DictReader(io.StringIO(verbs(*asked, "--format", "csv").stdout)))
     assert [float(line["difference"]) for line in lines] == [record["difference"] for record in records]
     first = f"{abs(records[0]['difference']):.4f}"
     for shape in ("table", "md", "latex"):
-        assert first in shell(*asked, "--format", shape).stdout
-    assert r"\toprule" in shell(*asked, "--format", "latex").stdout
+        assert first in verbs(*asked, "--format", shape).stdout
+    assert r"\toprule" in verbs(*asked, "--format", "latex").stdout
 
 
-def test_a_declared_comparison_is_corrected_and_another_is_exploratory(shell):
+def test_a_declared_comparison_is_corrected_and_another_is_exploratory(verbs):
     """The default matrix declares biotac against icub in force, not ols against lasso."""
     declared, other = (
-        json.loads(shell("compare", *pair, "--out", "here", "--format", "json").stdout)
+        json.loads(verbs("compare", *pair, "--out", "here", "--format", "json").stdout)
         for pair in (("biotac", "icub"), ("ols", "lasso"))
     )
     assert all(record["declared"] and record["p_holm"] >= record["p"] for record in declared)
     assert not any(record["declared"] or record["p_holm"] for record in other)
 
 
-def test_a_folder_against_itself_differs_nowhere(shell):
-    records = json.loads(shell("compare", "here", "here", "--format", "json").stdout)
+def test_a_folder_against_itself_differs_nowhere(verbs):
+    records = json.loads(verbs("compare", "here", "here", "--format", "json").stdout)
     assert len(records) == 4
     assert {(record["difference"], record["p"], record["paired"]) for record in records} == {(0.0, 1.0, True)}
 
 
-def test_what_is_not_there_is_named(shell):
-    assert "biotac" in shell("compare", "biotack", "icub", "--out", "here", code=2).stderr
-    assert "no results in nowhere" in shell("compare", "biotac", "icub", "--out", "nowhere", code=2).stderr
-    told = shell("compare", "biotac", "icub", "--out", "here", "--task", "forse", code=2).stderr
+def test_what_is_not_there_is_named(verbs):
+    assert "biotac" in verbs("compare", "biotack", "icub", "--out", "here", code=2).stderr
+    assert "no results in nowhere" in verbs("compare", "biotac", "icub", "--out", "nowhere", code=2).stderr
+    told = verbs("compare", "biotac", "icub", "--out", "here", "--task", "forse", code=2).stderr
     assert "forse" in told
     assert "force" in told

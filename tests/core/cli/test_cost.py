@@ -86,5 +86,5 @@ def test_the_table_states_what_its_times_mean(shell):
         (("cost", "--sensor", "icub", "--task", "force", "--rung", "fine"), "add --twin"),
     ],
 )
-def test_wrong_words_are_answered_with_the_next_step(shell, arguments, says):
-    assert_one_clear_screen(shell(*arguments, code=2), says)
+def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):
+    assert_one_clear_screen(verbs(*arguments, code=2), says)

@@ -10,30 +10,38 @@ import sys
 
 import pytest
 
+from tests.conftest import Shell, Verbs
+
 RUN = ("run", "--repeats", "5", "--sensor", "ideal", "--task", "force", "--estimator", "lasso", "--out", "out")
+
+DIGESTS = ("ranks.json", "tables.json")
 
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    from tests.conftest import Shell
-
+    """The verbs in the folder of a run, and the digests as that run wrote them."""
     shell = Shell(tmp_path_factory.mktemp("ran"))
     shell(*RUN)
-    return shell
+    verbs = Verbs(shell.folder)
+    verbs.digests = _digests(shell.folder)
+    return verbs
+
+
+def _digests(folder):
+    return [(folder / "out" / "cache" / name).read_bytes() for name in DIGESTS]
 
 
 def test_a_folder_shows_the_same_table_as_its_run(ran):
-    again = ran(*RUN, "--format", "json").stdout
+    again = Shell(ran.folder)(*RUN, "--format", "json").stdout
     assert ran("leaderboard", "out", "--format", "json").stdout == again
     assert json.loads(again) == json.loads((ran.folder / "out" / "leaderboard.json").read_text())
 
 
-def test_what_was_just_computed_and_what_is_read_again_have_one_digest(shell):
-    shell(*RUN)
-    kept = [shell.folder / "out" / "cache" / name for name in ("ranks.json", "tables.json")]
-    before = [path.read_bytes() for path in kept]
-    shell(*RUN)
-    assert [path.read_bytes() for path in kept] == before
+def test_what_was_just_computed_and_what_is_read_again_have_one_digest(ran):
+    for name in DIGESTS:
+        (ran.folder / "out" / "cache" / name).unlink()
+    Shell(ran.folder)(*RUN)
+    assert _digests(ran.folder) == ran.digests
 
 
 def test_every_format_goes_to_a_file_named_for_it(ran):
@@ -109,7 +117,7 @@ def test_more_is_shown_on_request(ran):
     assert "more note" not in many
     assert "Published figures" in many
     assert "numpy" in many
-    again = ran(*RUN, "--wide", "--notes").stdout
+    again = Shell(ran.folder)(*RUN, "--wide", "--notes").stdout
     assert "latency p50" in again
     assert "latency p50" in (ran.folder / "out" / "leaderboard.md").read_text()
 
@@ -147,7 +155,9 @@ def test_parquet_is_not_written_to_a_terminal(ran):
 def test_without_times_two_runs_give_the_same_bytes(ran, shell):
     shell(*RUN, "--jobs", "2")
     for shape in ("table", "md", "csv", "json", "latex"):
-        here, there = (one("leaderboard", "out", "--no-times", "--format", shape).stdout for one in (ran, shell))
+        here, there = (
+            one("leaderboard", "out", "--no-times", "--format", shape).stdout for one in (ran, Verbs(shell.folder))
+        )
         assert here == there
     with_times = list(csv.DictReader(io.StringIO(ran("leaderboard", "out", "--format", "csv").stdout)))
     without = list(csv.DictReader(io.StringIO(ran("leaderboard", "out", "--no-times", "--format", "csv").stdout)))
@@ -157,17 +167,17 @@ def test_without_times_two_runs_give_the_same_bytes(ran, shell):
 
 
 @pytest.mark.parametrize("content", [None, "", "{}", "not a folder"])
-def test_what_is_no_result_folder_is_told_in_a_sentence(shell, content):
-    place = shell.folder / "there"
+def test_what_is_no_result_folder_is_told_in_a_sentence(verbs, content):
+    place = verbs.folder / "there"
     if content == "not a folder":
         place.write_text("x")
     elif content is not None:
         place.mkdir()
         (place / "index.jsonl").write_text(content)
-    refused = shell("leaderboard", "there", code=2)
+    refused = verbs("leaderboard", "there", code=2)
     assert "Traceback" not in refused.stderr
     assert "tactbench run" in refused.stderr
-    assert not (shell.folder / "there" / "recordings").exists()
+    assert not (verbs.folder / "there" / "recordings").exists()
 
 
 def test_the_page_has_no_form_without_times(ran):

@@ -11,8 +11,9 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from tactbench.core.cli.live import LiveView, StreamState, Watched, one_line
+from tactbench.core.cli.live import LiveView, one_line
 from tactbench.core.cli.live_frame import frame
+from tactbench.core.cli.stream_state import StreamState, Watched
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 from tests.core.cli.fed_view import PAD, SCALE, SCENE, Fed

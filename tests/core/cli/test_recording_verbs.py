@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import Shell
+
 MAPPING = """
 version: 1
 title: a scale
@@ -28,12 +30,12 @@ streams:
 
 
 @pytest.fixture
-def tables(shell):
-    (shell.folder / "mapping.yaml").write_text(MAPPING)
+def tables(verbs):
+    (verbs.folder / "mapping.yaml").write_text(MAPPING)
     for name in ("one", "two"):
         rows = "".join(f"{n / 100},{n},{7},{-1 if n % 2 else n}\n" for n in range(50))
-        (shell.folder / f"{name}.csv").write_text("t,a,b,f\n" + rows)
-    return shell
+        (verbs.folder / f"{name}.csv").write_text("t,a,b,f\n" + rows)
+    return verbs
 
 
 def test_import_then_inspect(tables):
@@ -72,30 +74,30 @@ def test_a_damaged_recording(tables):
     assert "cut short" in done.stderr
 
 
-def test_record_then_inspect(shell):
-    done = shell(
+def test_record_then_inspect(verbs):
+    done = verbs(
         "record", "--sensor", "icub", "--cap-mm", "10", "--force-n", "2", "--seconds", "3", "--out", "press.h5"
     )
     assert "icub on twin (SIM), cap R 10 mm" in done.stdout
-    (about,) = json.loads(shell("inspect", "press.h5", "--format", "json").stdout)
+    (about,) = json.loads(verbs("inspect", "press.h5", "--format", "json").stdout)
     assert about["meta"]["simulated"]
     assert about["meta"]["labels"] == {"cap_radius_mm": 10.0}
     assert about["meta"]["scene"]["profile"]["end"]["value"] == 2.0
     assert {stream["of"] for stream in about["streams"]} == {"sensor", "reference"}
-    assert "exists already" in shell("record", "--sensor", "icub", "--out", "press.h5", code=2).stderr
+    assert "exists already" in verbs("record", "--sensor", "icub", "--out", "press.h5", code=2).stderr
 
 
-def test_record_a_slide(shell):
-    shell("record", "--sensor", "biotac", "--seconds", "3", "--slide-mm-s", "40", "--force-n", "1", "--out", "slide.h5")
-    about = json.loads(shell("inspect", "slide.h5", "--format", "json").stdout)
+def test_record_a_slide(verbs):
+    verbs("record", "--sensor", "biotac", "--seconds", "3", "--slide-mm-s", "40", "--force-n", "1", "--out", "slide.h5")
+    about = json.loads(verbs("inspect", "slide.h5", "--format", "json").stdout)
     assert "vibration" in json.dumps(about)
     assert "stick_ratio" in json.dumps(about)
 
 
-def test_a_rig_that_cannot_record(shell):
-    done = shell("record", "--sensor", "icub", "--rig", "replay", "--out", "press.h5", code=2)
+def test_a_rig_that_cannot_record(verbs):
+    done = verbs("record", "--sensor", "icub", "--rig", "replay", "--out", "press.h5", code=2)
     assert "cannot record" in done.stderr
-    assert not (shell.folder / "press.h5").exists()
+    assert not (verbs.folder / "press.h5").exists()
 
 
 def test_what_a_crash_left_behind(tables):
@@ -118,16 +120,16 @@ def test_what_a_crash_left_behind(tables):
     assert (tables.folder / "new.h5").exists()
 
 
-def test_a_folder_that_refuses_recordings_is_a_usage_error(shell, shared_data):
-    (shell.folder / "taken").write_text("a file, not a folder")
+def test_a_folder_that_refuses_recordings_is_a_usage_error(verbs, shared_data):
+    (verbs.folder / "taken").write_text("a file, not a folder")
     mapping = Path(__file__).parents[3] / "examples" / "mappings" / "eflesh-normal.yaml"
-    done = shell("import", str(mapping), "--root", str(shared_data / "eflesh"), "--out", "taken/there", code=2)
+    done = verbs("import", str(mapping), "--root", str(shared_data / "eflesh"), "--out", "taken/there", code=2)
     assert "--out" in done.stderr
     assert "Traceback" not in done.stderr
 
 
 @pytest.fixture
-def logged(shell):
+def logged(verbs):
     """A log of two fingertips: 50 samples each, every 20 ms."""
     lines = ["date Tue Nov 14 10:13:20.250 2023", "base hex  timestamps absolute", "internal events logged"]
     for number in range(50):
@@ -136,8 +138,8 @@ def logged(shell):
                 text = " ".join(f"{value:02X}" for value in (first, *data))
                 at_s = 0.02 * number + 0.001 * triangle + 0.0002 * (first == 0xC0)
                 lines.append(f"   {at_s:.6f} 1  4E{triangle:X}             Rx   d 8 {text}")
-    (shell.folder / "bus.asc").write_text("\n".join(lines) + "\n")
-    return shell
+    (verbs.folder / "bus.asc").write_text("\n".join(lines) + "\n")
+    return verbs
 
 
 def test_a_log_of_a_sensor_becomes_a_recording(logged):
@@ -155,7 +157,9 @@ def test_a_log_of_a_sensor_becomes_a_recording(logged):
     assert meta["counts"] == {"frames of others": 100}
     (stream,) = about["streams"]
     assert (stream["rows"], round(stream["mean_rate_hz"], 3)) == (50, 50.0)
-    run = logged("run", "--rig", "replay", "--recordings", "recordings", "--sensor", "icub", "--task", "force")
+    run = Shell(logged.folder)(
+        "run", "--rig", "replay", "--recordings", "recordings", "--sensor", "icub", "--task", "force"
+    )
     assert "no recording has it" in run.stdout  # it was found, and has no reference force
 
 

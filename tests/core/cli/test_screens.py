@@ -36,8 +36,8 @@ def assert_one_clear_screen(done, *says):
         (("leaderboard",), "tactbench run"),
     ],
 )
-def test_wrong_words_are_answered_with_the_next_step(shell, arguments, says):
-    assert_one_clear_screen(shell(*arguments, code=2), says)
+def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):
+    assert_one_clear_screen(verbs(*arguments, code=2), says)
 
 
 def test_a_wrong_word_leaves_no_result_behind(shell):
@@ -53,14 +53,14 @@ def test_a_wrong_word_leaves_no_result_behind(shell):
         ("tasks: [force\n", "matrix.yaml:2"),
     ],
 )
-def test_a_wrong_matrix_names_file_and_line(shell, text, says):
-    (shell.folder / "matrix.yaml").write_text(text)
-    assert_one_clear_screen(shell("run", "--config", "matrix.yaml", code=2), says)
+def test_a_wrong_matrix_names_file_and_line(verbs, text, says):
+    (verbs.folder / "matrix.yaml").write_text(text)
+    assert_one_clear_screen(verbs("run", "--config", "matrix.yaml", code=2), says)
 
 
-def test_a_folder_that_cannot_be_written(shell):
-    (shell.folder / "taken").write_text("a file, not a folder")
-    done = shell("run", "--sensor", "icub", "--task", "force", "--out", "taken/results", code=2)
+def test_a_folder_that_cannot_be_written(verbs):
+    (verbs.folder / "taken").write_text("a file, not a folder")
+    done = verbs("run", "--sensor", "icub", "--task", "force", "--out", "taken/results", code=2)
     assert_one_clear_screen(done, "--out DIR")
 
 
@@ -91,8 +91,8 @@ def test_listing_loads_no_numerics():
     assert "HEAVY []" in done.stdout
 
 
-def test_table_one_of_the_paper(shell):
-    shown = shell("show", "biotac", "icub").stdout
+def test_table_one_of_the_paper(verbs):
+    shown = verbs("show", "biotac", "icub").stdout
     rows = {line.split("  ")[0].strip(): line for line in (line.strip() for line in shown.splitlines()) if line}
     for title, biotac in (
         ("# taxels", "19"), ("measurement principle", "resistive"), ("DC Pressure Range", "0–100 kPa"),

@@ -70,13 +70,13 @@ def test_protocols_and_splits_side_by_side(shell):
     assert [row["score"] for row in again] == [unit["score"]]
 
 
-def test_a_protocol_that_cannot_keep_a_split_is_refused_before_anything_is_recorded(shell):
-    done = shell("run", "--sensor", "icub", "--task", "force", "--protocol", "karl2016", "--split", "unit", code=2)
+def test_a_protocol_that_cannot_keep_a_split_is_refused_before_anything_is_recorded(verbs):
+    done = verbs("run", "--sensor", "icub", "--task", "force", "--protocol", "karl2016", "--split", "unit", code=2)
     assert "by roles only" in done.stderr
-    assert not list(shell.folder.rglob("*.h5"))
+    assert not list(verbs.folder.rglob("*.h5"))
 
 
-def test_an_unknown_matrix_lists_what_there_is(shell):
-    done = shell("run", "--config", "beyong", code=2)
+def test_an_unknown_matrix_lists_what_there_is(verbs):
+    done = verbs("run", "--config", "beyong", code=2)
     assert "beyond" in done.stderr
     assert "protocols" in done.stderr

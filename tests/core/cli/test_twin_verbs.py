@@ -57,17 +57,17 @@ def test_the_twins_cost_says_what_a_rung_scores_and_what_a_sensor_cannot_have(sh
     assert (shell.folder / "tactbench-results/cost/twin.png").exists()
 
 
-def test_what_was_asked_for_shows(shell):
+def test_what_was_asked_for_shows(verbs):
     words = ("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "0", "--format", "csv")
-    done = shell(*words, "--effects", "-drift,+fluid-pressure")
+    done = verbs(*words, "--effects", "-drift,+fluid-pressure")
     lines = {line.split(",")[4]: line for line in done.stdout.splitlines()}
     assert ",True,True,asked for" in lines["fluid-pressure"]
     assert ',False,True,"left out as asked' in lines["wander"]
 
 
-def test_asked_effects_and_rungs_are_kept_with_the_recording(shell):
-    shell("record", "--sensor", "icub", "--out", "a.h5", "--seconds", "2", "--effects=-noise", "--rung", "closed-form")
-    shown = shell("inspect", "a.h5").stdout
+def test_asked_effects_and_rungs_are_kept_with_the_recording(verbs):
+    verbs("record", "--sensor", "icub", "--out", "a.h5", "--seconds", "2", "--effects=-noise", "--rung", "closed-form")
+    shown = verbs("inspect", "a.h5").stdout
     left_out = next(line for line in shown.splitlines() if "left out:" in line)
     assert "white-noise (asked)" in left_out
     assert "force-noise (asked)" in left_out
@@ -75,12 +75,12 @@ def test_asked_effects_and_rungs_are_kept_with_the_recording(shell):
     assert "rung = closed-form" in shown
 
 
-def test_a_scenario_is_listed_and_kept_with_the_recording(shell):
-    listed = shell("list", "scenarios").stdout
+def test_a_scenario_is_listed_and_kept_with_the_recording(verbs):
+    listed = verbs("list", "scenarios").stdout
     assert "hard-handled" in listed
     assert "biotac: pressed hard" in listed
-    shell("record", "--sensor", "biotac", "--out", "a.h5", "--seconds", "1", "--scenario", "hard-handled")
-    assert "scenario = hard-handled" in shell("inspect", "a.h5").stdout
+    verbs("record", "--sensor", "biotac", "--out", "a.h5", "--seconds", "1", "--scenario", "hard-handled")
+    assert "scenario = hard-handled" in verbs("inspect", "a.h5").stdout
 
 
 def test_a_scenario_is_asked_for_by_a_matrix_file(shell):
@@ -115,12 +115,12 @@ def test_a_scenario_is_asked_for_by_a_matrix_file(shell):
         (("cost",), "--twin"),
     ],
 )
-def test_wrong_words_are_answered_with_the_next_step(shell, arguments, says):
-    assert_one_clear_screen(shell(*arguments, code=2), says)
+def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):
+    assert_one_clear_screen(verbs(*arguments, code=2), says)
 
 
-def test_an_oracle_can_be_run_alone(shell):
-    done = shell("twin", "verify", "--only", "omission-icub-force", "--format", "json")
+def test_an_oracle_can_be_run_alone(verbs):
+    done = verbs("twin", "verify", "--only", "omission-icub-force", "--format", "json")
     verdicts = json.loads(done.stdout)
     assert all(verdict["met"] for verdict in verdicts)
     assert "2 of 2 within their bounds" in done.stderr

@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from tests.conftest import Shell
+from tests.conftest import Verbs
 
 
 @pytest.fixture(scope="module")
 def reported(results):
-    shell = Shell(results.parent)
-    return shell, shell("report")
+    verbs = Verbs(results.parent)
+    return verbs, verbs("report")
 
 
 def test_page_on_disk_table_on_stdout_the_rest_on_stderr(reported, results):
@@ -24,13 +24,13 @@ def test_page_on_disk_table_on_stdout_the_rest_on_stderr(reported, results):
 
 
 def test_the_same_table_for_programs_and_the_same_page_in_another_folder(reported, results):
-    shell, _ = reported
-    found = json.loads(shell("report", "tactbench-results", "--out", "elsewhere", "--format", "json").stdout)
+    verbs, _ = reported
+    found = json.loads(verbs("report", "tactbench-results", "--out", "elsewhere", "--format", "json").stdout)
     (ours,) = [one for one in found if one["cell"] == "icub/force/twin/karl2016/lasso"]
     assert ours["published"] == 0.7659
     assert (ours["verdict"], ours["ci_low"], ours["ci_high"]) == ("no interval", None, None)
     assert ours["sentence"].startswith("one replicate: too few for an interval")
-    page = (shell.folder / "elsewhere" / "index.html").read_bytes()
+    page = (verbs.folder / "elsewhere" / "index.html").read_bytes()
     assert page == (results / "report" / "index.html").read_bytes()
 
 
@@ -42,21 +42,23 @@ def one_clear_screen(done, *says):
         assert text in done.stderr
 
 
-def test_a_folder_that_is_not_there_is_not_made(shell):
-    one_clear_screen(shell("report", "nowhere", code=2), "There are no results in nowhere", "tactbench run")
-    assert not (shell.folder / "nowhere").exists()
+def test_a_folder_that_is_not_there_is_not_made(verbs):
+    one_clear_screen(verbs("report", "nowhere", code=2), "There are no results in nowhere", "tactbench run")
+    assert not (verbs.folder / "nowhere").exists()
 
 
 def test_results_without_a_finished_cell_say_what_to_run(shell):
     shell("run", "--repeats", "1", "--sensor", "icub", "--task", "grasp-stability")
     (shell.folder / "tactbench-results" / "index.jsonl").touch()
-    one_clear_screen(shell("report", code=2), "No cell in tactbench-results has finished", "tactbench run")
+    one_clear_screen(
+        Verbs(shell.folder)("report", code=2), "No cell in tactbench-results has finished", "tactbench run"
+    )
 
 
 def test_a_place_that_refuses_the_page_is_named(reported):
-    shell, _ = reported
-    (shell.folder / "taken").write_text("a file, not a folder")
-    one_clear_screen(shell("report", "--out", "taken", code=2), "taken", "--out")
+    verbs, _ = reported
+    (verbs.folder / "taken").write_text("a file, not a folder")
+    one_clear_screen(verbs("report", "--out", "taken", code=2), "taken", "--out")
 
 
 def test_a_row_of_another_version_is_left_out_and_named(reported, results, tmp_path):
@@ -70,5 +72,5 @@ def test_a_row_of_another_version_is_left_out_and_named(reported, results, tmp_p
     first["refs"].pop("search", None)
     first["row"].pop("search", None)
     index.write_text("\n".join([*lines[:place], json.dumps(first), *lines[place + 1 :]]) + "\n")
-    done = Shell(tmp_path)("report", "old")
+    done = Verbs(tmp_path)("report", "old")
     assert f"Left out: {first['row']['cell']}: its row is of another version" in done.stderr

@@ -9,12 +9,11 @@ from tactbench.plugin import Check
 
 def checks() -> Sequence[Check]:
     """Return every check of the twin against what must be true."""
-    from tactbench.rigs.twin.verification import contact, hard_cases, memory, omission, tangential
+    from tactbench.rigs.twin.verification import contact, memory, omission, tangential
 
     return [
         *contact.checks(),
         *memory.checks(),
         *tangential.checks(),
         *omission.checks(),
-        *hard_cases.checks(),
     ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray
 from tactbench.rigs.twin.effects.memory import lag, wandering
-from tactbench.rigs.twin.verification.hard_cases import Case, Family
+from tests.hard.cases import Case, Family
 
 
 def _times(case: Case, tau: float, *, longest: float = 1e4, repeated: float = 0.2) -> FloatArray:

@@ -34,7 +34,7 @@ from tactbench.plugin import (
     TaskSpec,
     load_registry,
 )
-from tactbench.rigs.twin.verification.hard_cases import Case, Family
+from tests.hard.cases import Case, Family
 
 FORCE = StreamSpec(name="force_torque", channels=(ChannelSpec(name="fz", kind="force", unit="N"),))
 QUICK: dict[str, dict[str, Any]] = {"forest": {"n_estimators": 5}}

@@ -22,7 +22,7 @@ from tactbench.plugin import (
     load_registry,
 )
 from tactbench.rigs.twin.rig import REFERENCE_STREAM, Twin, TwinAcquisition, build
-from tactbench.rigs.twin.verification.hard_cases import Case, Family
+from tests.hard.cases import Case, Family
 
 _CAPS_MM = (5.0, 10.0, 40.0)
 

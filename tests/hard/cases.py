@@ -1,4 +1,4 @@
-"""Random hard cases, each with a written right answer: families of them, a judge, and checks made of both.
+"""Random hard cases, each with a written right answer: families of them, and a judge.
 
 A family is a function that draws one case, carries it out and holds the answer against laws; its docstring is the right
 answer. Judged, a case has passed, was refused with an explanation, or failed: a wrong number, one that is not finite, a
@@ -7,17 +7,15 @@ warning, a refusal where there is an answer, an answer where there is none, or a
 
 from __future__ import annotations
 
-import inspect
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from tactbench.plugin import Check, Scalar, TactbenchError, Verdict
+from tactbench.plugin import Scalar, TactbenchError
 from tactbench.rigs.twin.draws import generator
 
 Right = Literal["answer", "refusal", "either"]
@@ -74,18 +72,6 @@ class Outcome:
     drawn: dict[str, Scalar]
 
 
-def families() -> dict[str, Family]:
-    """Return every family of the twin by its name, ``group: what is hard``."""
-    from tactbench.rigs.twin.verification import hard_channels, hard_contact, hard_memory, hard_skins
-
-    groups = {
-        "contact": (*hard_contact.FAMILIES, *hard_skins.FAMILIES),
-        "memory": hard_memory.FAMILIES,
-        "channels": hard_channels.FAMILIES,
-    }
-    return {f"{group}: {one.__name__.replace('_', ' ')}": one for group, some in groups.items() for one in some}
-
-
 def judge(name: str, family: Family, seed: int, number: int) -> Outcome:
     """Draw case `number` of a family and judge it; the same arguments give the same case on any machine."""
     case = Case(generator(seed, "hard case", name, str(number)))
@@ -107,35 +93,3 @@ def judge(name: str, family: Family, seed: int, number: int) -> Outcome:
     if case.right == "refusal":
         return Outcome("failed", "answered although there is no answer", case.drawn)
     return Outcome("passed", "", case.drawn)
-
-
-def checks(cases: int = 60, seed: int = 1) -> list[Check]:
-    """Return one check a family, `cases` spread over all of them (at least one each)."""
-    found = families()
-    each = max(1, round(cases / len(found)))
-    return [
-        Check(
-            name=f"hard {name.replace(': ', ' ')}",
-            group=name.split(":")[0],
-            title=(inspect.getdoc(family) or name).splitlines()[0],
-            run=partial(_verdicts, name, family, each, seed),
-        )
-        for name, family in found.items()
-    ]
-
-
-def _verdicts(name: str, family: Family, cases: int, seed: int) -> Sequence[Verdict]:
-    outcomes = [judge(name, family, seed, number) for number in range(cases)]
-    failed = [(number, one) for number, one in enumerate(outcomes) if one.verdict == "failed"]
-    note = f"case {failed[0][0]} with seed {seed}: {failed[0][1].detail}" if failed else ""
-    refused = sum(one.verdict == "refused" for one in outcomes)
-    return [
-        Verdict(
-            name=f"failed of {cases} cases",
-            found=float(len(failed)),
-            low=0.0,
-            high=0.0,
-            source=f"the laws in the family's description; {refused} refused with an explanation",
-            note=note,
-        )
-    ]

@@ -15,7 +15,7 @@ from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.skins import medium_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, outer_radius_mm, pad_of, skin_grid
-from tactbench.rigs.twin.verification.hard_cases import Case, Family
+from tests.hard.cases import Case, Family
 
 BALANCE = 1e-8
 """Relative force balance: a sum over thousands of cells rounds at 1e-13, and the law shall hold far from its edge."""

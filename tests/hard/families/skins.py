@@ -12,8 +12,8 @@ from tactbench.rigs.twin.contact.foam import CUT_OVER, Foam
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.skins import medium_of
 from tactbench.rigs.twin.geometry import skin_grid
-from tactbench.rigs.twin.verification.hard_cases import Case, Family
-from tactbench.rigs.twin.verification.hard_contact import SOLVED, draw_contact, draw_skin, lawful, press_of, skins
+from tests.hard.cases import Case, Family
+from tests.hard.families.contact import SOLVED, draw_contact, draw_skin, lawful, press_of, skins
 
 _STIFFNESSES = (
     "young", "shear", "tension", "cover_tension", "cover_bending", "contact_stiffness", "core_stiffness",

@@ -4,7 +4,7 @@ Every case runs in a worker process under a time limit of its own: one that does
 a hang. A case passes, is refused with an explanation, or fails; a failure is printed with the command that repeats it.
 Exit status 1 if any failed.
 
-Usage: python benchmarks/hard_cases.py [N] [--seed S] [--workers W] [--limit SECONDS] [--only TEXT] [--case NUMBER]
+Usage: python -m tests.hard.many [N] [--seed S] [--workers W] [--limit SECONDS] [--only TEXT] [--case NUMBER]
 
 With --only, families whose name holds TEXT; with --case as well, that one case of each.
 """
@@ -22,17 +22,11 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from tactbench.rigs.twin.verification import hard_cases
+from tests.hard.cases import judge
+from tests.hard.families import families
 
 WARM_UP_S = 120.0
 """Time a worker may take for its first imports."""
-
-
-def families() -> dict[str, Any]:
-    """Return all families: the twin's, and those of evaluation."""
-    import hard_evaluation
-
-    return {**hard_cases.families(), **hard_evaluation.families()}
 
 
 def work(pipe: Connection) -> None:
@@ -42,7 +36,7 @@ def work(pipe: Connection) -> None:
     while (job := pipe.recv()) is not None:
         name, seed, number = job
         began = time.perf_counter()
-        outcome = hard_cases.judge(name, found[name], seed, number)
+        outcome = judge(name, found[name], seed, number)
         pipe.send((outcome.verdict, outcome.detail, outcome.drawn, time.perf_counter() - began))
 
 
@@ -164,7 +158,7 @@ def main() -> int:
     for (name, seed, number), _, detail, drawn, _ in failures:
         print(f"failed: {name}, case {number}: {detail}")
         print(f"  drawn: {drawn}")
-        print(f'  repeat: python benchmarks/hard_cases.py --seed {seed} --only "{name}" --case {number}')
+        print(f'  repeat: python -m tests.hard.many --seed {seed} --only "{name}" --case {number}')
     return 1 if failures else 0
 
 
