@@ -95,7 +95,7 @@ class Setting:
     def allowed_n(self) -> float:
         """What the step rule promises, and five times the noise."""
         limits = self.limits
-        return limits.force_ceiling_n + self.stiffness_n_m * (limits.step_m + STATED["corridor_m"]) + 5 * NOISE_N
+        return float(limits.force_ceiling_n + self.stiffness_n_m * (limits.step_m + STATED["corridor_m"]) + 5 * NOISE_N)
 
 
 class Pressed:
