@@ -443,6 +443,8 @@ def main() -> None:
     outcomes = []
     for outcome in schedules(count, seed):
         outcomes.append(outcome)
+        if len(outcomes) % 20 == 0:
+            print(f"{len(outcomes)} after {time.perf_counter() - began_s:.0f} s", file=sys.stderr, flush=True)
         for wrong in outcome.wrong:
             print(f"WRONG {wrong}: {outcome}", flush=True)
     over = Counter(str(outcome.trigger) for outcome in outcomes)
