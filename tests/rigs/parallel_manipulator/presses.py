@@ -21,8 +21,8 @@ def load(name):
 
 FAULTS = load("guard_faults")
 PACKAGE = "tactbench.rigs.parallel_manipulator"
-# In real time, emulators and rig share a process and perhaps a busy machine: a force may be old, a beat late, and so may
-# an answer of the motor, whose driver is told of a slow line.
+# In real time, emulators and rig share a process and perhaps a busy machine: a force may be old, a beat late, and an
+# answer of the motor, too, whose driver is told of a slow line.
 PATIENT = {"time": "real", "force_age_s": 1.0, "heartbeat_s": 1.0, "period_s": 0.05, "wanted_n": 2.0}
 SLOW_LINE = {"baud": 600}
 
