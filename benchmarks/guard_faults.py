@@ -95,7 +95,7 @@ class Setting:
     def allowed_n(self) -> float:
         """What the step rule promises, and five times the noise."""
         limits = self.limits
-        return limits.force_ceiling_n + self.stiffness_n_m * (limits.step_m + STATED["corridor_m"]) + 5 * NOISE_N
+        return float(limits.force_ceiling_n + self.stiffness_n_m * (limits.step_m + STATED["corridor_m"]) + 5 * NOISE_N)
 
 
 class Pressed:
@@ -443,6 +443,8 @@ def main() -> None:
     outcomes = []
     for outcome in schedules(count, seed):
         outcomes.append(outcome)
+        if len(outcomes) % 20 == 0:
+            print(f"{len(outcomes)} after {time.perf_counter() - began_s:.0f} s", file=sys.stderr, flush=True)
         for wrong in outcome.wrong:
             print(f"WRONG {wrong}: {outcome}", flush=True)
     over = Counter(str(outcome.trigger) for outcome in outcomes)

@@ -22,10 +22,9 @@ def load(name):
 FAULTS = load("guard_faults")
 PACKAGE = "tactbench.rigs.parallel_manipulator"
 # In real time, emulators and rig share a process and perhaps a busy machine: a force may be old, a beat late, and an
-# answer of the motor, which has three times as long at 9600 baud.
-PATIENT = {
-    "time": "real", "force_age_s": 1.0, "heartbeat_s": 1.0, "period_s": 0.05, "baud": 9600, "wanted_n": 2.0,
-}  # fmt: skip
+# answer of the motor, too, whose driver is told of a slow line.
+PATIENT = {"time": "real", "force_age_s": 1.0, "heartbeat_s": 1.0, "period_s": 0.05, "wanted_n": 2.0}
+SLOW_LINE = {"baud": 600}
 
 
 class Rig:
@@ -42,7 +41,11 @@ class Rig:
             self.log = tmp_path / "guard.log"
             self.guard = GuardProcess(
                 ProcessSettings(
-                    DeviceSettings(f"{PACKAGE}.motor.driver:build", address or addresses["motor"], options["motor"]),
+                    DeviceSettings(
+                        f"{PACKAGE}.motor.driver:build",
+                        address or addresses["motor"],
+                        options["motor"] | SLOW_LINE,
+                    ),
                     DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:build", addresses["force"], options["force"]),
                     str(self.log),
                     time.monotonic_ns() - self.clock(),
