@@ -340,8 +340,8 @@ def changed(names: Mapping[str, float], setting: Setting, clock: Callable[[], in
             return replace(beat, command=CommandKind.STEP, distance_m=math.nan)
         if "moves too fast" in on:
             return replace(beat, command=CommandKind.MOVE_TO, position_m=RETREAT_M, speed_m_s=1.0)
-        if "rig wants 30 N" in on and beat.command is CommandKind.STEP:
-            return replace(beat, distance_m=limits.step_m)
+        if "rig wants 30 N" in on and beat.command is not CommandKind.NONE and beat.state != "approach":
+            return replace(beat, command=CommandKind.STEP, distance_m=limits.step_m)
         return beat
 
     return change

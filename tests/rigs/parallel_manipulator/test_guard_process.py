@@ -75,16 +75,14 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
         assert made.out
 
 
-def test_a_rig_that_takes_no_samples_loses_them_and_nothing_else(tmp_path, monkeypatch):
+def test_a_rig_that_takes_no_samples_still_gets_its_reports(tmp_path):
     with rig("process", tmp_path) as made:
-        # The rig beats and takes reports, and no samples: the socket is full after some seconds of them.
         made.guard._selector.unregister(made.guard._data)
         made.guard.arm(made.setting.limits)
         for number in range(1, 20):
             assert made.guard.beat(Beat(number, made.clock())).accepted
             made.guard.advance(made.clock() + 20_000_000)
-        assert made.guard.counts()["guard"]["rows_dropped"] == 0
-        assert sum(len(block.data) for block in made.guard.force_blocks()) == 0
+        assert made.guard.force_blocks() == []
 
 
 def test_what_goes_wrong_at_the_start_is_told(tmp_path):
