@@ -87,26 +87,13 @@ class PressingForce:
 
 
 def with_sensor(file: RigFile, sensor: str) -> RigFile:
-    """Return a rig file with one of its sensors.
-
-    Raises
-    ------
-    UsageError
-        If it has no entry for it, or emulated devices are to run in virtual time beside real ones.
-    """
+    """Return a rig file with one of its sensors; raises UsageError if it has no entry for it."""
     if sensor not in file.sensors:
         raise UsageError(
             f"The rig file has no entry for the sensor {sensor!r}; it has {', '.join(file.sensors)}.",
             hint=f"Add `{sensor}:` with its link under `sensors:`.",
         )
-    used = file.model_copy(update={"sensors": {sensor: file.sensors[sensor]}})
-    real = [name for name, entry in used.entries().items() if not entry.emulated]
-    if used.emulated and real and used.emulation.time == "virtual":
-        raise UsageError(
-            f"{', '.join(real)} is a real device and runs by the clock, the emulated ones in virtual time.",
-            hint="Write `time: real` under `emulation:`.",
-        )
-    return used
+    return file.model_copy(update={"sensors": {sensor: file.sensors[sensor]}})
 
 
 def emulation_of(file: RigFile, names: tuple[str, ...]) -> Emulation | None:

@@ -100,6 +100,16 @@ class RigFile(Frozen):
             )
         return self
 
+    def checked_for_one_clock(self) -> RigFile:
+        """Return this file; raise UsageError if emulated devices are to run in virtual time beside real ones."""
+        real = [name for name, entry in self.entries().items() if not entry.emulated]
+        if self.emulated and real and self.emulation.time == "virtual":
+            raise UsageError(
+                f"{', '.join(real)} is a real device and runs by the clock, the emulated ones in virtual time.",
+                hint="Write `time: real` under `emulation:`.",
+            )
+        return self
+
     def entries(self) -> dict[str, DeviceEntry]:
         """Return every device by its name in messages: the sensor's name, ``force``, or its part in the rig."""
         found: dict[str, DeviceEntry] = dict(self.sensors)

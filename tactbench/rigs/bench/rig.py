@@ -127,7 +127,7 @@ class Bench:
         LinkError
             If a link cannot be opened, or a device does not answer.
         """
-        file = with_sensor(self._file, sensor.name)
+        file = with_sensor(self._file, sensor.name).checked_for_one_clock()
         with ExitStack() as stack:
             simulated = stack.enter_context(self._simulated(file, sensor, scene, seed))
             profile = scene.profile

@@ -213,7 +213,7 @@ class ParallelManipulator:
             If a link cannot be opened, or a device does not answer.
         """
         settings, scene = self.settings, quiet(scene)
-        file = with_sensor(self._file, sensor.name)
+        file = with_sensor(self._file, sensor.name).checked_for_one_clock()
         xy_m, place = self._place(scene, seed)
         with ExitStack() as stack:
             senses = self._senses(stack, file, sensor, scene, seed)

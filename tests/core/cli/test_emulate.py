@@ -16,6 +16,7 @@ from tests.core.plugins import talking
 POINTS = [
     EntryPoint("talking", talking.HERE, "tactbench"),
     EntryPoint("twin", "tactbench.rigs.twin", "tactbench"),
+    EntryPoint("bench", "tactbench.rigs.bench", "tactbench"),
 ]
 
 
@@ -102,7 +103,7 @@ def test_a_rig_file_is_started_and_keeps_what_is_real(emulate, tmp_path):
         (("pad", "--fault", "scale:late"), "no emulated device called 'scale'"),
         (("pad", "--fault", "pad:late:delay=1"), "'delay_s'"),
         (("pad", "--fault", "pad:parity"), "no fault 'parity'"),
-        (("pad", "--physics", "bench"), "no rig called 'bench'"),
+        (("pad", "--physics", "twni"), "Did you mean 'twin'"),
         (("pad", "--write-rig-file", "mine.yaml"), "mine.yaml is there already"),
     ],
 )

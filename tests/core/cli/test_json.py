@@ -1,6 +1,7 @@
 """``--format json``: whatever prints it prints one JSON document and nothing else on stdout."""
 
 import json
+from pathlib import Path
 
 import click
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from tactbench.core.cli import cli
 from tests.conftest import Shell, Verbs
 
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "rigs" / "emulated.yaml"
 CELL = "ideal/force/twin/karl2016/ols/1"
 VERBS = {
     "run": ("--sensor", "ideal", "--task", "force", "--estimator", "ols", "--protocol", "karl2016", "--repeats", "1"),
@@ -17,6 +19,7 @@ VERBS = {
     "choose": ("--task", "force"),
     "inspect": ("ideal.h5",),
     "doctor": (),
+    "rig check": (str(EXAMPLE),),
     "leaderboard": (),
     "report": (),
     "compare": ("ols", "mean"),
