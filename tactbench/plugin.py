@@ -53,7 +53,7 @@ from tactbench.core.spec.rig import (
     SensorDescriptor,
     TaskDescriptor,
 )
-from tactbench.core.spec.rig_file import DeviceEntry, EmulationSettings, ForceEntry, NamedDevice, RigFile
+from tactbench.core.spec.rig_file import FORCE, DeviceEntry, EmulationSettings, ForceEntry, NamedDevice, RigFile
 from tactbench.core.spec.scene import (
     Environment,
     ForceRamp,
@@ -83,9 +83,11 @@ from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, P
 if TYPE_CHECKING:
     from tactbench.core.plugins.rig_devices import (
         PressingForce,
+        ask_operator,
         drivers_of,
         emulation_of,
         emulators_of,
+        physics_of,
         with_sensor,
     )
     from tactbench.core.recording.reader import Recording, open_recording
@@ -119,6 +121,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "API_VERSION",
+    "FORCE",
     "Acquisition",
     "Block",
     "BondedLayer",
@@ -246,6 +249,7 @@ __all__ = [
     "Unwrap",
     "UsageError",
     "Verdict",
+    "ask_operator",
     "assumed",
     "derived",
     "drivers_of",
@@ -259,6 +263,7 @@ __all__ = [
     "measured",
     "open_link",
     "open_recording",
+    "physics_of",
     "sourced",
     "with_sensor",
 ]
@@ -305,7 +310,9 @@ _ON_DEMAND = {
     "UdpLink": "tactbench.links.datagram_link",
     "Unwrap": "tactbench.devices.sequence",
     "drivers_of": "tactbench.core.plugins.rig_devices",
+    "ask_operator": "tactbench.core.plugins.rig_devices",
     "emulation_of": "tactbench.core.plugins.rig_devices",
+    "physics_of": "tactbench.core.plugins.rig_devices",
     "emulators_of": "tactbench.core.plugins.rig_devices",
     "encode_frame": "tactbench.links.bridge_frame",
     "fault_concerns": "tactbench.devices.fault",

@@ -228,14 +228,14 @@ def with_faults(entries: Mapping[str, DeviceEntry], faults: Sequence[str]) -> di
 def _named(registry: Registry, names: Sequence[str]) -> dict[str, DeviceEntry]:
     """Return an entry for every sensor and device named, by the names that they have in a rig file."""
     from tactbench.core.errors import UnknownNameError, UsageError
-    from tactbench.core.spec.rig_file import EMULATED, DeviceEntry, ForceEntry, NamedDevice
+    from tactbench.core.spec.rig_file import EMULATED, FORCE, DeviceEntry, ForceEntry, NamedDevice
 
     entries: dict[str, DeviceEntry] = {}
     for name in names:
         if name in registry.sensors:
             part, entry = name, DeviceEntry(link=EMULATED)
         elif name in registry.devices and registry.devices[name].kind == "force":
-            part, entry = "force", ForceEntry(link=EMULATED, device=name)
+            part, entry = FORCE, ForceEntry(link=EMULATED, device=name)
         elif name in registry.devices:
             part, entry = registry.devices[name].kind, NamedDevice(link=EMULATED, device=name)
         else:
@@ -257,6 +257,7 @@ def _say_where(
     import yaml
 
     from tactbench.core.leaderboard.text import command_line
+    from tactbench.core.spec.rig_file import FORCE
 
     found: dict[str, Any] = {
         name: entry.model_copy(update={"link": emulated.addresses[name], "faults": (), "emulator": True})
@@ -278,8 +279,8 @@ def _say_where(
         fields = entry.model_dump(mode="json", exclude_defaults=True)
         plain[name] = {key: fields[key] for key in ("device", *fields) if key in fields}
     text["sensors"] = {name: plain.pop(name) for name in sensors}
-    if "force" in plain:
-        text["force"] = plain.pop("force")
+    if FORCE in plain:
+        text[FORCE] = plain.pop(FORCE)
     if plain:
         text["devices"] = plain
     if file is not None and file.settings:

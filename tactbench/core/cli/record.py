@@ -60,7 +60,6 @@ def command(
     from contextlib import ExitStack, nullcontext
 
     from tactbench.core.acquisition import acquire
-    from tactbench.core.cli.live import LiveView
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import TactbenchError, UsageError
@@ -86,6 +85,8 @@ def command(
             watch: Callable[[Block], None] | None = None
             paused: Callable[[], AbstractContextManager[None]] = nullcontext
             if live:
+                from tactbench.core.cli.live import LiveView
+
                 mark = (
                     " (SIM)" if registry.rigs[rig].simulated else " (EMULATED)" if devices and devices.emulated else ""
                 )

@@ -8,11 +8,12 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.errors import PluginContractError, TactbenchError, UsageError
+from tactbench.core.errors import PluginContractError, RigError, TactbenchError, UsageError
+from tactbench.core.plugins.interfaces import Operator, Rig, RigContext
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.spec.recording import Emulation, Scalar
-from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
-from tactbench.core.spec.rig_file import DeviceEntry, ForceEntry, NamedDevice, RigFile
+from tactbench.core.spec.rig import DeviceDescriptor, EffectDescriptor, SensorDescriptor
+from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from tactbench.devices.emulator import Senses
     from tactbench.links.link import Clock, Link
 
-FORCE = "force"
-"""Name of the force sensor's entry among the devices of a rig file."""
 _PRESSED = "normal"
 """What the channel along which the sensor is pressed is called where it is not plain `fz`; tasks look for either."""
 
@@ -76,6 +75,11 @@ class PressingForce:
             hint="Correct `channel:` under `force:` in the rig file.",
         )
 
+    def about(self, zero: Mapping[str, FloatArray]) -> dict[str, Scalar]:
+        """Return what of the mounting and of the `zero` taken off, by stream, is worth recording."""
+        zeros = {f"zero of {name}": ", ".join(f"{value:.6g}" for value in values) for name, values in zero.items()}
+        return {**zeros, **self.mounting}
+
     def turned(self, block: Block, zero: Mapping[str, FloatArray]) -> Block:
         """Return a block with forces from the unloaded sensor's `zero`, by stream, and positive when pressing."""
         if block.stream not in zero:
@@ -96,11 +100,59 @@ def with_sensor(file: RigFile, sensor: str) -> RigFile:
     return file.model_copy(update={"sensors": {sensor: file.sensors[sensor]}})
 
 
-def emulation_of(file: RigFile, names: tuple[str, ...]) -> Emulation | None:
-    """Return what a recording says of the emulated devices of these names; None: there are none."""
+def physics_of(file: RigFile, registry: Registry, effects: tuple[EffectDescriptor, ...]) -> Rig | None:
+    """Build the simulated rig that moves a rig's emulated devices; None: it has none.
+
+    Raises
+    ------
+    UsageError
+        If the file names a rig that is no simulation.
+    """
+    if not file.emulated:
+        return None
+    descriptor = registry.rigs[file.emulation.physics]
+    if not descriptor.simulated:
+        raise UsageError(
+            f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."
+        )
+    rig: Rig = load_object(descriptor.where)(RigContext(effects=effects))
+    return rig
+
+
+def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str) -> None:
+    """Let somebody do at the rig what `text` says, in a word `doing`; emulated devices need nobody.
+
+    Raises
+    ------
+    RigError
+        If nobody is there.
+    """
+    if all(entry.emulated for entry in file.entries().values()):
+        return
+    if operator is None:
+        raise RigError(
+            f"Somebody has to {doing}: {text}",
+            hint="Start it at a terminal, or use a rig file with emulated devices.",
+        )
+    operator.asked(text)
+
+
+def emulation_of(file: RigFile, identity: Mapping[str, Mapping[str, str]]) -> Emulation | None:
+    """Return what a recording says of a rig's emulated devices; None: there are none.
+
+    Parameters
+    ----------
+    identity
+        By device: what it says of itself. An emulator says that it is one where a rig file forgets to.
+    """
+    entries = file.entries()
+    names = tuple(
+        name
+        for name, entry in entries.items()
+        if entry.emulated or entry.emulator or any("emulat" in text.lower() for text in identity.get(name, {}).values())
+    )
     if not names:
         return None
-    entries = file.entries()
     if not file.emulated:  # they were there before, and run by the clock
         return Emulation(time="real", devices=names)
     return Emulation(

@@ -10,6 +10,8 @@ from tactbench.core.errors import UsageError
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.recording import Scalar
 
+FORCE = "force"
+"""Name of the force sensor's entry among the devices."""
 EMULATED = "emulated"
 """Stands for a link's address where the device's emulator is to be started."""
 
@@ -114,5 +116,5 @@ class RigFile(Frozen):
         """Return every device by its name in messages: the sensor's name, ``force``, or its part in the rig."""
         found: dict[str, DeviceEntry] = dict(self.sensors)
         if self.force is not None:
-            found["force"] = self.force
+            found[FORCE] = self.force
         return found | self.devices

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactbench.plugin import (
+    FORCE,
     Acquisition,
     Block,
     Driver,
@@ -27,7 +28,6 @@ from tactbench.plugin import (
     Reading,
     Rig,
     RigContext,
-    RigError,
     RigFile,
     Scalar,
     Scene,
@@ -37,11 +37,12 @@ from tactbench.plugin import (
     StreamCounts,
     StreamSpec,
     UsageError,
+    ask_operator,
     drivers_of,
     emulation_of,
     emulators_of,
-    load_object,
     load_registry,
+    physics_of,
     with_sensor,
 )
 
@@ -49,9 +50,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from tactbench.plugin import Clock, FloatArray
-
-FORCE = "force"
-"""Name of the force sensor's entry among the drivers."""
 
 
 @dataclass
@@ -110,6 +108,7 @@ class Bench:
     """
 
     def __init__(self, file: RigFile, operator: Operator | None, physics: Rig | None) -> None:
+        self._registry = load_registry()
         self._file = file
         self._operator = operator
         self._physics = physics
@@ -133,24 +132,14 @@ class Bench:
             profile = scene.profile
             duration_s = profile.duration.to("s")
             senses = None if simulated is None else SceneSamples(simulated, duration_s, rest_s=profile.hold_s)
-            emulators = {} if senses is None else emulators_of(file, load_registry(), sensor.name, senses)
+            emulators = {} if senses is None else emulators_of(file, self._registry, sensor.name, senses)
             emulated = stack.enter_context(EmulatedDevices(emulators, time=file.emulation.time)) if emulators else None
             clock = time.monotonic_ns if emulated is None else emulated.clock
             links = {} if emulated is None else {name: partial(emulated.open_link, name) for name in emulators}
-            drivers = drivers_of(file, load_registry(), sensor.name, links, clock)
+            drivers = drivers_of(file, self._registry, sensor.name, links, clock)
             for driver in drivers.values():
                 stack.callback(driver.close)
-            about = {
-                f"{name} {key}": value for name, driver in drivers.items() for key, value in driver.identify().items()
-            }
-            # An emulator says that it is one; a rig file may forget to.
-            emulated_names = tuple(
-                name
-                for name, entry in file.entries().items()
-                if entry.emulated
-                or entry.emulator
-                or any("emulat" in text.lower() for key, text in about.items() if key.startswith(f"{name} "))
-            )
+            identity = {name: driver.identify() for name, driver in drivers.items()}
             self._prompt(file, sensor, scene)
             advance = emulated.advance if emulated is not None and file.emulation.time == "virtual" else None
             zero = _zero_of(drivers[FORCE], file.force.zero_s, clock) if file.force is not None else {}
@@ -166,12 +155,11 @@ class Bench:
                 assumptions=simulated.assumptions if simulated is not None else {},
                 drawn={
                     **(simulated.drawn if simulated is not None else {}),
-                    **about,
-                    **{f"zero of {stream}": ", ".join(f"{value:.6g}" for value in zero[stream]) for stream in zero},
-                    **({} if force is None else force.mounting),
+                    **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
+                    **({} if force is None else force.about(zero)),
                 },
                 clocks={},
-                emulation=emulation_of(file, emulated_names),
+                emulation=emulation_of(file, identity),
                 reading=reading,
                 duration_s=duration_s,
                 force=force,
@@ -190,19 +178,12 @@ class Bench:
             yield acquisition
 
     def _prompt(self, file: RigFile, sensor: SensorDescriptor, scene: Scene) -> None:
-        if all(entry.emulated for entry in file.entries().values()):
-            return
         profile = scene.profile
         text = (
             f"{scene.name}: {sensor.spec.title}, {scene.indenter}. Touch nothing for {profile.hold_s:.0f} s, then "
             f"press slowly to {profile.largest_n:g} N and back, within {profile.duration.to('s'):.0f} s in all."
         )
-        if self._operator is None:
-            raise RigError(
-                f"Somebody has to press: {text}",
-                hint="Start it at a terminal, or use a rig file with emulated devices.",
-            )
-        self._operator.asked(text)
+        ask_operator(file, self._operator, "press", text)
 
 
 def _zero_of(driver: Driver, seconds: float, clock: Clock) -> dict[str, FloatArray]:
@@ -233,12 +214,5 @@ def build(context: RigContext) -> Bench:
             hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft --write-rig-file FILE` makes "
             "one.",
         )
-    physics: Rig | None = None
-    if context.rig_file.emulated:
-        descriptor = load_registry().rigs[context.rig_file.emulation.physics]
-        if not descriptor.simulated:
-            raise UsageError(
-                f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."
-            )
-        physics = load_object(descriptor.where)(RigContext(effects=context.effects))
+    physics = physics_of(context.rig_file, load_registry(), context.effects)
     return Bench(context.rig_file, context.operator, physics)

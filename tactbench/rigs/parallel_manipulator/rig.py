@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactbench.plugin import (
+    FORCE,
     Acquisition,
     Block,
     Driver,
@@ -43,11 +44,12 @@ from tactbench.plugin import (
     StreamCounts,
     StreamSpec,
     UsageError,
+    ask_operator,
     drivers_of,
     emulation_of,
     emulators_of,
-    load_object,
     load_registry,
+    physics_of,
     with_sensor,
 )
 from tactbench.rigs.parallel_manipulator.control import Control, WatchedDriver
@@ -68,8 +70,6 @@ from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, settings
 if TYPE_CHECKING:
     from tactbench.plugin import Clock, EmulatedDevice, FloatArray
 
-FORCE = "force"
-"""Name of the force sensor's entry."""
 FORCE_AGE_S = 0.010
 """Added to three sampling periods of the force sensor: how old a sample may be."""
 MOST_EVENTS = 40
@@ -194,6 +194,7 @@ class ParallelManipulator:
 
     def __init__(self, file: RigFile, operator: Operator | None, physics: Rig | None) -> None:
         self.settings = settings_of(file)
+        self._registry = load_registry()
         self._file = with_limits(file, self.settings)
         self._operator, self._physics = operator, physics
 
@@ -223,7 +224,7 @@ class ParallelManipulator:
             links = {} if emulated is None else {name: partial(emulated.open_link, name) for name in emulators}
 
             def opened(*names: str) -> list[Driver]:
-                drivers = drivers_of(file, load_registry(), sensor.name, links, clock, names)
+                drivers = drivers_of(file, self._registry, sensor.name, links, clock, names)
                 for driver in drivers.values():
                     stack.callback(driver.close)
                 return [drivers[name] for name in names]
@@ -272,14 +273,13 @@ class ParallelManipulator:
                 about={
                     **({} if simulated is None else simulated.drawn),
                     **{f"{name} {key}": value for name, about in identity.items() for key, value in about.items()},
-                    **{f"zero of {stream}": ", ".join(f"{v:.6g}" for v in values) for stream, values in zero.items()},
-                    **force.mounting,
+                    **force.about(zero),
                     **place,
                     **({} if joints is None else {"platform mm": _millimetres(joints.measured_m())}),
                     **({} if senses is None else {"skin mm": 1e3 * senses[1].skin_m}),
                 },
                 clocks={},
-                emulation=emulation_of(file, tuple(emulators)) if emulators else None,
+                emulation=emulation_of(file, identity),
                 force=force,
                 zero=zero,
                 control=control,
@@ -335,7 +335,7 @@ class ParallelManipulator:
         return simulated, press
 
     def _emulators(self, file: RigFile, sensor: SensorDescriptor, senses: EmulatedPress) -> dict[str, EmulatedDevice]:
-        found = emulators_of(file, load_registry(), sensor.name, senses)
+        found = emulators_of(file, self._registry, sensor.name, senses)
         if MOTOR in found:
             emulator = found[MOTOR].emulator
             if not isinstance(emulator, MotorEmulator):
@@ -370,7 +370,7 @@ class ParallelManipulator:
         """Return what the guard's process is told of a device."""
         entry = file.entries()[name]
         assert isinstance(entry, ForceEntry | NamedDevice)
-        descriptor = load_registry().devices[entry.device]
+        descriptor = self._registry.devices[entry.device]
         options = {**(descriptor.emulated_options if entry.emulated else {}), **entry.options}
         return DeviceSettings(driver=descriptor.driver, link=addresses.get(name, entry.link), options=options)
 
@@ -425,19 +425,12 @@ class ParallelManipulator:
         return joints
 
     def _prompt(self, file: RigFile, sensor: SensorDescriptor, scene: Scene) -> None:
-        if all(entry.emulated for entry in file.entries().values()):
-            return
         profile = scene.profile
         text = (
             f"{scene.name}: {sensor.spec.title}. Mount the {scene.indenter}, take your hands out, and say so. Then it "
             f"is pressed to {profile.largest_n:g} N within {profile.duration.to('s'):.0f} s; Ctrl-C retreats."
         )
-        if self._operator is None:
-            raise RigError(
-                f"Somebody has to mount a cap: {text}",
-                hint="Start it at a terminal, or use a rig file with emulated devices.",
-            )
-        self._operator.asked(text)
+        ask_operator(file, self._operator, "mount a cap", text)
 
     def _course(self, scene: Scene) -> Course:
         profile = scene.profile
@@ -505,12 +498,5 @@ def build(context: RigContext) -> ParallelManipulator:
             hint="Name a rig file with --rig-file FILE; `tactbench rig check FILE` says what it would do.",
         )
     refuse(context.rig_file)
-    physics: Rig | None = None
-    if context.rig_file.emulated:
-        descriptor = load_registry().rigs[context.rig_file.emulation.physics]
-        if not descriptor.simulated:
-            raise UsageError(
-                f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."
-            )
-        physics = load_object(descriptor.where)(RigContext(effects=context.effects))
+    physics = physics_of(context.rig_file, load_registry(), context.effects)
     return ParallelManipulator(context.rig_file, context.operator, physics)

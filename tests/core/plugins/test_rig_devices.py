@@ -10,7 +10,15 @@ import pytest
 
 from tactbench.core.errors import LinkError, TactbenchError, UnknownNameError, UsageError
 from tactbench.core.plugins.registry import load_registry
-from tactbench.plugin import DatagramLink, EmulatedDevices, RigFile, drivers_of, emulators_of
+from tactbench.plugin import (
+    DatagramLink,
+    DeviceEntry,
+    EmulatedDevices,
+    RigFile,
+    drivers_of,
+    emulation_of,
+    emulators_of,
+)
 from tests.core.plugins import talking
 
 REGISTRY = load_registry([EntryPoint("talking", talking.HERE, "tactbench")])
@@ -165,3 +173,16 @@ def test_what_was_opened_is_closed_when_a_later_device_fails():
             drivers_of(file, REGISTRY, "pad", {"pad": opens, "force": fails}, devices.clock)
         with devices.open_link("pad"):  # it can be opened only if it was closed
             assert len(opened) == 1
+
+
+@pytest.mark.parametrize(
+    ("entry", "said", "marked"),
+    [({}, {}, False), ({"emulator": True}, {}, True), ({}, {"adapter": "tactbench EMULATOR"}, True),
+     ({}, {"serial": "7"}, False)],
+)  # fmt: skip
+def test_emulators_that_run_elsewhere_are_marked_by_the_file_or_by_what_they_say(entry, said, marked):
+    file = RigFile(rig="bench", sensors={"pad": DeviceEntry(link="udp://127.0.0.1:9", **entry)})
+    emulation = emulation_of(file, {"pad": said})
+    assert (emulation is not None) == marked
+    if emulation is not None:
+        assert (emulation.time, emulation.devices, emulation.physics) == ("real", ("pad",), "")
