@@ -232,8 +232,8 @@ def _watched(world: Any, since_s: float, most_s: float) -> tuple[float, float, b
 
 
 def _ended(log: Path) -> None:
-    """Wait until the guard has written that it leaves, a second at most."""
-    for _ in range(100):
+    """Wait until the guard has written that it leaves: at once on an idle machine, 10 s at most on a busy one."""
+    for _ in range(1000):
         if '"left"' in log.read_text(encoding="utf-8"):
             return
         time.sleep(0.01)

@@ -1,6 +1,7 @@
 """Rig and guard that are killed or hang, and what stands in their logs; the line of a motor with nobody at it."""
 
 import json
+import re
 import signal
 
 import numpy as np
@@ -55,7 +56,9 @@ def test_who_is_left_lets_the_motor_retreat(name, baud):
     assert triggers == expected
     if name in ("kill guard", "stop guard"):
         (lost,) = [line["lost"] for line in result.said if "lost" in line]
-        assert "the motor has retreated to -0.005 m" in lost
+        where = re.search(r"the motor has retreated to (\S+) m\.", lost)
+        # The drive's corridor, or two increments: within it a retreat has arrived.
+        assert float(where[1]) == pytest.approx(FAULTS.RETREAT_M, abs=1.01 * FAULTS.STATED["corridor_m"])
     else:
         assert "left" in result.log[-1]
 
