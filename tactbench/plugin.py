@@ -106,7 +106,7 @@ if TYPE_CHECKING:
     from tactbench.devices.fault import Fault, fault_concerns
     from tactbench.devices.log import DeviceLog, LogReader
     from tactbench.devices.reading import Reading
-    from tactbench.devices.sequence import Unwrap
+    from tactbench.devices.sequence import SequenceCheck, Unwrap
     from tactbench.links.address import LinkAddress, open_link
     from tactbench.links.bridge_emulator import BridgeEmulator
     from tactbench.links.bridge_frame import Frame, FrameDecoder, encode_frame
@@ -217,6 +217,7 @@ __all__ = [
     "SensorDescriptor",
     "SensorSpec",
     "Sent",
+    "SequenceCheck",
     "SerialLink",
     "SheetTable",
     "Shelf",
@@ -300,6 +301,7 @@ _ON_DEMAND = {
     "SceneSamples": "tactbench.devices.emulation.scene_samples",
     "Senses": "tactbench.devices.emulator",
     "Sent": "tactbench.devices.emulator",
+    "SequenceCheck": "tactbench.devices.sequence",
     "SerialLink": "tactbench.links.byte_link",
     "SpiBridge": "tactbench.links.spi_bridge",
     "SpiDeviceEmulator": "tactbench.devices.emulator",

@@ -4,10 +4,10 @@ It looks at force and motor every millisecond. What makes it retreat, and what i
 docs/hardware.md, Safety. What it promises, of a motor that does as its driver assumes:
 
 - *Steps.* One increment is out at a time, and the next is sent only if a force sample that was taken after the end of
-  the one before is below the ceiling. So the force never exceeds F_c + k (step_m + corridor_m) and the noise of one
-  sample, whatever the line's rate and whoever hangs (derived; k the largest stiffness at the ceiling F_c, step_m
-  rounded to increments of the drive, corridor_m how near to its target the drive calls a move ended). A line that falls
-  silent lets the motor end one increment.
+  the one before is below the ceiling, and is another one in number and value than the sample before it. So the force
+  never exceeds F_c + k (step_m + corridor_m) and the noise of one sample, whatever the line's rate and whoever hangs
+  (derived; k the largest stiffness at the ceiling F_c, step_m rounded to increments of the drive, corridor_m how near
+  to its target the drive calls a move ended). A line that falls silent lets the motor end one increment.
 - *Moves at a speed v* (approach): F_max = F_c + k v t_r + k v^2/(2 acc) of :mod:`worst_case`, with t_r of
   :func:`reaction`: age of the force, one look of the guard and its scheduling, the bytes ahead of the retreat and the
   retreat itself on the line, the motor's lag.
@@ -34,6 +34,7 @@ from tactbench.plugin import (
     LinkTimeout,
     LinkUnplugged,
     RigError,
+    SequenceCheck,
     StreamSpec,
     TactbenchError,
 )
@@ -156,6 +157,7 @@ class LocalGuard:
         self._motor, self._force, self._clock, self._advance = motor, force, clock, advance
         self._on_event, self._interrupted = on_event, interrupted
         self._watch: ForceWatch | None = None
+        self._order = SequenceCheck()
         self._limits: Limits | None = None
         self._force_blocks: list[Block] = []
         self._motor_blocks: list[Block] = []
@@ -256,7 +258,7 @@ class LocalGuard:
             self.look(min(LOOK_S, 1e-9 * left_ns))
 
     def force_blocks(self) -> list[Block]:
-        """Return all force samples since the last call."""
+        """Return all force samples since the last call, but for those that came twice or after newer ones."""
         found, self._force_blocks = self._force_blocks, []
         return found
 
@@ -271,8 +273,14 @@ class LocalGuard:
         return found
 
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return the drivers' counts, and the guard's ``beats``, ``early``, ``refused``, ``retreats_sent``."""
-        return {"force": dict(self._force.counts), "motor": dict(self._motor.counts), "guard": dict(self._counts)}
+        """Return the drivers' counts, and the guard's ``beats``, ``early``, ``refused``, ``retreats_sent``.
+
+        To those of the force sensor the guard adds ``duplicates`` and ``late`` samples, kept out, and ``gaps``, missing.
+        """
+        order = self._order
+        kept_out = {"duplicates": order.duplicates, "late": order.late, "gaps": order.gaps}
+        force = {**self._force.counts, **{name: count for name, count in kept_out.items() if count}}
+        return {"force": force, "motor": dict(self._motor.counts), "guard": dict(self._counts)}
 
     def disarm(self) -> Report:
         """Retreat if the motor is not at its place, and expect no more beats; a fault is cleared."""
@@ -361,8 +369,11 @@ class LocalGuard:
             self._force_gone = True
             return Trigger.FORCE_LOST, error.message
         for block in blocks:
-            self._force_blocks.append(block)
-            problem = problem or watch.take(block, limits)
+            newer = self._order(block)
+            if newer is not None:
+                self._force_blocks.append(newer)
+            found = watch.take(block, newer, limits)
+            problem = problem or found
         return problem or (None if limits is None else watch.old(self._clock(), limits))
 
     def _take_motor(self, timeout_s: float, limits: Limits | None) -> Problem | None:
@@ -431,7 +442,7 @@ class LocalGuard:
                 return _Verdict(False, reason)
         if self._motor.moving:
             return _Verdict(False, "the motor is moving", early=True)
-        if beat.force_sequence <= self._end_sequence:
+        if min(beat.force_sequence, watch.changed) <= self._end_sequence:
             return _Verdict(False, "no force sample is known from after the last move", early=True)
         try:
             if is_step:
