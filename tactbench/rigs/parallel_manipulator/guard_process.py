@@ -355,7 +355,7 @@ class _Server:
         self._log: IO[str] | None = None
         self._parent: int | None = None
         self._alone = self._over = False
-        self._told_alone = False
+        self._told_alone = self._arming = False
         self._dropped_rows = self._dropped_reports = 0
         self.terminated = False
 
@@ -388,16 +388,21 @@ class _Server:
             self._log.close()
 
     def rescue(self) -> None:
-        """After an error of the guard itself: write it down, and retreat without it if it was armed."""
+        """After an error of the guard itself: write it down; the motor retreats if it was armed, stands if it was homed."""
         self._write({"internal_error": traceback.format_exc()})
         guard = self._guard
-        if guard is None or guard.state not in (GuardState.ARMED, GuardState.RETREATING) or self._opener is None:
+        armed = guard is not None and guard.state in (GuardState.ARMED, GuardState.RETREATING)
+        if guard is None or self._opener is None or not (armed or self._arming):
             return
         assert self._options is not None
         guard.abandon()
         with suppress(TactbenchError):
-            position_m = retreat_blind(self._opener, self._options, self._clock, 10.0)
-            self._write({"retreated_to_m": position_m})
+            if armed and not self._arming:
+                position_m = retreat_blind(self._opener, self._options, self._clock, 10.0)
+                self._write({"retreated_to_m": position_m})
+            else:
+                stand_blind(self._opener, self._options, self._clock)
+                self._write({"stands": self._clock()})
 
     def _left(self) -> bool:
         """Return whether the process is to end."""
@@ -456,7 +461,10 @@ class _Server:
             elif kind == "beat":
                 self._answer_report(guard.beat(Beat(**body)))
             elif kind == "arm":
-                self._answer_report(guard.arm(Limits(**body)))
+                self._arming = True
+                report = guard.arm(Limits(**body))
+                self._arming = False
+                self._answer_report(report)
             elif kind == "disarm":
                 self._answer_report(guard.disarm())
             elif kind == "counts":
@@ -464,6 +472,7 @@ class _Server:
                 counts["guard"] |= {"rows_dropped": self._dropped_rows, "reports_dropped": self._dropped_reports}
                 self._answer("counts", counts)
         except TactbenchError as error:
+            self._arming = False
             self._answer("error", {"kind": type(error).__name__, "message": error.message, "hint": error.hint})
 
     def _start(self, body: dict[str, Any]) -> None:

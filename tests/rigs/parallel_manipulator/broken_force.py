@@ -1,4 +1,4 @@
-"""A driver of somebody else's, whose forces are no numbers once the sensor is pressed by a newton."""
+"""Drivers of somebody else's that go wrong once the sensor is pressed."""
 
 from dataclasses import replace
 
@@ -7,8 +7,8 @@ import numpy as np
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
 
 
-class BrokenDriver(NetFtDriver):
-    """Gives NaN in one channel that is not the pressing one."""
+class NanDriver(NetFtDriver):
+    """Above 1 N gives NaN in a channel that is not the pressing one."""
 
     def read(self, timeout_s):
         return [replace(block, data=broken(block.data)) for block in super().read(timeout_s)]
@@ -18,5 +18,19 @@ def broken(data):
     return np.where((data[:, 2:3] > 1.0) & (np.arange(data.shape[1]) == 0), np.nan, data)
 
 
+class RaisingDriver(NetFtDriver):
+    """Above 0.1 N raises what no driver should."""
+
+    def read(self, timeout_s):
+        blocks = super().read(timeout_s)
+        if any((block.data[:, 2] > 0.1).any() for block in blocks):
+            raise ZeroDivisionError("a driver's own error")
+        return blocks
+
+
 def build(settings):
-    return BrokenDriver(settings)
+    return NanDriver(settings)
+
+
+def build_raising(settings):
+    return RaisingDriver(settings)

@@ -77,7 +77,9 @@ class Rig:
 
 
 @contextmanager
-def rig(kind, tmp_path, setting=None, address=None, force_driver=f"{PACKAGE}.force_torque.net_ft.driver:build", **faults):
+def rig(
+    kind, tmp_path, setting=None, address=None, force_driver=f"{PACKAGE}.force_torque.net_ft.driver:build", **faults
+):
     """Yield a rig whose guard is started; `setting` of a guard in a process is made patient."""
     setting = setting or FAULTS.Setting()
     if kind == "process":
