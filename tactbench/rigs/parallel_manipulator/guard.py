@@ -275,7 +275,7 @@ class LocalGuard:
     def counts(self) -> Mapping[str, Mapping[str, int]]:
         """Return the drivers' counts, and the guard's ``beats``, ``early``, ``refused``, ``retreats_sent``.
 
-        To those of the force sensor the guard adds ``duplicates`` and ``late`` samples, kept out, and ``gaps``, missing.
+        To the force sensor's the guard adds ``duplicates`` and ``late`` samples, kept out, and ``gaps``, missing.
         """
         order = self._order
         kept_out = {"duplicates": order.duplicates, "late": order.late, "gaps": order.gaps}

@@ -291,7 +291,7 @@ class Guard(Protocol):
         """Let time pass until the rig's clock says so much; the rig's only wait while the guard is armed."""
 
     def force_blocks(self) -> list[Block]:
-        """Return all force samples since the last call: raw, unfiltered, the zero not subtracted, each once, in order."""
+        """Return all force samples since the last call: raw, unfiltered, zero not subtracted, each once, in order."""
 
     def motor_blocks(self) -> list[Block]:
         """Return all samples of the motor since the last call."""

@@ -388,7 +388,7 @@ class _Server:
             self._log.close()
 
     def rescue(self) -> None:
-        """After an error of the guard itself: write it down; the motor retreats if it was armed, stands if it was homed."""
+        """After an error within the guard: write it down; an armed motor retreats, one that is being homed stands."""
         self._write({"internal_error": traceback.format_exc()})
         guard = self._guard
         armed = guard is not None and guard.state in (GuardState.ARMED, GuardState.RETREATING)

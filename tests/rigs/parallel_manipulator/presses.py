@@ -22,6 +22,7 @@ def load(name):
 
 FAULTS = load("guard_faults")
 PACKAGE = "tactbench.rigs.parallel_manipulator"
+NET_FT = f"{PACKAGE}.force_torque.net_ft.driver:build"
 # In real time, emulators and rig share a process and perhaps a busy machine: a force may be old, a beat late, and an
 # answer of the motor, too, whose driver is told of a slow line.
 PATIENT = {"time": "real", "force_age_s": 1.0, "heartbeat_s": 1.0, "period_s": 0.05, "wanted_n": 2.0}
@@ -77,9 +78,7 @@ class Rig:
 
 
 @contextmanager
-def rig(
-    kind, tmp_path, setting=None, address=None, force_driver=f"{PACKAGE}.force_torque.net_ft.driver:build", **faults
-):
+def rig(kind, tmp_path, setting=None, address=None, force_driver=NET_FT, **faults):
     """Yield a rig whose guard is started; `setting` of a guard in a process is made patient."""
     setting = setting or FAULTS.Setting()
     if kind == "process":
