@@ -28,7 +28,7 @@ class DeviceEmulator(Protocol):
         """Return what has left the device by `now_s` and was not yet returned, in order, each with its time."""
 
     def next_s(self) -> float:
-        """Return when `poll` has something to do next; infinite: not before something comes."""
+        """Return when `poll` has something to do next; infinite: not before something comes. Only calls change it."""
 
 
 class SpiDeviceEmulator(Protocol):
