@@ -13,10 +13,10 @@ from functools import cached_property
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.lines import Line, Shown, shown_of
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
 from tactbench.core.leaderboard.placing import Placing, errors, places
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.verdict import verdict_of
 
@@ -46,7 +46,7 @@ class Block:
         return tuple(map(self.shown.line, self.places))
 
 
-def blocks_of(sheet: Sheet, letters: Mapping[str, str], times: bool) -> tuple[Shown, tuple[Block, ...]]:
+def blocks_of(sheet: ColumnTable, letters: Mapping[str, str], times: bool) -> tuple[Shown, tuple[Block, ...]]:
     """Arrange rows into blocks, ranked.
 
     Parameters
@@ -80,7 +80,9 @@ def blocks_of(sheet: Sheet, letters: Mapping[str, str], times: bool) -> tuple[Sh
     return shown, tuple(blocks)
 
 
-def _verdict(sheet: Sheet, members: Sequence[int], placings: Sequence[Placing | None], times: bool) -> tuple[str, ...]:
+def _verdict(
+    sheet: ColumnTable, members: Sequence[int], placings: Sequence[Placing | None], times: bool
+) -> tuple[str, ...]:
     ranked = [(sheet.rows[place], placing) for place in members if (placing := placings[place]) is not None]
     status, trivial = sheet["status"], sheet["is_baseline"]
     below = sum(status[place] == "done" and not trivial[place] and placings[place] is None for place in members)
@@ -94,7 +96,7 @@ def _order(key: _Key) -> tuple[Any, ...]:
     return task, split in ("shuffled", "in-session"), is_probe(protocol), key
 
 
-def _grouped(sheet: Sheet) -> dict[_Key, list[int]]:
+def _grouped(sheet: ColumnTable) -> dict[_Key, list[int]]:
     """Group the places of rows by what must not be mixed.
 
     A cell that was not begun knows neither its split, if nobody asked for one, nor whether it would have been
@@ -131,7 +133,7 @@ def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, s
 
 
 def _arranged(
-    sheet: Sheet, members: Sequence[int], placings: list[Placing | None]
+    sheet: ColumnTable, members: Sequence[int], placings: list[Placing | None]
 ) -> tuple[tuple[int, ...], str]:  # fmt: skip
     """Put members of a block in order, and note where its results stand; return why they have no intervals, if so."""
     status, trivial, scores, sensors = (sheet[key] for key in ("status", "is_baseline", "score", "sensor"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.text import cut, visible
 
 Row = Mapping[str, Any]
@@ -16,7 +16,7 @@ LONGEST = 1000
 _WITHOUT = "Times, memory and hosts are left out: a seed decides all that stands here."
 
 
-def foot_of(sheet: Sheet, provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
+def foot_of(sheet: ColumnTable, provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
     """Return the sentences below a table.
 
     Parameters

@@ -7,19 +7,19 @@ from itertools import compress
 from string import ascii_uppercase
 from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
 
 
-def host_letters(sheet: Sheet) -> dict[str, str]:
+def host_letters(sheet: ColumnTable) -> dict[str, str]:
     """Return a letter for each host that timed one of the rows, in order of their ids; none if there is but one."""
     hosts = sorted({host for host, _ in _clocks(sheet)})
     return {host: _letter(place) for place, host in enumerate(hosts)} if len(hosts) > 1 else {}
 
 
-def timing_marks(sheet: Sheet, letters: Mapping[str, str]) -> list[str]:
+def timing_marks(sheet: ColumnTable, letters: Mapping[str, str]) -> list[str]:
     """Return what stands behind every time of each row: ``[A]`` for the host, ``‖4`` for four cells at once.
 
     Returns
@@ -30,16 +30,14 @@ def timing_marks(sheet: Sheet, letters: Mapping[str, str]) -> list[str]:
     if not letters and set(sheet.known("concurrency")) <= {None, 0, 1}:
         return []
 
-    def mark(row: Row) -> str:
-        letter = letters.get(_host(row.get("host")))
-        at_once = _at_once(row.get("concurrency"))
-        return (f" [{letter}]" if letter else "") + (f" ‖{at_once}" if at_once > 1 else "")
-
-    marks = sheet.told(mark, "host", "concurrency")
+    marks = []
+    for host, concurrency in zip(sheet.known("host"), sheet.known("concurrency"), strict=True):
+        letter, at_once = letters.get(_host(host)), _at_once(concurrency)
+        marks.append((f" [{letter}]" if letter else "") + (f" ‖{at_once}" if at_once > 1 else ""))
     return marks if any(marks) else []
 
 
-def timing_notes(sheet: Sheet, letters: Mapping[str, str], provenance: Iterable[Row]) -> list[str]:
+def timing_notes(sheet: ColumnTable, letters: Mapping[str, str], provenance: Iterable[Row]) -> list[str]:
     """Return what the marks of times mean.
 
     Parameters
@@ -62,7 +60,7 @@ def timing_notes(sheet: Sheet, letters: Mapping[str, str], provenance: Iterable[
     return notes
 
 
-def _clocks(sheet: Sheet) -> set[tuple[str, int]]:
+def _clocks(sheet: ColumnTable) -> set[tuple[str, int]]:
     """Return by which hosts rows were timed, and while how many cells ran at once."""
     keys = ("status", "fit_s", "sim_s", "predict_s", "latency_ms_p50", "latency_ms_p95")
     # One by one: of nearly every row the first is known.

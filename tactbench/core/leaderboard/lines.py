@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from operator import add
 from typing import Any, Literal
 
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.columns import TIMED_COLUMNS, columns
 from tactbench.core.leaderboard.hosts import timing_marks
 from tactbench.core.leaderboard.marks import score_marks
 from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, intervals, scores, tail, whole
 from tactbench.core.leaderboard.placing import Placing
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.spec.status import STOPPED
 
@@ -38,7 +38,7 @@ class Line:
 class Shown:
     """All rows of a table as text."""
 
-    sheet: Sheet = field(repr=False, compare=False)
+    sheet: ColumnTable = field(repr=False, compare=False)
     texts: Mapping[str, Sequence[str]]
     """One text a row, by the name of the column."""
     kinds: Sequence[Kind]
@@ -51,7 +51,7 @@ class Shown:
         return Line(cells, self.kinds[place], row["cell"], self.placings[place], row)
 
 
-def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool) -> Shown:
+def shown_of(sheet: ColumnTable, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool) -> Shown:
     """Return what stands in the lines of a table.
 
     Parameters
@@ -96,13 +96,13 @@ def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[
     return Shown(sheet, texts, list(map(_kind, status, sheet["is_baseline"])), placings)
 
 
-def _right(sheet: Sheet) -> list[str]:
+def _right(sheet: ColumnTable) -> list[str]:
     """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
     told = zip(sheet.known("recordings_right"), sheet.known("recordings_asked"), strict=True)
     return [ABSENT if right is None or of is None else f"{right:.3g} of {of:.3g}" for right, of in told]
 
 
-def row_intervals(sheet: Sheet, units: Sequence[str]) -> list[str]:
+def row_intervals(sheet: ColumnTable, units: Sequence[str]) -> list[str]:
     """Return intervals; where too few replicates carry one, the range of their scores, named so."""
     told = intervals(sheet["ci_low"], sheet["ci_high"], units)
     counts = sheet.known("n_replicates")

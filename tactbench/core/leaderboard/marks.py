@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from itertools import chain, compress
 from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet, marks_of
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.text import visible
 
 DAGGER = (
@@ -17,23 +17,23 @@ DAGGER = (
 )
 
 
-def score_marks(sheet: Sheet) -> list[str]:
+def score_marks(sheet: ColumnTable) -> list[str]:
     """Return what stands behind each score: † for test-set statistics, ‡ for what its row is stamped with."""
     given = zip(sheet["dagger"], sheet["stamps"], strict=True)
     return [(" †" if dagger else "") + (" ‡" if stamps else "") for dagger, stamps in given]
 
 
-def mark_notes(sheet: Sheet) -> list[str]:
+def mark_notes(sheet: ColumnTable) -> list[str]:
     """Return what the marks behind scores mean: ‡ and †, each once."""
     dagger = [DAGGER] if any(sheet["dagger"]) else []
     stamps = dict.fromkeys(f"‡ {visible(str(stamp))}" for stamp in chain.from_iterable(filter(None, sheet["stamps"])))
     return [*stamps, *dagger]
 
 
-def simulation_notes(sheet: Sheet) -> list[str]:
+def simulation_notes(sheet: ColumnTable) -> list[str]:
     """Return what SIM and EMULATED mean, and what the simulations assumed."""
     assumed = list(compress(sheet["assumptions"], sheet["simulated"]))
-    told = dict.fromkeys(map(_assumptions, dict(zip(marks_of(assumed), assumed, strict=True)).values()))
+    told = dict.fromkeys(map(_assumptions, {id(one): one for one in assumed}.values()))
     emulated = sheet.known("emulated")
     marks = [
         text

@@ -10,11 +10,11 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.counts import told_counts
 from tactbench.core.leaderboard.marks import mark_notes, simulation_notes
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, question_name
 from tactbench.core.leaderboard.numbers import score, suffix
-from tactbench.core.leaderboard.sheet import Sheet, marks_of
 from tactbench.core.leaderboard.stopped import stopped_notes
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.spec.status import STATUSES, STOPPED
@@ -27,7 +27,7 @@ RANKS = (
 )
 
 
-def notes_of(sheet: Sheet, blocks: Sequence[Block]) -> list[str]:
+def notes_of(sheet: ColumnTable, blocks: Sequence[Block]) -> list[str]:
     """Return the notes on the lines of `blocks`, the most important first; those on times stand elsewhere.
 
     First what did not finish, what leaks and what a deployed sensor could not do, then what the scores must be read
@@ -71,7 +71,7 @@ def _rank_notes(blocks: Sequence[Block]) -> list[str]:
     return [note[0].upper() + note[1:] for note in notes]
 
 
-def _tare_notes(sheet: Sheet) -> list[str]:
+def _tare_notes(sheet: ColumnTable) -> list[str]:
     """Return one sentence on which recordings were tared, where some row's protocol is one that may."""
     asked = dict.fromkeys(zip(sheet["protocol"], sheet.known("tare_s"), sheet["status"], strict=True))
     held = sorted({f"{tare:g} s" for _, tare, _ in asked if tare})
@@ -86,7 +86,7 @@ def _tare_notes(sheet: Sheet) -> list[str]:
     return [f"{'; '.join(told)}."] if told else []
 
 
-def _floor_notes(sheet: Sheet) -> list[str]:
+def _floor_notes(sheet: ColumnTable) -> list[str]:
     """Return the floors of the references, once each, and what stands beyond them."""
     floors: dict[tuple[str, str], dict[float, None]] = {}
     known = zip(sheet.rows, sheet.known("reference_floor"), strict=True)
@@ -104,7 +104,7 @@ def _floor_notes(sheet: Sheet) -> list[str]:
     return told
 
 
-def _true_error_notes(sheet: Sheet) -> list[str]:
+def _true_error_notes(sheet: ColumnTable) -> list[str]:
     known = any(one is not None for one in sheet.known("true_score"))
     return ["True error (SIM): against the force that the twin exerted, free of the reference's noise."] * known
 
@@ -117,7 +117,7 @@ def _floor(found: Sequence[float], unit: str) -> str:
     )
 
 
-def interval_notes(sheet: Sheet) -> list[str]:
+def interval_notes(sheet: ColumnTable) -> list[str]:
     """Return one sentence a task and kind of interval; what is in brackets only where it is the same for all."""
     kinds: dict[str, dict[str, None]] = {}
     answers = [not trivial for trivial in sheet["is_baseline"]]
@@ -128,7 +128,7 @@ def interval_notes(sheet: Sheet) -> list[str]:
     return [next(iter(told)) if len(told) == 1 else short for short, told in kinds.items()]
 
 
-def _chosen_notes(sheet: Sheet) -> list[str]:
+def _chosen_notes(sheet: ColumnTable) -> list[str]:
     """Return one sentence for all answers that chose the same on validation data."""
     names: dict[str, dict[str, None]] = {}
     for chosen, row in zip(sheet["chosen"], sheet.rows, strict=True):
@@ -155,7 +155,7 @@ def _told(value: object) -> str:
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
-def _no_better_notes(sheet: Sheet) -> list[str]:
+def _no_better_notes(sheet: ColumnTable) -> list[str]:
     """Return one sentence a sensor and task on the answers that are not clearly better than the trivial one."""
     names: dict[tuple[str, str], dict[str, None]] = {}
     for row in compress(sheet.rows, _no_better(sheet)):
@@ -177,7 +177,7 @@ def _probing(row: Row) -> str:
     return f"tactbench run --sensor {row['sensor']} --task {row['task']} --rig {row['rig']} --recordings DIR --probe"
 
 
-def _other_knowledge_notes(sheet: Sheet) -> list[str]:
+def _other_knowledge_notes(sheet: ColumnTable) -> list[str]:
     """Return which trivial answers knew more than readings tell."""
     names: dict[str, dict[str, None]] = {}
     for row in compress(sheet.rows, (looks == "time" for looks in sheet.known("looks_at"))):
@@ -190,7 +190,7 @@ def _other_knowledge_notes(sheet: Sheet) -> list[str]:
     ]
 
 
-def _no_better(sheet: Sheet) -> list[bool]:
+def _no_better(sheet: ColumnTable) -> list[bool]:
     keys = ("status", "is_baseline", "baseline", "metric", "ci_low", "ci_high")
     return [
         status == "done"
@@ -205,11 +205,11 @@ def _no_better(sheet: Sheet) -> list[bool]:
     ]
 
 
-def _left_out_notes(sheet: Sheet) -> list[str]:
+def _left_out_notes(sheet: ColumnTable) -> list[str]:
     """Return what was left out of the data, and what their recordings remark; rows share these, each is told once."""
     counted: dict[str, None] = {}
     remarked: dict[str, None] = {}
-    asked = zip(sheet["sensor"], sheet["task"], marks_of(sheet["counts"]), strict=True)
+    asked = zip(sheet["sensor"], sheet["task"], map(id, sheet["counts"]), strict=True)
     for (sensor, task, _), counts in dict(zip(asked, sheet["counts"], strict=True)).items():
         if counts:
             where = question_name({"sensor": sensor, "task": task})

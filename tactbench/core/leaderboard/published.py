@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.names import answer_name, metric_name
 from tactbench.core.leaderboard.numbers import score
 from tactbench.core.leaderboard.sections import Section
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
 
 Row = Mapping[str, Any]
@@ -19,7 +19,7 @@ TITLE = "Published figures · by others, with their sensors and data; not ranked
 _OTHERS = "another model than ours"
 
 
-def published_section(sheet: Sheet) -> Section | None:
+def published_section(sheet: ColumnTable) -> Section | None:
     """Return the published figures that stand beside some of the rows, each once; None if there is none."""
     lines: dict[tuple[str, ...], None] = {}
     for figure, row in zip(sheet["published"], sheet.rows, strict=True):

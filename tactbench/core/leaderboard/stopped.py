@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any
 
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.names import asked_of, question_name
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import command_line, cut, visible
 from tactbench.core.spec.status import STOPPED
 
@@ -18,7 +18,7 @@ LONGEST_REASON = 600
 """Characters of a reason in a note; JSON, CSV and Parquet have all of it."""
 
 
-def stopped_notes(sheet: Sheet, statuses: Collection[str]) -> list[str]:
+def stopped_notes(sheet: ColumnTable, statuses: Collection[str]) -> list[str]:
     """Return one sentence for all cells that ended alike in one of `statuses`: which, why, how to look into it."""
     alike: dict[tuple[str, int | None, str], list[Row]] = {}
     for status, row in zip(sheet["status"], sheet.rows, strict=True):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
-from tactbench.core.leaderboard.collector import collector_at_rest
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.columns import COLUMNS, NUMERIC, columns
 from tactbench.core.leaderboard.foot import foot_of
 from tactbench.core.leaderboard.hosts import host_letters, timing_notes
@@ -23,7 +23,6 @@ from tactbench.core.leaderboard.over_tasks import over_tasks
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.published import published_section
 from tactbench.core.leaderboard.sections import Section
-from tactbench.core.leaderboard.sheet import Sheet
 
 __all__ = [
     "ABSENT",
@@ -67,7 +66,7 @@ class Table:
         return [self.shown.sheet.rows[place] for block in self.blocks for place in block.places]
 
 
-def build_table(rows: Sequence[Row] | Sheet, provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
+def build_table(rows: Sequence[Row] | ColumnTable, provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
     """Arrange `rows` into blocks, ranked, with their notes.
 
     Parameters
@@ -79,12 +78,8 @@ def build_table(rows: Sequence[Row] | Sheet, provenance: Sequence[Row] = (), *, 
     times
         False: the table of what a seed decides, the same on every machine; no times, no hosts, no provenance.
     """
-    with collector_at_rest():
-        return _arranged(rows, tuple(provenance) if times else (), times)
-
-
-def _arranged(rows: Sequence[Row] | Sheet, known: tuple[Row, ...], times: bool) -> Table:
-    sheet = rows if isinstance(rows, Sheet) else Sheet.by_name(rows)
+    known = tuple(provenance) if times else ()
+    sheet = rows if isinstance(rows, ColumnTable) else ColumnTable.by_name(rows)
     letters = host_letters(sheet) if times else {}
     shown, blocks = blocks_of(sheet, letters, times)
     ordered = sheet.taken([place for block in blocks for place in block.places])

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.table import NUMERIC, Block, Line
 from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
@@ -36,7 +36,7 @@ def _table(
     block: Block, columns: tuple[str, ...], rows: Mapping[str, Row], anchors: Mapping[str, str], anchor: str
 ) -> PlainTable:  # fmt: skip
     members = [rows[line.cell] for line in block.lines]
-    sheet = Sheet(members)
+    sheet = ColumnTable(members)
     values = {name: VALUES[name](sheet) for name in columns if name in VALUES}
     lines = []
     for place, (line, row) in enumerate(zip(block.lines, members, strict=True)):

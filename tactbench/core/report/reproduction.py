@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.lines import row_intervals
 from tactbench.core.leaderboard.numbers import interval, score, suffix
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import LOWER_IS_BETTER
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.calibrated import Calibrated, PredictiveRange
@@ -256,7 +256,7 @@ def told_interval(line: Reproduction) -> str:
 
 def row_interval(row: Row) -> str:
     """Return a row's interval as the tables show it: "one replicate" where there is but one, the range of a few."""
-    return row_intervals(Sheet([row]), [row["unit"]])[0]
+    return row_intervals(ColumnTable([row]), [row["unit"]])[0]
 
 
 def told_range(line: Reproduction) -> str:

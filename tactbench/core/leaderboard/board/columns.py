@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.column_table import ColumnTable
 
 MANY = 5_000
 """Cells beyond which numbers are told to few digits, and what is large and each cell's own is left to its file."""
@@ -84,7 +84,7 @@ def rounded(numbers: Sequence[float | None]) -> list[float | None]:
     return [None if one is None or not math.isfinite(one) else float(f"{one:.{digits}g}") for one in numbers]
 
 
-def details(sheet: Sheet, room: int) -> tuple[dict[str, str], list[str]]:
+def details(sheet: ColumnTable, room: int) -> tuple[dict[str, str], list[str]]:
     """Return what is known of each cell besides its line in the table, by key, and the keys left out.
 
     Parameters

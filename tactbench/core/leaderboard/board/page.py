@@ -12,11 +12,11 @@ from typing import Any
 import tactbench
 from tactbench.core.leaderboard.board.columns import column, cut_start, deflated, details, plain, plain_values
 from tactbench.core.leaderboard.board.static import static_tables
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.lines import Shown
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.particulars import GROUPS, TITLES
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import NUMERIC, Block, Section, Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.values import VALUES
@@ -129,7 +129,7 @@ def _column(name: str, shown: Shown) -> dict[str, Any]:
     return column(shown.texts[name], values)
 
 
-def _frame(sheet: Sheet, tables: str) -> str:
+def _frame(sheet: ColumnTable, tables: str) -> str:
     """Return the page but for its data."""
     style = house_style() + own(_HOME, "board.css")
     script = '\n"use strict";\n(() => {\n' + own(_HOME, *_SCRIPTS) + "})();\n"
@@ -152,7 +152,7 @@ def _frame(sheet: Sheet, tables: str) -> str:
     )
 
 
-def _summary(sheet: Sheet) -> str:
+def _summary(sheet: ColumnTable) -> str:
     """Return how many cells there are, and how they ended."""
     ends = Counter(map(visible, map(str, sheet["status"])))
     told = ", ".join(f"{count:,} {status}" for status, count in ends.most_common())
