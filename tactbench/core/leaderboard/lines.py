@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import add
-from typing import Any, Literal
+from typing import Any
 
 from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.columns import TIMED_COLUMNS, columns
@@ -13,11 +13,11 @@ from tactbench.core.leaderboard.hosts import timing_marks
 from tactbench.core.leaderboard.marks import score_marks
 from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, intervals, scores, tail, whole
 from tactbench.core.leaderboard.placing import Placing
+from tactbench.core.leaderboard.text_table import Kind
 from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.spec.status import STOPPED
 
 Row = Mapping[str, Any]
-Kind = Literal["result", "baseline", "failed", "skipped"]
 
 
 @dataclass(frozen=True)
@@ -38,20 +38,20 @@ class Line:
 class Shown:
     """All rows of a table as text."""
 
-    sheet: ColumnTable = field(repr=False, compare=False)
+    by_key: ColumnTable = field(repr=False, compare=False)
     texts: Mapping[str, Sequence[str]]
     """One text a row, by the name of the column."""
     kinds: Sequence[Kind]
     placings: Sequence[Placing | None]
 
     def line(self, place: int) -> Line:
-        """Return the line of the row at this place of the sheet."""
-        row = self.sheet.rows[place]
+        """Return the line of the row at this place of the by_key."""
+        row = self.by_key.rows[place]
         cells = tuple(column[place] for column in self.texts.values())
         return Line(cells, self.kinds[place], row["cell"], self.placings[place], row)
 
 
-def shown_of(sheet: ColumnTable, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool) -> Shown:
+def shown_of(by_key: ColumnTable, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool) -> Shown:
     """Return what stands in the lines of a table.
 
     Parameters
@@ -63,52 +63,52 @@ def shown_of(sheet: ColumnTable, placings: Sequence[Placing | None], letters: Ma
     times
         Whether the table has times.
     """
-    units = sheet["unit"]
+    units = by_key["unit"]
     texts = {
-        "#": _places(placings, sheet["is_baseline"]),
-        "sensor": sheet.sensors,
-        "estimator": sheet.answers,
-        "score": list(map(add, scores(sheet["score"], units), score_marks(sheet))),
-        "95 % interval": row_intervals(sheet, units),
-        "beyond floor": scores(sheet.known("score_beyond_floor"), units),
-        "95 % beyond": intervals(sheet.known("beyond_floor_ci_low"), sheet.known("beyond_floor_ci_high"), units),
-        "true error": scores(sheet.known("true_score"), units),
+        "#": _places(placings, by_key["is_baseline"]),
+        "sensor": by_key.sensors,
+        "estimator": by_key.answers,
+        "score": list(map(add, scores(by_key["score"], units), score_marks(by_key))),
+        "95 % interval": row_intervals(by_key, units),
+        "beyond floor": scores(by_key.known("score_beyond_floor"), units),
+        "95 % beyond": intervals(by_key.known("beyond_floor_ci_low"), by_key.known("beyond_floor_ci_high"), units),
+        "true error": scores(by_key.known("true_score"), units),
         "rank 95 %": _ranges(placings),
-        "recordings right": _right(sheet),
-        "published": scores(sheet["published"], units),
-        "baseline": scores(sheet["baseline"], units),
-        "n test": list(map(whole, sheet["n_test"])),
-        "sessions": list(map(whole, sheet["n_sessions"])),
+        "recordings right": _right(by_key),
+        "published": scores(by_key["published"], units),
+        "baseline": scores(by_key["baseline"], units),
+        "n test": list(map(whole, by_key["n_test"])),
+        "sessions": list(map(whole, by_key["n_sessions"])),
     }
-    texts = {name: texts[name] for name in columns(sheet, times=False)}
+    texts = {name: texts[name] for name in columns(by_key, times=False)}
     if times:
-        marks = timing_marks(sheet, letters)
-        told = {name: list(map(duration, VALUES[name](sheet))) for name in TIMED_COLUMNS}
-        told["delay"] = list(map(delay, sheet.known("answer_delay_ms"), sheet.known("delay_parts_ms")))
-        told["p95"] = list(map(tail, *map(sheet.known, ("latency_ms_p95", "latency_ms_max", "latency_n"))))
+        marks = timing_marks(by_key, letters)
+        told = {name: list(map(duration, VALUES[name](by_key))) for name in TIMED_COLUMNS}
+        told["delay"] = list(map(delay, by_key.known("answer_delay_ms"), by_key.known("delay_parts_ms")))
+        told["p95"] = list(map(tail, *map(by_key.known, ("latency_ms_p95", "latency_ms_max", "latency_n"))))
         texts |= {name: _marked(column, marks) for name, column in told.items()}
-    status = sheet["status"]
+    status = by_key["status"]
     for place in [place for place, ended in enumerate(status) if ended != "done"]:
         for name, column in texts.items():
             if name not in ("sensor", "estimator"):
                 column[place] = ABSENT
         texts["#"][place], texts["score"][place] = "", status[place].upper()
-    return Shown(sheet, texts, list(map(_kind, status, sheet["is_baseline"])), placings)
+    return Shown(by_key, texts, list(map(_kind, status, by_key["is_baseline"])), placings)
 
 
-def _right(sheet: ColumnTable) -> list[str]:
+def _right(by_key: ColumnTable) -> list[str]:
     """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
-    told = zip(sheet.known("recordings_right"), sheet.known("recordings_asked"), strict=True)
+    told = zip(by_key.known("recordings_right"), by_key.known("recordings_asked"), strict=True)
     return [ABSENT if right is None or of is None else f"{right:.3g} of {of:.3g}" for right, of in told]
 
 
-def row_intervals(sheet: ColumnTable, units: Sequence[str]) -> list[str]:
+def row_intervals(by_key: ColumnTable, units: Sequence[str]) -> list[str]:
     """Return intervals; where too few replicates carry one, the range of their scores, named so."""
-    told = intervals(sheet["ci_low"], sheet["ci_high"], units)
-    counts = sheet.known("n_replicates")
+    told = intervals(by_key["ci_low"], by_key["ci_high"], units)
+    counts = by_key.known("n_replicates")
     if not any(counts):
         return told
-    ranges = intervals(sheet.known("score_min"), sheet.known("score_max"), units)
+    ranges = intervals(by_key.known("score_min"), by_key.known("score_max"), units)
     return [
         text if text != ABSENT or not count
         else "one replicate" if count == 1

@@ -17,28 +17,28 @@ DAGGER = (
 )
 
 
-def score_marks(sheet: ColumnTable) -> list[str]:
+def score_marks(by_key: ColumnTable) -> list[str]:
     """Return what stands behind each score: † for test-set statistics, ‡ for what its row is stamped with."""
-    given = zip(sheet["dagger"], sheet["stamps"], strict=True)
+    given = zip(by_key["dagger"], by_key["stamps"], strict=True)
     return [(" †" if dagger else "") + (" ‡" if stamps else "") for dagger, stamps in given]
 
 
-def mark_notes(sheet: ColumnTable) -> list[str]:
+def mark_notes(by_key: ColumnTable) -> list[str]:
     """Return what the marks behind scores mean: ‡ and †, each once."""
-    dagger = [DAGGER] if any(sheet["dagger"]) else []
-    stamps = dict.fromkeys(f"‡ {visible(str(stamp))}" for stamp in chain.from_iterable(filter(None, sheet["stamps"])))
+    dagger = [DAGGER] if any(by_key["dagger"]) else []
+    stamps = dict.fromkeys(f"‡ {visible(str(stamp))}" for stamp in chain.from_iterable(filter(None, by_key["stamps"])))
     return [*stamps, *dagger]
 
 
-def simulation_notes(sheet: ColumnTable) -> list[str]:
+def simulation_notes(by_key: ColumnTable) -> list[str]:
     """Return what SIM and EMULATED mean, and what the simulations assumed."""
-    assumed = list(compress(sheet["assumptions"], sheet["simulated"]))
+    assumed = list(compress(by_key["assumptions"], by_key["simulated"]))
     told = dict.fromkeys(map(_assumptions, {id(one): one for one in assumed}.values()))
-    emulated = sheet.known("emulated")
+    emulated = by_key.known("emulated")
     marks = [
         text
         for text, some in (
-            ("SIM: simulated by the twin", [*compress(map(operator.not_, emulated), sheet["simulated"])]),
+            ("SIM: simulated by the twin", [*compress(map(operator.not_, emulated), by_key["simulated"])]),
             ("EMULATED: read through the drivers from emulated devices that the twin moved", emulated),
         )
         if any(some)

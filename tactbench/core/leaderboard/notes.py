@@ -27,7 +27,7 @@ RANKS = (
 )
 
 
-def notes_of(sheet: ColumnTable, blocks: Sequence[Block]) -> list[str]:
+def notes_of(by_key: ColumnTable, blocks: Sequence[Block]) -> list[str]:
     """Return the notes on the lines of `blocks`, the most important first; those on times stand elsewhere.
 
     First what did not finish, what leaks and what a deployed sensor could not do, then what the scores must be read
@@ -35,23 +35,23 @@ def notes_of(sheet: ColumnTable, blocks: Sequence[Block]) -> list[str]:
 
     Parameters
     ----------
-    sheet
+    by_key
         The rows in the order of the lines.
     """
     return [
-        *stopped_notes(sheet, STOPPED),
-        *mark_notes(sheet),
-        *_floor_notes(sheet),
-        *_no_better_notes(sheet),
-        *_tare_notes(sheet),
+        *stopped_notes(by_key, STOPPED),
+        *mark_notes(by_key),
+        *_floor_notes(by_key),
+        *_no_better_notes(by_key),
+        *_tare_notes(by_key),
         *_rank_notes(blocks),
-        *_true_error_notes(sheet),
-        *_other_knowledge_notes(sheet),
-        *stopped_notes(sheet, frozenset(STATUSES) - STOPPED),
-        *interval_notes(sheet),
-        *_chosen_notes(sheet),
-        *_left_out_notes(sheet),
-        *simulation_notes(sheet),
+        *_true_error_notes(by_key),
+        *_other_knowledge_notes(by_key),
+        *stopped_notes(by_key, frozenset(STATUSES) - STOPPED),
+        *interval_notes(by_key),
+        *_chosen_notes(by_key),
+        *_left_out_notes(by_key),
+        *simulation_notes(by_key),
     ]
 
 
@@ -71,9 +71,9 @@ def _rank_notes(blocks: Sequence[Block]) -> list[str]:
     return [note[0].upper() + note[1:] for note in notes]
 
 
-def _tare_notes(sheet: ColumnTable) -> list[str]:
+def _tare_notes(by_key: ColumnTable) -> list[str]:
     """Return one sentence on which recordings were tared, where some row's protocol is one that may."""
-    asked = dict.fromkeys(zip(sheet["protocol"], sheet.known("tare_s"), sheet["status"], strict=True))
+    asked = dict.fromkeys(zip(by_key["protocol"], by_key.known("tare_s"), by_key["status"], strict=True))
     held = sorted({f"{tare:g} s" for _, tare, _ in asked if tare})
     names = {str(protocol) for protocol, _, status in asked if status == "done"}
     told = []
@@ -86,10 +86,10 @@ def _tare_notes(sheet: ColumnTable) -> list[str]:
     return [f"{'; '.join(told)}."] if told else []
 
 
-def _floor_notes(sheet: ColumnTable) -> list[str]:
+def _floor_notes(by_key: ColumnTable) -> list[str]:
     """Return the floors of the references, once each, and what stands beyond them."""
     floors: dict[tuple[str, str], dict[float, None]] = {}
-    known = zip(sheet.rows, sheet.known("reference_floor"), strict=True)
+    known = zip(by_key.rows, by_key.known("reference_floor"), strict=True)
     for row, floor in known:
         if floor is not None:
             floors.setdefault((question_name(row), str(row["unit"])), {})[floor] = None
@@ -104,8 +104,8 @@ def _floor_notes(sheet: ColumnTable) -> list[str]:
     return told
 
 
-def _true_error_notes(sheet: ColumnTable) -> list[str]:
-    known = any(one is not None for one in sheet.known("true_score"))
+def _true_error_notes(by_key: ColumnTable) -> list[str]:
+    known = any(one is not None for one in by_key.known("true_score"))
     return ["True error (SIM): against the force that the twin exerted, free of the reference's noise."] * known
 
 
@@ -117,21 +117,21 @@ def _floor(found: Sequence[float], unit: str) -> str:
     )
 
 
-def interval_notes(sheet: ColumnTable) -> list[str]:
+def interval_notes(by_key: ColumnTable) -> list[str]:
     """Return one sentence a task and kind of interval; what is in brackets only where it is the same for all."""
     kinds: dict[str, dict[str, None]] = {}
-    answers = [not trivial for trivial in sheet["is_baseline"]]
-    for task, method in dict.fromkeys(compress(zip(sheet["task"], sheet["ci_method"], strict=True), answers)):
+    answers = [not trivial for trivial in by_key["is_baseline"]]
+    for task, method in dict.fromkeys(compress(zip(by_key["task"], by_key["ci_method"], strict=True), answers)):
         if method:
             told = visible(f"{task}: interval by {method}.")
             kinds.setdefault(re.sub(r" \([^)]*\)", "", told), {})[told] = None
     return [next(iter(told)) if len(told) == 1 else short for short, told in kinds.items()]
 
 
-def _chosen_notes(sheet: ColumnTable) -> list[str]:
+def _chosen_notes(by_key: ColumnTable) -> list[str]:
     """Return one sentence for all answers that chose the same on validation data."""
     names: dict[str, dict[str, None]] = {}
-    for chosen, row in zip(sheet["chosen"], sheet.rows, strict=True):
+    for chosen, row in zip(by_key["chosen"], by_key.rows, strict=True):
         if chosen:
             names.setdefault(visible(picked(row)), {})[f"{question_name(row)}/{answer_name(row)}"] = None
     return [f"{', '.join(who)}: chosen on validation data: {what}." for what, who in names.items()]
@@ -155,10 +155,10 @@ def _told(value: object) -> str:
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
-def _no_better_notes(sheet: ColumnTable) -> list[str]:
+def _no_better_notes(by_key: ColumnTable) -> list[str]:
     """Return one sentence a sensor and task on the answers that are not clearly better than the trivial one."""
     names: dict[tuple[str, str], dict[str, None]] = {}
-    for row in compress(sheet.rows, _no_better(sheet)):
+    for row in compress(by_key.rows, _no_better(by_key)):
         if not is_probe(row["protocol"]):  # no better than trivial is what a probe should be
             names.setdefault((question_name(row), _probing(row)), {})[f"{answer_name(row)} ({row['protocol']})"] = None
     return [
@@ -177,10 +177,10 @@ def _probing(row: Row) -> str:
     return f"tactbench run --sensor {row['sensor']} --task {row['task']} --rig {row['rig']} --recordings DIR --probe"
 
 
-def _other_knowledge_notes(sheet: ColumnTable) -> list[str]:
+def _other_knowledge_notes(by_key: ColumnTable) -> list[str]:
     """Return which trivial answers knew more than readings tell."""
     names: dict[str, dict[str, None]] = {}
-    for row in compress(sheet.rows, (looks == "time" for looks in sheet.known("looks_at"))):
+    for row in compress(by_key.rows, (looks == "time" for looks in by_key.known("looks_at"))):
         if row["is_baseline"] and row["status"] == "done":
             names.setdefault(answer_name(row), {})[f"{question_name(row)} {score(row['score'], row['unit'])}"] = None
     return [
@@ -190,7 +190,7 @@ def _other_knowledge_notes(sheet: ColumnTable) -> list[str]:
     ]
 
 
-def _no_better(sheet: ColumnTable) -> list[bool]:
+def _no_better(by_key: ColumnTable) -> list[bool]:
     keys = ("status", "is_baseline", "baseline", "metric", "ci_low", "ci_high")
     return [
         status == "done"
@@ -201,20 +201,20 @@ def _no_better(sheet: ColumnTable) -> list[bool]:
             if metric in LOWER_IS_BETTER
             else (low is not None and low <= baseline)
         )
-        for status, trivial, baseline, metric, low, high in zip(*(sheet[key] for key in keys), strict=True)
+        for status, trivial, baseline, metric, low, high in zip(*(by_key[key] for key in keys), strict=True)
     ]
 
 
-def _left_out_notes(sheet: ColumnTable) -> list[str]:
+def _left_out_notes(by_key: ColumnTable) -> list[str]:
     """Return what was left out of the data, and what their recordings remark; rows share these, each is told once."""
     counted: dict[str, None] = {}
     remarked: dict[str, None] = {}
-    asked = zip(sheet["sensor"], sheet["task"], map(id, sheet["counts"]), strict=True)
-    for (sensor, task, _), counts in dict(zip(asked, sheet["counts"], strict=True)).items():
+    asked = zip(by_key["sensor"], by_key["task"], map(id, by_key["counts"]), strict=True)
+    for (sensor, task, _), counts in dict(zip(asked, by_key["counts"], strict=True)).items():
         if counts:
             where = question_name({"sensor": sensor, "task": task})
             counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in told_counts(counts))
-    for sensor, remarks in zip(sheet["sensor"], sheet["remarks"], strict=True):
+    for sensor, remarks in zip(by_key["sensor"], by_key["remarks"], strict=True):
         if remarks:
             remarked |= dict.fromkeys(visible(f"{sensor}: {remark}") for remark in remarks)
     return [*counted, *remarked]

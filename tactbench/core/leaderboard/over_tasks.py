@@ -10,8 +10,8 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.sections import Section
 from tactbench.core.leaderboard.text import visible
+from tactbench.core.leaderboard.text_table import TextTable
 
 Row = Mapping[str, Any]
 
@@ -26,15 +26,15 @@ MOST_ROWS = 2000
 """Rows beyond which resampling all of them takes too long for a table."""
 
 
-def over_tasks(sheet: ColumnTable) -> Section | None:
+def over_tasks(by_key: ColumnTable) -> TextTable | None:
     """Return the means of all answers that two tasks or more were given; None if there are none.
 
     A task that was asked under several splits is left out: none of them stands for it.
     """
     groups: dict[tuple[Any, ...], dict[str, list[Row]]] = {}
-    keys = (sheet.sensors, sheet.answers, map(visible, sheet["protocol"]), sheet["rig"])
-    given = zip(zip(*keys, strict=True), sheet["task"], sheet.rows, strict=True)
-    for key, task, row in compress(given, _counts(sheet)):
+    keys = (by_key.sensors, by_key.answers, map(visible, by_key["protocol"]), by_key["rig"])
+    given = zip(zip(*keys, strict=True), by_key["task"], by_key.rows, strict=True)
+    for key, task, row in compress(given, _counts(by_key)):
         groups.setdefault(key, {}).setdefault(task, []).append(row)
     alone = {
         key: [members[0] for _, members in sorted(tasks.items()) if len(members) == 1] for key, tasks in groups.items()
@@ -54,12 +54,12 @@ def over_tasks(sheet: ColumnTable) -> Section | None:
         texts = (score(value, "1"), interval(low, high, "1"), names)
         lines.append((sensor, answer, protocol, *texts))
         notes |= dict.fromkeys(visible(f"Not in the mean of {sensor}/{answer}: {told}.") for told in left_out)
-    return Section(TITLE, COLUMNS, NUMERIC, tuple(lines), tuple(notes)) if lines else None
+    return TextTable(TITLE, COLUMNS, tuple(lines), NUMERIC, notes=tuple(notes)) if lines else None
 
 
-def _counts(sheet: ColumnTable) -> list[bool]:
+def _counts(by_key: ColumnTable) -> list[bool]:
     """Return which rows are answers that are averaged."""
-    ours = {protocol: not is_probe(protocol) for protocol in set(sheet["protocol"])}
+    ours = {protocol: not is_probe(protocol) for protocol in set(by_key["protocol"])}
     keys = ("status", "is_baseline", "protocol", "split", "replicates", "score")
     return [
         status == "done"
@@ -68,7 +68,7 @@ def _counts(sheet: ColumnTable) -> list[bool]:
         and split not in ("shuffled", "in-session")
         and bool(replicates)
         and math.isfinite(score)
-        for status, trivial, protocol, split, replicates, score in zip(*map(sheet.known, keys), strict=True)
+        for status, trivial, protocol, split, replicates, score in zip(*map(by_key.known, keys), strict=True)
     ]
 
 

@@ -18,10 +18,10 @@ LONGEST_REASON = 600
 """Characters of a reason in a note; JSON, CSV and Parquet have all of it."""
 
 
-def stopped_notes(sheet: ColumnTable, statuses: Collection[str]) -> list[str]:
+def stopped_notes(by_key: ColumnTable, statuses: Collection[str]) -> list[str]:
     """Return one sentence for all cells that ended alike in one of `statuses`: which, why, how to look into it."""
     alike: dict[tuple[str, int | None, str], list[Row]] = {}
-    for status, row in zip(sheet["status"], sheet.rows, strict=True):
+    for status, row in zip(by_key["status"], by_key.rows, strict=True):
         if status in statuses and status != "done":
             alike.setdefault((row["status"], row["signal"], row["reason"]), []).append(row)
     return [_told(status, signal, reason, members) for (status, signal, reason), members in alike.items()]

@@ -63,4 +63,4 @@ def test_without_times_there_are_no_hosts():
     rows = [row(host="h1", concurrency=4), row("b", host="h2")]
     table = build_table(rows, KNOWN, times=False)
     assert not {"sim", "fit", "latency p50", "p95", "batch/row"} & set(table.columns)
-    assert not [note for note in (*table.notes, *table.foot) if "h1" in note or "timed" in note]
+    assert not [note for note in (*table.notes, *table.footer) if "h1" in note or "timed" in note]

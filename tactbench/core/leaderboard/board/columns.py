@@ -84,7 +84,7 @@ def rounded(numbers: Sequence[float | None]) -> list[float | None]:
     return [None if one is None or not math.isfinite(one) else float(f"{one:.{digits}g}") for one in numbers]
 
 
-def details(sheet: ColumnTable, room: int) -> tuple[dict[str, str], list[str]]:
+def details(by_key: ColumnTable, room: int) -> tuple[dict[str, str], list[str]]:
     """Return what is known of each cell besides its line in the table, by key, and the keys left out.
 
     Parameters
@@ -92,13 +92,13 @@ def details(sheet: ColumnTable, room: int) -> tuple[dict[str, str], list[str]]:
     room
         Characters for all of it. What does not fit is cut shorter, then left out, the least telling first.
     """
-    many = len(sheet.rows) > MANY
-    others = sorted(set(sheet) - {*_FIRST, *_IN_THE_TABLE, *_LARGE}, key=str)
+    many = len(by_key.rows) > MANY
+    others = sorted(set(by_key) - {*_FIRST, *_IN_THE_TABLE, *_LARGE}, key=str)
     kept = _FIRST if many else (*_FIRST, *_IN_THE_TABLE, *others, *_LARGE)
     told: dict[str, str] = {}
-    left_out = [key for key in (*others, *_LARGE) if key not in kept and any(sheet.known(key))]
+    left_out = [key for key in (*others, *_LARGE) if key not in kept and any(by_key.known(key))]
     for key in kept:
-        values = sheet.known(key)
+        values = by_key.known(key)
         if all(value in (None, "") or value == [] or value == {} for value in values):
             continue
         if many and key == "key":

@@ -17,8 +17,9 @@ from tactbench.core.leaderboard.lines import Shown
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.particulars import GROUPS, TITLES
-from tactbench.core.leaderboard.table import NUMERIC, Block, Section, Table
+from tactbench.core.leaderboard.table import NUMERIC, Block, Table
 from tactbench.core.leaderboard.text import visible
+from tactbench.core.leaderboard.text_table import TextTable
 from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
 
@@ -42,12 +43,12 @@ _SPARE = 4_000
 
 def page_of(table: Table) -> str:
     """Return the page of a table with times; the same table gives the same page."""
-    sheet = table.shown.sheet
-    frame = _frame(sheet, static_tables(table) if len(sheet.rows) <= MOST_STATIC else "")
+    by_key = table.shown.by_key
+    frame = _frame(by_key, static_tables(table) if len(by_key.rows) <= MOST_STATIC else "")
     columns = [deflated(_column(name, table.shown)) for name in table.columns]
     head = _head(table)
     taken = len(frame.encode()) + sum(map(len, columns)) + len(deflated(head)) + _SPARE
-    fields, left_out = details(sheet, LARGEST - taken)
+    fields, left_out = details(by_key, LARGEST - taken)
     head |= {"fields": list(fields), "leftOut": left_out}
     data = json.dumps([deflated(head), *columns, *fields.values()])
     # The last one: a name may say the same.
@@ -57,14 +58,14 @@ def page_of(table: Table) -> str:
 
 def _head(table: Table) -> dict[str, Any]:
     """Return all that the page's script must know beside its columns."""
-    shown, sheet = table.shown, table.shown.sheet
-    firsts = [sheet.rows[block.places[0]] for block in table.blocks]
+    shown, by_key = table.shown, table.shown.by_key
+    firsts = [by_key.rows[block.places[0]] for block in table.blocks]
     notes = [cut_start(note, LONGEST_NOTE) for note in table.notes]
     if len(notes) > MOST_NOTES:
         notes = [*notes[:MOST_NOTES], f"{len(notes) - MOST_NOTES} more notes are not in this page."]
     return {
         "version": tactbench.__version__,
-        "rows": len(sheet.rows),
+        "rows": len(by_key.rows),
         "order": [place for block in table.blocks for place in block.places],
         "kinds": column(shown.kinds),
         "blocks": [
@@ -75,7 +76,7 @@ def _head(table: Table) -> dict[str, Any]:
         ],
         "columns": [{"name": name, "numeric": name in NUMERIC} for name in table.columns],
         "sections": [_section(section) for section in table.sections],
-        "footer": [cut_start(text, LONGEST_NOTE) for text in table.foot],
+        "footer": [cut_start(text, LONGEST_NOTE) for text in table.footer],
         "roles": {"rank": "#", "sensor": "sensor", "estimator": "estimator", "score": "score",
                   "interval": "95 % interval", "times": [name for name in DURATIONS if name in table.columns]},
         "groups": GROUPS,
@@ -87,7 +88,7 @@ def _head(table: Table) -> dict[str, Any]:
 
 def _is_simulated(block: Block) -> bool:
     """Return whether a block stands among simulated ones; a cell that was not begun does not know it of itself."""
-    simulated = block.shown.sheet["simulated"]
+    simulated = block.shown.by_key["simulated"]
     return SIMULATED in block.title.split(" · ")[2:] or any(simulated[place] for place in block.places)
 
 
@@ -99,7 +100,7 @@ def _id(entry: Mapping[str, Any]) -> str:
         return ""
 
 
-def _section(section: Section) -> dict[str, Any]:
+def _section(section: TextTable) -> dict[str, Any]:
     """Return a table below the blocks, which no cell is behind."""
     lines = [list(line) for line in section.lines[:MOST_LINES]]
     more = len(section.lines) - len(lines)
@@ -108,7 +109,7 @@ def _section(section: Section) -> dict[str, Any]:
         "title": section.title,
         "columns": [[name, name in section.numeric] for name in section.columns],
         "lines": lines,
-        "alarms": sorted(section.alarms),
+        "alarms": [place for place, kind in enumerate(section.kinds) if kind == "alarm"],
         "notes": [cut_start(note, LONGEST_NOTE) for note in notes],
     }
 
@@ -123,20 +124,20 @@ def _column(name: str, shown: Shown) -> dict[str, Any]:
     elif name == "rank 95 %":
         values = [(one.low + one.high) / 2 if one and one.low and one.high else None for one in shown.placings]
     else:
-        values = VALUES[name](shown.sheet)
+        values = VALUES[name](shown.by_key)
     # A stopped cell may know a number that the table does not show: it is not sorted by it either.
     values = [None if kind in ("failed", "skipped") else one for one, kind in zip(values, shown.kinds, strict=True)]
     return column(shown.texts[name], values)
 
 
-def _frame(sheet: ColumnTable, tables: str) -> str:
+def _frame(by_key: ColumnTable, tables: str) -> str:
     """Return the page but for its data."""
     style = house_style() + own(_HOME, "board.css")
     script = '\n"use strict";\n(() => {\n' + own(_HOME, *_SCRIPTS) + "})();\n"
     if not tables:
         tables = (
-            f"<p class='missing'>This board has {len(sheet.rows):,} cells: a script of its own draws them, and needs a "
-            "browser that allows it. Nothing is fetched from anywhere. Without scripts, read "
+            f"<p class='missing'>This board has {len(by_key.rows):,} cells: a script of its own draws them, and needs "
+            "a browser that allows it. Nothing is fetched from anywhere. Without scripts, read "
             "<code>leaderboard.md</code> or <code>leaderboard.csv</code> in the result folder.</p>"
         )
     return Template(own(_HOME, "board.html")).substitute(
@@ -146,17 +147,17 @@ def _frame(sheet: ColumnTable, tables: str) -> str:
         script=script,
         style_hash=policy_hash(style),
         script_hash=policy_hash(script),
-        summary=escape(_summary(sheet)),
+        summary=escape(_summary(by_key)),
         tables=tables,
         data=_DATA_HERE,
     )
 
 
-def _summary(sheet: ColumnTable) -> str:
+def _summary(by_key: ColumnTable) -> str:
     """Return how many cells there are, and how they ended."""
-    ends = Counter(map(visible, map(str, sheet["status"])))
+    ends = Counter(map(visible, map(str, by_key["status"])))
     told = ", ".join(f"{count:,} {status}" for status, count in ends.most_common())
-    sensors, tasks = (len(set(sheet[key])) for key in ("sensor", "task"))
-    if not sheet.rows:
+    sensors, tasks = (len(set(by_key[key])) for key in ("sensor", "task"))
+    if not by_key.rows:
         return "No cells."
-    return f"{len(sheet.rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {told}."
+    return f"{len(by_key.rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {told}."

@@ -29,7 +29,7 @@ def static_tables(table: Table) -> str:
             f'<div class="box"><table><caption>{_text(block.title)}{said}</caption>\n'
             f"<thead><tr>{heads}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
         )
-    notes = "\n".join(f"<li>{prose(note)}</li>" for note in (*table.notes, *table.foot))
+    notes = "\n".join(f"<li>{prose(note)}</li>" for note in (*table.notes, *table.footer))
     return "\n".join(parts) + f'\n<ul class="notes">\n{notes}\n</ul>'
 
 
