@@ -8,12 +8,12 @@ import re
 import pytest
 
 from tactbench.core.leaderboard.column_table import ColumnTable
-from tactbench.core.leaderboard.formats import to_page
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.values import VALUES
 from tests.browser.boards import HOST, HOSTILE, PROVENANCE, board_rows
 from tests.browser.test_page import loaded
+from tests.core.leaderboard.rendering import to_page
 from tests.core.leaderboard.rows import row
 
 pytestmark = pytest.mark.browser

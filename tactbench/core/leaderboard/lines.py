@@ -10,7 +10,6 @@ from typing import Any
 from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.columns import TIMED_COLUMNS, columns
 from tactbench.core.leaderboard.hosts import timing_marks
-from tactbench.core.leaderboard.marks import score_marks
 from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, intervals, scores, tail, whole
 from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.leaderboard.text_table import Kind
@@ -68,7 +67,7 @@ def shown_of(by_key: ColumnTable, placings: Sequence[Placing | None], letters: M
         "#": _places(placings, by_key["is_baseline"]),
         "sensor": by_key.sensors,
         "estimator": by_key.answers,
-        "score": list(map(add, scores(by_key["score"], units), score_marks(by_key))),
+        "score": list(map(add, scores(by_key["score"], units), _score_marks(by_key))),
         "95 % interval": row_intervals(by_key, units),
         "beyond floor": scores(by_key.known("score_beyond_floor"), units),
         "95 % beyond": intervals(by_key.known("beyond_floor_ci_low"), by_key.known("beyond_floor_ci_high"), units),
@@ -145,3 +144,9 @@ def _ranges(placings: Sequence[Placing | None]) -> list[str]:
 
 def _marked(told: list[str], marks: Sequence[str]) -> list[str]:
     return [text if text == ABSENT else text + mark for text, mark in zip(told, marks, strict=True)] if marks else told
+
+
+def _score_marks(by_key: ColumnTable) -> list[str]:
+    """Return what stands behind each score: † for test-set statistics, ‡ for what its row is stamped with."""
+    given = zip(by_key["dagger"], by_key["stamps"], strict=True)
+    return [(" †" if dagger else "") + (" ‡" if stamps else "") for dagger, stamps in given]

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
+import operator
 import re
-from collections.abc import Mapping, Sequence
-from itertools import compress
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from itertools import chain, compress
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.column_table import ColumnTable
-from tactbench.core.leaderboard.counts import told_counts
-from tactbench.core.leaderboard.marks import mark_notes, simulation_notes
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, question_name
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, asked_of, question_name
 from tactbench.core.leaderboard.numbers import score, suffix
-from tactbench.core.leaderboard.stopped import stopped_notes
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.leaderboard.text import command_line, cut, visible
 from tactbench.core.spec.status import STATUSES, STOPPED
 
 Row = Mapping[str, Any]
@@ -25,6 +24,18 @@ RANKS = (
     "A place with = is shared: the data do not tell these answers apart. Rank 95 % holds the places that the data do "
     "not exclude (docs/statistics.md)."
 )
+DAGGER = (
+    "† test-set statistics were used: the protocol drops test rows by the test set's own mean and deviation, and "
+    "`karl2016` scales each set, the test set too, by its own. A deployed sensor cannot; protocol `deployable` shows "
+    "what it can."
+)
+_SET = re.compile(r"^(training|validation|test) (rows .*)$")
+_SIGMA = re.compile(r"^rows with (.+) beyond three sigma$")
+MOST_CHANNELS = 4
+MOST_NAMES = 8
+"""Cells that ended alike and are named; the others are counted, and stand in the table."""
+LONGEST_REASON = 600
+"""Characters of a reason in a note; JSON, CSV and Parquet have all of it."""
 
 
 def notes_of(by_key: ColumnTable, blocks: Sequence[Block]) -> list[str]:
@@ -39,19 +50,19 @@ def notes_of(by_key: ColumnTable, blocks: Sequence[Block]) -> list[str]:
         The rows in the order of the lines.
     """
     return [
-        *stopped_notes(by_key, STOPPED),
-        *mark_notes(by_key),
+        *_stopped_notes(by_key, STOPPED),
+        *_mark_notes(by_key),
         *_floor_notes(by_key),
         *_no_better_notes(by_key),
         *_tare_notes(by_key),
         *_rank_notes(blocks),
         *_true_error_notes(by_key),
         *_other_knowledge_notes(by_key),
-        *stopped_notes(by_key, frozenset(STATUSES) - STOPPED),
+        *_stopped_notes(by_key, frozenset(STATUSES) - STOPPED),
         *interval_notes(by_key),
         *_chosen_notes(by_key),
         *_left_out_notes(by_key),
-        *simulation_notes(by_key),
+        *_simulation_notes(by_key),
     ]
 
 
@@ -213,8 +224,79 @@ def _left_out_notes(by_key: ColumnTable) -> list[str]:
     for (sensor, task, _), counts in dict(zip(asked, by_key["counts"], strict=True)).items():
         if counts:
             where = question_name({"sensor": sensor, "task": task})
-            counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in told_counts(counts))
+            counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in count_texts(counts))
     for sensor, remarks in zip(by_key["sensor"], by_key["remarks"], strict=True):
         if remarks:
             remarked |= dict.fromkeys(visible(f"{sensor}: {remark}") for remark in remarks)
     return [*counted, *remarked]
+
+
+def count_texts(counts: Mapping[str, int]) -> list[str]:
+    """Return one text a reason, of a cell's counts."""
+    sums: Counter[str] = Counter()
+    beyond: Counter[str] = Counter()
+    for what, count in counts.items():
+        in_a_set = _SET.match(what)
+        reason = in_a_set[2] if in_a_set else what
+        sigma = _SIGMA.match(reason)
+        if sigma:
+            beyond[sigma[1]] += count
+        else:
+            sums[reason] += count
+    told = [f"{what}: {count}" for what, count in sums.items() if count]
+    if beyond:
+        listed = ", ".join(f"{channel} {count}" for channel, count in beyond.most_common(MOST_CHANNELS))
+        more = len(beyond) - MOST_CHANNELS
+        rest = f" and {more} more channels" if more > 0 else ""
+        told.append(f"rows beyond three sigma in {listed}{rest}")
+    return told
+
+
+def _stopped_notes(by_key: ColumnTable, statuses: Collection[str]) -> list[str]:
+    """Return one sentence for all cells that ended alike in one of `statuses`: which, why, how to look into it."""
+    alike: dict[tuple[str, int | None, str], list[Row]] = {}
+    for status, row in zip(by_key["status"], by_key.rows, strict=True):
+        if status in statuses and status != "done":
+            alike.setdefault((row["status"], row["signal"], row["reason"]), []).append(row)
+    return [_stopped_note(status, signal, reason, members) for (status, signal, reason), members in alike.items()]
+
+
+def _stopped_note(status: str, signal: int | None, reason: str, members: list[Row]) -> str:
+    names = list(dict.fromkeys(f"{question_name(row)}/{asked_of(row)}" for row in members))
+    more = len(names) - MOST_NAMES
+    listed = ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+    by = f" by signal {signal}" if signal is not None else ""
+    said = cut(visible(reason), LONGEST_REASON)
+    told = f"{listed} {visible(status)}{by}: {said}"
+    if status not in STOPPED:
+        return told
+    end = "" if told.endswith((".", "!", "?", "…")) else "."
+    return f"{told}{end} Look into it: {command_line('tactbench', 'why', members[0]['cell'])}"
+
+
+def _mark_notes(by_key: ColumnTable) -> list[str]:
+    """Return what the marks behind scores mean: ‡ and †, each once."""
+    dagger = [DAGGER] if any(by_key["dagger"]) else []
+    stamps = dict.fromkeys(f"‡ {visible(str(stamp))}" for stamp in chain.from_iterable(filter(None, by_key["stamps"])))
+    return [*stamps, *dagger]
+
+
+def _simulation_notes(by_key: ColumnTable) -> list[str]:
+    """Return what SIM and EMULATED mean, and what the simulations assumed."""
+    assumed = list(compress(by_key["assumptions"], by_key["simulated"]))
+    told = dict.fromkeys(map(_assumptions, {id(one): one for one in assumed}.values()))
+    emulated = by_key.known("emulated")
+    marks = [
+        text
+        for text, some in (
+            ("SIM: simulated by the twin", [*compress(map(operator.not_, emulated), by_key["simulated"])]),
+            ("EMULATED: read through the drivers from emulated devices that the twin moved", emulated),
+        )
+        if any(some)
+    ]
+    return [f"{'; '.join(marks)}; never ranked against hardware. Assumed: {one}." for one in told]
+
+
+def _assumptions(assumptions: Mapping[str, Any]) -> str:
+    told = ", ".join(f"{key} {value}" for key, value in sorted(assumptions.items()))
+    return visible(told) or "see docs/twin.md"

@@ -5,13 +5,13 @@ import json
 import pytest
 from rich.console import Console
 
-from tactbench.core.leaderboard.counts import told_counts
-from tactbench.core.leaderboard.formats import JSON_KEYS, to_csv, to_json, to_latex, to_markdown
+from tactbench.core.leaderboard.notes import count_texts
 from tactbench.core.leaderboard.numbers import duration, score
-from tactbench.core.leaderboard.records import OF_REPLICATES, RANK_KEYS
+from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.terminal import show
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE
+from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown
 
 from .rows import row
 
@@ -119,7 +119,7 @@ def test_counts_are_summed_over_sets_and_the_busiest_channels_come_first():
         f"{one} rows with T{place} beyond three sigma": place for one in ("training", "test") for place in range(7)
     }
     counts |= {f"{one} rows before the press begins": 600 for one in ("training", "test")}
-    assert told_counts(counts) == [
+    assert count_texts(counts) == [
         "rows before the press begins: 1200",
         "rows beyond three sigma in T6 12, T5 10, T4 8, T3 6 and 3 more channels",
     ]

@@ -8,7 +8,6 @@ import pytest
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.leaderboard.columns import COLUMNS
 from tactbench.core.leaderboard.fitting import fit, pieces, wrapped
-from tactbench.core.leaderboard.formats import to_markdown
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.terminal import plain_text
 from tactbench.core.leaderboard.view import (
@@ -23,6 +22,7 @@ from tactbench.core.leaderboard.view import (
     notes,
 )
 from tactbench.core.leaderboard.xlsx import xlsx
+from tests.core.leaderboard.rendering import to_markdown
 
 from .rows import row
 from .test_force import KNOWN

@@ -8,8 +8,8 @@ import pytest
 from tactbench.core.leaderboard.board import columns
 from tactbench.core.leaderboard.board import page as page_module
 from tactbench.core.leaderboard.board.page import LARGEST
-from tactbench.core.leaderboard.formats import to_page
 from tactbench.core.leaderboard.table import build_table
+from tests.core.leaderboard.rendering import to_page
 from tests.core.leaderboard.rows import row
 
 from .reading import read_page, values
