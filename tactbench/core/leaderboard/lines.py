@@ -8,12 +8,11 @@ from operator import add
 from typing import Any
 
 from tactbench.core.leaderboard.column_table import ColumnTable
-from tactbench.core.leaderboard.columns import TIMED_COLUMNS, columns
+from tactbench.core.leaderboard.columns import OF_ROWS, columns
 from tactbench.core.leaderboard.hosts import timing_marks
-from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, intervals, scores, tail, whole
+from tactbench.core.leaderboard.numbers import ABSENT
 from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.leaderboard.text_table import Kind
-from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.spec.status import STOPPED
 
 Row = Mapping[str, Any]
@@ -44,7 +43,7 @@ class Shown:
     placings: Sequence[Placing | None]
 
     def line(self, place: int) -> Line:
-        """Return the line of the row at this place of the by_key."""
+        """Return the line of the row at this place."""
         row = self.by_key.rows[place]
         cells = tuple(column[place] for column in self.texts.values())
         return Line(cells, self.kinds[place], row["cell"], self.placings[place], row)
@@ -62,30 +61,19 @@ def shown_of(by_key: ColumnTable, placings: Sequence[Placing | None], letters: M
     times
         Whether the table has times.
     """
-    units = by_key["unit"]
-    texts = {
-        "#": _places(placings, by_key["is_baseline"]),
-        "sensor": by_key.sensors,
-        "estimator": by_key.answers,
-        "score": list(map(add, scores(by_key["score"], units), _score_marks(by_key))),
-        "95 % interval": row_intervals(by_key, units),
-        "beyond floor": scores(by_key.known("score_beyond_floor"), units),
-        "95 % beyond": intervals(by_key.known("beyond_floor_ci_low"), by_key.known("beyond_floor_ci_high"), units),
-        "true error": scores(by_key.known("true_score"), units),
-        "rank 95 %": _ranges(placings),
-        "recordings right": _right(by_key),
-        "published": scores(by_key["published"], units),
-        "baseline": scores(by_key["baseline"], units),
-        "n test": list(map(whole, by_key["n_test"])),
-        "sessions": list(map(whole, by_key["n_sessions"])),
-    }
-    texts = {name: texts[name] for name in columns(by_key, times=False)}
-    if times:
-        marks = timing_marks(by_key, letters)
-        told = {name: list(map(duration, VALUES[name](by_key))) for name in TIMED_COLUMNS}
-        told["delay"] = list(map(delay, by_key.known("answer_delay_ms"), by_key.known("delay_parts_ms")))
-        told["p95"] = list(map(tail, *map(by_key.known, ("latency_ms_p95", "latency_ms_max", "latency_n"))))
-        texts |= {name: _marked(column, marks) for name, column in told.items()}
+    texts: dict[str, list[str]] = {}
+    marks = timing_marks(by_key, letters)
+    for name in columns(by_key, times=times):
+        if name in OF_ROWS:
+            texts[name] = list(map(OF_ROWS[name].text, by_key.rows))
+            if name == "score":
+                texts[name] = list(map(add, texts[name], _score_marks(by_key)))
+            elif OF_ROWS[name].timed and marks:
+                texts[name] = [text if text == ABSENT else text + mark
+                               for text, mark in zip(texts[name], marks, strict=True)]  # fmt: skip
+    texts |= {"#": _places(placings, by_key["is_baseline"]), "rank 95 %": _ranges(placings),
+              "sensor": by_key.sensors, "estimator": by_key.answers}  # fmt: skip
+    texts = {name: texts[name] for name in columns(by_key, times=times)}
     status = by_key["status"]
     for place in [place for place, ended in enumerate(status) if ended != "done"]:
         for name, column in texts.items():
@@ -93,28 +81,6 @@ def shown_of(by_key: ColumnTable, placings: Sequence[Placing | None], letters: M
                 column[place] = ABSENT
         texts["#"][place], texts["score"][place] = "", status[place].upper()
     return Shown(by_key, texts, list(map(_kind, status, by_key["is_baseline"])), placings)
-
-
-def _right(by_key: ColumnTable) -> list[str]:
-    """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
-    told = zip(by_key.known("recordings_right"), by_key.known("recordings_asked"), strict=True)
-    return [ABSENT if right is None or of is None else f"{right:.3g} of {of:.3g}" for right, of in told]
-
-
-def row_intervals(by_key: ColumnTable, units: Sequence[str]) -> list[str]:
-    """Return intervals; where too few replicates carry one, the range of their scores, named so."""
-    told = intervals(by_key["ci_low"], by_key["ci_high"], units)
-    counts = by_key.known("n_replicates")
-    if not any(counts):
-        return told
-    ranges = intervals(by_key.known("score_min"), by_key.known("score_max"), units)
-    return [
-        text if text != ABSENT or not count
-        else "one replicate" if count == 1
-        else text if spread == ABSENT
-        else f"range {spread}"
-        for text, count, spread in zip(told, counts, ranges, strict=True)
-    ]  # fmt: skip
 
 
 def _kind(status: str, trivial: bool) -> Kind:
@@ -140,10 +106,6 @@ def _ranges(placings: Sequence[Placing | None]) -> list[str]:
         else f"{one.low}–{one.high}"
         for one in placings
     ]  # fmt: skip
-
-
-def _marked(told: list[str], marks: Sequence[str]) -> list[str]:
-    return [text if text == ABSENT else text + mark for text, mark in zip(told, marks, strict=True)] if marks else told
 
 
 def _score_marks(by_key: ColumnTable) -> list[str]:

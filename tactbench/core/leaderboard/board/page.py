@@ -13,6 +13,7 @@ import tactbench
 from tactbench.core.leaderboard.board.columns import column, cut_start, deflated, details, plain, plain_values
 from tactbench.core.leaderboard.board.static import static_tables
 from tactbench.core.leaderboard.column_table import ColumnTable
+from tactbench.core.leaderboard.columns import VALUES
 from tactbench.core.leaderboard.lines import Shown
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
@@ -20,7 +21,6 @@ from tactbench.core.leaderboard.particulars import GROUPS, TITLES
 from tactbench.core.leaderboard.table import NUMERIC, Block, Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.text_table import TextTable
-from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
 
 TITLE = "tactbench leaderboard"
@@ -124,7 +124,7 @@ def _column(name: str, shown: Shown) -> dict[str, Any]:
     elif name == "rank 95 %":
         values = [(one.low + one.high) / 2 if one and one.low and one.high else None for one in shown.placings]
     else:
-        values = VALUES[name](shown.by_key)
+        values = list(map(VALUES[name], shown.by_key.rows))
     # A stopped cell may know a number that the table does not show: it is not sorted by it either.
     values = [None if kind in ("failed", "skipped") else one for one, kind in zip(values, shown.kinds, strict=True)]
     return column(shown.texts[name], values)
