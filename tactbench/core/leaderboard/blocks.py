@@ -14,7 +14,7 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.column_table import ColumnTable
-from tactbench.core.leaderboard.lines import Line, Shown, shown_of
+from tactbench.core.leaderboard.lines import Line, RowTexts, row_texts
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
 from tactbench.core.leaderboard.placing import Placing, errors, places
 from tactbench.core.leaderboard.text import visible
@@ -31,7 +31,7 @@ class Block:
     """Rows that may be compared."""
 
     title: str
-    shown: Shown
+    shown: RowTexts
     """All rows of the table."""
     places: tuple[int, ...]
     """Those of this block, in order."""
@@ -46,7 +46,7 @@ class Block:
         return tuple(map(self.shown.line, self.places))
 
 
-def blocks_of(by_key: ColumnTable, letters: Mapping[str, str], times: bool) -> tuple[Shown, tuple[Block, ...]]:
+def blocks_of(by_key: ColumnTable, letters: Mapping[str, str], times: bool) -> tuple[RowTexts, tuple[Block, ...]]:
     """Arrange rows into blocks, ranked.
 
     Parameters
@@ -60,13 +60,13 @@ def blocks_of(by_key: ColumnTable, letters: Mapping[str, str], times: bool) -> t
 
     Returns
     -------
-    Shown, tuple of Block
+    RowTexts, tuple of Block
         All rows as text, and which of them stand together.
     """
     groups = _grouped(by_key)
     placings: list[Placing | None] = [None] * len(by_key.rows)
     arranged = [(key, *_arranged(by_key, groups[key], placings)) for key in sorted(groups, key=_order)]
-    shown = shown_of(by_key, placings, letters, times)
+    shown = row_texts(by_key, placings, letters, times)
     blocks = [
         Block(
             _title(key, [by_key.rows[place] for place in groups[key]]),

@@ -53,8 +53,8 @@ def _told(provenance: Sequence[Row]) -> tuple[str, ...]:
         return ("The provenance of these rows cannot be read.",)
 
 
-def _seeds(told: Sequence[Any]) -> str:
-    seeds = sorted({seed for seed in told if isinstance(seed, int)})
+def _seeds(values: Sequence[Any]) -> str:
+    seeds = sorted({seed for seed in values if isinstance(seed, int)})
     if not seeds:
         return "Seeds are not known."
     listed = ", ".join(map(str, seeds[:MOST_SEEDS]))

@@ -72,12 +72,12 @@ def _clocks(by_key: ColumnTable) -> set[tuple[str, int]]:
     return {(_host(host), _at_once(cells)) for host, cells in clocks}
 
 
-def _host(told: Any) -> str:
-    return str(told or "")
+def _host(value: Any) -> str:
+    return str(value or "")
 
 
-def _at_once(told: Any) -> int:
-    return int(told or 1)
+def _at_once(value: Any) -> int:
+    return int(value or 1)
 
 
 def _cores(machine: Row | None, otherwise: int) -> int:

@@ -56,8 +56,8 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
     last = len(table.blocks) - 1
     for place, (block, grid) in enumerate(zip(table.blocks, viewed.grids(table, view), strict=True)):
         # A paper's table shows no ranks.
-        told = [note for note in viewed.notes(table, view) if whole_width or note != RANKS]
-        notes = (*told, *viewed.footer(table, view)) if place == last else ()
+        shown = [note for note in viewed.notes(table, view) if whole_width or note != RANKS]
+        notes = (*shown, *viewed.footer(table, view)) if place == last else ()
         grid = grid if whole_width else _narrow(grid)
         parts += _table(replace(grid, title=_caption(block, grid)), notes, whole_width=whole_width, number=place)
     for number, section in enumerate(viewed.sections(table, view), len(table.blocks)):

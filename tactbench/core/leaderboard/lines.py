@@ -33,7 +33,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Shown:
+class RowTexts:
     """All rows of a table as text."""
 
     by_key: ColumnTable = field(repr=False, compare=False)
@@ -49,7 +49,9 @@ class Shown:
         return Line(cells, self.kinds[place], row["cell"], self.placings[place], row)
 
 
-def shown_of(by_key: ColumnTable, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool) -> Shown:
+def row_texts(
+    by_key: ColumnTable, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool
+) -> RowTexts:
     """Return what stands in the lines of a table.
 
     Parameters
@@ -80,7 +82,7 @@ def shown_of(by_key: ColumnTable, placings: Sequence[Placing | None], letters: M
             if name not in ("sensor", "estimator"):
                 column[place] = ABSENT
         texts["#"][place], texts["score"][place] = "", status[place].upper()
-    return Shown(by_key, texts, list(map(_kind, status, by_key["is_baseline"])), placings)
+    return RowTexts(by_key, texts, list(map(_kind, status, by_key["is_baseline"])), placings)
 
 
 def _kind(status: str, trivial: bool) -> Kind:

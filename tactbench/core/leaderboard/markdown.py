@@ -48,8 +48,8 @@ def markdown_grid(
 
 
 def _heading(title: str) -> str:
-    told = markdown_text(title).rstrip()
-    return f"{told[:-1]}\\#" if told.endswith("#") else told
+    text = markdown_text(title).rstrip()
+    return f"{text[:-1]}\\#" if text.endswith("#") else text
 
 
 def markdown_text(text: str) -> str:
@@ -65,8 +65,8 @@ def markdown_note(text: str) -> str:
 
 
 def _escaped(text: str) -> str:
-    told = _ACTS.sub(r"\\\g<0>", text.replace("\n", " "))
-    return told.replace("&", "&amp;").replace("<", "&lt;")
+    escaped = _ACTS.sub(r"\\\g<0>", text.replace("\n", " "))
+    return escaped.replace("&", "&amp;").replace("<", "&lt;")
 
 
 def markdown_tables(tables: Sequence[TextTable], notes: Sequence[str]) -> str:

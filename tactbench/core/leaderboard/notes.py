@@ -87,14 +87,14 @@ def _tare_notes(by_key: ColumnTable) -> list[str]:
     asked = dict.fromkeys(zip(by_key["protocol"], by_key.known("tare_s"), by_key["status"], strict=True))
     held = sorted({f"{tare:g} s" for _, tare, _ in asked if tare})
     names = {str(protocol) for protocol, _, status in asked if status == "done"}
-    told = []
+    sentences = []
     if held:
-        told.append(
+        sentences.append(
             f"`deployable`: each recording is tared on its own unloaded hold before its press ({', '.join(held)})"
         )
     if "deployable-untared" in names:
-        told.append("`deployable-untared`: readings as they are")
-    return [f"{'; '.join(told)}."] if told else []
+        sentences.append("`deployable-untared`: readings as they are")
+    return [f"{'; '.join(sentences)}."] if sentences else []
 
 
 def _floor_notes(by_key: ColumnTable) -> list[str]:
@@ -104,15 +104,15 @@ def _floor_notes(by_key: ColumnTable) -> list[str]:
     for row, floor in known:
         if floor is not None:
             floors.setdefault((question_name(row), str(row["unit"])), {})[floor] = None
-    told = []
+    sentences = []
     if floors:
         each = "; ".join(f"{where} {_floor(list(found), unit)}" for (where, unit), found in floors.items())
-        told.append(
+        sentences.append(
             f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond "
             "floor is sqrt(max(0, RMSE² − floor²)) of each replicate; a smaller RMSE is below it by chance. Ranks go "
             "by it where all answers of a block have it."
         )
-    return told
+    return sentences
 
 
 def _true_error_notes(by_key: ColumnTable) -> list[str]:
@@ -122,9 +122,9 @@ def _true_error_notes(by_key: ColumnTable) -> list[str]:
 
 def _floor(found: Sequence[float], unit: str) -> str:
     """Return a floor; of several campaigns the root of their mean square."""
-    told = f"{score(math.sqrt(sum(one * one for one in found) / len(found)), unit)}{suffix(unit)}"
+    text = f"{score(math.sqrt(sum(one * one for one in found) / len(found)), unit)}{suffix(unit)}"
     return (
-        told if len(found) == 1 else f"{told} (of {len(found)}: {score(min(found), unit)} … {score(max(found), unit)})"
+        text if len(found) == 1 else f"{text} (of {len(found)}: {score(min(found), unit)} … {score(max(found), unit)})"
     )
 
 
@@ -134,9 +134,9 @@ def interval_notes(by_key: ColumnTable) -> list[str]:
     answers = [not trivial for trivial in by_key["is_baseline"]]
     for task, method in dict.fromkeys(compress(zip(by_key["task"], by_key["ci_method"], strict=True), answers)):
         if method:
-            told = visible(f"{task}: interval by {method}.")
-            kinds.setdefault(re.sub(r" \([^)]*\)", "", told), {})[told] = None
-    return [next(iter(told)) if len(told) == 1 else short for short, told in kinds.items()]
+            sentence = visible(f"{task}: interval by {method}.")
+            kinds.setdefault(re.sub(r" \([^)]*\)", "", sentence), {})[sentence] = None
+    return [next(iter(texts)) if len(texts) == 1 else short for short, texts in kinds.items()]
 
 
 def _chosen_notes(by_key: ColumnTable) -> list[str]:
@@ -243,13 +243,13 @@ def count_texts(counts: Mapping[str, int]) -> list[str]:
             beyond[sigma[1]] += count
         else:
             sums[reason] += count
-    told = [f"{what}: {count}" for what, count in sums.items() if count]
+    texts = [f"{what}: {count}" for what, count in sums.items() if count]
     if beyond:
         listed = ", ".join(f"{channel} {count}" for channel, count in beyond.most_common(MOST_CHANNELS))
         more = len(beyond) - MOST_CHANNELS
         rest = f" and {more} more channels" if more > 0 else ""
-        told.append(f"rows beyond three sigma in {listed}{rest}")
-    return told
+        texts.append(f"rows beyond three sigma in {listed}{rest}")
+    return texts
 
 
 def _stopped_notes(by_key: ColumnTable, statuses: Collection[str]) -> list[str]:
@@ -267,11 +267,11 @@ def _stopped_note(status: str, signal: int | None, reason: str, members: list[Ro
     listed = ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
     by = f" by signal {signal}" if signal is not None else ""
     said = cut(visible(reason), LONGEST_REASON)
-    told = f"{listed} {visible(status)}{by}: {said}"
+    sentence = f"{listed} {visible(status)}{by}: {said}"
     if status not in STOPPED:
-        return told
-    end = "" if told.endswith((".", "!", "?", "…")) else "."
-    return f"{told}{end} Look into it: {command_line('tactbench', 'why', members[0]['cell'])}"
+        return sentence
+    end = "" if sentence.endswith((".", "!", "?", "…")) else "."
+    return f"{sentence}{end} Look into it: {command_line('tactbench', 'why', members[0]['cell'])}"
 
 
 def _mark_notes(by_key: ColumnTable) -> list[str]:
@@ -284,7 +284,7 @@ def _mark_notes(by_key: ColumnTable) -> list[str]:
 def _simulation_notes(by_key: ColumnTable) -> list[str]:
     """Return what SIM and EMULATED mean, and what the simulations assumed."""
     assumed = list(compress(by_key["assumptions"], by_key["simulated"]))
-    told = dict.fromkeys(map(_assumptions, {id(one): one for one in assumed}.values()))
+    assumptions = dict.fromkeys(map(_assumptions, {id(one): one for one in assumed}.values()))
     emulated = by_key.known("emulated")
     marks = [
         text
@@ -294,9 +294,9 @@ def _simulation_notes(by_key: ColumnTable) -> list[str]:
         )
         if any(some)
     ]
-    return [f"{'; '.join(marks)}; never ranked against hardware. Assumed: {one}." for one in told]
+    return [f"{'; '.join(marks)}; never ranked against hardware. Assumed: {one}." for one in assumptions]
 
 
 def _assumptions(assumptions: Mapping[str, Any]) -> str:
-    told = ", ".join(f"{key} {value}" for key, value in sorted(assumptions.items()))
-    return visible(told) or "see docs/twin.md"
+    text = ", ".join(f"{key} {value}" for key, value in sorted(assumptions.items()))
+    return visible(text) or "see docs/twin.md"

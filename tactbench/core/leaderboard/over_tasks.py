@@ -49,11 +49,11 @@ def over_tasks(by_key: ColumnTable) -> TextTable | None:
         if found is None:
             continue
         value, low, high, left_out = found
-        absent = {told.partition(":")[0] for told in left_out}
+        absent = {reason.partition(":")[0] for reason in left_out}
         names = ", ".join(visible(row["task"]) for row in members if row["task"] not in absent)
         texts = (score(value, "1"), interval(low, high, "1"), names)
         lines.append((sensor, answer, protocol, *texts))
-        notes |= dict.fromkeys(visible(f"Not in the mean of {sensor}/{answer}: {told}.") for told in left_out)
+        notes |= dict.fromkeys(visible(f"Not in the mean of {sensor}/{answer}: {reason}.") for reason in left_out)
     return TextTable(TITLE, COLUMNS, tuple(lines), NUMERIC, notes=tuple(notes)) if lines else None
 
 

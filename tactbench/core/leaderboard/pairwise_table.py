@@ -135,10 +135,10 @@ def _averages(found: Sequence[PairwiseComparison]) -> list[str]:
         sides = [aggregate([row for row in side if row is not None]) for side in zip(*pairs, strict=True)]
         if len({pair.row["task"] for pair in members}) < 2 or sides[0] is None or sides[1] is None:
             continue
-        told = f"{members[0].first} {_average(sides[0])}, {members[0].second} {_average(sides[1])}"
+        averages = f"{members[0].first} {_average(sides[0])}, {members[0].second} {_average(sides[1])}"
         notes.append(
             f"Interquartile mean over {sides[0].tasks} tasks under {protocol} ({sides[0].entries} scores; 0 is the "
-            f"trivial baseline, 1 the reference): {told}."
+            f"trivial baseline, 1 the reference): {averages}."
             + "".join(f" Left out: {one}." for one in dict.fromkeys(sides[0].left_out + sides[1].left_out))
         )
     return notes

@@ -124,9 +124,11 @@ def _about_first(row: Row, first: Row | None) -> list[str]:
     if not beyond:
         return []
     unit = row["unit"]
-    told = f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix(unit)}"
+    sentence = (
+        f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix(unit)}"
+    )
     leak = _skill(first["score"], trivial, row) >= LEAK_SHARE * _skill(row["score"], trivial, row)
-    return [f"LEAK: {told}" if leak else f"{told}: a part of the answer is known before"]
+    return [f"LEAK: {sentence}" if leak else f"{sentence}: a part of the answer is known before"]
 
 
 def _beyond_guessing(first: Row, trivial: float) -> bool | None:

@@ -15,7 +15,7 @@ from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.columns import COLUMNS, NUMERIC, columns
 from tactbench.core.leaderboard.footer import footer_of
 from tactbench.core.leaderboard.hosts import host_letters, timing_notes
-from tactbench.core.leaderboard.lines import Line, Shown
+from tactbench.core.leaderboard.lines import Line, RowTexts
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.leaderboard.notes import notes_of
 from tactbench.core.leaderboard.numbers import ABSENT
@@ -45,7 +45,7 @@ Row = Mapping[str, Any]
 class Table:
     """A leaderboard, ready to be shown."""
 
-    shown: Shown
+    shown: RowTexts
     """All rows, by the names of their cells, as text."""
     blocks: tuple[Block, ...]
     notes: tuple[str, ...]

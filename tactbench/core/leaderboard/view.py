@@ -50,7 +50,7 @@ def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
     UnknownNameError
         If there is no such column.
     """
-    known = {**{name: name for name in (*COLUMNS, CELL)}, **{told: name for name, told in SHOWN.items()}}
+    known = {**{name: name for name in (*COLUMNS, CELL)}, **{shown: name for name, shown in SHOWN.items()}}
     for name in asked:
         if name not in known:
             raise UnknownNameError("column", name, (*COLUMNS, CELL))
@@ -142,8 +142,8 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
         ]
         options.append("--wide")
     where = (view.folder,) if view.folder else ()
-    told = _listed(more)
-    all_of_it = [f"{told[:1].upper()}{told[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
+    listed = _listed(more)
+    all_of_it = [f"{listed[:1].upper()}{listed[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
     first = next((line for block in table.blocks for line in block.lines if line.kind == "result"), None)
     if first is None:
         return tuple(all_of_it if more else [])

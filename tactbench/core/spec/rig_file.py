@@ -78,7 +78,7 @@ class RigFile(Frozen):
     rig: str
     """Name of the rig (``tactbench list rigs``) that the file is for."""
     title: str = ""
-    """Shown with its recordings."""
+    """RowTexts with its recordings."""
     sensors: dict[str, DeviceEntry] = Field(min_length=1)
     """By the sensor's name; a run uses the one it asks for."""
     force: ForceEntry | None = None

@@ -95,7 +95,7 @@ def details(by_key: ColumnTable, room: int) -> tuple[dict[str, str], list[str]]:
     many = len(by_key.rows) > MANY
     others = sorted(set(by_key) - {*_FIRST, *_IN_THE_TABLE, *_LARGE}, key=str)
     kept = _FIRST if many else (*_FIRST, *_IN_THE_TABLE, *others, *_LARGE)
-    told: dict[str, str] = {}
+    fields: dict[str, str] = {}
     left_out = [key for key in (*others, *_LARGE) if key not in kept and any(by_key.known(key))]
     for key in kept:
         values = by_key.known(key)
@@ -108,12 +108,12 @@ def details(by_key: ColumnTable, room: int) -> tuple[dict[str, str], list[str]]:
         for longest in _LENGTHS if str in set(map(type, values)) else _LENGTHS[:1]:
             text = deflated(column(plain_values(values, longest)))
             if len(text) <= room:
-                told[key] = text
+                fields[key] = text
                 room -= len(text)
                 break
         else:
             left_out.append(key)
-    return told, left_out
+    return fields, left_out
 
 
 def plain_values(values: Sequence[Any], longest: int = LONGEST) -> list[Any]:

@@ -14,10 +14,10 @@ from tactbench.core.leaderboard.board.columns import column, cut_start, deflated
 from tactbench.core.leaderboard.board.static import static_tables
 from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.columns import VALUES
-from tactbench.core.leaderboard.lines import Shown
+from tactbench.core.leaderboard.lines import RowTexts
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
-from tactbench.core.leaderboard.particulars import GROUPS, TITLES
+from tactbench.core.leaderboard.row_groups import GROUPS, TITLES
 from tactbench.core.leaderboard.table import NUMERIC, Block, Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.text_table import TextTable
@@ -114,7 +114,7 @@ def _section(section: TextTable) -> dict[str, Any]:
     }
 
 
-def _column(name: str, shown: Shown) -> dict[str, Any]:
+def _column(name: str, shown: RowTexts) -> dict[str, Any]:
     """Return a column of the table: its texts, and of numbers what they are sorted by."""
     if name not in NUMERIC:
         return column(plain_values(shown.texts[name]))
@@ -156,8 +156,8 @@ def _frame(by_key: ColumnTable, tables: str) -> str:
 def _summary(by_key: ColumnTable) -> str:
     """Return how many cells there are, and how they ended."""
     ends = Counter(map(visible, map(str, by_key["status"])))
-    told = ", ".join(f"{count:,} {status}" for status, count in ends.most_common())
+    statuses = ", ".join(f"{count:,} {status}" for status, count in ends.most_common())
     sensors, tasks = (len(set(by_key[key])) for key in ("sensor", "task"))
     if not by_key.rows:
         return "No cells."
-    return f"{len(by_key.rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {told}."
+    return f"{len(by_key.rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {statuses}."

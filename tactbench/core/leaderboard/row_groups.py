@@ -40,4 +40,4 @@ TITLES = {
 """Lists and tables."""
 
 APART = ("traceback", "classes")
-"""Shown in places of their own."""
+"""RowTexts in places of their own."""
