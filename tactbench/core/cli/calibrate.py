@@ -47,7 +47,7 @@ def command(
         found = load_result(out)
         if found is None:
             raise UsageError(f"There is no calibration in {out}, and none came along.", hint="Leave out --show.")
-        remark(f"RowTexts: {found.shown}.")
+        remark(f"Shown: {found.shown}.")
         print_calibration(found, summary(found), shape)
         return
     result = _drawn(_procedure(config), draws, seed, jobs, out)

@@ -120,7 +120,7 @@ class _Bar:
 
         above = [Text.from_ansi(self._text, no_wrap=True)] if self._text else []
 
-        class RowTexts(RichProgress):
+        class Shown(RichProgress):
             """Bars below what is known so far."""
 
             def get_renderables(self) -> Iterator[Any]:
@@ -137,7 +137,7 @@ class _Bar:
             TextColumn("{task.fields[now]}", markup=False),
         )
         # The terminal is handed over as it is: rich must not take over streams that cells print to.
-        self._shown = RowTexts(
+        self._shown = Shown(
             *columns, console=Console(file=self._terminal), auto_refresh=alone, redirect_stdout=False,
             redirect_stderr=False, transient=True,
         )  # fmt: skip

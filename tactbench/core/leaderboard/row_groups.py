@@ -40,4 +40,4 @@ TITLES = {
 """Lists and tables."""
 
 APART = ("traceback", "classes")
-"""RowTexts in places of their own."""
+"""Shown in places of their own."""

@@ -78,7 +78,7 @@ class RigFile(Frozen):
     rig: str
     """Name of the rig (``tactbench list rigs``) that the file is for."""
     title: str = ""
-    """RowTexts with its recordings."""
+    """Shown with its recordings."""
     sensors: dict[str, DeviceEntry] = Field(min_length=1)
     """By the sensor's name; a run uses the one it asks for."""
     force: ForceEntry | None = None

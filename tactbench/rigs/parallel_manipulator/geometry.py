@@ -48,7 +48,7 @@ class _Delta(BaseModel, ABC):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     title: str
-    """RowTexts with what is computed from it; what is shipped is called an example."""
+    """Shown with what is computed from it; what is shipped is called an example."""
     source: Source
     """Where these numbers come from: `measured` on the machine, `sourced` from its drawings, or `assumed`."""
     azimuth_deg: PerLeg = (0.0, 120.0, 240.0)

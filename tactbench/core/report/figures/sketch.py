@@ -65,7 +65,7 @@ def marks(group: Group) -> str:
     if row["dagger"]:
         said.append("†: each set, the test set too, is scaled by its own mean and deviation.")
     said += [f"‡: {stamp}" for stamp in row["stamps"]]
-    said += [f"RowTexts: {one}; the tables are over all of them." for one in _shown(row)]
+    said += [f"Shown: {one}; the tables are over all of them." for one in _shown(row)]
     return " ".join(said)
 
 
