@@ -14,6 +14,7 @@ from tests.conftest import Shell, Verbs
 
 RUN = ("run", "--repeats", "5", "--sensor", "ideal", "--task", "force", "--estimator", "lasso", "--out", "out")
 
+
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     """The verbs in the folder of a run."""
