@@ -10,7 +10,8 @@ import sys
 import can
 import pytest
 
-from tactbench.plugin import CanBus, CanFrame, LinkError, LinkTimeout, LinkUnplugged, open_link
+from tactbench.links.can_link import CanBus
+from tactbench.plugin.devices import CanFrame, LinkError, LinkTimeout, LinkUnplugged, open_link
 from tests.links.ends import pty
 
 FRAMES = [

@@ -8,7 +8,8 @@ fitted warm-up is taken off, and 15 s or more after a contact. What hard presses
 
 from __future__ import annotations
 
-from tactbench.plugin import ChannelKind, Creep, Nuisances, Quantity, Scenario, assumed, derived, measured
+from tactbench.plugin import ChannelKind, Quantity, assumed, derived, measured
+from tactbench.plugin.simulation import Creep, Nuisances, Scenario
 
 _STEP = measured(1.0, "count", "raw channels of RF, DX and RG move in steps of one count")
 _NONE_KNOWN = "no recording shows it; left at 0 rather than invented"

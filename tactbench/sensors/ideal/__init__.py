@@ -7,19 +7,17 @@ closed form for a point load, for a Gaussian pressure and for a uniform one.
 from __future__ import annotations
 
 from tactbench.plugin import (
-    BondedLayer,
     ChannelSpec,
     DataSheet,
-    Nuisances,
     Quantity,
     SensorDescriptor,
     SensorSpec,
-    SkinSheet,
     Source,
     StreamSpec,
     assumed,
     hookimpl,
 )
+from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
 TACTBENCH_API = 1
 

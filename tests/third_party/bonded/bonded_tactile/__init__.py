@@ -1,17 +1,7 @@
 """A sensor maker's plugin: four taxels on a thick, nearly incompressible layer."""
 
-from tactbench.plugin import (
-    BondedLayer,
-    ChannelSpec,
-    Nuisances,
-    SensorDescriptor,
-    SensorSpec,
-    SkinSheet,
-    Source,
-    StreamSpec,
-    assumed,
-    hookimpl,
-)
+from tactbench.plugin import ChannelSpec, SensorDescriptor, SensorSpec, Source, StreamSpec, assumed, hookimpl
+from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
 TACTBENCH_API = 1
 MINE = "its maker"
