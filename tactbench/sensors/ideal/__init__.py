@@ -49,21 +49,6 @@ PARAMETERS = {
     "influence": _by_definition(1.5, "mm"),
 }
 
-_NONE = Nuisances(
-    white=_by_definition(0.0, "count"),
-    offset_shared=_by_definition(0.0, "count"),
-    offset_own=_by_definition(0.0, "count"),
-    offset_session=_by_definition(0.0, "count"),
-    gain_scatter=_by_definition(0.0, "1"),
-    warm_up=_by_definition(0.0, "count"),
-    warm_up_tau=_by_definition(1.0, "s"),
-    warm_up_scatter=_by_definition(0.0, "1"),
-    wander=_by_definition(0.0, "count"),
-    wander_tau=_by_definition(1.0, "s"),
-    # No converter: readings are stored as float64, unrounded.
-    step=_by_definition(0.0, "count"),
-)
-
 _SOURCE = Source(tag="assumed", reference=_WHY)
 
 STREAM = StreamSpec(
@@ -95,7 +80,7 @@ SPEC = SensorSpec(
     link_delay=_by_definition(0.0, "ms"),
     skin=SKIN,
     parameters=PARAMETERS,
-    nuisances={"taxel": _NONE},
+    nuisances={"taxel": Nuisances()},
     data_sheet=DataSheet(exists=False),
 )
 

@@ -253,6 +253,7 @@ def test_what_a_plan_leaves_out_is_never_imported(sensors):
     code = """
 import sys
 from tactbench.plugin import *
+from tactbench.plugin.simulation import *
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.rig import build
 from tactbench.sensors.icub import tactbench_sensors
