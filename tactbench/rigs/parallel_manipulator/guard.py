@@ -25,18 +25,8 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple, NoReturn
 
-from tactbench.plugin import (
-    Block,
-    Clock,
-    Driver,
-    LinkClosed,
-    LinkError,
-    LinkTimeout,
-    LinkUnplugged,
-    RigError,
-    StreamSpec,
-    TactbenchError,
-)
+from tactbench.plugin import Block, RigError, StreamSpec, TactbenchError
+from tactbench.plugin.devices import Clock, Driver, LinkClosed, LinkError, LinkTimeout, LinkUnplugged
 from tactbench.rigs.parallel_manipulator.force_watch import ForceWatch, Problem
 from tactbench.rigs.parallel_manipulator.guard_interface import (
     Beat,

@@ -7,7 +7,8 @@ import signal
 import numpy as np
 import pytest
 
-from tactbench.plugin import Block, LinkError, LinkTimeout, Quality
+from tactbench.plugin import Block, Quality
+from tactbench.plugin.devices import LinkError, LinkTimeout
 from tactbench.rigs.parallel_manipulator.guard_interface import Beat, GuardLostError
 from tactbench.rigs.parallel_manipulator.guard_messages import (
     FORCE,

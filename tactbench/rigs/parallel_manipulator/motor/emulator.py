@@ -1,6 +1,6 @@
 """The motor's drive at the end of its line: bytes in, bytes out, on a clock that is passed in; no input or output.
 
-A :class:`tactbench.plugin.DeviceEmulator`.
+A :class:`tactbench.plugin.devices.DeviceEmulator`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from tactbench.plugin import CanFrame, EmulatorSettings, Fault, Sent, fault_concerns, sourced
+from tactbench.plugin import sourced
+from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
@@ -41,7 +42,7 @@ SWITCH_M = -8e-3
 """Where an emulated drive of a rig file has its reference switch, 2 mm from its end stop (assumed)."""
 
 
-class MotorEmulator:
+class MotorEmulator(DeviceEmulator):
     """A drive with its motor, and its line's pace. The first call is power-on.
 
     Parameters
