@@ -19,7 +19,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tactbench.plugin import DriverSettings, EmulatedDevice, EmulatedDevices, assumed
+from tactbench.plugin import assumed
+from tactbench.plugin.devices import DriverSettings, EmulatedDevice, EmulatedDevices
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
 from tactbench.rigs.parallel_manipulator.guard import LocalGuard

@@ -31,19 +31,19 @@ from tactbench.core.acquisition import acquire
 from tactbench.core.calibration.readoff import thinned
 from tactbench.core.evaluation.cell import evaluate
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import PlannedScene, in_drawn_order
 from tactbench.plugin import (
     ForceRamp,
-    Nuisances,
     Placement,
     RigContext,
     Scene,
     SensorDescriptor,
-    Simulation,
     assumed,
     load_object,
     load_registry,
 )
+from tactbench.plugin.simulation import Nuisances
 from tactbench.rigs.twin.likeness.statistics import warming
 
 REGISTRY = load_registry()

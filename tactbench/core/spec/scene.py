@@ -11,6 +11,7 @@ from tactbench.core.spec.quantity import Frozen, Quantity, assumed, derived, mea
 from tactbench.core.spec.sensor import ChannelKind
 
 Role = Literal["train", "validation", "test"]
+"""What a recording is for, given by its task."""
 
 PAPER = "Karl et al. 2016, ML-based tactile sensor calibration"
 

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from tactbench.core.errors import NotApplicable
 from tactbench.core.spec import units
 from tactbench.core.spec.figure import RealFigure
-from tactbench.core.spec.quantity import Frozen, Quantity, Source
+from tactbench.core.spec.quantity import Frozen, Quantity, Source, assumed
 from tactbench.core.spec.skin import Skin
 
 ChannelKind = Literal[
@@ -91,30 +91,39 @@ class Creep(Frozen):
     """Its time constant [time]."""
 
 
-class Nuisances(Frozen):
-    """What comes on top of the physics, for all channels of one kind. Counts are the channel's own unit."""
+_NONE_STATED = "the sensor states none"
+_NO_COUNTS = assumed(0.0, "count", _NONE_STATED)
+_NO_SHARE = assumed(0.0, "1", _NONE_STATED)
+_ANY_TIME = assumed(1.0, "s", "without effect")
 
-    white: Quantity
+
+class Nuisances(Frozen):
+    """What comes on top of the physics, for all channels of one kind. Counts are the channel's own unit.
+
+    What is left out is 0; a warm-up or a wander needs its time constant.
+    """
+
+    white: Quantity = _NO_COUNTS
     """Standard deviation of white noise, before rounding."""
-    offset_shared: Quantity
+    offset_shared: Quantity = _NO_COUNTS
     """Standard deviation of an offset that all channels of one recording share."""
-    offset_own: Quantity
+    offset_own: Quantity = _NO_COUNTS
     """Each channel's own offset in a recording: its root mean square over channels and recordings."""
-    offset_session: Quantity
+    offset_session: Quantity = _NO_COUNTS
     """Standard deviation of each channel's own offset between sessions."""
-    gain_scatter: Quantity
+    gain_scatter: Quantity = _NO_SHARE
     """Standard deviation of each channel's gain within one sensor unit [1]."""
-    warm_up: Quantity
+    warm_up: Quantity = _NO_COUNTS
     """How far the shared rest level rises from power-on to equilibrium."""
-    warm_up_tau: Quantity
+    warm_up_tau: Quantity = _ANY_TIME
     """Time constant of that rise [time]."""
-    warm_up_scatter: Quantity
+    warm_up_scatter: Quantity = _NO_SHARE
     """Standard deviation of the factors with which channels follow it [1]."""
-    wander: Quantity
+    wander: Quantity = _NO_COUNTS
     """Standard deviation of free drift (Ornstein–Uhlenbeck)."""
-    wander_tau: Quantity
+    wander_tau: Quantity = _ANY_TIME
     """Its correlation time [time]."""
-    step: Quantity
+    step: Quantity = _NO_COUNTS
     """Step of the converter."""
     creep: tuple[Creep, ...] = ()
     unit_gain: Quantity | None = None
@@ -134,6 +143,13 @@ class Nuisances(Frozen):
         if isinstance(given, dict) and "largest_slope" in given:
             return {name: value for name, value in given.items() if name != "largest_slope"}
         return given
+
+    @model_validator(mode="after")
+    def _has_its_time_constants(self) -> Nuisances:
+        for name in ("warm_up", "wander"):
+            if getattr(self, name).value and f"{name}_tau" not in self.model_fields_set:
+                raise ValueError(f"{name} is not 0, so {name}_tau is needed, the time constant of it")
+        return self
 
     def hidden(self, noise_scale: float = 1.0) -> float:
         """Return the standard deviation that white noise and rounding hide anyway, in the channel's unit."""

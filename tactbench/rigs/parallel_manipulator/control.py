@@ -11,12 +11,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from tactbench.plugin import Block, Driver, StreamSpec, TactbenchError
+from tactbench.plugin import Block, StreamSpec, TactbenchError
+from tactbench.plugin.devices import Driver
 from tactbench.rigs.parallel_manipulator.guard_interface import Beat, Event, Guard, Limits, Report
 from tactbench.rigs.parallel_manipulator.press import Press
 
 if TYPE_CHECKING:
-    from tactbench.plugin import Clock
+    from tactbench.plugin.devices import Clock
 
 STOP_S = 10.0
 """The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""

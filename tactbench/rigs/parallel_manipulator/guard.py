@@ -25,18 +25,15 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple, NoReturn
 
-from tactbench.plugin import (
-    Block,
+from tactbench.plugin import Block, RigError, StreamSpec, TactbenchError
+from tactbench.plugin.devices import (
     Clock,
     Driver,
     LinkClosed,
     LinkError,
     LinkTimeout,
     LinkUnplugged,
-    RigError,
     SequenceCheck,
-    StreamSpec,
-    TactbenchError,
 )
 from tactbench.rigs.parallel_manipulator.force_watch import ForceWatch, Problem
 from tactbench.rigs.parallel_manipulator.guard_interface import (

@@ -36,20 +36,8 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
-from tactbench.plugin import (
-    Block,
-    Clock,
-    DriverSettings,
-    LinkError,
-    LinkTimeout,
-    LinkUnplugged,
-    RigError,
-    StreamSpec,
-    TactbenchError,
-    UsageError,
-    load_object,
-    open_link,
-)
+from tactbench.plugin import Block, RigError, StreamSpec, TactbenchError, UsageError, load_object
+from tactbench.plugin.devices import Clock, DriverSettings, LinkError, LinkTimeout, LinkUnplugged, open_link
 from tactbench.rigs.parallel_manipulator.guard import LOOK_S, RETREAT_S, LocalGuard
 from tactbench.rigs.parallel_manipulator.guard_interface import (
     Beat,

@@ -19,36 +19,39 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactbench.plugin import (
-    FORCE,
     Acquisition,
     Block,
+    NotApplicable,
+    PlanEntry,
+    PluginContractError,
+    Rig,
+    RigContext,
+    RigError,
+    Scalar,
+    Scene,
+    SensorDescriptor,
+    StreamSpec,
+    UsageError,
+    load_registry,
+)
+from tactbench.plugin.devices import (
+    FORCE,
+    DeviceAcquisition,
     Driver,
     EmulatedDevices,
     Emulation,
     ForceEntry,
     NamedDevice,
-    NotApplicable,
     Operator,
-    PlanEntry,
-    PluginContractError,
     PressingForce,
     Reading,
-    Rig,
-    RigContext,
-    RigError,
     RigFile,
-    Scalar,
-    Scene,
-    SensorDescriptor,
     StreamClock,
     StreamCounts,
-    StreamSpec,
-    UsageError,
     ask_operator,
     drivers_of,
     emulation_of,
     emulators_of,
-    load_registry,
     physics_of,
     with_sensor,
 )
@@ -68,7 +71,8 @@ from tactbench.rigs.parallel_manipulator.rig_check import refuse
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, settings_of, with_limits
 
 if TYPE_CHECKING:
-    from tactbench.plugin import Clock, EmulatedDevice, FloatArray
+    from tactbench.plugin import FloatArray
+    from tactbench.plugin.devices import Clock, EmulatedDevice
 
 FORCE_AGE_S = 0.010
 """Added to three sampling periods of the force sensor: how old a sample may be."""
@@ -199,7 +203,7 @@ class ParallelManipulator:
         self._operator, self._physics = operator, physics
 
     @contextmanager
-    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[PressAcquisition]:
+    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[DeviceAcquisition]:
         """Open the devices, go to the scene's place, find the surface, and wait just above it.
 
         Raises
@@ -323,7 +327,7 @@ class ParallelManipulator:
         if not hasattr(simulated, "press_curve"):
             raise PluginContractError(
                 f"The simulated rig {file.emulation.physics!r} has no press curves.",
-                hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.",
+                hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.simulation.",
             )
         heights, limits = self.settings.heights, self.settings.limits
         rng = np.random.default_rng([file.emulation.seed, seed, *b"skin", *scene.name.encode()])
@@ -341,6 +345,9 @@ class ParallelManipulator:
             if not isinstance(emulator, MotorEmulator):
                 raise UsageError(f"The emulated {MOTOR} is no faulhaber device.", hint="This rig moves one.")
             senses.pressed_by(emulator.drive)
+        for name in JOINTS:
+            if name in found and isinstance(joint := found[name].emulator, MotorEmulator):
+                joint.drive.servo.load = None  # the platform's weight is not modelled
         return found
 
     def _guard(

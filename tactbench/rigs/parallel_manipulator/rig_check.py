@@ -9,7 +9,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
-from tactbench.plugin import (
+from tactbench.plugin import TactbenchError, UsageError, load_registry
+from tactbench.plugin.devices import (
     CanFrame,
     CheckTable,
     DeviceEntry,
@@ -17,11 +18,8 @@ from tactbench.plugin import (
     PressingForce,
     RigCheck,
     RigFile,
-    TactbenchError,
-    UsageError,
     drivers_of,
     emulators_of,
-    load_registry,
 )
 from tactbench.rigs.parallel_manipulator.guard import LONGEST_COMMAND, MANDATORY, reaction
 from tactbench.rigs.parallel_manipulator.joints import check_places, workspace_of
@@ -42,7 +40,7 @@ from tactbench.rigs.parallel_manipulator.worst_case import (
 )
 
 if TYPE_CHECKING:
-    from tactbench.plugin import Link
+    from tactbench.plugin.devices import Link
     from tactbench.rigs.parallel_manipulator.worst_case import Reaction
 
 FIRST = 4

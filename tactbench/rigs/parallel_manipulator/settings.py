@@ -11,7 +11,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
 
-from tactbench.plugin import ForceLoop, NamedDevice, Quantity, RigFile, UsageError, sourced
+from tactbench.plugin import ForceLoop, Quantity, UsageError, sourced
+from tactbench.plugin.devices import NamedDevice, RigFile
 from tactbench.rigs.parallel_manipulator.force_law import ForceLaw
 from tactbench.rigs.parallel_manipulator.geometry import Geometry
 from tactbench.rigs.parallel_manipulator.motion_profile import MotionLimits

@@ -7,15 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tactbench.plugin import (
-    ChannelSpec,
-    FloatArray,
-    NotApplicable,
-    RigError,
-    Scene,
-    SensorDescriptor,
-    SensorSpec,
-)
+from tactbench.plugin import ChannelSpec, FloatArray, NotApplicable, RigError, Scene, SensorDescriptor, SensorSpec
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity, rung
 from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan

@@ -13,8 +13,6 @@ import numpy.typing as npt
 from tactbench.plugin import (
     Block,
     ChannelSpec,
-    EffectDescriptor,
-    Explained,
     FloatArray,
     NotApplicable,
     PlanEntry,
@@ -26,6 +24,7 @@ from tactbench.plugin import (
     Source,
     StreamSpec,
 )
+from tactbench.plugin.simulation import EffectDescriptor, Explained
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene

@@ -24,7 +24,8 @@ def rig_check(tmp_path):
 
     def run(settings):
         path = tmp_path / "rig.yaml"
-        path.write_text(f"version: 1\nrig: acme-press\nsensors: {{icub: {{link: emulated}}}}\nsettings: {settings}\n", encoding="utf-8")
+        lines = ("version: 1", "rig: acme-press", "sensors: {icub: {link: emulated}}", f"settings: {settings}")
+        path.write_text("\n".join(lines), encoding="utf-8")
         env = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}", "COLUMNS": "200", "PYTHONWARNINGS": "error"}
         return subprocess.run(
             [sys.executable, "-m", "tactbench", "rig", "check", str(path)], env=env, capture_output=True, text=True,

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tactbench.plugin import Block, SequenceCheck
+from tactbench.plugin import Block
+from tactbench.plugin.devices import SequenceCheck
 from tactbench.rigs.parallel_manipulator.force_torque.wrench import stream
 from tactbench.rigs.parallel_manipulator.force_watch import ForceWatch
 from tactbench.rigs.parallel_manipulator.guard_interface import Trigger

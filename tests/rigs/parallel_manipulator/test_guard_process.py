@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactbench.plugin import Block, LinkError, LinkTimeout, Quality
+from tactbench.plugin import Block, Quality
+from tactbench.plugin.devices import LinkError, LinkTimeout
 from tactbench.rigs.parallel_manipulator.guard_interface import Beat, GuardLostError
 from tactbench.rigs.parallel_manipulator.guard_messages import (
     FORCE,

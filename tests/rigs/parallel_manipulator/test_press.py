@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from tactbench.plugin import NotApplicable, RigError, RigFile, Slide, assumed
+from tactbench.plugin import NotApplicable, RigError, assumed
+from tactbench.plugin.devices import RigFile
+from tactbench.plugin.simulation import Slide
 from tactbench.rigs.parallel_manipulator.loop_stability import ramp_error_n
 from tactbench.rigs.parallel_manipulator.press import PressState
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator

@@ -9,21 +9,19 @@ import sys
 import numpy as np
 import pytest
 
+from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import (
-    EffectDescriptor,
-    Environment,
     ForceRamp,
     Indenter,
     NotApplicable,
     Placement,
     Quality,
-    Reason,
     RigContext,
     RigError,
     Scene,
-    Simulation,
     assumed,
 )
+from tactbench.plugin.simulation import EffectDescriptor, Environment, Reason
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.rig import Twin, build
@@ -233,7 +231,7 @@ def test_a_cap_below_a_cell_is_refused(rig, sensors):
 
 def test_a_strangers_effect_takes_part(sensors, tmp_path, monkeypatch):
     (tmp_path / "dew.py").write_text(
-        "from tactbench.plugin import Reason\n"
+        "from tactbench.plugin.simulation import Reason\n"
         "def called_for(scene, sensor):\n    return Reason(True, 'it is raining')\n"
         "def apply(run):\n    for track in run.tracks:\n        track.readings -= 7\n"
     )
@@ -255,6 +253,7 @@ def test_what_a_plan_leaves_out_is_never_imported(sensors):
     code = """
 import sys
 from tactbench.plugin import *
+from tactbench.plugin.simulation import *
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.rig import build
 from tactbench.sensors.icub import tactbench_sensors

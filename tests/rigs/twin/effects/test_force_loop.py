@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import Environment, ForceLoop, ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.plugin import ForceLoop, ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND, depth_of, force_at_depth
