@@ -106,6 +106,7 @@ class Control:
         self._blocks: deque[Block] = deque()
         self._events: deque[Event] = deque()
         self._over = threading.Event()
+        self._stop = ""
         self._thread: threading.Thread | None = None
         self._counts: Mapping[str, Mapping[str, int]] | None = None
 
@@ -135,6 +136,16 @@ class Control:
         """Beat from a thread of its own, until :meth:`stop`: for real time."""
         self._thread = threading.Thread(target=self._run, name="force control", daemon=True)
         self._thread.start()
+
+    def retreat(self, why: str, within_s: float) -> None:
+        """Let the motor retreat from the next control period on; return when it has ended, or the time is over."""
+        self._stop = self._stop or why
+        until_ns = self._clock() + round(1e9 * within_s)
+        while not self.press.over and self._clock() < until_ns:
+            if self._thread is None:
+                self.carry(self._next_ns)
+            else:
+                self._over.wait(1e-9 * self._period_ns)
 
     def stop(self) -> None:
         """End the thread, if there is one; the guard may be used by the caller then."""
@@ -179,6 +190,8 @@ class Control:
         self._gather()
         raw, self._raw = self._raw, []
         press, last_ns = self.press, max(self._sensor.last_ns, self._began_ns)
+        if self._stop:
+            press.fail(self._stop)
         if now_ns - last_ns > self._stale_ns:
             press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - last_ns):.0f} ms")
         try:

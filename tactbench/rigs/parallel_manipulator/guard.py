@@ -59,8 +59,6 @@ ALIVE_S = 0.2
 """For so long the force is watched before anything moves (assumed: 200 samples at 1 kHz)."""
 AGAIN_S = 0.25
 """After which a retreat that is not under way is sent again (assumed: above the time of an answer at 9600 baud)."""
-RETREAT_S = 1.0
-"""Added to the way's time, after which a retreat has failed (assumed)."""
 REFUSED = 3
 """Refused commands in a row that end the rig's command (assumed)."""
 LONGEST_COMMAND = 9
@@ -160,6 +158,7 @@ class LocalGuard:
         self._motor_blocks: list[Block] = []
         self._events: list[Event] = []
         self._said: list[str] = []
+        self._not_out = ""
         self._counts: Counter[str] = Counter()
         self._force_gone = self._motor_gone = self._home_anew = self._closed = False
         self._beats = self._refused = 0
@@ -291,7 +290,8 @@ class LocalGuard:
             self.state = GuardState.IDLE
             self._tell(None, "disarmed")
         self._limits, self.trigger = None, None
-        return self._report(0, _Verdict(True))
+        report, self._not_out = self._report(0, _Verdict(True)), ""
+        return report
 
     def abandon(self) -> None:
         """Close the motor's link and send nothing more: for whoever goes on without this guard."""
@@ -472,9 +472,8 @@ class LocalGuard:
         self.state, self.trigger = GuardState.RETREATING, trigger
         self._home_anew |= trigger in _HOME_ANEW
         self._into_skin = False
-        low, high = limits.travel_m
         self._began_ns = self._clock()
-        self._deadline_ns = self._began_ns + round(1e9 * ((high - low) / limits.retreat_speed_m_s + RETREAT_S))
+        self._deadline_ns = self._began_ns + round(1e9 * limits.retreat_s)
         self._send_retreat()
         self._tell(trigger, text)
 
@@ -493,7 +492,7 @@ class LocalGuard:
         now_ns, state = self._clock(), self._motor.state
         took = f"{1e-9 * (now_ns - self._began_ns):.3f} s"
         if self._motor_gone:
-            self._end(Trigger.MOTOR_GONE, "the motor's link is gone: stand clear, it ends its last move and holds")
+            self._end(Trigger.MOTOR_GONE, "stand clear: the motor ends its last move and holds there")
         elif not self._motor.moving and self._at(limits.retreat_m) and state is not None and state.t_ns > self._sent_ns:
             self._end(None, f"out after {took}")
         elif now_ns > self._deadline_ns:
@@ -510,6 +509,7 @@ class LocalGuard:
         ordinary = failed is None and self.trigger in _ORDINARY
         self.state = GuardState.RETREATED if ordinary else GuardState.FAULT
         self._home_anew |= failed is not None
+        self._not_out = "" if failed is None else text
         self._tell(failed, text)
 
     def _at(self, position_m: float) -> bool:
@@ -589,9 +589,7 @@ class LocalGuard:
 
     def _retract(self, careful: Limits) -> None:
         """Go to the place of retreat under watch; raises as `_home`."""
-        deadline_ns = self._clock() + round(
-            1e9 * ((careful.travel_m[1] - careful.travel_m[0]) / careful.retreat_speed_m_s + RETREAT_S)
-        )
+        deadline_ns = self._clock() + round(1e9 * careful.retreat_s)
         self._motor.retreat()
         sent_ns = self._clock()
         while True:
@@ -653,5 +651,6 @@ class LocalGuard:
             force_t_ns=watch.t_ns,
             touched=self._touched,
             trigger=self.trigger,
+            not_out=self._not_out,
             event="; ".join(said),
         )

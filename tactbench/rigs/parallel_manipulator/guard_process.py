@@ -38,7 +38,7 @@ from typing import IO, Any, NoReturn
 
 from tactbench.plugin import Block, RigError, StreamSpec, TactbenchError, UsageError, load_object
 from tactbench.plugin.devices import Clock, DriverSettings, LinkError, LinkTimeout, LinkUnplugged, open_link
-from tactbench.rigs.parallel_manipulator.guard import LOOK_S, RETREAT_S, LocalGuard
+from tactbench.rigs.parallel_manipulator.guard import LOOK_S, LocalGuard
 from tactbench.rigs.parallel_manipulator.guard_interface import (
     Beat,
     Event,
@@ -158,7 +158,7 @@ class GuardProcess:
         self._limits, self._arming = limits, True
         self._say("arm", json.loads(limits.to_json()))
         try:
-            report = self._report(0, HOMING_S + 2 * self._way_s(limits) + START_S)
+            report = self._report(0, HOMING_S + 2 * limits.retreat_s + START_S)
         except GuardRefusesError:
             self._limits = None
             raise
@@ -200,7 +200,7 @@ class GuardProcess:
 
     def disarm(self) -> Report:
         """See :meth:`Guard.disarm`."""
-        way_s = 0.0 if self._limits is None else self._way_s(self._limits)
+        way_s = 0.0 if self._limits is None else self._limits.retreat_s
         self._say("disarm")
         report = self._report(0, way_s + START_S)
         self._limits = None
@@ -211,7 +211,7 @@ class GuardProcess:
         if self._closed:
             return
         self._closed = True
-        way_s = 0.0 if self._limits is None else self._way_s(self._limits)
+        way_s = 0.0 if self._limits is None else self._limits.retreat_s
         with suppress(OSError):
             self._control.sendall(encode_message("close"))
         try:
@@ -231,11 +231,6 @@ class GuardProcess:
         if self._streams is None:
             raise GuardRefusesError("The guard was not started.", hint="Use start().")
         return self._streams
-
-    @staticmethod
-    def _way_s(limits: Limits) -> float:
-        low, high = limits.travel_m
-        return (high - low) / limits.retreat_speed_m_s + RETREAT_S
 
     def _present(self) -> None:
         if self._lost is not None:
@@ -311,7 +306,7 @@ class GuardProcess:
                 stand_blind(opener, self._options, self._clock)
                 said = "the motor was told to stand"
             elif self._limits is not None:
-                position_m = retreat_blind(opener, self._options, self._clock, self._way_s(self._limits))
+                position_m = retreat_blind(opener, self._options, self._clock, self._limits.retreat_s)
                 said = f"the motor has retreated to {position_m:g} m"
         except TactbenchError as error:
             trigger = Trigger.RETREAT_FAILED

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -55,7 +55,7 @@ from tactbench.plugin.devices import (
     physics_of,
     with_sensor,
 )
-from tactbench.rigs.parallel_manipulator.control import Control, WatchedDriver
+from tactbench.rigs.parallel_manipulator.control import STOP_S, Control, WatchedDriver
 from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress, quiet
 from tactbench.rigs.parallel_manipulator.guard import LocalGuard
 from tactbench.rigs.parallel_manipulator.guard_interface import Event, Guard, GuardState, Limits, Report
@@ -100,6 +100,8 @@ class PressAcquisition:
     clock: Clock = field(repr=False)
     begin_ns: int
     duration_s: float
+    retreat_s: float
+    """A retreat takes at most."""
     gaps: Mapping[str, int]
     """By stream: rows that were missing before the scene."""
     rows: dict[str, int] = field(default_factory=dict)
@@ -130,6 +132,16 @@ class PressAcquisition:
             if last > first:
                 self.rows[block.stream] = self.rows.get(block.stream, 0) + last - first
                 yield self.force.turned(_rows(block, slice(first, last)), self.zero)
+
+    def stop(self, why: str) -> str:
+        """Let the motor retreat at once, and wait for it; return what is to be done where it is not out.
+
+        A second interrupt ends the waiting; the guard goes on with the retreat.
+        """
+        with suppress(KeyboardInterrupt):
+            self.control.retreat(why, self.retreat_s)
+        self.said += self.control.events()
+        return self.control.press.not_out
 
     @property
     def drawn(self) -> Mapping[str, Scalar]:
@@ -175,7 +187,8 @@ class PressAcquisition:
     @property
     def ended(self) -> str:
         """Why it ended before its time; empty: it did not."""
-        return self.control.press.ended or self.reading.ended
+        press = self.control.press
+        return "; ".join(filter(None, (press.ended, press.not_out))) or self.reading.ended
 
 
 class ParallelManipulator:
@@ -292,6 +305,7 @@ class ParallelManipulator:
                 clock=clock,
                 begin_ns=begin_ns,
                 duration_s=scene.profile.duration.to("s"),
+                retreat_s=limits.retreat_s + STOP_S,
                 gaps=gaps,
                 said=events,
             )
