@@ -136,10 +136,13 @@ class PressAcquisition:
     def stop(self, why: str) -> str:
         """Let the motor retreat at once, and wait for it; return what is to be done where it is not out.
 
-        A second interrupt ends the waiting; the guard goes on with the retreat.
+        It retreats already, so a second interrupt changes nothing.
         """
-        with suppress(KeyboardInterrupt):
-            self.control.retreat(why, self.retreat_s)
+        waiting = True
+        while waiting:
+            with suppress(KeyboardInterrupt):
+                self.control.retreat(why, self.retreat_s)
+                waiting = False
         self.said += self.control.events()
         return self.control.press.not_out
 

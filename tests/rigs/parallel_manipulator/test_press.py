@@ -106,6 +106,13 @@ def test_a_first_touch_stays_within_its_bound(stiffness):
         assert bound <= 0.31
 
 
+def test_a_motor_that_does_not_come_out_is_said():
+    found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=9"], **QUICK)
+    assert "in ramp: motor's link is gone" in found.acquisition.ended
+    assert "stand clear" in found.acquisition.ended
+    assert found.acquisition.stop("stopped by hand") == found.press.not_out != ""
+
+
 def test_no_contact_ends_with_a_retreat():
     # The skin of this seed is lower than the motor may go.
     heights = {"settings__heights__surface_spread_mm": 0.4, "settings__heights__depth_mm": 0.01}
