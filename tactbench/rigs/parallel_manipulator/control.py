@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 STOP_S = 10.0
 """The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""
+COUNTED_NS = 250_000_000
+"""After which the guard's counts are asked for again."""
 
 
 class WatchedDriver(Driver):
@@ -108,7 +110,8 @@ class Control:
         self._over = threading.Event()
         self._stop = ""
         self._thread: threading.Thread | None = None
-        self._counts: Mapping[str, Mapping[str, int]] | None = None
+        self._counts: Mapping[str, Mapping[str, int]] = {}
+        self._counted_ns = 0
 
     @property
     def report(self) -> Report:
@@ -157,8 +160,9 @@ class Control:
             self._counts = self._guard.counts()
 
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return what guard, motor and force sensor have counted; once stopped, until then."""
-        return self._guard.counts() if self._counts is None else self._counts
+        """Return what guard, motor and force sensor have counted: beside the thread at most 0.25 s old."""
+        alone = self._thread is None and not self._over.is_set()
+        return self._guard.counts() if alone else self._counts
 
     def _run(self) -> None:
         try:
@@ -176,6 +180,9 @@ class Control:
             self._raw += self._pressing(block)
         self._blocks.extend(self._guard.motor_blocks())
         self._events.extend(self._guard.events())
+        # Kept here: one thread alone may use the guard.
+        if self._thread is not None and self._clock() - self._counted_ns >= COUNTED_NS:
+            self._counts, self._counted_ns = self._guard.counts(), self._clock()
 
     def _pressing(self, block: Block) -> list[tuple[float, float]]:
         assert block.t_ns is not None

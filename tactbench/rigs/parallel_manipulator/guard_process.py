@@ -195,7 +195,7 @@ class GuardProcess:
     def counts(self) -> Mapping[str, Mapping[str, int]]:
         """See :meth:`Guard.counts`; of the guard also ``rows_dropped``: samples that this end did not take in time."""
         self._say("counts")
-        _, body = self._answer("counts", START_S)
+        _, body = self._answer("counts", START_S if self._limits is None else self._limits.heartbeat_s)
         return body
 
     def disarm(self) -> Report:
@@ -273,8 +273,12 @@ class GuardProcess:
         """Take what the process has sent, waiting for it at most so long; raises GuardLostError if it is gone."""
         for key, _ in self._selector.select(timeout_s):
             data = b""
-            with suppress(BlockingIOError, ConnectionError):
+            try:
                 data = key.fileobj.recv(1 << 18)  # type: ignore[union-attr]
+            except BlockingIOError:
+                continue
+            except ConnectionError:
+                pass
             if not data:
                 self._gone("its socket is closed")
             if key.fileobj is self._data:

@@ -82,6 +82,19 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
         assert made.out
 
 
+def test_a_wake_up_without_data_is_not_a_lost_guard(tmp_path, monkeypatch):
+    with rig("process", tmp_path) as made:
+        made.guard.arm(made.setting.limits)
+        keys = [(key, 1) for key in made.guard._selector.get_map().values()]
+        made.guard.advance(made.clock() + 10_000_000)
+        with monkeypatch.context() as patch:
+            # As select() says it now and then: somebody else has read, or nothing came after all.
+            patch.setattr(made.guard._selector, "select", lambda timeout_s: keys)
+            for _ in range(20):
+                made.guard._take(0.0)
+        assert made.guard.beat(Beat(1, made.clock())).accepted
+
+
 RAISING = "tests.rigs.parallel_manipulator.broken_force:build_raising"
 TO_A_SWITCH = {"homing": "switch", "homing_speed_m_s": 5e-3, "home_m": 3e-3}
 
