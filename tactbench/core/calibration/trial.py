@@ -16,7 +16,7 @@ from tactbench.core.calibration.draw import Draw, parameters_of
 from tactbench.core.calibration.placing import procedures, with_parameters
 from tactbench.core.calibration.readoff import read_off, thinned
 from tactbench.core.errors import TactbenchError, UsageError
-from tactbench.core.evaluation.cell import CellResult, evaluate
+from tactbench.core.evaluation.cell import CellContext, CellResult, evaluate
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.matrix.installed import rig_of
 from tactbench.core.plugins.interfaces import Rig
@@ -143,7 +143,15 @@ def _answer(
         key = json.dumps([output.estimator.model_dump(), output.every], sort_keys=True)
         if key not in answers:
             answers[key] = evaluate(
-                task, registry.estimators[output.estimator.name], output.estimator.params, protocol, None, [],
-                seed=seed, clock=time.perf_counter, dataset=thinned(data, output.every),
-            )  # fmt: skip
+                CellContext(
+                    task,
+                    registry.estimators[output.estimator.name],
+                    output.estimator.params,
+                    protocol,
+                    None,
+                    seed=seed,
+                    clock=time.perf_counter,
+                ),
+                thinned(data, output.every),
+            )
         yield output.name, read_off(output, answers[key], data.metas)

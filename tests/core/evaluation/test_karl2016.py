@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.protocols import KARL2016
@@ -107,9 +107,18 @@ def test_the_window_is_the_mean_over_t_minus_k_to_t_within_one_recording(tmp_pat
 
 def run(paths, estimator="lasso", task=None, **more):
     return evaluate(
-        task or force_task(), ESTIMATORS[estimator], more.pop("params", {}), "karl2016", more.pop("split", None), paths,
-        seed=more.pop("seed", 0), clock=ticking(), **more,
-    )  # fmt: skip
+        CellContext(
+            task or force_task(),
+            ESTIMATORS[estimator],
+            more.pop("params", {}),
+            "karl2016",
+            more.pop("split", None),
+            seed=more.pop("seed", 0),
+            clock=ticking(),
+            **more,
+        ),
+        paths,
+    )
 
 
 def test_lasso_on_one_perfect_feature_is_wrong_by_exactly_lambda(tmp_path):

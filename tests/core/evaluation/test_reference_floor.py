@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.reference_floor import (
@@ -176,7 +176,9 @@ TASK = force_task(protocols=("deployable",), splits=("roles",))
 
 def result_of(paths, task=TASK):
     estimator = installed().estimators["ols" if task.kind == "regression" else "logistic"]
-    return evaluate(task, estimator, {}, "deployable", "roles", paths, seed=1, clock=lambda: 0.0, latency=False)
+    return evaluate(
+        CellContext(task, estimator, {}, "deployable", "roles", seed=1, clock=lambda: 0.0, latency=False), paths
+    )
 
 
 def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import DataError, NotApplicable, UsageError
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
 from tactbench.core.evaluation.sets import Scale, keep, part
@@ -34,8 +34,19 @@ def grasps(folder, role=None, objects=12, each=20, seed=0):
 
 
 def run(paths, split=None, task=None, estimator="forest", **more):
-    return evaluate(task or force_task(), ESTIMATORS[estimator], more.pop("params", {"n_estimators": 10}), "deployable",
-                    split, paths, seed=0, clock=ticking(), **more)  # fmt: skip
+    return evaluate(
+        CellContext(
+            task or force_task(),
+            ESTIMATORS[estimator],
+            more.pop("params", {"n_estimators": 10}),
+            "deployable",
+            split,
+            seed=0,
+            clock=ticking(),
+            **more,
+        ),
+        paths,
+    )
 
 
 @pytest.mark.parametrize("split", ["session", "in-session", "shuffled", "object"])
@@ -143,7 +154,7 @@ def test_deployable_scales_by_training_data_only(tmp_path):
     result = run(paths, estimator="ridge", params={})
     for table in data.tables:
         table.X[:] = table.X  # same data: the same score
-    assert run(paths, estimator="ridge", params={}, dataset=data).score == result.score
+    assert run(data, estimator="ridge", params={}).score == result.score
     from collections import Counter
 
     from tactbench.core.evaluation.selection import scales
