@@ -119,8 +119,25 @@ def test_the_place_of_contact_is_stated_with_the_commanded_offset(rig, sensors):
     assumed_x, assumed_s = (acquisition.assumptions[f"contact_{axis}_mm"] for axis in "xs")
     assert (assumed_x, assumed_s) == (-3.5, -0.5)
     # Where this recording met the skin is drawn about it.
-    drawn_x, drawn_s = (acquisition.drawn[f"placement_{axis}_mm"] for axis in "xs")
+    drawn_x, drawn_s = (acquisition.drawn[f"placed_{axis}_mm"] for axis in "xs")
     assert 0 < np.hypot(drawn_x - assumed_x, drawn_s - assumed_s) < 5 * 0.2
+
+
+def test_nuisances_that_are_set_change_the_recording_and_are_stated(rig, sensors):
+    held = _scene(profile=ForceRamp(end=_q(0.0, "N"), samples=2000), environment=QUIET)
+    values = {"noise_scale": 1.0, "taxel_white_count": 9.0, "taxel_step_count": 0.0, "placement_tilt_x_rad": 0.0}
+    acquisition, streams = _record(rig, sensors["biotac"], held.asked(Simulation(nuisances=values)))
+    assert values.items() <= acquisition.assumptions.items()
+    assert "placement_tilt_x_rad" not in _record(rig, sensors["biotac"], held)[0].assumptions
+    noise = streams["electrodes"][1].std(axis=0)
+    # 2000 samples of 19 electrodes, stored in whole counts: the standard error of the mean deviation is 0.36 %; five.
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(np.hypot(9.0, 12**-0.5), rel=0.02)
+
+
+def test_a_nuisance_that_the_sensor_does_not_declare_is_not_stated(rig, sensors):
+    asked = _scene(profile=ForceRamp(samples=20)).asked(Simulation(nuisances={"dc_pressure_white_count": 9.0}))
+    acquisition, _ = _record(rig, sensors["icub"], asked)
+    assert "dc_pressure_white_count" not in acquisition.assumptions
 
 
 def test_a_scenario_changes_the_recording_and_is_stated(rig, sensors):
