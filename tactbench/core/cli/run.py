@@ -59,7 +59,8 @@ def command(
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
-    from tactbench.core.leaderboard.files import table_of, write_tables
+    from tactbench.core.leaderboard.files import write_tables
+    from tactbench.core.leaderboard.table import build_table
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
@@ -76,7 +77,7 @@ def command(
         )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
     rows = over_replicates(outcome.rows)
-    table = table_of(rows, store.folder, provenance)
+    table = build_table(rows, provenance)
     print_table(table, shape, view_of(store.folder, wide=wide, notes=notes))
     if shape == "table":
         _side_by_side(rows)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from tactbench.core.leaderboard.datasheet import Comparison
+    from tactbench.core.leaderboard.datasheet import Property
     from tactbench.core.plugins.registry import Owned, Registry
     from tactbench.core.spec.sensor import SensorSpec
 
@@ -116,7 +116,7 @@ def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
         click.echo(f"Facts behind these sensors: {counted}. See them all with --all.")
 
 
-def _grid(title: str, sensors: list[SensorSpec], rows: list[Comparison], *, with_source: bool) -> None:
+def _grid(title: str, sensors: list[SensorSpec], rows: list[Property], *, with_source: bool) -> None:
     from rich import box
     from rich.table import Table
     from rich.text import Text

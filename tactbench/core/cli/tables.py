@@ -119,8 +119,6 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     UsageError
         If the file cannot be written.
     """
-    from tactbench.core.leaderboard.collector import collector_at_rest
-
     if shape == "table" and to is None and sys.stdout.isatty():
         from tactbench.core.leaderboard.terminal import show
 
@@ -140,8 +138,7 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     else:
         from tactbench.core.leaderboard.formats import TEXTS, VIEWED
 
-        with collector_at_rest():
-            text = VIEWED[shape](table, view) if shape in VIEWED else TEXTS[shape](table)
+        text = VIEWED[shape](table, view) if shape in VIEWED else TEXTS[shape](table)
         _put(text.encode("utf-8", "replace"), to)
 
 

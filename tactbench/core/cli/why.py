@@ -104,9 +104,8 @@ def _replicates(found: Subject) -> list[str]:
 
 def _rests_on(row: Row) -> list[str]:
     """Return what the score of a finished cell is made of and what it is to be held against."""
-    from tactbench.core.leaderboard.counts import told_counts
     from tactbench.core.leaderboard.names import metric_name
-    from tactbench.core.leaderboard.notes import picked
+    from tactbench.core.leaderboard.notes import count_texts, picked
     from tactbench.core.leaderboard.numbers import score, suffix
 
     unit = str(row["unit"])
@@ -125,7 +124,7 @@ def _rests_on(row: Row) -> list[str]:
                              f"recordings of {row['n_sessions']} sessions"))  # fmt: skip
     if row.get("assumptions"):
         parts.append(("assumed", ", ".join(f"{name} {value}" for name, value in sorted(row["assumptions"].items()))))
-    counted = told_counts(row.get("counts") or {})
+    counted = count_texts(row.get("counts") or {})
     if counted:
         parts.append(("left out", "; ".join(counted)))
     parts += [("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ()))]

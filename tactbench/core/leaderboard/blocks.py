@@ -13,10 +13,10 @@ from functools import cached_property
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.lines import Line, Shown, shown_of
+from tactbench.core.leaderboard.column_table import ColumnTable
+from tactbench.core.leaderboard.lines import Line, RowTexts, row_texts
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
 from tactbench.core.leaderboard.placing import Placing, errors, places
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.verdict import verdict_of
 
@@ -31,7 +31,7 @@ class Block:
     """Rows that may be compared."""
 
     title: str
-    shown: Shown
+    shown: RowTexts
     """All rows of the table."""
     places: tuple[int, ...]
     """Those of this block, in order."""
@@ -46,12 +46,12 @@ class Block:
         return tuple(map(self.shown.line, self.places))
 
 
-def blocks_of(sheet: Sheet, letters: Mapping[str, str], times: bool) -> tuple[Shown, tuple[Block, ...]]:
+def blocks_of(by_key: ColumnTable, letters: Mapping[str, str], times: bool) -> tuple[RowTexts, tuple[Block, ...]]:
     """Arrange rows into blocks, ranked.
 
     Parameters
     ----------
-    sheet
+    by_key
         Rows in the order of their cells' names.
     letters
         The mark of each host.
@@ -60,31 +60,33 @@ def blocks_of(sheet: Sheet, letters: Mapping[str, str], times: bool) -> tuple[Sh
 
     Returns
     -------
-    Shown, tuple of Block
+    RowTexts, tuple of Block
         All rows as text, and which of them stand together.
     """
-    groups = _grouped(sheet)
-    placings: list[Placing | None] = [None] * len(sheet.rows)
-    arranged = [(key, *_arranged(sheet, groups[key], placings)) for key in sorted(groups, key=_order)]
-    shown = shown_of(sheet, placings, letters, times)
+    groups = _grouped(by_key)
+    placings: list[Placing | None] = [None] * len(by_key.rows)
+    arranged = [(key, *_arranged(by_key, groups[key], placings)) for key in sorted(groups, key=_order)]
+    shown = row_texts(by_key, placings, letters, times)
     blocks = [
         Block(
-            _title(key, [sheet.rows[place] for place in groups[key]]),
+            _title(key, [by_key.rows[place] for place in groups[key]]),
             shown,
             members,
             unranked,
-            _verdict(sheet, members, placings, times),
+            _verdict(by_key, members, placings, times),
         )
         for key, members, unranked in arranged
     ]
     return shown, tuple(blocks)
 
 
-def _verdict(sheet: Sheet, members: Sequence[int], placings: Sequence[Placing | None], times: bool) -> tuple[str, ...]:
-    ranked = [(sheet.rows[place], placing) for place in members if (placing := placings[place]) is not None]
-    status, trivial = sheet["status"], sheet["is_baseline"]
+def _verdict(
+    by_key: ColumnTable, members: Sequence[int], placings: Sequence[Placing | None], times: bool
+) -> tuple[str, ...]:
+    ranked = [(by_key.rows[place], placing) for place in members if (placing := placings[place]) is not None]
+    status, trivial = by_key["status"], by_key["is_baseline"]
     below = sum(status[place] == "done" and not trivial[place] and placings[place] is None for place in members)
-    baselines = [sheet.rows[place] for place in members if status[place] == "done" and trivial[place]]
+    baselines = [by_key.rows[place] for place in members if status[place] == "done" and trivial[place]]
     return tuple(map(visible, verdict_of(ranked, below, baselines, times=times)))
 
 
@@ -94,14 +96,14 @@ def _order(key: _Key) -> tuple[Any, ...]:
     return task, split in ("shuffled", "in-session"), is_probe(protocol), key
 
 
-def _grouped(sheet: Sheet) -> dict[_Key, list[int]]:
+def _grouped(by_key: ColumnTable) -> dict[_Key, list[int]]:
     """Group the places of rows by what must not be mixed.
 
     A cell that was not begun knows neither its split, if nobody asked for one, nor whether it would have been
     simulated: it stands with the finished cells of its rig, if these agree.
     """
-    origins = list(zip(*(sheet[key] for key in _ORIGIN), strict=True))
-    alike = dict(zip(origins, sheet.rows, strict=True))  # one row of each origin: the others are asked nothing
+    origins = list(zip(*(by_key[key] for key in _ORIGIN), strict=True))
+    alike = dict(zip(origins, by_key.rows, strict=True))  # one row of each origin: the others are asked nothing
     kinds: dict[str, set[str]] = {}
     splits: dict[tuple[Any, ...], set[str]] = {}
     for row in alike.values():
@@ -131,12 +133,12 @@ def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, s
 
 
 def _arranged(
-    sheet: Sheet, members: Sequence[int], placings: list[Placing | None]
+    by_key: ColumnTable, members: Sequence[int], placings: list[Placing | None]
 ) -> tuple[tuple[int, ...], str]:  # fmt: skip
     """Put members of a block in order, and note where its results stand; return why they have no intervals, if so."""
-    status, trivial, scores, sensors = (sheet[key] for key in ("status", "is_baseline", "score", "sensor"))
-    bars = sheet.known("baseline")
-    sign = 1.0 if sheet["metric"][members[0]] in LOWER_IS_BETTER else -1.0
+    status, trivial, scores, sensors = (by_key[key] for key in ("status", "is_baseline", "score", "sensor"))
+    bars = by_key.known("baseline")
+    sign = 1.0 if by_key["metric"][members[0]] in LOWER_IS_BETTER else -1.0
     done = [place for place in members if status[place] == "done"]
     error = {place: sign * scores[place] if math.isfinite(scores[place]) else math.inf for place in done}
     answers: list[int] = []
@@ -144,10 +146,10 @@ def _arranged(
     for place in done:
         if not trivial[place]:
             (below if no_better(error[place], sign, bars[place]) else answers).append(place)
-    order = dict(zip(answers, errors(sheet.taken(answers)), strict=True))
+    order = dict(zip(answers, errors(by_key.taken(answers)), strict=True))
     # What is equal stays in the order of the names.
     results = sorted(answers, key=lambda place: (order[place], error[place]))
-    ranked = sheet.taken(results)
+    ranked = by_key.taken(results)
     found, unranked = places(ranked)
     standing = {place: found[cell] for place, cell in zip(results, ranked["cell"], strict=True)}
     for place, placing in standing.items():

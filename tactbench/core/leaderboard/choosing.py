@@ -234,9 +234,9 @@ class _Choosing:
                 "tactbench", "run", "--rig", "replay", "--recordings", "DIR", "--task", self.task.name
             )
             yield f"how a real unit scores, for these are SIM; with recordings of one run `{replay}`."
-        told = {row["sensor"] for row in self.rows}
+        tested = {row["sensor"] for row in self.rows}
         for name, spec in sorted(self.sensors.items()):
-            if name not in told and spec.data_sheet.exists and spec.channels(*self.task.features):
+            if name not in tested and spec.data_sheet.exists and spec.channels(*self.task.features):
                 yield f"how {visible(name)} scores: no result here; run `{self.run(name)}`."
 
     def run(self, sensor: str, *more: str) -> str:

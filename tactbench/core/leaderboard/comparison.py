@@ -1,7 +1,4 @@
-"""The same question asked in several ways, side by side: protocols, splits, or the folds of one split.
-
-Plain data: a terminal, a page or a program renders the same :class:`Comparison`.
-"""
+"""The same question asked in several ways, side by side: protocols, splits, or the folds of one split."""
 
 from __future__ import annotations
 
@@ -13,6 +10,7 @@ from typing import Any
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.leaderboard.names import answer_name, hardware_name, metric_name, sensor_name
 from tactbench.core.leaderboard.numbers import interval, score
+from tactbench.core.leaderboard.text_table import TextTable
 
 Row = Mapping[str, Any]
 
@@ -20,20 +18,6 @@ _NOTE = (
     "Differences are against the first column; intervals are those of each score alone, and two that overlap may still "
     "differ. Δ is the interval of the difference, where both were tested on the same replicates."
 )
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One table: a line for each sensor and estimator, a column for each way of asking."""
-
-    title: str
-    columns: tuple[str, ...]
-    """`sensor`, `estimator`, then the ways"""
-    lines: tuple[tuple[str, ...], ...]
-    """one string a column; a cell's second line is its interval"""
-    notes: tuple[str, ...]
-    records: tuple[dict[str, Any], ...]
-    """the same as numbers, one record for each cell of the table; all have the same keys"""
 
 
 @dataclass(frozen=True)
@@ -51,7 +35,7 @@ class Curve:
     """(training sessions, score, low, high), in order of the sessions"""
 
 
-def compare(rows: Iterable[Row], by: str) -> list[Comparison]:
+def compare(rows: Iterable[Row], by: str) -> list[TextTable]:
     """Return a table for each task (and whatever else must not be mixed) that was asked in several ways.
 
     Parameters
@@ -136,7 +120,7 @@ def _numbers_first(name: str) -> tuple[bool, float]:
         return True, 0.0
 
 
-def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> Comparison:
+def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> TextTable:
     from tactbench.core.statistics.paired import difference  # numerics, for who compares
 
     lines: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
@@ -157,9 +141,10 @@ def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> Compari
                 if found.paired:
                     record["difference_low"], record["difference_high"] = found.low, found.high
     first = members[0]
-    return Comparison(
+    return TextTable(
         title=_title(first, by),
         columns=("sensor", "estimator", *ways),
+        numeric=frozenset(ways),
         lines=tuple(
             (*names, *(_text(cells.get(way), first["unit"]) for way in ways)) for names, cells in lines.items()
         ),

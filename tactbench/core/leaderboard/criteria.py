@@ -104,15 +104,15 @@ def listed(words: Sequence[str]) -> str:
 
 def _delay(row: Row, wished: float, rate_stated: bool) -> Criterion:
     name, looks = "answer delay", row.get("looks_at") == "features"
-    told = row.get("answer_delay_ms")
+    delay_ms = row.get("answer_delay_ms")
     parts = {part: time for part, time in (row.get("delay_parts_ms") or {}).items() if time is not None}
-    least = told if told is not None else sum(parts.values()) if parts else row.get("latency_ms_p50")
+    least = delay_ms if delay_ms is not None else sum(parts.values()) if parts else row.get("latency_ms_p50")
     if least is None:
         return Criterion(name, "unknown", "not timed")
     assumed = "sampling" in parts and not rate_stated
     sure = least - parts["sampling"] if assumed else least
     # Without the link an answer from readings is later than its row says.
-    whole = told is not None and not assumed and not (parts and looks and "link" not in parts)
+    whole = delay_ms is not None and not assumed and not (parts and looks and "link" not in parts)
     if sure > wished or whole:
         how = "" if whole else "at least "
         return _at_most(name, sure, wished, how + _ms(sure), lambda ms: how + _ms(ms), "too slow")
@@ -166,11 +166,11 @@ def _score(figure: Figure, wish: Wish, task: TaskSpec, pressed: float | None) ->
     if wished is None:
         return None
 
-    def told(number: float) -> str:
+    def formatted(number: float) -> str:
         return score(number, task.unit) + suffix(task.unit)
 
     compare, word = (_at_most, "above the wished error") if lower else (_at_least, "below the wished score")
-    found = compare("score", figure.value, wished, "", told, word)
+    found = compare("score", figure.value, wished, "", formatted, word)
     if found.state == "missed":
         return replace(found, text=found.missed_by)
     if wish.range_n is not None and pressed is None:
@@ -183,21 +183,23 @@ def _score(figure: Figure, wish: Wish, task: TaskSpec, pressed: float | None) ->
     return replace(found, text="but not by its whole interval" if crosses else "")
 
 
-_Told = Callable[[float], str]
+_Formatter = Callable[[float], str]
 
 
-def _at_most(name: str, value: float, wished: float, text: str, told: _Told, word: str) -> Criterion:
-    return _compared(name, value, wished, value - wished, text, told, word)
+def _at_most(name: str, value: float, wished: float, text: str, formatted: _Formatter, word: str) -> Criterion:
+    return _compared(name, value, wished, value - wished, text, formatted, word)
 
 
-def _at_least(name: str, value: float, wished: float, text: str, told: _Told, word: str) -> Criterion:
-    return _compared(name, value, wished, wished - value, text, told, word)
+def _at_least(name: str, value: float, wished: float, text: str, formatted: _Formatter, word: str) -> Criterion:
+    return _compared(name, value, wished, wished - value, text, formatted, word)
 
 
-def _compared(name: str, value: float, wished: float, short: float, text: str, told: _Told, word: str) -> Criterion:
+def _compared(
+    name: str, value: float, wished: float, short: float, text: str, formatted: _Formatter, word: str
+) -> Criterion:
     if not short > 0:
         return Criterion(name, "met", text, value)
-    missed = f"{told(short)} {word}"
+    missed = f"{formatted(short)} {word}"
     return Criterion(name, "missed", f"{text}, {missed}", value, short, short / wished if wished else 1.0, missed)
 
 

@@ -34,14 +34,14 @@ class Fact:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Property:
     """A titled row: one fact a sensor."""
 
     title: str
     facts: tuple[Fact, ...]
 
 
-def table_one(sensors: Sequence[SensorSpec]) -> list[Comparison]:
+def table_one(sensors: Sequence[SensorSpec]) -> list[Property]:
     """Return the paper's Table I for any sensors."""
     rows = [
         _row("# taxels", sensors, lambda sensor: _text(str(len(sensor.channels("taxel"))))),
@@ -49,19 +49,19 @@ def table_one(sensors: Sequence[SensorSpec]) -> list[Comparison]:
                                                               s.principle_source.reference)),
     ]  # fmt: skip
     rows += [
-        Comparison(title, tuple(_range(sensor, kind, which) for sensor in sensors)) for title, kind, which in _TABLE_ONE
+        Property(title, tuple(_range(sensor, kind, which) for sensor in sensors)) for title, kind, which in _TABLE_ONE
     ]
     return rows
 
 
-def data_sheets(sensors: Sequence[SensorSpec]) -> list[Comparison]:
+def data_sheets(sensors: Sequence[SensorSpec]) -> list[Property]:
     """Return the sensors as devices: range, size, mass, interface, power, availability."""
     return [
-        Comparison(name.replace("_", " "), tuple(_of_device(sensor, name) for sensor in sensors)) for name in OF_DEVICES
+        Property(name.replace("_", " "), tuple(_of_device(sensor, name) for sensor in sensors)) for name in OF_DEVICES
     ]
 
 
-def details(sensors: Sequence[SensorSpec]) -> list[Comparison]:
+def details(sensors: Sequence[SensorSpec]) -> list[Property]:
     """Return what else the specs say: clocks, converters, rest levels, skin, parameters, noise."""
     rows = [
         _row("streams", sensors, _streams),
@@ -74,7 +74,7 @@ def details(sensors: Sequence[SensorSpec]) -> list[Comparison]:
     tables = [_quantities(sensor) for sensor in sensors]
     titles = dict.fromkeys(title for table in tables for title in table)
     rows += [
-        Comparison(title, tuple(_quantity(table[title]) if title in table else Fact(ABSENT) for table in tables))
+        Property(title, tuple(_quantity(table[title]) if title in table else Fact(ABSENT) for table in tables))
         for title in titles
     ]
     return rows
@@ -92,8 +92,8 @@ def parameters_markdown(sensors: Sequence[SensorSpec]) -> str:
     return "\n".join(parts)
 
 
-def _row(title: str, sensors: Sequence[SensorSpec], look: Callable[[SensorSpec], Fact]) -> Comparison:
-    return Comparison(title, tuple(look(sensor) for sensor in sensors))
+def _row(title: str, sensors: Sequence[SensorSpec], look: Callable[[SensorSpec], Fact]) -> Property:
+    return Property(title, tuple(look(sensor) for sensor in sensors))
 
 
 def _text(text: str) -> Fact:

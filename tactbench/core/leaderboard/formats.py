@@ -2,37 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable
 
 from tactbench.core.leaderboard.csv_text import csv_text
 from tactbench.core.leaderboard.latex import latex
-from tactbench.core.leaderboard.markdown import markdown, markdown_grid, markdown_note, markdown_text
-from tactbench.core.leaderboard.parquet import parquet
-from tactbench.core.leaderboard.records import JSON_KEYS, json_text, records
-from tactbench.core.leaderboard.table import Table, build_table
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, View
-
-__all__ = [
-    "FORMATS",
-    "JSON_KEYS",
-    "SUFFIXES",
-    "TEXTS",
-    "VIEWED",
-    "json_array",
-    "markdown_grid",
-    "markdown_note",
-    "markdown_text",
-    "page",
-    "to_csv",
-    "to_json",
-    "to_latex",
-    "to_markdown",
-    "to_page",
-    "to_parquet",
-]
-
-Row = Mapping[str, Any]
+from tactbench.core.leaderboard.markdown import markdown
+from tactbench.core.leaderboard.records import JSON_KEYS as JSON_KEYS
+from tactbench.core.leaderboard.records import json_text, records
+from tactbench.core.leaderboard.table import Table
+from tactbench.core.leaderboard.view import View
 
 
 def json_array(table: Table) -> str:
@@ -65,47 +43,3 @@ SUFFIXES = {
     ".xlsx": "xlsx", ".txt": "table",
 }  # fmt: skip
 """The format that a file is meant to have, by how its name ends."""
-
-
-def to_json(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> str:
-    """Return the rows as a JSON array, in the order of the table."""
-    return json_array(build_table(rows, provenance, times=times))
-
-
-def to_csv(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> str:
-    """Return the rows as CSV, in the order of the table."""
-    return csv_text(build_table(rows, provenance, times=times))
-
-
-def to_markdown(
-    rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True, view: View = DEFAULT_VIEW
-) -> str:
-    """Return the table as Markdown, a heading a block."""
-    return markdown(build_table(rows, provenance, times=times), view)
-
-
-def to_latex(
-    rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True, view: View = DEFAULT_VIEW
-) -> str:
-    """Return the table as LaTeX for the booktabs package, a table a block."""
-    return latex(build_table(rows, provenance, times=times), view)
-
-
-def to_parquet(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> bytes:
-    """Return the rows as a Parquet file; raises UsageError without pyarrow."""
-    return parquet(build_table(rows, provenance, times=times))
-
-
-def to_page(rows: Sequence[Row], provenance: Sequence[Row] = ()) -> str:
-    """Return the leaderboard as one HTML file, every cell behind its numbers."""
-    return page(build_table(rows, provenance))
-
-
-FORMATS: dict[str, Callable[..., str]] = {
-    "json": to_json,
-    "csv": to_csv,
-    "md": to_markdown,
-    "latex": to_latex,
-    "html": to_page,
-}
-"""From rows (and their provenance) to text, by the name of the format on the command line."""

@@ -11,14 +11,15 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from tactbench.core.leaderboard import view as viewed
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.columns import INTERVALS
 from tactbench.core.leaderboard.fitting import fit, wrapped
 from tactbench.core.leaderboard.notes import RANKS, interval_notes
 from tactbench.core.leaderboard.numbers import whole
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.text import visible
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, Grid, View
+from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, View
 
 _TEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
@@ -49,48 +50,47 @@ _FIRST_TO_GO = ("published", "score")
 
 
 def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
-    """Return the table as LaTeX, a table a block; notes and foot stand below the last block."""
+    """Return the table as LaTeX, a table a block; notes and footer stand below the last block."""
     parts: list[str] = []
     whole_width = view.wide or bool(view.columns)
     last = len(table.blocks) - 1
     for place, (block, grid) in enumerate(zip(table.blocks, viewed.grids(table, view), strict=True)):
         # A paper's table shows no ranks.
-        told = [note for note in viewed.notes(table, view) if whole_width or note != RANKS]
-        notes = (*told, *viewed.foot(table, view)) if place == last else ()
+        shown = [note for note in viewed.notes(table, view) if whole_width or note != RANKS]
+        notes = (*shown, *viewed.footer(table, view)) if place == last else ()
         grid = grid if whole_width else _narrow(grid)
         parts += _table(replace(grid, title=_caption(block, grid)), notes, whole_width=whole_width, number=place)
     for number, section in enumerate(viewed.sections(table, view), len(table.blocks)):
-        grid = Grid(section.title, section.columns, section.columns, section.lines, (), section.numeric)
-        parts += _table(grid, section.notes, whole_width=True, number=number)
+        parts += _table(section, section.notes, whole_width=True, number=number)
     parts += [f"% {tex(text)}" for text in viewed.commands(table, view)]
     return "\n".join(parts) + "\n"
 
 
-def _caption(block: Block, grid: Grid) -> str:
+def _caption(block: Block, grid: TextTable) -> str:
     """Return the title of a block, its verdict, how many samples were tested and what its intervals are."""
     rows = [line.row for line in block.lines if line.row["status"] == "done" and not line.row["is_baseline"]]
     counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
     n = f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples" if counts else ""
     task = f"{visible(str(block.lines[0].row['task']))}: "
-    how = [f"95 % {text.removeprefix(task)}" for text in interval_notes(Sheet(rows))] if rows else []
+    how = [f"95 % {text.removeprefix(task)}" for text in interval_notes(ColumnTable(rows))] if rows else []
     rule = "Below the rule: trivial answers" if "#" not in grid.columns and _first_trivial(grid) else ""
-    said = [text.rstrip(".") for text in (block.title, *grid.said[:1], n, *how, rule) if text]
+    said = [text.rstrip(".") for text in (block.title, *grid.summary[:1], n, *how, rule) if text]
     return f"{'. '.join(said)}."
 
 
-def _narrow(grid: Grid) -> Grid:
+def _narrow(grid: TextTable) -> TextTable:
     """Return the columns of a paper's table."""
     kept = [place for place, name in enumerate(grid.columns) if name in _IN_A_COLUMN]
     lines = tuple(tuple(line[place] for place in kept) for line in grid.lines)
     names = [grid.columns[place] for place in kept]
     headers = tuple(grid.headers[place] for place in kept)
-    return replace(grid, columns=tuple(names), headers=headers, lines=lines)
+    return replace(grid, columns=tuple(names), headings=headers, lines=lines)
 
 
-def _table(grid: Grid, notes: Iterable[str], *, whole_width: bool, number: int) -> list[str]:
+def _table(grid: TextTable, notes: Iterable[str], *, whole_width: bool, number: int) -> list[str]:
     """Return a grid as a table: of one column, long texts broken into further lines; or over both, as it is."""
     if whole_width:
-        return latex_grid(grid.title, grid.headers, _right(grid), grid.lines, notes, number=number, star=True)
+        return latex_table(grid, notes, number=number)
     places = {name: place for place, name in enumerate(grid.columns)}
     gap = 2 * _SEP_PT
     intervals = {places[name] for name in INTERVALS if name in places}
@@ -103,21 +103,18 @@ def _table(grid: Grid, notes: Iterable[str], *, whole_width: bool, number: int) 
     lines = [list(_broken(cells, widths)) for cells in grid.lines]
     rules = [sum(map(len, lines[:place])) for place in _first_trivial(grid)]
     heads = list(_broken(grid.headers, widths))
-    names = [grid.columns[place] for place in widths]
-    right = {str(place) for place, name in enumerate(names) if name in grid.numeric}
-    return latex_grid(
-        grid.title, map(str, range(len(names))), right, [line for one in lines for line in one], notes, heads=heads,
-        number=number, rules=rules,
-    )  # fmt: skip
+    kept = replace(
+        grid,
+        columns=tuple(grid.columns[place] for place in widths),
+        headings=(),
+        lines=tuple(tuple(line) for one in lines for line in one),
+    )
+    return latex_table(kept, notes, headings=heads, number=number, over_both=False, rules=rules)
 
 
-def _first_trivial(grid: Grid) -> list[int]:
+def _first_trivial(grid: TextTable) -> list[int]:
     """Return the place of the first trivial answer, if a table of one column, which shows no ranks, has some."""
     return [grid.kinds.index("baseline")] if "baseline" in grid.kinds and grid.kinds[0] != "baseline" else []
-
-
-def _right(grid: Grid) -> set[str]:
-    return {head for name, head in zip(grid.columns, grid.headers, strict=True) if name in grid.numeric}
 
 
 def _broken(cells: Sequence[str], widths: Mapping[int, float]) -> Iterator[list[str]]:
@@ -153,47 +150,44 @@ _WIDTHS = {
 the wider space that follows it."""
 
 
-def latex_grid(
-    title: str,
-    columns: Iterable[str],
-    numeric: Collection[str],
-    lines: Iterable[Iterable[str]],
+def latex_table(
+    grid: TextTable,
     notes: Iterable[str],
     *,
-    heads: Iterable[Iterable[str]] = (),
+    headings: Iterable[Iterable[str]] = (),
     number: int = 0,
-    star: bool = False,
+    over_both: bool = True,
     rules: Collection[int] = (),
 ) -> list[str]:
     """Return a table as lines of LaTeX, columns of numbers to the right, notes below.
 
     Parameters
     ----------
-    heads
-        Lines of headings, if they are not the names of the columns.
+    headings
+        Lines of headings, if there is not one.
     number
         Of the table among those of one file, from 0: its label ends in it, counted from 1.
-    star
+    over_both
         Whether it goes over both columns of a two-column paper.
     rules
         Lines above which there is a rule.
     """
-    names, lines = list(columns), [list(line) for line in lines]
-    table = "table*" if star else "table"
-    widths = [max(map(points, texts)) for texts in zip(names, *lines, strict=True)]
-    too_wide = star and sum(widths) + 2 * _SEP_PT * len(names) > PAGE_PT
+    lines, heads = grid.lines, list(headings) or [grid.headers]
+    table = "table*" if over_both else "table"
+    widths = [max(map(points, texts)) for texts in zip(grid.headers, *lines, strict=True)]
+    too_wide = over_both and sum(widths) + 2 * _SEP_PT * len(widths) > PAGE_PT
     return [
         rf"\begin{{{table}}}[t]",
         r"\centering",
         r"\footnotesize",
         rf"\setlength{{\tabcolsep}}{{{_SEP_PT:g}pt}}",
-        rf"\caption{{{tex(title)}}}",
-        rf"\label{{{_label(title, number)}}}",
+        rf"\caption{{{tex(grid.title)}}}",
+        rf"\label{{{_label(grid.title, number)}}}",
         r"\par\smallskip",
         *([r"\resizebox{\textwidth}{!}{% of the package graphicx"] if too_wide else []),
-        rf"\begin{{tabular}}{{{''.join('r' if name in numeric else 'l' for name in names)}}}",
+        rf"\begin{{tabular}}{{{''.join('r' if right else 'l' for right in grid.right)}}}",
         r"\toprule",
-        *(" & ".join(map(tex, line)) + r" \\" for line in (list(heads) or [names])),
+        *(" & ".join(map(tex, line)) + r" \\" for line in heads),
         r"\midrule",
         *("\\midrule\n" * (place in rules) + " & ".join(map(tex, line)) + r" \\" for place, line in enumerate(lines)),
         r"\bottomrule",
@@ -203,6 +197,14 @@ def latex_grid(
         rf"\end{{{table}}}",
         "",
     ]
+
+
+def latex_tables(tables: Sequence[TextTable], notes: Sequence[str]) -> str:
+    """Return tables as LaTeX, notes below the last."""
+    parts: list[str] = []
+    for number, table in enumerate(tables):
+        parts += latex_table(table, notes if table is tables[-1] else (), number=number)
+    return "\n".join(parts) + "\n"
 
 
 def _label(title: str, number: int) -> str:

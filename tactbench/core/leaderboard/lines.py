@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import add
-from typing import Any, Literal
+from typing import Any
 
-from tactbench.core.leaderboard.columns import TIMED_COLUMNS, columns
+from tactbench.core.leaderboard.column_table import ColumnTable
+from tactbench.core.leaderboard.columns import OF_ROWS, columns
 from tactbench.core.leaderboard.hosts import timing_marks
-from tactbench.core.leaderboard.marks import score_marks
-from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, intervals, scores, tail, whole
+from tactbench.core.leaderboard.numbers import ABSENT
 from tactbench.core.leaderboard.placing import Placing
-from tactbench.core.leaderboard.sheet import Sheet
-from tactbench.core.leaderboard.values import VALUES
+from tactbench.core.leaderboard.text_table import Kind
 from tactbench.core.spec.status import STOPPED
 
 Row = Mapping[str, Any]
-Kind = Literal["result", "baseline", "failed", "skipped"]
 
 
 @dataclass(frozen=True)
@@ -35,23 +33,25 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Shown:
+class RowTexts:
     """All rows of a table as text."""
 
-    sheet: Sheet = field(repr=False, compare=False)
+    by_key: ColumnTable = field(repr=False, compare=False)
     texts: Mapping[str, Sequence[str]]
     """One text a row, by the name of the column."""
     kinds: Sequence[Kind]
     placings: Sequence[Placing | None]
 
     def line(self, place: int) -> Line:
-        """Return the line of the row at this place of the sheet."""
-        row = self.sheet.rows[place]
+        """Return the line of the row at this place."""
+        row = self.by_key.rows[place]
         cells = tuple(column[place] for column in self.texts.values())
         return Line(cells, self.kinds[place], row["cell"], self.placings[place], row)
 
 
-def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool) -> Shown:
+def row_texts(
+    by_key: ColumnTable, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool
+) -> RowTexts:
     """Return what stands in the lines of a table.
 
     Parameters
@@ -63,59 +63,26 @@ def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[
     times
         Whether the table has times.
     """
-    units = sheet["unit"]
-    texts = {
-        "#": _places(placings, sheet["is_baseline"]),
-        "sensor": sheet.sensors,
-        "estimator": sheet.answers,
-        "score": list(map(add, scores(sheet["score"], units), score_marks(sheet))),
-        "95 % interval": row_intervals(sheet, units),
-        "beyond floor": scores(sheet.known("score_beyond_floor"), units),
-        "95 % beyond": intervals(sheet.known("beyond_floor_ci_low"), sheet.known("beyond_floor_ci_high"), units),
-        "true error": scores(sheet.known("true_score"), units),
-        "rank 95 %": _ranges(placings),
-        "recordings right": _right(sheet),
-        "published": scores(sheet["published"], units),
-        "baseline": scores(sheet["baseline"], units),
-        "n test": list(map(whole, sheet["n_test"])),
-        "sessions": list(map(whole, sheet["n_sessions"])),
-    }
-    texts = {name: texts[name] for name in columns(sheet, times=False)}
-    if times:
-        marks = timing_marks(sheet, letters)
-        told = {name: list(map(duration, VALUES[name](sheet))) for name in TIMED_COLUMNS}
-        told["delay"] = list(map(delay, sheet.known("answer_delay_ms"), sheet.known("delay_parts_ms")))
-        told["p95"] = list(map(tail, *map(sheet.known, ("latency_ms_p95", "latency_ms_max", "latency_n"))))
-        texts |= {name: _marked(column, marks) for name, column in told.items()}
-    status = sheet["status"]
+    texts: dict[str, list[str]] = {}
+    marks = timing_marks(by_key, letters)
+    for name in columns(by_key, times=times):
+        if name in OF_ROWS:
+            texts[name] = list(map(OF_ROWS[name].text, by_key.rows))
+            if name == "score":
+                texts[name] = list(map(add, texts[name], _score_marks(by_key)))
+            elif OF_ROWS[name].timed and marks:
+                texts[name] = [text if text == ABSENT else text + mark
+                               for text, mark in zip(texts[name], marks, strict=True)]  # fmt: skip
+    texts |= {"#": _places(placings, by_key["is_baseline"]), "rank 95 %": _ranges(placings),
+              "sensor": by_key.sensors, "estimator": by_key.answers}  # fmt: skip
+    texts = {name: texts[name] for name in columns(by_key, times=times)}
+    status = by_key["status"]
     for place in [place for place, ended in enumerate(status) if ended != "done"]:
         for name, column in texts.items():
             if name not in ("sensor", "estimator"):
                 column[place] = ABSENT
         texts["#"][place], texts["score"][place] = "", status[place].upper()
-    return Shown(sheet, texts, list(map(_kind, status, sheet["is_baseline"])), placings)
-
-
-def _right(sheet: Sheet) -> list[str]:
-    """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
-    told = zip(sheet.known("recordings_right"), sheet.known("recordings_asked"), strict=True)
-    return [ABSENT if right is None or of is None else f"{right:.3g} of {of:.3g}" for right, of in told]
-
-
-def row_intervals(sheet: Sheet, units: Sequence[str]) -> list[str]:
-    """Return intervals; where too few replicates carry one, the range of their scores, named so."""
-    told = intervals(sheet["ci_low"], sheet["ci_high"], units)
-    counts = sheet.known("n_replicates")
-    if not any(counts):
-        return told
-    ranges = intervals(sheet.known("score_min"), sheet.known("score_max"), units)
-    return [
-        text if text != ABSENT or not count
-        else "one replicate" if count == 1
-        else text if spread == ABSENT
-        else f"range {spread}"
-        for text, count, spread in zip(told, counts, ranges, strict=True)
-    ]  # fmt: skip
+    return RowTexts(by_key, texts, list(map(_kind, status, by_key["is_baseline"])), placings)
 
 
 def _kind(status: str, trivial: bool) -> Kind:
@@ -143,5 +110,7 @@ def _ranges(placings: Sequence[Placing | None]) -> list[str]:
     ]  # fmt: skip
 
 
-def _marked(told: list[str], marks: Sequence[str]) -> list[str]:
-    return [text if text == ABSENT else text + mark for text, mark in zip(told, marks, strict=True)] if marks else told
+def _score_marks(by_key: ColumnTable) -> list[str]:
+    """Return what stands behind each score: † for test-set statistics, ‡ for what its row is stamped with."""
+    given = zip(by_key["dagger"], by_key["stamps"], strict=True)
+    return [(" †" if dagger else "") + (" ‡" if stamps else "") for dagger, stamps in given]

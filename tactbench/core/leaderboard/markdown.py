@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 from tactbench.core.leaderboard import view as viewed
 from tactbench.core.leaderboard.table import Table
+from tactbench.core.leaderboard.text_table import TextTable
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, View
 
 _ACTS = re.compile(r"[\\|*\[\]~]|(?<![^\W_])_|_(?![^\W_])")
@@ -18,33 +19,37 @@ def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
     """Return the table as Markdown, a heading a block."""
     parts: list[str] = []
     for grid in viewed.grids(table, view):
-        numeric = {head for name, head in zip(grid.columns, grid.headers, strict=True) if name in grid.numeric}
-        heading, *lines = markdown_grid(grid.title, grid.headers, numeric, grid.lines)
-        parts += [heading, *(f"{markdown_note(text)}\n" for text in grid.said), *lines, ""]
+        parts += [*markdown_lines(grid), ""]
     parts += [f"- {markdown_note(note)}" for note in (*viewed.notes(table, view), *viewed.commands(table, view))]
     for section in viewed.sections(table, view):
-        parts += ["", *markdown_grid(section.title, section.columns, section.numeric, section.lines)]
-        parts += ["", *(f"- {markdown_note(note)}" for note in section.notes)] if section.notes else []
-    foot = viewed.foot(table, view)
-    parts += ["", *(f"- {markdown_note(sentence)}" for sentence in foot)] if foot else []
+        parts += ["", *markdown_lines(section)]
+    footer = viewed.footer(table, view)
+    parts += ["", *(f"- {markdown_note(sentence)}" for sentence in footer)] if footer else []
     return "\n".join(parts) + "\n"
 
 
-def markdown_grid(
-    title: str, columns: Sequence[str], numeric: Collection[str], lines: Iterable[Iterable[str]]
-) -> list[str]:
-    """Return a heading and a table as lines of Markdown, columns of numbers to the right."""
+def markdown_lines(table: TextTable) -> list[str]:
+    """Return a table as lines of Markdown: a heading, sentences, columns of numbers to the right, notes."""
     return [
-        f"### {_heading(title)}\n",
-        "| " + " | ".join(markdown_text(name) for name in columns) + " |",
-        "|" + "|".join("---:" if name in numeric else "---" for name in columns) + "|",
-        *("| " + " | ".join(markdown_text(cell) for cell in line) + " |" for line in lines),
+        f"### {_heading(table.title)}\n",
+        *(f"{markdown_note(text)}\n" for text in table.summary),
+        "| " + " | ".join(markdown_text(name) for name in table.headers) + " |",
+        "|" + "|".join("---:" if right else "---" for right in table.right) + "|",
+        *("| " + " | ".join(markdown_text(cell) for cell in line) + " |" for line in table.lines),
+        *(["", *(f"- {markdown_note(note)}" for note in table.notes)] if table.notes else []),
     ]
 
 
+def markdown_grid(
+    title: str, columns: Sequence[str], numeric: Collection[str], lines: Iterable[Sequence[str]]
+) -> list[str]:
+    """Return a heading and a table as lines of Markdown, columns of numbers to the right."""
+    return markdown_lines(TextTable(title, tuple(columns), tuple(map(tuple, lines)), frozenset(numeric)))
+
+
 def _heading(title: str) -> str:
-    told = markdown_text(title).rstrip()
-    return f"{told[:-1]}\\#" if told.endswith("#") else told
+    text = markdown_text(title).rstrip()
+    return f"{text[:-1]}\\#" if text.endswith("#") else text
 
 
 def markdown_text(text: str) -> str:
@@ -60,5 +65,11 @@ def markdown_note(text: str) -> str:
 
 
 def _escaped(text: str) -> str:
-    told = _ACTS.sub(r"\\\g<0>", text.replace("\n", " "))
-    return told.replace("&", "&amp;").replace("<", "&lt;")
+    escaped = _ACTS.sub(r"\\\g<0>", text.replace("\n", " "))
+    return escaped.replace("&", "&amp;").replace("<", "&lt;")
+
+
+def markdown_tables(tables: Sequence[TextTable], notes: Sequence[str]) -> str:
+    """Return tables as Markdown, notes below the last."""
+    parts = [line for table in tables for line in (*markdown_lines(table), "")]
+    return "\n".join([*parts, *(f"- {markdown_note(note)}" for note in notes)]) + "\n"

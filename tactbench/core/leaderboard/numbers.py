@@ -2,37 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache
 
 ABSENT = "–"
 
 
-def scores(values: Sequence[float | None], units: Sequence[str]) -> list[str]:
-    """Return scores: three decimals for shares; four for numbers with a unit, two from ten on."""
-    return [
-        ABSENT if value is None
-        else f"{value:.3f}" if unit == "1"
-        else f"{value:.4f}" if -10 < value < 10
-        else f"{value:.2f}"
-        for value, unit in zip(values, units, strict=True)
-    ]  # fmt: skip
-
-
 def score(value: float | None, unit: str) -> str:
-    """Return one of `scores`."""
-    return scores((value,), (unit,))[0]
-
-
-def intervals(lows: Sequence[float | None], highs: Sequence[float | None], units: Sequence[str]) -> list[str]:
-    """Return intervals in the digits of their scores."""
-    ends = zip(scores(lows, units), scores(highs, units), strict=True)
-    return [ABSENT if low == ABSENT or high == ABSENT else f"{low} … {high}" for low, high in ends]
+    """Return a score: three decimals for a share; four for a number with a unit, two from ten on."""
+    if value is None:
+        return ABSENT
+    return f"{value:.3f}" if unit == "1" else f"{value:.4f}" if -10 < value < 10 else f"{value:.2f}"
 
 
 def interval(low: float | None, high: float | None, unit: str) -> str:
-    """Return one of `intervals`."""
-    return intervals((low,), (high,), (unit,))[0]
+    """Return an interval in the digits of its score."""
+    return ABSENT if low is None or high is None else f"{score(low, unit)} … {score(high, unit)}"
 
 
 def suffix(unit: str) -> str:

@@ -61,9 +61,9 @@ def parquet(table: Table) -> bytes:
 def kind(name: str) -> str:
     """Return what a column holds: whole, float, boolean or text; lists and tables are text."""
     types = FORMAT[name].types if name in FORMAT else frozenset()
-    for told, one in (("boolean", bool), ("float", float), ("whole", int)):
+    for label, one in (("boolean", bool), ("float", float), ("whole", int)):
         if one in types:
-            return told
+            return label
     return _RANKS.get(name, "text")
 
 

@@ -1,26 +1,16 @@
-"""Where each answer of a block stands: its place, whether it shares it, and between which places it may lie.
-
-Ranks take every pair of cells and numpy; what they came to is remembered by a digest of everything that decides them
-(the scores and replicates of the block, and the code that ranks), so that a table that is shown again costs neither.
-"""
+"""Where each answer of a block stands: its place, whether it shares it, and between which places it may lie."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from tactbench.core.leaderboard import memo
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER
-from tactbench.core.leaderboard.sheet import Sheet, alike
 from tactbench.core.statistics.excess import beyond_floor, excess_of
 from tactbench.core.statistics.median import FEWEST
 
-_DECIDES = (
-    "cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes", "reference_floor",
-    "beyond_floor_ci_low", "beyond_floor_ci_high",
-)  # fmt: skip
 MOST_RANKED = 20_000
 """Answers of one block beyond which comparing all pairs takes too long."""
 
@@ -43,7 +33,7 @@ class Placing(NamedTuple):
     """Without how many replicates, each left out alone, it is the best one; 0 for all where replicates differ."""
 
 
-def places(results: Sheet) -> tuple[dict[str, Placing], str]:
+def places(results: ColumnTable) -> tuple[dict[str, Placing], str]:
     """Return where each of `results` stands, by the name of its cell, and why there are no rank intervals, if so.
 
     Parameters
@@ -59,22 +49,15 @@ def places(results: Sheet) -> tuple[dict[str, Placing], str]:
     if not results.rows or reason:
         return _by_score(results), reason
     try:
-        facts = [*map(results.known, _DECIDES), _plain(results["replicates"])]
-        digest = memo.digest_of(*map(memo.source_digest, memo.STATISTICS), facts)
-        found = _believed(memo.recall(digest), results["cell"])
-        if found is None:
-            from tactbench.core.statistics.ranking import ranks
+        from tactbench.core.statistics.ranking import ranks
 
-            ranked = ranks(results.rows)
-            found = {cell: Placing(**vars(rank)) for cell, rank in ranked.items()}
-            memo.remember(digest, [[cell, *placing] for cell, placing in found.items()])
+        return {cell: Placing(**vars(rank)) for cell, rank in ranks(results.rows).items()}, ""
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         # Rows of a stranger's folder: their replicates may be anything.
         return _by_score(results), f"their replicates cannot be used ({type(error).__name__})"
-    return found, ""
 
 
-def errors(results: Sheet) -> list[float]:
+def errors(results: ColumnTable) -> list[float]:
     """Return what answers of one metric are ordered by, the lower the better.
 
     The score; of errors of force the mean square beyond the floor of the reference, if all of them have one. It may be
@@ -89,13 +72,7 @@ def errors(results: Sheet) -> list[float]:
     ]  # fmt: skip
 
 
-def _plain(replicates: Sequence[Any]) -> Any:
-    """Return replicates as lists: the same whatever the order of their keys."""
-    by_key = alike(replicates) if set(map(type, replicates)) == {dict} else None
-    return list(map(memo.ordered, replicates)) if by_key is None else memo.ordered(by_key)
-
-
-def _unrankable(results: Sheet) -> str:
+def _unrankable(results: ColumnTable) -> str:
     """Return why places have no intervals, if they have none; a row without replicates enters with its own interval."""
     if not any(results.known("replicates")):
         return "rows keep no replicates" if results.rows else ""
@@ -104,7 +81,7 @@ def _unrankable(results: Sheet) -> str:
     return "" if all(map(math.isfinite, results["score"])) else "a score is no finite number"
 
 
-def _by_score(results: Sheet) -> dict[str, Placing]:
+def _by_score(results: ColumnTable) -> dict[str, Placing]:
     found: dict[str, Placing] = {}
     ordered = errors(results)
     many = Counter(ordered)
@@ -115,25 +92,3 @@ def _by_score(results: Sheet) -> dict[str, Placing]:
         found[cell] = Placing(place, None, None, many[error] > 1)
         before = error
     return found
-
-
-def _believed(told: Any, cells: Sequence[str]) -> dict[str, Placing] | None:
-    """Return remembered places if they can be those of `cells`, the best first: a file on disk may say anything."""
-    if not isinstance(told, list) or len(told) != len(cells):
-        return None
-    if set(map(type, told)) != {list} or set(map(len, told)) != {len(_ENTRY)}:
-        return None
-    columns = list(zip(*told, strict=True))
-    if any(set(map(type, column)) != {kind} for column, kind in zip(columns, _ENTRY, strict=True)):
-        return None
-    if not all(1 <= low <= place <= high <= len(cells) for _, place, low, high, *_ in told):
-        return None
-    found = {cell: Placing(*placing) for cell, *placing in told}
-    if found.keys() != set(cells):
-        return None
-    places = [found[cell].place for cell in cells]
-    return found if places == sorted(places) else None
-
-
-_ENTRY = (str, int, int, int, bool, bool, bool, int)
-"""What is remembered of an answer: the name of its cell, and its placing."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.names import answer_name, metric_name
 from tactbench.core.leaderboard.numbers import score
-from tactbench.core.leaderboard.sections import Section
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.text import visible
+from tactbench.core.leaderboard.text_table import TextTable
 
 Row = Mapping[str, Any]
 
@@ -19,10 +19,10 @@ TITLE = "Published figures · by others, with their sensors and data; not ranked
 _OTHERS = "another model than ours"
 
 
-def published_section(sheet: Sheet) -> Section | None:
+def published_section(by_key: ColumnTable) -> TextTable | None:
     """Return the published figures that stand beside some of the rows, each once; None if there is none."""
     lines: dict[tuple[str, ...], None] = {}
-    for figure, row in zip(sheet["published"], sheet.rows, strict=True):
+    for figure, row in zip(by_key["published"], by_key.rows, strict=True):
         if figure is None:
             continue
         whose, remark = _whose(row)
@@ -32,7 +32,7 @@ def published_section(sheet: Sheet) -> Section | None:
     if not lines:
         return None
     ordered = sorted(lines, key=lambda line: (line[1:], line[0]))
-    return Section(TITLE, COLUMNS, NUMERIC, tuple(ordered), detail=True)
+    return TextTable(TITLE, COLUMNS, tuple(ordered), NUMERIC, detail=True)
 
 
 def _whose(row: Row) -> tuple[str, str]:

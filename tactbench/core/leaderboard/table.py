@@ -11,19 +11,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
-from tactbench.core.leaderboard.collector import collector_at_rest
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.columns import COLUMNS, NUMERIC, columns
-from tactbench.core.leaderboard.foot import foot_of
+from tactbench.core.leaderboard.footer import footer_of
 from tactbench.core.leaderboard.hosts import host_letters, timing_notes
-from tactbench.core.leaderboard.lines import Line, Shown
+from tactbench.core.leaderboard.lines import Line, RowTexts
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.leaderboard.notes import notes_of
 from tactbench.core.leaderboard.numbers import ABSENT
 from tactbench.core.leaderboard.over_tasks import over_tasks
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.published import published_section
-from tactbench.core.leaderboard.sections import Section
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.text_table import TextTable
 
 __all__ = [
     "ABSENT",
@@ -33,7 +32,6 @@ __all__ = [
     "NUMERIC",
     "Block",
     "Line",
-    "Section",
     "Table",
     "answer_name",
     "build_table",
@@ -47,14 +45,14 @@ Row = Mapping[str, Any]
 class Table:
     """A leaderboard, ready to be shown."""
 
-    shown: Shown
+    shown: RowTexts
     """All rows, by the names of their cells, as text."""
     blocks: tuple[Block, ...]
     notes: tuple[str, ...]
     columns: tuple[str, ...] = COLUMNS
-    sections: tuple[Section, ...] = ()
+    sections: tuple[TextTable, ...] = ()
     """Tables below the blocks: averages over tasks, published figures, what was probed."""
-    foot: tuple[str, ...] = ()
+    footer: tuple[str, ...] = ()
     """Who computed this, with what, where."""
     provenance: tuple[Row, ...] = ()
     """The same as data."""
@@ -64,10 +62,10 @@ class Table:
     @property
     def rows(self) -> list[Row]:
         """The rows, in the order of the lines."""
-        return [self.shown.sheet.rows[place] for block in self.blocks for place in block.places]
+        return [self.shown.by_key.rows[place] for block in self.blocks for place in block.places]
 
 
-def build_table(rows: Sequence[Row] | Sheet, provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
+def build_table(rows: Sequence[Row] | ColumnTable, provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
     """Arrange `rows` into blocks, ranked, with their notes.
 
     Parameters
@@ -79,26 +77,22 @@ def build_table(rows: Sequence[Row] | Sheet, provenance: Sequence[Row] = (), *, 
     times
         False: the table of what a seed decides, the same on every machine; no times, no hosts, no provenance.
     """
-    with collector_at_rest():
-        return _arranged(rows, tuple(provenance) if times else (), times)
-
-
-def _arranged(rows: Sequence[Row] | Sheet, known: tuple[Row, ...], times: bool) -> Table:
-    sheet = rows if isinstance(rows, Sheet) else Sheet.by_name(rows)
-    letters = host_letters(sheet) if times else {}
-    shown, blocks = blocks_of(sheet, letters, times)
-    ordered = sheet.taken([place for block in blocks for place in block.places])
+    known = tuple(provenance) if times else ()
+    by_key = rows if isinstance(rows, ColumnTable) else ColumnTable.by_name(rows)
+    letters = host_letters(by_key) if times else {}
+    shown, blocks = blocks_of(by_key, letters, times)
+    ordered = by_key.taken([place for block in blocks for place in block.places])
     notes = notes_of(ordered, blocks)
     if times:
-        notes += timing_notes(sheet, letters, known)
-    sections = (over_tasks(sheet), published_section(sheet), build_probe(ordered.rows))
+        notes += timing_notes(by_key, letters, known)
+    sections = (over_tasks(by_key), published_section(by_key), build_probe(ordered.rows))
     return Table(
         shown,
         blocks,
         tuple(notes),
-        columns(sheet, times=times),
+        columns(by_key, times=times),
         tuple(section for section in sections if section is not None),
-        foot_of(sheet, known, times),
+        footer_of(by_key, known, times),
         known,
         times,
     )

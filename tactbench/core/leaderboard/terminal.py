@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 from tactbench.core.leaderboard import view as viewed
 from tactbench.core.leaderboard.columns import INTERVALS
 from tactbench.core.leaderboard.fitting import fit, wrapped
-from tactbench.core.leaderboard.table import Section, Table
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, Grid, View
+from tactbench.core.leaderboard.table import Table
+from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, View
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-_STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim"}
-_ALARM = "yellow"
+_STYLE = {"result": "bold", "baseline": "dim", "failed": "red", "skipped": "dim", "alarm": "yellow", "plain": ""}
 _FIRST_TO_GO = (
     "cell", "batch/row", "p95", "sessions", "n test", "sim", "baseline", "latency p50", "rank 95 %", "fit",
     "true error", "95 % interval", "published", "delay", "95 % beyond",
@@ -34,7 +34,7 @@ def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
     """Print a leaderboard on `console`; text from plugins is never read as markup."""
     from rich.segment import Segment, Segments
 
-    style = {name: console.get_style(name) for name in {"bold", _ALARM, *_STYLE.values()}}
+    style = {name: console.get_style(name) for name in {"bold", *filter(None, _STYLE.values())}}
     said = [
         part
         for text, how in _lines(table, console.width, view)
@@ -66,28 +66,24 @@ def _lines(table: Table, width: int, view: View) -> Iterator[Styled]:
     for section in viewed.sections(table, view):
         yield "", ""
         yield from _section_lines(section, width)
-    foot = viewed.foot(table, view)
-    if foot:
+    footer = viewed.footer(table, view)
+    if footer:
         yield "", ""
-        yield from _note_lines(foot, width)
+        yield from _note_lines(footer, width)
 
 
 def _too_narrow(names: Collection[str]) -> list[str]:
     return [f"This terminal is too narrow for: {', '.join(names)}. They are in the files."] if names else []
 
 
-def _section_lines(section: Section, width: int) -> Iterator[Styled]:
-    grid = Grid(section.title, section.columns, section.columns, section.lines, (), section.numeric)
-    styles = [_ALARM if place in section.alarms else "" for place in range(len(section.lines))]
-    lines, gone = _grid_lines(grid, width, section.columns[:0:-1], styles)
+def _section_lines(section: TextTable, width: int) -> Iterator[Styled]:
+    lines, gone = _grid_lines(section, width, section.columns[:0:-1])
     yield from lines
     yield from _note_lines([*section.notes, *_too_narrow(gone)], width)
 
 
-def _grid_lines(
-    grid: Grid, width: int, first_to_go: Sequence[str], styles: Sequence[str] = ()
-) -> tuple[list[Styled], list[str]]:
-    """Return the lines of a grid with their styles, and the columns, of `first_to_go`, that there was no room for.
+def _grid_lines(grid: TextTable, width: int, first_to_go: Sequence[str]) -> tuple[list[Styled], list[str]]:
+    """Return the lines of a table with their styles, and the columns, of `first_to_go`, that there was no room for.
 
     Lines are padded here: a grid of rich takes a second for a thousand of them, and a text of its own for each of a
     thousand blocks a third of one.
@@ -119,10 +115,10 @@ def _grid_lines(
     body: list[Styled] = [(text, "bold") for text in padded(grid.headers)]
     body.append((rule[:width], ""))
     for place, line in enumerate(grid.lines):
-        style = _STYLE[grid.kinds[place]] if grid.kinds else styles[place]
+        style = _STYLE[grid.kinds[place] if grid.kinds else "plain"]
         body += [(text, style) for text in padded(line)]
     title: list[Styled] = [(line, "bold") for line in _folded(grid.title, width)]
-    title += [(line, "") for text in grid.said for line in _folded(text, width)]
+    title += [(line, "") for text in grid.summary for line in _folded(text, width)]
     return [*title, ("", ""), *body, ("", "")], [grid.columns[place] for place in gone]
 
 

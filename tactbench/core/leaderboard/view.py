@@ -8,12 +8,12 @@ from typing import Any
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.columns import COLUMNS, INTERVALS, NUMERIC, SHOWN
-from tactbench.core.leaderboard.lines import Kind, Line
+from tactbench.core.leaderboard.lines import Line
 from tactbench.core.leaderboard.names import metric_name
 from tactbench.core.leaderboard.numbers import ABSENT
-from tactbench.core.leaderboard.sections import Section
 from tactbench.core.leaderboard.table import Block, Table
 from tactbench.core.leaderboard.text import command_line, visible
+from tactbench.core.leaderboard.text_table import TextTable
 from tactbench.core.statistics.median import counted, percent
 
 CELL = "cell"
@@ -42,22 +42,6 @@ DEFAULT_VIEW = View()
 WHOLE = View(wide=True, notes=True)
 
 
-@dataclass(frozen=True)
-class Grid:
-    """A table of texts under its title."""
-
-    title: str
-    columns: tuple[str, ...]
-    """Names of the columns."""
-    headers: tuple[str, ...]
-    """What stands above them."""
-    lines: tuple[tuple[str, ...], ...]
-    kinds: tuple[Kind, ...]
-    numeric: frozenset[str] = NUMERIC
-    said: tuple[str, ...] = ()
-    """Sentences below the title."""
-
-
 def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
     """Return the names of columns that a person asks for by these or by their names for programs (``rank``).
 
@@ -66,19 +50,19 @@ def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
     UnknownNameError
         If there is no such column.
     """
-    known = {**{name: name for name in (*COLUMNS, CELL)}, **{told: name for name, told in SHOWN.items()}}
+    known = {**{name: name for name in (*COLUMNS, CELL)}, **{shown: name for name, shown in SHOWN.items()}}
     for name in asked:
         if name not in known:
             raise UnknownNameError("column", name, (*COLUMNS, CELL))
     return tuple(dict.fromkeys(known[name] for name in asked))
 
 
-def grids(table: Table, view: View) -> list[Grid]:
+def grids(table: Table, view: View) -> list[TextTable]:
     """Return what is printed of a table's blocks."""
     return [grid_of(table, block, view) for block in table.blocks]
 
 
-def grid_of(table: Table, block: Block, view: View) -> Grid:
+def grid_of(table: Table, block: Block, view: View) -> TextTable:
     """Return what is printed of a block."""
     texts = [_by_column(table, line) for line in block.lines]
     if all("†" in text["score"] for text, line in zip(texts, block.lines, strict=True) if line.row["status"] == "done"):
@@ -92,13 +76,14 @@ def grid_of(table: Table, block: Block, view: View) -> Grid:
         floor = any(text.get("beyond floor", ABSENT) != ABSENT for text in texts)
         names = [name for name in (OF_FLOOR if floor else DEFAULT) if name in texts[0]]
     rows = [line.row for line in block.lines]
-    return Grid(
+    return TextTable(
         block.title,
         tuple(names),
-        tuple(header(name, rows) for name in names),
         tuple(tuple(text[name] for name in names) for text in texts),
+        NUMERIC,
+        tuple(header(name, rows) for name in names),
         tuple(line.kind for line in block.lines),
-        said=block.verdict,
+        block.verdict,
     )
 
 
@@ -133,7 +118,7 @@ def _over(rows: Sequence[Any], key: str) -> str:
     return f"over {counted(count, visible(str(unit or 'replicate')))}" if count else ""
 
 
-def sections(table: Table, view: View) -> tuple[Section, ...]:
+def sections(table: Table, view: View) -> tuple[TextTable, ...]:
     """Return the tables to print below the blocks."""
     return tuple(section for section in table.sections if view.wide or not section.detail)
 
@@ -147,7 +132,7 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
     """Return the command that shows what is not printed, and the one that tells what a row rests on."""
     hidden = len(table.notes) - len(notes(table, view))
     more, options = [], []
-    if hidden or len(foot(table, view)) < len(table.foot):
+    if hidden or len(footer(table, view)) < len(table.footer):
         more.append(f"{hidden} more note{'s' if hidden != 1 else ''}" if hidden else "the whole provenance")
         options.append("--notes")
     if not view.wide and not view.columns:
@@ -157,8 +142,8 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
         ]
         options.append("--wide")
     where = (view.folder,) if view.folder else ()
-    told = _listed(more)
-    all_of_it = [f"{told[:1].upper()}{told[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
+    listed = _listed(more)
+    all_of_it = [f"{listed[:1].upper()}{listed[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
     first = next((line for block in table.blocks for line in block.lines if line.kind == "result"), None)
     if first is None:
         return tuple(all_of_it if more else [])
@@ -171,9 +156,9 @@ def _listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
 
 
-def foot(table: Table, view: View) -> tuple[str, ...]:
+def footer(table: Table, view: View) -> tuple[str, ...]:
     """Return the provenance to print."""
-    return table.foot if view.notes else table.foot[:1]
+    return table.footer if view.notes else table.footer[:1]
 
 
 def best(table: Table, count: int) -> Table:

@@ -59,7 +59,7 @@ def xlsx(table: Table) -> bytes:
         for row in rows:
             put(sheet, [row[name] for name in used])
     sheet = book.create_sheet("notes")
-    for text in (*table.notes, *(f"{section.title}" for section in table.sections), *table.foot):
+    for text in (*table.notes, *(f"{section.title}" for section in table.sections), *table.footer):
         put(sheet, [text])
     out = io.BytesIO()
     book.save(out)

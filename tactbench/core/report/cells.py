@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.particulars import APART, GROUPS, TITLES
+from tactbench.core.leaderboard.row_groups import APART, GROUPS, TITLES
 from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
 from tactbench.core.report.section import Details, Section, Subject
 

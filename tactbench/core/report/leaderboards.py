@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.columns import VALUES
 from tactbench.core.leaderboard.table import NUMERIC, Block, Line
-from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
 from tactbench.core.report.section import Section, Subject
 
@@ -36,11 +35,9 @@ def _table(
     block: Block, columns: tuple[str, ...], rows: Mapping[str, Row], anchors: Mapping[str, str], anchor: str
 ) -> PlainTable:  # fmt: skip
     members = [rows[line.cell] for line in block.lines]
-    sheet = Sheet(members)
-    values = {name: VALUES[name](sheet) for name in columns if name in VALUES}
     lines = []
-    for place, (line, row) in enumerate(zip(block.lines, members, strict=True)):
-        own = {name: column[place] for name, column in values.items()}
+    for line, row in zip(block.lines, members, strict=True):
+        own = {name: VALUES[name](row) for name in columns if name in VALUES}
         reason = "" if row["status"] == "done" else str(row["reason"])
         lines.append([*_entries(line, columns, own, anchors[line.cell]), Entry(reason)])
     kinds = [line.kind for line in block.lines]

@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from tactbench.core.leaderboard.lines import row_intervals
+from tactbench.core.leaderboard.columns import row_interval as row_interval
 from tactbench.core.leaderboard.numbers import interval, score, suffix
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import LOWER_IS_BETTER
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.calibrated import Calibrated, PredictiveRange
@@ -252,11 +251,6 @@ def records(lines: Iterable[Reproduction]) -> list[dict[str, Any]]:
 def told_interval(line: Reproduction) -> str:
     """Return the interval of our score as text."""
     return row_interval(line.row) if line.row is not None and line.row["status"] == "done" else "–"
-
-
-def row_interval(row: Row) -> str:
-    """Return a row's interval as the tables show it: "one replicate" where there is but one, the range of a few."""
-    return row_intervals(Sheet([row]), [row["unit"]])[0]
 
 
 def told_range(line: Reproduction) -> str:

@@ -345,6 +345,9 @@ class ParallelManipulator:
             if not isinstance(emulator, MotorEmulator):
                 raise UsageError(f"The emulated {MOTOR} is no faulhaber device.", hint="This rig moves one.")
             senses.pressed_by(emulator.drive)
+        for name in JOINTS:
+            if name in found and isinstance(joint := found[name].emulator, MotorEmulator):
+                joint.drive.servo.load = None  # the platform's weight is not modelled
         return found
 
     def _guard(

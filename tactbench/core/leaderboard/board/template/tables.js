@@ -6,19 +6,18 @@ const state = { sort: null, page: 0, matrixSort: null, matrixPage: 0, size: PAGE
 
 // What rows are compared by in a column: numbers by value, texts by their place among all texts.
 const keysOf = (entry) => {
-  if (entry.column.values) return entry.column.values();
+  if (entry.column.sort) return entry.column.sort;
   if (entry.keys) return entry.keys;
-  const { words: list, at } = entry.column;
-  if (!list) return (entry.keys = new Float64Array(board.rows).fill(NaN));
-  const place = new Float64Array(list.length).fill(NaN);
-  const texts = list.map(asText);
-  [...list.keys()].filter((one) => texts[one] && texts[one] !== ABSENT)
+  const { dictionary, index } = entry.column;
+  const place = new Float64Array(dictionary.length).fill(NaN);
+  const texts = dictionary.map(asText);
+  [...texts.keys()].filter((one) => texts[one] && texts[one] !== ABSENT)
     .sort((one, other) => words.compare(texts[one], texts[other]))
     .forEach((one, order, all) => {
       const before = order ? all[order - 1] : -1;
       place[one] = order && !words.compare(texts[one], texts[before]) ? place[before] : order;
     });
-  entry.keys = Float64Array.from(at, (one) => place[one]);
+  entry.keys = Float64Array.from(index, (one) => place[one]);
   return entry.keys;
 };
 

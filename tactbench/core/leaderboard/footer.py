@@ -1,11 +1,11 @@
-"""What stands at the foot of every table: how many runs it is of, and who computed them, with what, where."""
+"""What stands in the footer of every table: how many runs it is of, and who computed them, with what, where."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.text import cut, visible
 
 Row = Mapping[str, Any]
@@ -16,30 +16,30 @@ LONGEST = 1000
 _WITHOUT = "Times, memory and hosts are left out: a seed decides all that stands here."
 
 
-def foot_of(sheet: Sheet, provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
+def footer_of(by_key: ColumnTable, provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
     """Return the sentences below a table.
 
     Parameters
     ----------
-    sheet
+    by_key
         All rows of the table.
     provenance
         What is known of the runs they are from; possibly from a stranger's folder.
     times
         False: nothing is said of machines.
     """
-    own = zip(sheet.known("seeds"), sheet["seed"], strict=True)
+    own = zip(by_key.known("seeds"), by_key["seed"], strict=True)
     seeds = _seeds([seed for several, first in own for seed in several or [first]])
     if not times:
         return (f"{_WITHOUT} {seeds}",)
-    runs = len(set(filter(None, sheet.known("made_by"))))
+    runs = len(set(filter(None, by_key.known("made_by"))))
     of_runs = f" of {runs} kind{'s' if runs != 1 else ''} of runs (versions, machine, settings)" if runs else ""
     if any((n or 0) > 1 and unit == "replicate" for n, unit in
-           zip(sheet.known("n_replicates"), sheet.known("replicate_unit"), strict=True)):  # fmt: skip
+           zip(by_key.known("n_replicates"), by_key.known("replicate_unit"), strict=True)):  # fmt: skip
         seeds += (
             " One a replicate, which is everything recorded anew; scores are medians, intervals those of the median."
         )
-    return (f"{len(sheet.rows)} cells{of_runs}. {seeds}", *(cut(visible(said), LONGEST) for said in _told(provenance)))
+    return (f"{len(by_key.rows)} cells{of_runs}. {seeds}", *(cut(visible(said), LONGEST) for said in _told(provenance)))
 
 
 def _told(provenance: Sequence[Row]) -> tuple[str, ...]:
@@ -53,8 +53,8 @@ def _told(provenance: Sequence[Row]) -> tuple[str, ...]:
         return ("The provenance of these rows cannot be read.",)
 
 
-def _seeds(told: Sequence[Any]) -> str:
-    seeds = sorted({seed for seed in told if isinstance(seed, int)})
+def _seeds(values: Sequence[Any]) -> str:
+    seeds = sorted({seed for seed in values if isinstance(seed, int)})
     if not seeds:
         return "Seeds are not known."
     listed = ", ".join(map(str, seeds[:MOST_SEEDS]))

@@ -19,7 +19,7 @@ Key = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class Duel:
+class PairwiseComparison:
     """Two cells that ask the same question, or why they are not compared."""
 
     kind: Kind
@@ -44,11 +44,11 @@ class Duel:
     def row(self) -> Row:
         """Return one of the rows, for what both have."""
         found = self.first_row if self.first_row is not None else self.second_row
-        assert found is not None, "a duel has one row at least"
+        assert found is not None, "a comparison has one row at least"
         return found
 
 
-def duels(rows: Sequence[Row], first: str, second: str, task: str | None = None) -> list[Duel]:
+def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None = None) -> list[PairwiseComparison]:
     """Compare two sensors or two estimators of one leaderboard, wherever both have answered the same question.
 
     Raises
@@ -70,9 +70,9 @@ def duels(rows: Sequence[Row], first: str, second: str, task: str | None = None)
     raise UnknownNameError(f"{kind} in these results", wrong, known)
 
 
-def folder_duels(
+def folder_comparisons(
     first_rows: Iterable[Row], second_rows: Iterable[Row], first: str, second: str, task: str | None = None
-) -> list[Duel]:
+) -> list[PairwiseComparison]:
     """Compare the same cells of two result folders; raises UnknownNameError for a task that one has not."""
     one, other = ([row for row in _in_task(rows, task) if not row["is_baseline"]] for rows in (first_rows, second_rows))
     return _compared("folders", first, second, one, other)
@@ -86,8 +86,10 @@ def _in_task(rows: Iterable[Row], task: str | None) -> list[Row]:
     return [row for row in rows if task is None or row["task"] == task]
 
 
-def with_declared(found: Sequence[Duel], rows: Sequence[Row], declared: Iterable[ComparisonChoice]) -> list[Duel]:
-    """Return duels with p-values corrected for all comparisons that were declared, whichever of them are shown.
+def with_declared(
+    found: Sequence[PairwiseComparison], rows: Sequence[Row], declared: Iterable[ComparisonChoice]
+) -> list[PairwiseComparison]:
+    """Return comparisons with p-values corrected for all comparisons that were declared, whichever of them are shown.
 
     Parameters
     ----------
@@ -98,37 +100,39 @@ def with_declared(found: Sequence[Duel], rows: Sequence[Row], declared: Iterable
     """
     family: dict[frozenset[str], float | None] = {}
     for choice in declared:
-        for duel in _declared(rows, choice):
-            if duel.difference is not None:
-                family.setdefault(_cells(duel), duel.difference.p)
+        for pair in _declared(rows, choice):
+            if pair.difference is not None:
+                family.setdefault(_cells(pair), pair.difference.p)
     corrected = dict(zip(family, holm(list(family.values())), strict=True))
     return [
-        replace(duel, declared=_cells(duel) in corrected, p_corrected=corrected.get(_cells(duel)))
-        if duel.kind != "folders" and duel.difference is not None
-        else duel
-        for duel in found
+        replace(pair, declared=_cells(pair) in corrected, p_corrected=corrected.get(_cells(pair)))
+        if pair.kind != "folders" and pair.difference is not None
+        else pair
+        for pair in found
     ]
 
 
-def _declared(rows: Sequence[Row], choice: ComparisonChoice) -> list[Duel]:
+def _declared(rows: Sequence[Row], choice: ComparisonChoice) -> list[PairwiseComparison]:
     pair = choice.sensors or choice.estimators
     assert pair is not None, "a comparison is of two"
     try:
-        found = duels(rows, *pair, choice.task)
+        found = comparisons(rows, *pair, choice.task)
     except UnknownNameError:
         return []  # this run had one of them only
-    return [duel for duel in found if duel.kind == ("sensors" if choice.sensors else "estimators")]
+    return [pair for pair in found if pair.kind == ("sensors" if choice.sensors else "estimators")]
 
 
-def _cells(duel: Duel) -> frozenset[str]:
-    return frozenset(str(row["cell"]) for row in (duel.first_row, duel.second_row) if row is not None)
+def _cells(pair: PairwiseComparison) -> frozenset[str]:
+    return frozenset(str(row["cell"]) for row in (pair.first_row, pair.second_row) if row is not None)
 
 
 def _of(rows: Sequence[Row], name: Callable[[Row], str], first: str, second: str) -> tuple[list[Row], list[Row]]:
     return [row for row in rows if name(row) == first], [row for row in rows if name(row) == second]
 
 
-def _compared(kind: Kind, first: str, second: str, first_rows: Sequence[Row], second_rows: Sequence[Row]) -> list[Duel]:
+def _compared(
+    kind: Kind, first: str, second: str, first_rows: Sequence[Row], second_rows: Sequence[Row]
+) -> list[PairwiseComparison]:
     keys = [{_key(kind, row): row for row in rows} for rows in (first_rows, second_rows)]
     found = []
     for key in dict.fromkeys([*keys[0], *keys[1]]):
@@ -143,7 +147,7 @@ def _compared(kind: Kind, first: str, second: str, first_rows: Sequence[Row], se
         assert shown is not None, "the key is of one of the two"
         result = difference(one, other) if one is not None and other is not None and not refused else None
         folds = over_folds([(one, other)]) if one is not None and other is not None and result is not None else None
-        found.append(Duel(kind, first, second, _common(kind, shown), one, other, result, folds, refused))
+        found.append(PairwiseComparison(kind, first, second, _common(kind, shown), one, other, result, folds, refused))
     return found
 
 

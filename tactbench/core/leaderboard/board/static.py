@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 
 from tactbench.core.leaderboard.one_file import prose
@@ -10,7 +9,7 @@ from tactbench.core.leaderboard.table import NUMERIC, Table
 from tactbench.core.leaderboard.text import visible
 
 
-def still(table: Table, remarks: Sequence[str]) -> str:
+def static_tables(table: Table) -> str:
     """Return every block of `table` as HTML, and its notes; everything in them is escaped."""
     parts: list[str] = []
     for block in table.blocks:
@@ -30,7 +29,7 @@ def still(table: Table, remarks: Sequence[str]) -> str:
             f'<div class="box"><table><caption>{_text(block.title)}{said}</caption>\n'
             f"<thead><tr>{heads}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
         )
-    notes = "\n".join(f"<li>{prose(note)}</li>" for note in (*remarks, *table.notes, *table.foot))
+    notes = "\n".join(f"<li>{prose(note)}</li>" for note in (*table.notes, *table.footer))
     return "\n".join(parts) + f'\n<ul class="notes">\n{notes}\n</ul>'
 
 

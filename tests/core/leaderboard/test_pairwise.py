@@ -3,8 +3,8 @@
 import pytest
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.duel import duels, folder_duels, with_declared
-from tactbench.core.leaderboard.duel_table import notes_of, record_of, tables_of
+from tactbench.core.leaderboard.pairwise import comparisons, folder_comparisons, with_declared
+from tactbench.core.leaderboard.pairwise_table import notes_of, record_of, tables_of
 from tactbench.core.spec.matrix import ComparisonChoice
 
 from .rows import row
@@ -27,7 +27,7 @@ WORSE = (1.3, 1.4, 1.5, 1.65, 1.7, 1.8)
 def test_two_sensors_are_compared_estimator_by_estimator():
     rows = [answered(), answered("b", WORSE), answered(estimator="ols"), answered("b", WORSE, "ols"),
             answered("a", estimator="mean", is_baseline=True), answered("c")]  # fmt: skip
-    found = duels(rows, "a", "b")
+    found = comparisons(rows, "a", "b")
     assert [(one.kind, one.of) for one in found] == [("sensors", "lasso"), ("sensors", "ols")]
     assert all(one.difference.verdict == "better" and one.difference.paired for one in found)
     (table,) = tables_of(found)
@@ -44,8 +44,8 @@ def test_two_estimators_are_compared_sensor_by_sensor_and_a_baseline_may_be_one(
         answered(estimator="ols", means=WORSE),
         answered(estimator="mean", means=WORSE, is_baseline=True),
     ]
-    assert [one.of for one in duels(rows, "ols", "lasso")] == ["a"]
-    assert duels(rows, "lasso", "mean")[0].difference.verdict == "better"
+    assert [one.of for one in comparisons(rows, "ols", "lasso")] == ["a"]
+    assert comparisons(rows, "lasso", "mean")[0].difference.verdict == "better"
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_two_estimators_are_compared_sensor_by_sensor_and_a_baseline_may_be_one(
     ],
 )
 def test_what_must_not_be_compared_is_refused_with_its_reason(more, why):
-    found = duels([answered(), answered("b", **more)], "a", "b")
+    found = comparisons([answered(), answered("b", **more)], "a", "b")
     assert found[0].refused == why
     assert all(one.difference is None for one in found)
     assert all("not compared" in line[-1] for table in tables_of(found) for line in table.lines)
@@ -70,30 +70,30 @@ def test_what_must_not_be_compared_is_refused_with_its_reason(more, why):
 def test_a_name_that_is_neither_names_the_nearest():
     rows = [answered("biotac"), answered("icub")]
     with pytest.raises(UnknownNameError, match="biotac"):
-        duels(rows, "biotack", "icub")
+        comparisons(rows, "biotack", "icub")
     with pytest.raises(UnknownNameError, match="icub"):
-        duels(rows, "biotac", "icup")
+        comparisons(rows, "biotac", "icup")
     with pytest.raises(UnknownNameError):
-        duels(rows, "biotac", "lasso")
+        comparisons(rows, "biotac", "lasso")
 
 
 def test_declared_comparisons_are_corrected_for_all_that_were_declared():
     rows = [answered(), answered("b", WORSE), answered(estimator="ols"), answered("b", WORSE, "ols")]
     declared = [ComparisonChoice(sensors=("a", "b")), ComparisonChoice(estimators=("lasso", "ols")),
                 ComparisonChoice(sensors=("a", "nobody"))]  # fmt: skip
-    found = with_declared(duels(rows, "b", "a"), rows, declared)
+    found = with_declared(comparisons(rows, "b", "a"), rows, declared)
     p = found[0].difference.p
     assert p == 2 / 64
     # Four were tested: two pairs of sensors at p, two pairs of estimators with none to tell.
     assert [one.p_corrected for one in found] == [4 * p, 4 * p]
-    other = with_declared(duels(rows, "a", "b"), rows, [ComparisonChoice(sensors=("a", "b"), task="elsewhere")])
+    other = with_declared(comparisons(rows, "a", "b"), rows, [ComparisonChoice(sensors=("a", "b"), task="elsewhere")])
     assert not any(one.declared for one in other)
     assert [one.p_corrected for one in other] == [None, None]
 
 
 def test_two_folders_are_compared_cell_by_cell():
     before, after = [answered(), answered("b")], [answered(means=WORSE), answered("c")]
-    found = folder_duels(before, after, "old", "new")
+    found = folder_comparisons(before, after, "old", "new")
     assert [(one.of, one.refused) for one in found] == [
         ("a, lasso", ""), ("b, lasso", "new has no such cell"), ("c, lasso", "old has no such cell"),
     ]  # fmt: skip
@@ -104,7 +104,7 @@ def test_several_tasks_are_averaged():
     rows = [
         answered(sensor, means, task=task) for task in ("x", "y") for sensor, means in (("a", (1.0,) * 6), ("b", WORSE))
     ]
-    (note,) = [note for note in notes_of(duels(rows, "a", "b")) if note.startswith("Interquartile")]
+    (note,) = [note for note in notes_of(comparisons(rows, "a", "b")) if note.startswith("Interquartile")]
     assert "over 2 tasks" in note
     assert "a 0.667" in note
-    assert not any(note.startswith("Interquartile") for note in notes_of(duels(rows, "a", "b", "x")))
+    assert not any(note.startswith("Interquartile") for note in notes_of(comparisons(rows, "a", "b", "x")))

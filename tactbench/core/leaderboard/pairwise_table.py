@@ -1,14 +1,14 @@
-"""Duels as text and as records: one table a question, the same digits in every format."""
+"""Pairwise comparisons as text and as records: one table a question, the same digits in every format."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from tactbench.core.leaderboard.duel import Duel
 from tactbench.core.leaderboard.names import hardware_name, metric_name
 from tactbench.core.leaderboard.numbers import interval, score, suffix
+from tactbench.core.leaderboard.pairwise import PairwiseComparison
+from tactbench.core.leaderboard.text_table import TextTable
 from tactbench.core.statistics.aggregate import Aggregate, aggregate
 
 NUMERIC = frozenset({"A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "effect", "P(A better)", "n"})
@@ -17,27 +17,20 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class DuelTable:
-    """Lines of text under one title."""
-
-    title: str
-    columns: tuple[str, ...]
-    lines: tuple[tuple[str, ...], ...]
-
-
-def tables_of(duels: Sequence[Duel]) -> list[DuelTable]:
+def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
     """Return a table for each question: task, metric, protocol, split and hardware."""
-    groups: dict[str, list[Duel]] = {}
-    for duel in duels:
-        groups.setdefault(_title(duel), []).append(duel)
-    return [DuelTable(title, COLUMNS, tuple(_line(duel) for duel in members)) for title, members in groups.items()]
+    groups: dict[str, list[PairwiseComparison]] = {}
+    for pair in comparisons:
+        groups.setdefault(_title(pair), []).append(pair)
+    return [
+        TextTable(title, COLUMNS, tuple(_line(pair) for pair in members), NUMERIC) for title, members in groups.items()
+    ]
 
 
-def _title(duel: Duel) -> str:
-    row = duel.row
+def _title(pair: PairwiseComparison) -> str:
+    row = pair.row
     parts = [
-        f"A = {duel.first}, B = {duel.second}",
+        f"A = {pair.first}, B = {pair.second}",
         row["task"],
         metric_name(row),
     ]
@@ -48,38 +41,38 @@ def _title(duel: Duel) -> str:
     return " · ".join(parts)
 
 
-def _line(duel: Duel) -> tuple[str, ...]:
-    unit = duel.row["unit"]
+def _line(pair: PairwiseComparison) -> tuple[str, ...]:
+    unit = pair.row["unit"]
     scores = [score(row["score"], unit) if row and row["score"] is not None else "–"
-              for row in (duel.first_row, duel.second_row)]  # fmt: skip
-    found = duel.difference
+              for row in (pair.first_row, pair.second_row)]  # fmt: skip
+    found = pair.difference
     if found is None:
-        return (duel.of, *scores, *("–" for _ in COLUMNS[4:]), f"not compared: {duel.refused}")
+        return (pair.of, *scores, *("–" for _ in COLUMNS[4:]), f"not compared: {pair.refused}")
     return (
-        duel.of,
+        pair.of,
         *scores,
         signed(found.value, unit),
         "–" if found.low is None or found.high is None else f"{signed(found.low, unit)} … {signed(found.high, unit)}",
         probability(found.p),
-        probability(duel.folds.p) if duel.folds else "–",
-        probability(duel.p_corrected) if duel.declared else "exploratory",
+        probability(pair.folds.p) if pair.folds else "–",
+        probability(pair.p_corrected) if pair.declared else "exploratory",
         "–" if found.effect is None else signed(found.effect, "1"),
         "–" if found.improved is None else f"{found.improved:.2f}",
         f"{found.replicates}" + ("" if found.paired else " unpaired"),
-        verdict(duel),
+        verdict(pair),
     )
 
 
-def verdict(duel: Duel) -> str:
+def verdict(pair: PairwiseComparison) -> str:
     """Return who is better, or that it cannot be told."""
-    found = duel.difference
+    found = pair.difference
     if found is None:
         return "not compared"
     if found.verdict in ("equivalent", "undecided"):
         return found.verdict
-    winner = duel.first if found.verdict == "better" else duel.second
-    region = duel.row.get("equivalence")
-    beyond = f" by more than {region:g}{suffix(duel.row['unit'])}" if region and found.beyond else ""
+    winner = pair.first if found.verdict == "better" else pair.second
+    region = pair.row.get("equivalence")
+    beyond = f" by more than {region:g}{suffix(pair.row['unit'])}" if region and found.beyond else ""
     return f"{winner} better{beyond}"
 
 
@@ -95,57 +88,57 @@ def probability(p: float | None) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.2g}"
 
 
-def notes_of(duels: Sequence[Duel]) -> list[str]:
+def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
     """Return what must be known to read the tables."""
-    found = [duel for duel in duels if duel.difference is not None]
+    found = [pair for pair in comparisons if pair.difference is not None]
     notes = [
         "A − B is in the metric's unit; p is of no difference at all, by exchanging A and B within replicates; effect "
         "is the difference over the standard deviation of the replicates' differences; n counts replicates."
     ] if found else []  # fmt: skip
-    for duel in found:
-        assert duel.difference is not None, "these were compared"
-        notes.append(f"{duel.row['task']}: {duel.difference.method}.")
-        region = duel.row.get("equivalence")
+    for pair in found:
+        assert pair.difference is not None, "these were compared"
+        notes.append(f"{pair.row['task']}: {pair.difference.method}.")
+        region = pair.row.get("equivalence")
         notes.append(
-            f"{duel.row['task']}: scores within {region:g}{suffix(duel.row['unit'])} are practically the same."
+            f"{pair.row['task']}: scores within {region:g}{suffix(pair.row['unit'])} are practically the same."
             if region
-            else f"{duel.row['task']} declares no region of practical equivalence."
+            else f"{pair.row['task']} declares no region of practical equivalence."
         )
-        least = duel.difference.smallest_p
+        least = pair.difference.smallest_p
         if least and least > 0.01:
-            notes.append(f"{duel.difference.replicates} replicates cannot give a p below {least:.2g}.")
-        if duel.folds:
+            notes.append(f"{pair.difference.replicates} replicates cannot give a p below {least:.2g}.")
+        if pair.folds:
             notes.append(
-                f"p folds: {duel.folds.method}; training data of folds overlap, so p over replicates is too small "
+                f"p folds: {pair.folds.method}; training data of folds overlap, so p over replicates is too small "
                 "for a claim about estimators trained anew."
             )
-    if found and all(duel.declared for duel in found):
+    if found and all(pair.declared for pair in found):
         notes.append("p Holm is corrected for all declared comparisons of these results.")
-    elif any(duel.declared for duel in found):
+    elif any(pair.declared for pair in found):
         notes.append("p Holm is corrected for all declared comparisons; the others are exploratory.")
     elif found:
         notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
-    if any(duel.row["simulated"] for duel in found):
+    if any(pair.row["simulated"] for pair in found):
         notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
     return list(dict.fromkeys([*notes, *_averages(found)]))
 
 
-def _averages(found: Sequence[Duel]) -> list[str]:
+def _averages(found: Sequence[PairwiseComparison]) -> list[str]:
     """Return the interquartile mean over tasks of either, where two tasks or more were compared under one protocol."""
-    groups: dict[tuple[Any, ...], list[Duel]] = {}
-    for duel in found:
-        row = duel.row
-        groups.setdefault((hardware_name(row), row["protocol"]), []).append(duel)
+    groups: dict[tuple[Any, ...], list[PairwiseComparison]] = {}
+    for pair in found:
+        row = pair.row
+        groups.setdefault((hardware_name(row), row["protocol"]), []).append(pair)
     notes = []
     for (_, protocol), members in groups.items():
-        pairs = [(duel.first_row, duel.second_row) for duel in members]
+        pairs = [(pair.first_row, pair.second_row) for pair in members]
         sides = [aggregate([row for row in side if row is not None]) for side in zip(*pairs, strict=True)]
-        if len({duel.row["task"] for duel in members}) < 2 or sides[0] is None or sides[1] is None:
+        if len({pair.row["task"] for pair in members}) < 2 or sides[0] is None or sides[1] is None:
             continue
-        told = f"{members[0].first} {_average(sides[0])}, {members[0].second} {_average(sides[1])}"
+        averages = f"{members[0].first} {_average(sides[0])}, {members[0].second} {_average(sides[1])}"
         notes.append(
             f"Interquartile mean over {sides[0].tasks} tasks under {protocol} ({sides[0].entries} scores; 0 is the "
-            f"trivial baseline, 1 the reference): {told}."
+            f"trivial baseline, 1 the reference): {averages}."
             + "".join(f" Left out: {one}." for one in dict.fromkeys(sides[0].left_out + sides[1].left_out))
         )
     return notes
@@ -155,21 +148,21 @@ def _average(side: Aggregate) -> str:
     return f"{side.value:.3f} ({interval(side.low, side.high, '1')})"
 
 
-def record_of(duel: Duel) -> dict[str, Any]:
-    """Return a duel as one flat record; all have the same keys."""
-    row, found, folds = duel.row, duel.difference, duel.folds
+def record_of(pair: PairwiseComparison) -> dict[str, Any]:
+    """Return a pair as one flat record; all have the same keys."""
+    row, found, folds = pair.row, pair.difference, pair.folds
     each: Mapping[str, Any] = {} if found is None else vars(found)
     return {
-        "compared": duel.kind, "a": duel.first, "b": duel.second, "of": duel.of, "task": row["task"],
+        "compared": pair.kind, "a": pair.first, "b": pair.second, "of": pair.of, "task": row["task"],
         "rig": row["rig"], "simulated": row["simulated"], "protocol": row["protocol"], "split": row["split"],
         "repeat": row["repeat"], "metric": row["metric"], "unit": row["unit"],
-        "score_a": duel.first_row["score"] if duel.first_row else None,
-        "score_b": duel.second_row["score"] if duel.second_row else None,
+        "score_a": pair.first_row["score"] if pair.first_row else None,
+        "score_b": pair.second_row["score"] if pair.second_row else None,
         "difference": each.get("value"), "low": each.get("low"), "high": each.get("high"), "p": each.get("p"),
         "smallest_p": each.get("smallest_p"), "p_folds": folds.p if folds else None,
         "folds_low": folds.low if folds else None, "folds_high": folds.high if folds else None,
-        "declared": duel.declared, "p_holm": duel.p_corrected, "effect": each.get("effect"),
+        "declared": pair.declared, "p_holm": pair.p_corrected, "effect": each.get("effect"),
         "improved": each.get("improved"), "equivalence": row.get("equivalence"), "verdict": each.get("verdict"),
         "beyond": each.get("beyond"), "paired": each.get("paired"), "replicates": each.get("replicates"),
-        "replicate_unit": each.get("unit"), "method": each.get("method"), "refused": duel.refused,
+        "replicate_unit": each.get("unit"), "method": each.get("method"), "refused": pair.refused,
     }  # fmt: skip
