@@ -12,6 +12,7 @@ from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.scene import NUISANCES, Scene, Simulation, Slide
 from tactbench.plugin import load_registry
 from tactbench.plugin.simulation import Nuisances
+from tests.conftest import ROOT
 
 SCENE = Scene(name="a", drive=ForceLoop(), slide=Slide(speed=assumed(5.0, "mm/s", "test")))
 SENSORS = [load_registry().sensors[name].spec for name in ("biotac", "icub", "ideal")]
@@ -32,6 +33,11 @@ def test_a_name_is_part_field_and_unit(name):
     told = unit.lower().replace("/", "_per_", 1).replace("/", "_")
     words = [*(way[-2:] if way[0] != "environment" else way[-1:]), *([] if unit == "1" else [told])]
     assert name == "_".join(words)
+
+
+def test_the_document_names_every_nuisance_of_a_scene():
+    text = (ROOT / "docs" / "twin.md").read_text(encoding="utf-8")
+    assert [name for name in NUISANCES if f"`{name}`" not in text] == []
 
 
 @pytest.mark.parametrize("spec", SENSORS, ids=lambda spec: spec.name)
