@@ -22,7 +22,7 @@ from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
 from tactbench.core.evaluation.reference_floor import BeyondFloor, beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import summed
-from tactbench.core.evaluation.replication import Units, replicates
+from tactbench.core.evaluation.replication import ReplicateUnits, replicates
 from tactbench.core.evaluation.selection import Build, Choice, features_of, select
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
@@ -369,7 +369,9 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
 NOT_TARED = "not tared: no recording states an unloaded hold"
 
 
-def _against(truth: FloatArray, metric: Metric, tested: Answers, unit: Units, seed: int) -> tuple[float, float, float]:
+def _against(
+    truth: FloatArray, metric: Metric, tested: Answers, unit: ReplicateUnits, seed: int
+) -> tuple[float, float, float]:
     """Return the metric against (n,) another truth than the recorded one, and its interval."""
     found = score_interval(metric, truth, tested.y_pred, tested.recording, unit.codes, unit.name, 0, seed)
     return metric.of(truth, tested.y_pred), found.low, found.high
