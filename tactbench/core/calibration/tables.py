@@ -82,9 +82,9 @@ def _published(spec: CalibrationSpec, told: Summary, lines: Sequence[Line]) -> T
 def _nuisances(lines: Sequence[Line]) -> TextTable:
     return TextTable(
         "Nuisances: median and middle 80 %",
-        ("nuisance", "where", "unit", "prior", "accepted"),
+        ("nuisance", "sets", "unit", "prior", "accepted"),
         tuple(
-            {"nuisance": line["name"], "where": line["path"], "unit": line["unit"], "prior": _range(line, "prior"),
+            {"nuisance": line["name"], "sets": line["sets"], "unit": line["unit"], "prior": _range(line, "prior"),
              "accepted": _range(line, "accepted")}
             for line in lines
         ),

@@ -149,7 +149,7 @@ def _scenes(registry: Registry, task: str, wanted: str | None, simulation: Simul
     if wanted is not None and wanted not in planned:
         raise UnknownNameError(f"scene of task {task!r}", wanted, planned)
     scenes = [planned[wanted]] if wanted is not None else list(planned.values())
-    return [scene.model_copy(update={"simulation": simulation}) if simulation else scene for scene in scenes]
+    return [scene.asked(simulation) if simulation else scene for scene in scenes]
 
 
 def _alike(rig: Explaining, sensor: SensorDescriptor, scenes: list[Scene]) -> list[list[Scene]]:

@@ -122,6 +122,8 @@ def _rests_on(row: Row) -> list[str]:
         parts.append(("chosen on validation data", picked(row)))
     parts.append(("samples", f"{row['n_train']} to train on, {row['n_test']} to test on, from {row['n_recordings']} "
                              f"recordings of {row['n_sessions']} sessions"))  # fmt: skip
+    if row.get("assumptions"):
+        parts.append(("assumed", ", ".join(f"{name} {value}" for name, value in sorted(row["assumptions"].items()))))
     counted = count_texts(row.get("counts") or {})
     if counted:
         parts.append(("left out", "; ".join(counted)))

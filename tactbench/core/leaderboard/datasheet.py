@@ -175,16 +175,11 @@ def _quantities(sensor: SensorSpec) -> dict[str, Quantity]:
     if sensor.skin is not None:
         found.update(_named("skin", sensor.skin))
     found.update({f"{name.replace('_', ' ')}": quantity for name, quantity in sensor.parameters.items()})
-    for kind, nuisances in sensor.nuisances.items():
-        found.update(_named(f"{kind.replace('_', ' ')} noise", nuisances))
-    for scenario, other in sensor.scenarios.items():
-        for kind, nuisances in other.nuisances.items():
-            usual = dict(_named("", sensor.nuisances[kind])) if kind in sensor.nuisances else {}
-            found.update(
-                (f"{kind.replace('_', ' ')} noise, {scenario}{title}", quantity)
-                for title, quantity in _named("", nuisances)
-                if usual.get(title) != quantity
-            )
+    usual = sensor.settable()
+    found.update(usual)
+    for scenario in sensor.scenarios:
+        other = sensor.handled(scenario).settable()
+        found.update((f"{name}, {scenario}", amount) for name, amount in other.items() if usual.get(name) != amount)
     return found
 
 

@@ -10,7 +10,7 @@ from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.names import EMULATED, SIMULATED, answer_name, hardware_name
 from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.holm import holm
-from tactbench.core.statistics.overlap import OverFolds, over_folds
+from tactbench.core.statistics.over_folds import FoldDifference, over_folds
 from tactbench.core.statistics.paired import Difference, difference
 
 Row = Mapping[str, Any]
@@ -31,7 +31,7 @@ class PairwiseComparison:
     first_row: Row | None
     second_row: Row | None
     difference: Difference | None
-    folds: OverFolds | None
+    folds: FoldDifference | None
     """the same over folds whose training data overlap, where there are several"""
     refused: str
     """why there is no difference; empty if there is one"""

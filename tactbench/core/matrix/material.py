@@ -52,9 +52,7 @@ def orders_for(
             continue
         orders[wanted] = []
         for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(wanted[2]), cell.seed):
-            scene = planned.scene
-            if simulation != Simulation():
-                scene = scene.model_copy(update={"simulation": simulation})
+            scene = planned.scene.asked(simulation)
             key = recording_key(cell.sensor, cell.rig, scene, planned.role, cell.seed, registry, sources, cell.rig_file)
             path = store.recording_path(cell.sensor, scene.name, key)
             orders[wanted].append(Order(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, cell.rig_file))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
-from tactbench.core.errors import NotApplicable
+from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.spec import units
 from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.quantity import Frozen, Quantity, Source, assumed
@@ -151,6 +152,45 @@ class Nuisances(Frozen):
                 raise ValueError(f"{name} is not 0, so {name}_tau is needed, the time constant of it")
         return self
 
+    def by_name(self, kind: str) -> dict[str, tuple[str, Quantity]]:
+        """Return every amount with its field, by the name under which a run sets it: ``taxel_white_count``."""
+        stated = {field: getattr(self, field) for field in type(self).model_fields if field != "creep"}
+        for place, term in enumerate(self.creep, start=1):
+            stated |= {f"creep_{place}_fraction": term.fraction, f"creep_{place}_tau": term.tau}
+        return {
+            units.with_unit(f"{kind}_{field}", one.unit): (field, one)
+            for field, one in stated.items()
+            if one is not None
+        }
+
+    def with_values(self, kind: str, values: Mapping[str, float]) -> Nuisances:
+        """Return these nuisances with other `values`, by name; names that are not theirs are passed over.
+
+        Raises
+        ------
+        UsageError
+            If an amount cannot have its value.
+        """
+        known = self.by_name(kind)
+        given = {field: getattr(self, field) for field in self.model_fields_set}
+        creep = [term.model_dump() for term in self.creep]
+        for name, value in values.items():
+            if name not in known:
+                continue
+            field, old = known[name]
+            if value < 0 and field != "warm_up":
+                raise UsageError(f"{name} = {value:g} is below 0.", hint="Give 0 or more.")
+            new = assumed(value, old.unit, "set for this run")
+            if field.startswith("creep_"):
+                _, place, part = field.split("_")
+                creep[int(place) - 1][part] = new
+            else:
+                given[field] = new
+        try:
+            return Nuisances.model_validate({**given, "creep": creep})
+        except ValidationError as error:
+            raise UsageError(f"{kind}: {error.errors()[0]['msg']}.", hint="Set that as well.") from error
+
     def hidden(self, noise_scale: float = 1.0) -> float:
         """Return the standard deviation that white noise and rounding hide anyway, in the channel's unit."""
         return math.hypot(noise_scale * self.white.value, self.step.value / math.sqrt(12.0))
@@ -248,6 +288,23 @@ class SensorSpec(Frozen):
         """Return the channels of the given kinds (all of them without arguments), in order of the streams."""
         every = (channel for stream in self.streams for channel in stream.channels)
         return tuple(channel for channel in every if not kinds or channel.kind in kinds)
+
+    def settable(self) -> dict[str, Quantity]:
+        """Return what the sensor declares of nuisances, by the name under which a run sets it."""
+        return {name: amount for kind, own in self.nuisances.items() for name, (_, amount) in own.by_name(kind).items()}
+
+    def with_nuisances(self, values: Mapping[str, float]) -> SensorSpec:
+        """Return the spec with other `values` of its nuisances, by name; names that are not its own are passed over.
+
+        Raises
+        ------
+        UsageError
+            If a nuisance cannot have its value.
+        """
+        if not values.keys() & self.settable().keys():
+            return self
+        nuisances = {kind: own.with_values(kind, values) for kind, own in self.nuisances.items()}
+        return self.model_copy(update={"nuisances": nuisances})
 
     def handled(self, scenario: str | None) -> SensorSpec:
         """Return the spec with the nuisances of one of its scenarios; None: as it is.

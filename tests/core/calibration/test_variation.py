@@ -23,7 +23,7 @@ VARIATIONS = [
     {
         "name": "width", "title": "Some widths", "outputs": ["narrow"], "seeds": 5, "reason": "A test.",
         "settings": [
-            {"label": f"width {value}", "given": [{"path": "placement.scatter", "value": value, "unit": "mm"}]}
+            {"label": f"width {value}", "given": [{"name": "placement_scatter_mm", "value": value}]}
             for value in WIDTHS
         ],
     },
@@ -141,8 +141,8 @@ def test_what_comes_along_is_checked_before_anything_is_simulated():
     checked(spec)
     assert {variation.name for variation in spec.variations} == {"contact_place", "warmth"}
     wrong = spec.variations[0].model_dump()
-    wrong["settings"][1]["given"][0]["path"] = "placement.z"
-    with pytest.raises(UsageError, match=r"placement\.z"):
+    wrong["settings"][1]["given"][0]["name"] = "drive_delay_ms"
+    with pytest.raises(UsageError, match="drive_delay_ms: the scene has no drive"):
         checked(type(spec).model_validate({**spec.model_dump(), "variations": [wrong]}))
 
 

@@ -14,7 +14,7 @@ Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class OverFolds:
+class FoldDifference:
     """The mean difference over folds, and what can be said of it."""
 
     mean: float
@@ -25,7 +25,7 @@ class OverFolds:
     method: str
 
 
-def corrected_t(differences: Sequence[float], test_over_train: float, repeats: int = 1) -> OverFolds | None:
+def corrected_t(differences: Sequence[float], test_over_train: float, repeats: int = 1) -> FoldDifference | None:
     """Return the corrected resampled t-test of differences over folds; None of fewer than two.
 
     Parameters
@@ -54,10 +54,10 @@ def corrected_t(differences: Sequence[float], test_over_train: float, repeats: i
     p = two_sided(mean / deviation, n - 1) if deviation > 0 else float(mean == 0)
     who = "Bouckaert and Frank" if repeats > 1 else "Nadeau and Bengio"
     over = f"{n // repeats} folds" + (f" of {repeats} repeats" if repeats > 1 else "")
-    return OverFolds(mean, mean - reach, mean + reach, p, n, f"corrected resampled t ({who}) over {over}")
+    return FoldDifference(mean, mean - reach, mean + reach, p, n, f"corrected resampled t ({who}) over {over}")
 
 
-def over_folds(pairs: Sequence[tuple[Row, Row]]) -> OverFolds | None:
+def over_folds(pairs: Sequence[tuple[Row, Row]]) -> FoldDifference | None:
     """Return the corrected test of two cells over the folds that both have, their repeats together.
 
     Parameters

@@ -13,7 +13,7 @@ FURTHEST = 10.0
 
 
 @dataclass(frozen=True)
-class Scale:
+class ScoreTransform:
     """A monotone function of a score, and its inverse."""
 
     name: str
@@ -21,7 +21,7 @@ class Scale:
     back: Callable[[Any], Any]
 
 
-def scale_of(metric: str, score: float, n: int) -> Scale:
+def transform_of(metric: str, score: float, n: int) -> ScoreTransform:
     """Return the scale of a metric on which Student's interval is to be made.
 
     Parameters
@@ -40,17 +40,19 @@ def scale_of(metric: str, score: float, n: int) -> Scale:
     """
     if metric in ("rmse", "mae"):
         least = max(score, np.finfo(np.float64).tiny ** 0.5) / 1e3
-        return Scale(
+        return ScoreTransform(
             "reciprocal scale",
             lambda x: 1.0 / np.maximum(x, least),
             lambda x: 1.0 / np.maximum(x, 1.0 / (FURTHEST * max(score, least))),
         )
     if metric == "r2":
-        return Scale("scale of log(1 − R²)", lambda x: np.log(np.maximum(1.0 - x, 0.5 / n)), lambda x: 1.0 - np.exp(x))
+        return ScoreTransform(
+            "scale of log(1 − R²)", lambda x: np.log(np.maximum(1.0 - x, 0.5 / n)), lambda x: 1.0 - np.exp(x)
+        )
     edge = 0.5 / n
 
     def odds(x: Any) -> Any:
         inside = np.clip(x, edge, 1.0 - edge)
         return np.log(inside / (1.0 - inside))
 
-    return Scale("scale of log-odds", odds, lambda x: 1.0 / (1.0 + np.exp(-x)))
+    return ScoreTransform("scale of log-odds", odds, lambda x: 1.0 / (1.0 + np.exp(-x)))

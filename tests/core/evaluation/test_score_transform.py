@@ -9,7 +9,7 @@ from scipy import stats
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.jackknife import influences
 from tactbench.core.evaluation.metrics import METRICS
-from tactbench.core.evaluation.scales import FURTHEST, scale_of
+from tactbench.core.evaluation.score_transform import FURTHEST, transform_of
 
 
 @given(st.lists(st.floats(-100, 100), min_size=2, max_size=20))
@@ -34,7 +34,7 @@ def test_replicates_stand_in_within_their_stratum_only():
 @pytest.mark.parametrize("metric", sorted(METRICS))
 @given(st.floats(0.01, 0.99))
 def test_a_scale_and_back_is_where_it_began(metric, value):
-    scale = scale_of(metric, 0.5, 1000)
+    scale = transform_of(metric, 0.5, 1000)
     assert scale.back(scale.there(value)) == pytest.approx(value, rel=1e-9)
 
 
