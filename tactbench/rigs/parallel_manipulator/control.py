@@ -193,6 +193,8 @@ class Control:
     def _period(self) -> None:
         now_ns = self._clock()
         self.late += now_ns - self._next_ns > self._period_ns
+        if now_ns - self._next_ns > self._stale_ns:
+            self._began_ns = now_ns  # it was this process that hung, and the sensor's reading with it
         self._next_ns = max(self._next_ns + self._period_ns, now_ns + self._period_ns // 2)
         self._gather()
         raw, self._raw = self._raw, []

@@ -45,3 +45,36 @@ def test_while_it_runs_counts_are_those_of_its_own_thread():
     # Of the end, not of a quarter of a second before.
     assert control.counts()["guard"]["beats"] == guard.counts()["guard"]["beats"]
     guard.close()
+
+
+def test_a_rig_that_has_hung_does_not_blame_the_sensor():
+    setting = FAULTS.Setting()
+    world = FAULTS.Pressed(setting)
+    guard = world.guard()
+    guard.start()
+    armed = guard.arm(setting.limits)
+    press, sensor = Press(SETTINGS, COURSE, 1e-6), Sensor()
+    control = Control(guard, setting.limits, armed, press, sensor, world.clock, period_s=0.02, stale_s=0.1)
+    for _ in range(10):
+        sensor.last_ns = world.clock()
+        control.carry(world.clock() + 20_000_000)
+    assert not press.over
+    guard.advance(world.clock() + 4_000_000_000)
+    control.carry(world.clock() + 100_000_000)
+    assert press.ended == "in standoff: no beat in time"
+    guard.close()
+
+
+def test_a_sensor_that_sends_nothing_ends_the_press():
+    setting = FAULTS.Setting()
+    world = FAULTS.Pressed(setting)
+    guard = world.guard()
+    guard.start()
+    armed = guard.arm(setting.limits)
+    press = Press(SETTINGS, COURSE, 1e-6)
+    control = Control(guard, setting.limits, armed, press, Sensor(), world.clock, period_s=0.02, stale_s=0.1)
+    control.carry(world.clock() + 90_000_000)
+    assert press.ended == ""
+    control.carry(world.clock() + 60_000_000)
+    assert "the sensor has sent nothing for 1" in press.ended
+    guard.close()
