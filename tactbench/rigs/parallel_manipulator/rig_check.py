@@ -132,16 +132,17 @@ def _units(found: _Findings, settings: RigSettings, options: FaulhaberOptions) -
     profile, touch = options.profile(), settings.touch
     stated = profile.model_fields_set
 
-    def unit(name: str) -> str:
+    def unit(name: str, shown: str) -> str:
         quantity = getattr(profile, name)
-        return f"{quantity} ({'the rig file' if name in stated else f'ASSUMED: {quantity.source.reference}'})"
+        by = "the rig file" if name in stated else f"ASSUMED: {quantity.source.reference}"
+        return f"{quantity.to(shown):g} {shown} ({by})"
 
     found.table(
         "units of the motor's drive",
-        ("one increment", unit("position_unit")),
-        ("one unit of speed", unit("speed_unit")),
-        ("one unit of acceleration", unit("acceleration_unit")),
-        ("one unit of current", unit("current_unit")),
+        ("one increment", unit("position_unit", "um")),
+        ("one unit of speed", unit("speed_unit", "mm/s")),
+        ("one unit of acceleration", unit("acceleration_unit", "mm/s/s")),
+        ("one unit of current", unit("current_unit", "mA")),
     )
     missing = [name for name in MANDATORY if getattr(options, name) is None]
     if missing:
