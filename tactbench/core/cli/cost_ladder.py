@@ -40,7 +40,7 @@ def show_ladder(
     from tactbench.core.cli.screen import remark
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import flat_csv, write_ladder
-    from tactbench.core.leaderboard.table import METRIC_NAMES
+    from tactbench.core.leaderboard.names import METRIC_NAMES
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()

@@ -11,7 +11,7 @@ from tactbench.core.cli.progress import progress
 from tactbench.core.cli.screen import remark
 from tactbench.core.cost.task_score import in_unit, quick_estimator, task_score, with_all_effects
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
-from tactbench.core.leaderboard.table import METRIC_NAMES
+from tactbench.core.leaderboard.names import METRIC_NAMES
 from tactbench.core.plugins.interfaces import RigContext
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.spec.scene import Simulation

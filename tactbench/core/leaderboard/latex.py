@@ -11,12 +11,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from tactbench.core.leaderboard import view as viewed
-from tactbench.core.leaderboard.column_table import ColumnTable
+from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import INTERVALS
 from tactbench.core.leaderboard.fitting import fit, wrapped
 from tactbench.core.leaderboard.notes import RANKS, interval_notes
 from tactbench.core.leaderboard.numbers import whole
-from tactbench.core.leaderboard.table import Block, Table
+from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.text_table import TextTable
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, View
@@ -72,7 +72,7 @@ def _caption(block: Block, grid: TextTable) -> str:
     counts = sorted({row["n_test"] for row in rows if row["n_test"] is not None})
     n = f"n = {'–'.join(map(whole, dict.fromkeys((counts[0], counts[-1]))))} test samples" if counts else ""
     task = f"{visible(str(block.lines[0].row['task']))}: "
-    how = [f"95 % {text.removeprefix(task)}" for text in interval_notes(ColumnTable(rows))] if rows else []
+    how = [f"95 % {text.removeprefix(task)}" for text in interval_notes(rows)] if rows else []
     rule = "Below the rule: trivial answers" if "#" not in grid.columns and _first_trivial(grid) else ""
     said = [text.rstrip(".") for text in (block.title, *grid.summary[:1], n, *how, rule) if text]
     return f"{'. '.join(said)}."

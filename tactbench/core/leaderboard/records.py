@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from tactbench.core.leaderboard.columns import SHOWN
-from tactbench.core.leaderboard.table import Line, Table
+from tactbench.core.leaderboard.lines import Line
+from tactbench.core.leaderboard.table import Table
 from tactbench.core.spec.row import FORMAT
 
 JSON_KEYS = (
@@ -65,15 +66,13 @@ def keys(table: Table) -> tuple[str, ...]:
 def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
     """Yield each line's row, ranks among it, and its text by column."""
     chosen = keys(table)
-    for block in table.blocks:
-        for line in block.lines:
-            values = {key: line.row.get(key) for key in chosen}
-            yield values | _ranks(line), shown(table, line)
+    for line in table.lines:
+        yield {key: line.row.get(key) for key in chosen} | _ranks(line), shown(line)
 
 
-def shown(table: Table, line: Line) -> dict[str, str]:
+def shown(line: Line) -> dict[str, str]:
     """Return the text of a line, by what its columns are called for programs."""
-    return {SHOWN[name]: text for name, text in zip(table.columns, line.cells, strict=True)}
+    return {SHOWN[name]: text for name, text in line.texts.items()}
 
 
 def finite(value: Any) -> Any:

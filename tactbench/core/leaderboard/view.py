@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError
+from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import COLUMNS, INTERVALS, NUMERIC, SHOWN
-from tactbench.core.leaderboard.lines import Line
 from tactbench.core.leaderboard.names import metric_name
 from tactbench.core.leaderboard.numbers import ABSENT
-from tactbench.core.leaderboard.table import Block, Table
+from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.text import command_line, visible
 from tactbench.core.leaderboard.text_table import TextTable
 from tactbench.core.statistics.median import counted, percent
+
+Row = Mapping[str, Any]
 
 CELL = "cell"
 """The column of cells' names, as `why` and `rerun` take them."""
@@ -59,12 +61,12 @@ def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
 
 def grids(table: Table, view: View) -> list[TextTable]:
     """Return what is printed of a table's blocks."""
-    return [grid_of(table, block, view) for block in table.blocks]
+    return [grid_of(block, view) for block in table.blocks]
 
 
-def grid_of(table: Table, block: Block, view: View) -> TextTable:
+def grid_of(block: Block, view: View) -> TextTable:
     """Return what is printed of a block."""
-    texts = [_by_column(table, line) for line in block.lines]
+    texts = [{**line.texts, CELL: visible(_cell(line.row))} for line in block.lines]
     if all("†" in text["score"] for text, line in zip(texts, block.lines, strict=True) if line.row["status"] == "done"):
         # The title has it: not repeated behind every score.
         texts = [{**text, "score": text["score"].replace(" †", "")} for text in texts]
@@ -87,12 +89,13 @@ def grid_of(table: Table, block: Block, view: View) -> TextTable:
     )
 
 
-def _by_column(table: Table, line: Line) -> dict[str, str]:
-    name = line.cell.removesuffix(f"/{line.row.get('repeat')}") if line.row.get("repeats") == 1 else line.cell
-    return {**dict(zip(table.columns, line.cells, strict=True)), CELL: visible(name)}
+def _cell(row: Row) -> str:
+    """Return the name of a cell, without the number of its only replicate."""
+    name = str(row["cell"])
+    return name.removesuffix(f"/{row.get('repeat')}") if row.get("repeats") == 1 else name
 
 
-def header(name: str, rows: Sequence[Any]) -> str:
+def header(name: str, rows: Sequence[Row]) -> str:
     """Return what stands above a column of a block: a score by its metric and unit, an interval by what it is over."""
     first = rows[0]
     unit = f" [{visible(str(first['unit']))}]" if first["unit"] != "1" else ""
@@ -111,7 +114,7 @@ def header(name: str, rows: Sequence[Any]) -> str:
     return name
 
 
-def _over(rows: Sequence[Any], key: str) -> str:
+def _over(rows: Sequence[Row], key: str) -> str:
     """Return what all intervals of a block are over: ``over 8 replicates``; empty if it differs or is not known."""
     found = {(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row.get(key) is not None}
     count, unit = next(iter(found)) if len(found) == 1 else (None, None)
@@ -144,11 +147,11 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
     where = (view.folder,) if view.folder else ()
     listed = _listed(more)
     all_of_it = [f"{listed[:1].upper()}{listed[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
-    first = next((line for block in table.blocks for line in block.lines if line.kind == "result"), None)
+    first = next((line for line in table.lines if line.kind == "result"), None)
     if first is None:
         return tuple(all_of_it if more else [])
     out = ("--out", view.folder) if view.folder else ()
-    why = command_line("tactbench", "why", _by_column(table, first)[CELL], *out)
+    why = command_line("tactbench", "why", _cell(first.row), *out)
     return (*(all_of_it if more else []), f"What a row rests on, its delay part by part: `{why}`.")
 
 
@@ -167,13 +170,13 @@ def best(table: Table, count: int) -> Table:
     for block in table.blocks:
         seen: dict[str, int] = {}
         kept = []
-        for place, line in zip(block.places, block.lines, strict=True):
+        for line in block.lines:
             sensor = str(line.row["sensor"])
             if line.kind == "result" and seen.setdefault(sensor, 0) < count:
                 seen[sensor] += 1
-                kept.append(place)
+                kept.append(line)
         if kept:
-            blocks.append(replace(block, places=tuple(kept)))
+            blocks.append(replace(block, lines=tuple(kept)))
     which = "the first answer" if count == 1 else f"the first {count} answers"
     note = f"Of each block only {which} of each sensor; places are those among all answers."
     return replace(table, blocks=tuple(blocks), notes=(note, *table.notes))

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from tactbench.core.leaderboard.names import METRIC_NAMES
 from tactbench.core.leaderboard.numbers import delay, duration, interval, score, tail
-from tactbench.core.leaderboard.table import METRIC_NAMES
 
 COLUMNS = (
     "estimator", "score", "95 % interval", "fit", "quartiles", "delay", "latency p50", "p95", "batch/row", "data",

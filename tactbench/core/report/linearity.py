@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, sensor_name
 from tactbench.core.leaderboard.numbers import score, suffix
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER, sensor_name
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.reproduction import row_interval
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from tactbench.core.leaderboard.columns import row_interval as row_interval
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER
 from tactbench.core.leaderboard.numbers import interval, score, suffix
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.calibrated import Calibrated, PredictiveRange
 from tactbench.core.spec.task import Published, TaskSpec

@@ -9,7 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.leaderboard.table import Table, answer_name, build_table
+from tactbench.core.leaderboard.names import answer_name
+from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.material import Material

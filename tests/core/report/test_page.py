@@ -8,13 +8,12 @@ import time
 
 import pytest
 
-from tactbench.core.leaderboard.table import NUMERIC
+from tactbench.core.leaderboard.columns import NUMERIC, OF_ROWS
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.calibrated import Calibrated, Finding, Share
 from tactbench.core.report.costs import read_table
 from tactbench.core.report.drawn import Drawn
-from tactbench.core.report.leaderboards import VALUES
 from tactbench.core.report.material import Material, open_material
 from tactbench.core.report.page import make_page
 from tactbench.core.report.section import Subject
@@ -126,7 +125,7 @@ def test_two_names_that_look_alike_have_two_anchors(material):
 
 
 def test_every_column_of_numbers_has_something_to_be_sorted_by():
-    assert NUMERIC - set(VALUES) == {"#", "rank 95 %"}  # both are sorted by the place itself
+    assert NUMERIC - set(OF_ROWS) == {"#", "rank 95 %"}  # both are sorted by the place itself
 
 
 def test_what_is_missing_is_said_with_the_command_that_makes_it(material):

@@ -10,18 +10,20 @@ from string import Template
 from typing import Any
 
 import tactbench
+from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.board.columns import column, cut_start, deflated, details, plain, plain_values
 from tactbench.core.leaderboard.board.static import static_tables
-from tactbench.core.leaderboard.column_table import ColumnTable
-from tactbench.core.leaderboard.columns import VALUES
-from tactbench.core.leaderboard.lines import RowTexts
+from tactbench.core.leaderboard.columns import NUMERIC
+from tactbench.core.leaderboard.lines import Line
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
 from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.row_groups import GROUPS, TITLES
-from tactbench.core.leaderboard.table import NUMERIC, Block, Table
+from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.text_table import TextTable
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
+
+Row = Mapping[str, Any]
 
 TITLE = "tactbench leaderboard"
 LARGEST = 4_000_000
@@ -43,12 +45,14 @@ _SPARE = 4_000
 
 def page_of(table: Table) -> str:
     """Return the page of a table with times; the same table gives the same page."""
-    by_key = table.shown.by_key
-    frame = _frame(by_key, static_tables(table) if len(by_key.rows) <= MOST_STATIC else "")
-    columns = [deflated(_column(name, table.shown)) for name in table.columns]
-    head = _head(table)
+    # By name: neighbours are alike, and deflate to less than in the order of the table.
+    lines = sorted(table.lines, key=lambda line: str(line.row["cell"]))
+    rows = [line.row for line in lines]
+    frame = _frame(rows, static_tables(table) if len(rows) <= MOST_STATIC else "")
+    columns = [deflated(_column(name, lines)) for name in table.columns]
+    head = _head(table, lines)
     taken = len(frame.encode()) + sum(map(len, columns)) + len(deflated(head)) + _SPARE
-    fields, left_out = details(by_key, LARGEST - taken)
+    fields, left_out = details(rows, LARGEST - taken)
     head |= {"fields": list(fields), "leftOut": left_out}
     data = json.dumps([deflated(head), *columns, *fields.values()])
     # The last one: a name may say the same.
@@ -56,20 +60,20 @@ def page_of(table: Table) -> str:
     return before + data + after
 
 
-def _head(table: Table) -> dict[str, Any]:
-    """Return all that the page's script must know beside its columns."""
-    shown, by_key = table.shown, table.shown.by_key
-    firsts = [by_key.rows[block.places[0]] for block in table.blocks]
+def _head(table: Table, lines: Sequence[Line]) -> dict[str, Any]:
+    """Return all that the page's script must know beside its columns, of these lines."""
+    places = {id(line): place for place, line in enumerate(lines)}
+    firsts = [block.lines[0].row for block in table.blocks]
     notes = [cut_start(note, LONGEST_NOTE) for note in table.notes]
     if len(notes) > MOST_NOTES:
         notes = [*notes[:MOST_NOTES], f"{len(notes) - MOST_NOTES} more notes are not in this page."]
     return {
         "version": tactbench.__version__,
-        "rows": len(by_key.rows),
-        "order": [place for block in table.blocks for place in block.places],
-        "kinds": column(shown.kinds),
+        "rows": len(lines),
+        "order": [places[id(line)] for line in table.lines],
+        "kinds": column([line.kind for line in lines]),
         "blocks": [
-            {"title": block.title, "verdict": list(block.verdict), "size": len(block.places)}
+            {"title": block.title, "verdict": list(block.verdict), "size": len(block.lines)}
             | {"lower": first["metric"] in LOWER_IS_BETTER, "metric": first["metric"], "unit": first["unit"]}
             | {"simulated": _is_simulated(block)}
             for block, first in zip(table.blocks, firsts, strict=True)
@@ -88,8 +92,7 @@ def _head(table: Table) -> dict[str, Any]:
 
 def _is_simulated(block: Block) -> bool:
     """Return whether a block stands among simulated ones; a cell that was not begun does not know it of itself."""
-    simulated = block.shown.by_key["simulated"]
-    return SIMULATED in block.title.split(" · ")[2:] or any(simulated[place] for place in block.places)
+    return SIMULATED in block.title.split(" · ")[2:] or any(line.row["simulated"] for line in block.lines)
 
 
 def _id(entry: Mapping[str, Any]) -> str:
@@ -114,29 +117,19 @@ def _section(section: TextTable) -> dict[str, Any]:
     }
 
 
-def _column(name: str, shown: RowTexts) -> dict[str, Any]:
+def _column(name: str, lines: Sequence[Line]) -> dict[str, Any]:
     """Return a column of the table: its texts, and of numbers what they are sorted by."""
-    if name not in NUMERIC:
-        return column(plain_values(shown.texts[name]))
-    values: Sequence[float | None]
-    if name == "#":
-        values = [placing and placing.place for placing in shown.placings]
-    elif name == "rank 95 %":
-        values = [(one.low + one.high) / 2 if one and one.low and one.high else None for one in shown.placings]
-    else:
-        values = list(map(VALUES[name], shown.by_key.rows))
-    # A stopped cell may know a number that the table does not show: it is not sorted by it either.
-    values = [None if kind in ("failed", "skipped") else one for one, kind in zip(values, shown.kinds, strict=True)]
-    return column(shown.texts[name], values)
+    texts = [line.texts[name] for line in lines]
+    return column(texts, [line.value(name) for line in lines]) if name in NUMERIC else column(plain_values(texts))
 
 
-def _frame(by_key: ColumnTable, tables: str) -> str:
+def _frame(rows: Sequence[Row], tables: str) -> str:
     """Return the page but for its data."""
     style = house_style() + own(_HOME, "board.css")
     script = '\n"use strict";\n(() => {\n' + own(_HOME, *_SCRIPTS) + "})();\n"
     if not tables:
         tables = (
-            f"<p class='missing'>This board has {len(by_key.rows):,} cells: a script of its own draws them, and needs "
+            f"<p class='missing'>This board has {len(rows):,} cells: a script of its own draws them, and needs "
             "a browser that allows it. Nothing is fetched from anywhere. Without scripts, read "
             "<code>leaderboard.md</code> or <code>leaderboard.csv</code> in the result folder.</p>"
         )
@@ -147,17 +140,17 @@ def _frame(by_key: ColumnTable, tables: str) -> str:
         script=script,
         style_hash=policy_hash(style),
         script_hash=policy_hash(script),
-        summary=escape(_summary(by_key)),
+        summary=escape(_summary(rows)),
         tables=tables,
         data=_DATA_HERE,
     )
 
 
-def _summary(by_key: ColumnTable) -> str:
+def _summary(rows: Sequence[Row]) -> str:
     """Return how many cells there are, and how they ended."""
-    ends = Counter(map(visible, map(str, by_key["status"])))
-    statuses = ", ".join(f"{count:,} {status}" for status, count in ends.most_common())
-    sensors, tasks = (len(set(by_key[key])) for key in ("sensor", "task"))
-    if not by_key.rows:
+    if not rows:
         return "No cells."
-    return f"{len(by_key.rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {statuses}."
+    ends = Counter(visible(str(row["status"])) for row in rows)
+    statuses = ", ".join(f"{count:,} {status}" for status, count in ends.most_common())
+    sensors, tasks = (len({row[key] for row in rows}) for key in ("sensor", "task"))
+    return f"{len(rows):,} cells of {sensors:,} sensors and {tasks:,} tasks: {statuses}."

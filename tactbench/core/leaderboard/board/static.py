@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from html import escape
 
+from tactbench.core.leaderboard.columns import NUMERIC
 from tactbench.core.leaderboard.one_file import prose
-from tactbench.core.leaderboard.table import NUMERIC, Table
+from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.text import visible
 
 

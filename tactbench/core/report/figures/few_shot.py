@@ -10,7 +10,7 @@ import numpy as np
 
 from tactbench.core.evaluation.splits import shots
 from tactbench.core.leaderboard.comparison import Curve, few_shot_curves
-from tactbench.core.leaderboard.table import METRIC_NAMES
+from tactbench.core.leaderboard.names import METRIC_NAMES
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures.saving import write
 from tactbench.core.report.figures.sketch import with_unit

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.errors import TactbenchError
-from tactbench.core.leaderboard.table import answer_name
+from tactbench.core.leaderboard.names import answer_name
 from tactbench.core.matrix.store import Row
 from tactbench.core.report.figures.style import sensor_colours
 from tactbench.core.report.material import Material

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER, METRIC_NAMES, answer_name
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures.saving import write
 from tactbench.core.report.figures.sketch import with_unit

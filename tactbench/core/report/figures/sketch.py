@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.leaderboard.table import METRIC_NAMES, answer_name
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name
 from tactbench.core.report.figures.group import Group, Panel
 from tactbench.core.report.figures.style import colour_name
 from tactbench.core.spec.task import LabelTarget, TaskSpec
