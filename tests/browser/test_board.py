@@ -9,7 +9,7 @@ import pytest
 
 from tactbench.core.leaderboard.columns import OF_ROWS
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.tables.text import visible
 from tests.browser.boards import HOST, HOSTILE, PROVENANCE, board_rows
 from tests.browser.test_page import loaded
 from tests.core.leaderboard.rendering import to_page

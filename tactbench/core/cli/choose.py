@@ -55,8 +55,8 @@ def command(
     """
     from tactbench.core.leaderboard.choosing import choose
     from tactbench.core.leaderboard.criteria import Wish
-    from tactbench.core.leaderboard.records import json_text
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.tables.text import json_text
 
     registry = load_registry()
     task = registry.tasks[task_name].spec
@@ -174,7 +174,7 @@ def _table(choice: Choice) -> Any:
     from rich.text import Text
 
     from tactbench.core.leaderboard.choosing import interval_text
-    from tactbench.core.leaderboard.numbers import score
+    from tactbench.core.tables.numbers import score
 
     wishes = dict.fromkeys(one.wish for candidate in choice.candidates for one in candidate.criteria)
     head = ["sensor / estimator", "score, interval", *(wish for wish in wishes if wish != "score")]

@@ -97,19 +97,9 @@ def _calibrated(folder: Path) -> Calibrated | None:
 
 
 def _print(made: Report, shape: str) -> None:
-    from tactbench.core.cli.grid import print_grid, print_records
-    from tactbench.core.report.plain import markdown
+    from tactbench.core.cli.grid import print_records, print_tables
 
-    if shape == "md":
-        click.echo(markdown(made.reproduction), nl=False)
-    elif shape != "table":
+    if shape in ("json", "csv"):
         print_records(made.records, shape)
     else:
-        table = made.reproduction
-        lines = [
-            {name: entry.text for name, entry in zip(table.columns, line, strict=True)} for line in table.lines
-        ]  # fmt: skip
-        styles = ["bold" if kind == "inside" else "" for kind in table.kinds]
-        print_grid(table.title, table.columns, lines, numeric=tuple(table.numeric), styles=styles)
-        for note in table.notes:
-            click.echo(f" {note}")
+        print_tables([made.reproduction], shape)

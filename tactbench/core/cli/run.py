@@ -90,10 +90,11 @@ def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the replicates that are finished, as wide as the terminal."""
     from tactbench.core.cli.screen import console
     from tactbench.core.leaderboard.table import build_table
-    from tactbench.core.leaderboard.terminal import blocks_text
+    from tactbench.core.leaderboard.view import DEFAULT_VIEW, grids
     from tactbench.core.statistics.replicates import over_replicates
+    from tactbench.core.tables.terminal import plain_text
 
-    return blocks_text(build_table(over_replicates(rows)), console().width)
+    return plain_text(grids(build_table(over_replicates(rows)), DEFAULT_VIEW), console().width)
 
 
 def _side_by_side(rows: Sequence[Mapping[str, Any]]) -> None:

@@ -15,8 +15,8 @@ from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.lines import Line, line_of
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
 from tactbench.core.leaderboard.placing import Placing, errors, places
-from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.verdict import verdict_of
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 _Key = tuple[str, str, str, str]

@@ -25,10 +25,10 @@ from tactbench.core.leaderboard.criteria import (
     pressed_n,
 )
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, hardware_name, metric_name, sensor_name
-from tactbench.core.leaderboard.numbers import ABSENT, interval
-from tactbench.core.leaderboard.text import command_line, visible
 from tactbench.core.spec.sensor import DataSheet, SensorSpec
 from tactbench.core.spec.task import TaskSpec
+from tactbench.core.tables.numbers import ABSENT, interval
+from tactbench.core.tables.text import command_line, visible
 
 _OF_DEVICES = ("length", "mass", "interface", "power", "availability")
 """Facts of a data sheet that no wish asks for and every integrator needs."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, interval, score, tail, whole
+from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, tail, whole
 
 Row = Mapping[str, Any]
 Value = Callable[[Row], float | None]

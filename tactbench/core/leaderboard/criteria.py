@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER
-from tactbench.core.leaderboard.numbers import duration, score, suffix
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.spec.units import conversion
+from tactbench.core.tables.numbers import duration, score, suffix
 
 Row = Mapping[str, Any]
 State = Literal["met", "missed", "unknown"]

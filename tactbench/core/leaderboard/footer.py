@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.text import cut, visible
+from tactbench.core.tables.text import cut, visible
 
 Row = Mapping[str, Any]
 

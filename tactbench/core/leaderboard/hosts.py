@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from string import ascii_uppercase
 from typing import Any
 
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 

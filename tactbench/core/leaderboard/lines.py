@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from tactbench.core.leaderboard.columns import NUMERIC, OF_ROWS
 from tactbench.core.leaderboard.hosts import timing_mark
 from tactbench.core.leaderboard.names import answer_name, sensor_name
-from tactbench.core.leaderboard.numbers import ABSENT
 from tactbench.core.leaderboard.placing import Placing
-from tactbench.core.leaderboard.text_table import Kind
 from tactbench.core.spec.status import STOPPED
+from tactbench.core.tables.numbers import ABSENT
 
 Row = Mapping[str, Any]
+Kind = Literal["result", "baseline", "failed", "skipped"]
+"""Of a line: an answer, a trivial one, a cell that did not end well or was not begun."""
 
 
 @dataclass(frozen=True)

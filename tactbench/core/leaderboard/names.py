@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.text import visible
 from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 

@@ -12,9 +12,9 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, asked_of, question_name
-from tactbench.core.leaderboard.numbers import score, suffix
-from tactbench.core.leaderboard.text import command_line, cut, visible
 from tactbench.core.spec.status import STATUSES, STOPPED
+from tactbench.core.tables.numbers import score, suffix
+from tactbench.core.tables.text import command_line, cut, visible
 
 Row = Mapping[str, Any]
 

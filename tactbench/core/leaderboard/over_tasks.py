@@ -8,9 +8,9 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.names import answer_name, sensor_name
-from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.text import visible
-from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.tables.numbers import interval, score
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 

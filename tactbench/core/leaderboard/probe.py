@@ -9,9 +9,9 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, sensor_name
-from tactbench.core.leaderboard.numbers import interval, score, suffix
-from tactbench.core.leaderboard.text import visible
-from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 

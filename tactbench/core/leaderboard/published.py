@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.names import answer_name, metric_name
-from tactbench.core.leaderboard.numbers import score
-from tactbench.core.leaderboard.text import visible
-from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.tables.numbers import score
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
-import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -53,9 +50,6 @@ OF_THE_MACHINE = frozenset({
 })  # fmt: skip
 """Keys that machine, place or hour decide, not the seed alone."""
 
-_ACTS = re.compile("[\x7f-\x9f\xad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]")
-"""Controls, marks of direction and lone surrogates."""
-
 
 def keys(table: Table) -> tuple[str, ...]:
     """Return the keys that a table's records have, before their ranks."""
@@ -73,28 +67,6 @@ def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
 def shown(line: Line) -> dict[str, str]:
     """Return the text of a line, by what its columns are called for programs."""
     return {SHOWN[name]: text for name, text in line.texts.items()}
-
-
-def finite(value: Any) -> Any:
-    """Return `value` with None in place of every number that is not finite."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: finite(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(one) for one in value]
-    return value
-
-
-def json_text(value: Any, **how: Any) -> str:
-    """Return `value` as JSON: what acts on a terminal or is no UTF-8 is escaped; a number that is none is null."""
-    try:
-        text = json.dumps(value, ensure_ascii=False, allow_nan=False, **how)
-    except ValueError:
-        text = json.dumps(finite(value), ensure_ascii=False, allow_nan=False, **how)
-    if text.isascii() and "\x7f" not in text:
-        return text
-    return _ACTS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def _ranks(line: Line) -> dict[str, Any]:

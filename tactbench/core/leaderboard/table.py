@@ -20,7 +20,7 @@ from tactbench.core.leaderboard.notes import notes_of
 from tactbench.core.leaderboard.over_tasks import over_tasks
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.published import published_section
-from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 

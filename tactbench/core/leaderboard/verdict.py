@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name
-from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.leaderboard.placing import Placing
-from tactbench.core.leaderboard.text import visible
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
+from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 

@@ -10,11 +10,11 @@ from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import COLUMNS, INTERVALS, NUMERIC, SHOWN
 from tactbench.core.leaderboard.names import metric_name
-from tactbench.core.leaderboard.numbers import ABSENT
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.text import command_line, visible
-from tactbench.core.leaderboard.text_table import TextTable
 from tactbench.core.statistics.median import counted, percent
+from tactbench.core.tables.numbers import ABSENT
+from tactbench.core.tables.text import command_line, visible
+from tactbench.core.tables.text_table import Entry, TextTable, finite
 
 Row = Mapping[str, Any]
 
@@ -24,6 +24,11 @@ DEFAULT = ("#", "sensor", "estimator", "score", "95 % interval", "published", "d
 OF_FLOOR = ("#", "sensor", "estimator", "score", "beyond floor", "95 % beyond", "published", "delay")
 """Where a block has errors beyond the floor of the reference: what its ranks go by, with its interval."""
 MOST_NOTES = 3
+_FIRST_TO_GO = (
+    "cell", "batch/row", "p95", "sessions", "n test", "sim", "baseline", "latency p50", "rank 95 %", "fit",
+    "true error", "95 % interval", "published", "delay", "95 % beyond",
+)  # fmt: skip
+"""Columns that a terminal does without, in this order; those that were asked for by name are never left out."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,18 @@ def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(known[name] for name in asked))
 
 
+def document(table: Table, view: View) -> list[TextTable | tuple[str, ...]]:
+    """Return the tables and notes that are printed, from above."""
+    told = (*notes(table, view), *commands(table, view))
+    parts: tuple[TextTable | tuple[str, ...], ...] = (
+        *grids(table, view),
+        told,
+        *sections(table, view),
+        footer(table, view),
+    )
+    return [part for part in parts if part]
+
+
 def grids(table: Table, view: View) -> list[TextTable]:
     """Return what is printed of a table's blocks."""
     return [grid_of(block, view) for block in table.blocks]
@@ -86,7 +103,33 @@ def grid_of(block: Block, view: View) -> TextTable:
         tuple(header(name, rows) for name in names),
         tuple(line.kind for line in block.lines),
         block.verdict,
+        first_to_go=() if view.columns else _FIRST_TO_GO,
+        intervals=frozenset(INTERVALS),
+        unbroken=frozenset({CELL}),
     )
+
+
+def full_grid(block: Block, anchors: Mapping[str, str] | None = None) -> TextTable:
+    """Return a block with every column, what numbers are sorted by, and why cells did not end well.
+
+    Parameters
+    ----------
+    anchors
+        Where a page tells more about a cell, by its name.
+    """
+    lines = []
+    for line in block.lines:
+        anchor = (anchors or {}).get(line.row["cell"], "")
+        numbers = [name in NUMERIC and text not in ("", ABSENT) for name, text in line.texts.items()]
+        texts = [
+            Entry(text, finite(line.value(name)), anchor) if number else text
+            for (name, text), number in zip(line.texts.items(), numbers, strict=True)
+        ]
+        why = "" if line.row["status"] == "done" else visible(f"{line.row['status']}: {line.row['reason']}")
+        lines.append((*texts, why))
+    columns = (*block.lines[0].texts, "reason")
+    kinds = tuple(line.kind for line in block.lines)
+    return TextTable(block.title, columns, tuple(lines), NUMERIC, kinds=kinds, summary=block.verdict).compact()
 
 
 def _cell(row: Row) -> str:
@@ -123,7 +166,11 @@ def _over(rows: Sequence[Row], key: str) -> str:
 
 def sections(table: Table, view: View) -> tuple[TextTable, ...]:
     """Return the tables to print below the blocks."""
-    return tuple(section for section in table.sections if view.wide or not section.detail)
+    return tuple(
+        replace(section, first_to_go=section.columns[:0:-1], intervals=frozenset(INTERVALS))
+        for section in table.sections
+        if view.wide or not section.detail
+    )
 
 
 def notes(table: Table, view: View) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.names import metric_name
 from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, keys, records
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.tables.text import visible
 
 _FIRST = (*RANK_KEYS, "sensor", "estimator", "score")
 _LONGEST_NAME = 31

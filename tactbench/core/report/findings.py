@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from tactbench.core.report.calibrated import Share
 from tactbench.core.report.linearity import contrasts
-from tactbench.core.report.plain import ABSENT, Entry, PlainTable, plain
 from tactbench.core.report.section import Section, Subject
+from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, text_table
 
 
 def findings_section(subject: Subject) -> Section:
@@ -27,7 +27,7 @@ def findings_section(subject: Subject) -> Section:
     return Section("findings", "The paper's findings", missing=tuple(lacks), tables=tuple(tables), notes=notes)
 
 
-def _frequencies(subject: Subject) -> PlainTable | None:
+def _frequencies(subject: Subject) -> TextTable | None:
     if subject.calibrated is None or not subject.calibrated.findings:
         return None
     lines = [
@@ -40,7 +40,7 @@ def _frequencies(subject: Subject) -> PlainTable | None:
         )
         for one in subject.calibrated.findings
     ]
-    return plain(
+    return text_table(
         "Findings: share of the draws in which they come out, with its 95 % interval",
         ("finding", "accepted draws", "all draws", "stated by", "what is asked of a draw"),
         lines,
@@ -54,7 +54,7 @@ def _told(one: Share | None) -> Entry:
     return Entry(f"{one.share:.0%} ({one.low:.0%} … {one.high:.0%}) of {one.draws}", one.share)
 
 
-def _linear(subject: Subject) -> PlainTable | None:
+def _linear(subject: Subject) -> TextTable | None:
     lines = []
     for one in contrasts(subject.rows, subject.material.registry):
         anchors = [subject.anchors[row["cell"]] for row in (one.linear, one.other)]
@@ -70,7 +70,7 @@ def _linear(subject: Subject) -> PlainTable | None:
         )
     if not lines:
         return None
-    return plain(
+    return text_table(
         "Linear against non-linear",
         ("question", "linear", "score", "non-linear", "score", "comparison"),
         lines,

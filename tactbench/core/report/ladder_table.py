@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tactbench.core.leaderboard.names import METRIC_NAMES
-from tactbench.core.leaderboard.numbers import delay, duration, interval, score, tail
+from tactbench.core.tables.numbers import delay, duration, interval, score, tail
 
 COLUMNS = (
     "estimator", "score", "95 % interval", "fit", "quartiles", "delay", "latency p50", "p95", "batch/row", "data",

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, sensor_name
-from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.reproduction import row_interval
+from tactbench.core.tables.numbers import score, suffix
 
 Row = Mapping[str, Any]
 _SAME = ("sensor", "task", "rig", "protocol", "split", "repeat")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import UnwritableError, UsageError
-from tactbench.core.leaderboard.formats import JSON_KEYS
+from tactbench.core.leaderboard.records import JSON_KEYS
 from tactbench.core.matrix.files import replace_file
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.calibrated import Calibrated
@@ -16,10 +16,10 @@ from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures.sensitivity import draw_sensitivity
 from tactbench.core.report.material import Material
 from tactbench.core.report.page import make_page
-from tactbench.core.report.plain import PlainTable
 from tactbench.core.report.published import published_table
 from tactbench.core.report.reproduction import records, reproduce
 from tactbench.core.report.section import Subject
+from tactbench.core.tables.text_table import TextTable
 
 Drawer = Callable[[Material, Path, Progress, Callable[[str], None]], Sequence[Drawn]]
 """Told the material, the folder for figures, where progress goes and what to call with each figure it leaves out."""
@@ -30,7 +30,7 @@ class Report:
     """A report that has been written, and what it lacks."""
 
     page: Path
-    reproduction: PlainTable
+    reproduction: TextTable
     records: Sequence[Mapping[str, Any]]
     """The reproduction table for programs."""
     missing: tuple[str, ...]

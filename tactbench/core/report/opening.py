@@ -6,14 +6,14 @@ import json
 from collections import Counter
 from typing import Any
 
-from tactbench.core.leaderboard.numbers import score
 from tactbench.core.matrix.keys import RELEVANT
 from tactbench.core.report.figures.published_and_ours import COLUMN
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.leaderboards import block_anchor
-from tactbench.core.report.plain import Entry, PlainTable, plain
 from tactbench.core.report.reproduction import reproduce
 from tactbench.core.report.section import Answer, Picture, Section, Subject
+from tactbench.core.tables.numbers import score
+from tactbench.core.tables.text_table import Entry, TextTable, text_table
 
 _FACTS = ("tactbench", "commit", "python", "platform", "machine", "cpu", "cores", "host", "jobs")
 
@@ -118,8 +118,8 @@ def _made_by(facts: dict[str, Any]) -> str:
     )
 
 
-def _table(title: str, facts: dict[str, Any], names: Any) -> PlainTable:
-    return plain(title, ("", "value"), [(name, Entry(str(facts[name]))) for name in names if facts.get(name)])
+def _table(title: str, facts: dict[str, Any], names: Any) -> TextTable:
+    return text_table(title, ("", "value"), [(name, Entry(str(facts[name]))) for name in names if facts.get(name)])
 
 
 def _simulated(subject: Subject) -> list[str]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tactbench.core.leaderboard.numbers import score
-from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
 from tactbench.core.report.reproduction import Reproduction, reproduce, told_interval, told_range, unasked
 from tactbench.core.report.section import Section, Subject
+from tactbench.core.tables.numbers import score
+from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 COLUMNS = ("number", "published", "ours", "95 % interval", "calibrated range", "verdict")
 NUMERIC = ("published", "ours", "95 % interval", "calibrated range")
@@ -25,7 +25,7 @@ def published_section(subject: Subject) -> Section:
     return Section("reproduction", "Published numbers, and ours", said=said, tables=(table,), missing=missing)
 
 
-def published_table(subject: Subject) -> PlainTable:
+def published_table(subject: Subject) -> TextTable:
     """Return the reproduction table of all tasks that are installed."""
     lines = reproduce(subject.material.registry, subject.rows, subject.calibrated)
     titles: dict[str, list[str]] = {}
@@ -35,7 +35,7 @@ def published_table(subject: Subject) -> PlainTable:
     notes = [f"{', '.join(dict.fromkeys(whose))}: {remark}." for remark, whose in titles.items()]
     notes += unasked(subject.material.registry, subject.rows)
     notes += subject.calibrated.notes if subject.calibrated else ()
-    return plain(
+    return text_table(
         "Reproduction",
         COLUMNS,
         [_entries(line, subject) for line in lines],

@@ -9,11 +9,11 @@ from typing import Any, Literal
 
 from tactbench.core.leaderboard.columns import row_interval as row_interval
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER
-from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.calibrated import Calibrated, PredictiveRange
 from tactbench.core.spec.task import Published, TaskSpec
 from tactbench.core.statistics.median import counted, percent
+from tactbench.core.tables.numbers import interval, score, suffix
 
 Row = Mapping[str, Any]
 Verdict = Literal["inside", "outside", "no interval", "no answer"]

@@ -14,7 +14,7 @@ from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.material import Material
-from tactbench.core.report.plain import PlainTable
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 _DESCRIBED = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "seed")
@@ -100,7 +100,7 @@ class Details:
     anchor: str
     title: str
     status: str
-    tables: tuple[PlainTable, ...]
+    tables: tuple[TextTable, ...]
     lists: tuple[tuple[str, tuple[str, ...]], ...] = ()
     """Titled lists of sentences."""
     traceback: str = ""
@@ -125,7 +125,7 @@ class Section:
     said: tuple[str, ...] = ()
     answers: tuple[Answer, ...] = ()
     """Below the pictures: what came out, each with a link."""
-    tables: tuple[PlainTable, ...] = ()
+    tables: tuple[TextTable, ...] = ()
     notes: tuple[str, ...] = ()
     """Below the tables."""
     pictures: tuple[Picture, ...] = ()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from tactbench.core.errors import TactbenchError
 from tactbench.core.leaderboard.datasheet import details, table_one
 from tactbench.core.recording.reader import read_meta
-from tactbench.core.report.plain import Entry, PlainTable, plain
 from tactbench.core.report.section import Section, Subject
 from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.tables.text_table import Entry, TextTable, text_table
 
 _READINGS = 5
 """So many first lines of `details` are about readings; the parameters behind them are for `tactbench show --all`."""
@@ -50,7 +50,7 @@ def _spec(name: str, subject: Subject) -> SensorSpec | None:
     return None
 
 
-def _table(title: str, specs: list[SensorSpec], *, table: int) -> PlainTable:
+def _table(title: str, specs: list[SensorSpec], *, table: int) -> TextTable:
     rows = table_one(specs) if table == 1 else details(specs)[:_READINGS]
     columns = ["", *(column for spec in specs for column in (spec.title, f"{spec.title}: source"))]
     lines = []
@@ -59,4 +59,4 @@ def _table(title: str, specs: list[SensorSpec], *, table: int) -> PlainTable:
         for fact in row.facts:
             line += [Entry(fact.text), Entry(": ".join(part for part in (fact.tag, fact.reference) if part))]
         lines.append(line)
-    return plain(title, columns, lines)
+    return text_table(title, columns, lines)

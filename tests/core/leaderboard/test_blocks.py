@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tactbench.core.leaderboard.formats import plain_text
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
 from tactbench.core.leaderboard.view import WHOLE
 from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown
 

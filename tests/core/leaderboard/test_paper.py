@@ -6,9 +6,10 @@ import subprocess
 
 import pytest
 
-from tactbench.core.leaderboard.latex import COLUMN_PT, latex, points
+from tactbench.core.leaderboard.latex import COLUMN_PT, latex
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import WHOLE
+from tactbench.core.tables.latex import points
 
 from .rows import row
 from .test_force import KNOWN
@@ -78,7 +79,7 @@ def test_it_compiles_and_no_box_is_overfull(tmp_path, view):
     "text", ["0.6928 †", "0.0000 … 0.2208", "lasso (lambda_=0.2)", "biotac SIM", "RMSE [N]", "WMmw", "Ünïcode µ 中"]
 )
 def test_widths_are_those_that_latex_sets(tmp_path, text):
-    from tactbench.core.leaderboard.latex import tex
+    from tactbench.core.tables.latex import tex
 
     if shutil.which("pdflatex") is None:
         pytest.skip("there is no pdflatex")

@@ -5,12 +5,12 @@ import json
 import pytest
 from rich.console import Console
 
+from tactbench.core.leaderboard.formats import show
 from tactbench.core.leaderboard.notes import count_texts
-from tactbench.core.leaderboard.numbers import duration, score
 from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import show
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE
+from tactbench.core.tables.numbers import duration, score
 from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown
 
 from .rows import row

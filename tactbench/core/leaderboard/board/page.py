@@ -5,27 +5,24 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from html import escape
-from string import Template
+from dataclasses import replace
 from typing import Any
 
 import tactbench
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.board.columns import column, cut_start, deflated, details, plain, plain_values
-from tactbench.core.leaderboard.board.static import static_tables
 from tactbench.core.leaderboard.columns import NUMERIC
 from tactbench.core.leaderboard.lines import Line
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
-from tactbench.core.leaderboard.one_file import house_style, own, policy_hash
 from tactbench.core.leaderboard.row_groups import GROUPS, TITLES
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.text import visible
-from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.leaderboard.view import full_grid
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
+from tactbench.core.tables.html import render
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 
-TITLE = "tactbench leaderboard"
 LARGEST = 4_000_000
 """Bytes of a page: what does not fit is left to the cells' files, and the page says so."""
 MOST_STATIC = 500
@@ -33,11 +30,10 @@ MOST_STATIC = 500
 LONGEST_NOTE = 4_000
 MOST_NOTES = 2_000
 MOST_LINES = 500
-"""Lines of a table below the blocks."""
+"""Lines of a table below the blocks; `leaderboard.md` has them all."""
 DURATIONS = ("delay", "latency p50", "p95", "fit", "sim", "batch/row")
 """Columns that a score can be drawn against."""
 _SCRIPTS = ("read.js", "text.js", "cells.js", "tables.js", "matrix.js", "pareto.js", "start.js")
-_HOME = "tactbench.core.leaderboard.board"
 _DATA_HERE = "{the data}"
 _SPARE = 4_000
 """Characters for the names of the details and the quotes between the columns."""
@@ -48,7 +44,21 @@ def page_of(table: Table) -> str:
     # By name: neighbours are alike, and deflate to less than in the order of the table.
     lines = sorted(table.lines, key=lambda line: str(line.row["cell"]))
     rows = [line.row for line in lines]
-    frame = _frame(rows, static_tables(table) if len(rows) <= MOST_STATIC else "")
+    few = len(rows) <= MOST_STATIC
+    frame = render(
+        "tactbench.core.leaderboard.board",
+        "board.html",
+        title="tactbench leaderboard",
+        styles=["board.css"],
+        scripts=_SCRIPTS,
+        summary=_summary(rows),
+        rows=len(rows),
+        tables=[full_grid(block) for block in table.blocks] if few else [],
+        notes=table.notes if few else (),
+        sections=[replace(section, lines=section.lines[:MOST_LINES]) for section in table.sections],
+        footer=[cut_start(text, LONGEST_NOTE) for text in table.footer],
+        data=_DATA_HERE,
+    )
     columns = [deflated(_column(name, lines)) for name in table.columns]
     head = _head(table, lines)
     taken = len(frame.encode()) + sum(map(len, columns)) + len(deflated(head)) + _SPARE
@@ -79,8 +89,6 @@ def _head(table: Table, lines: Sequence[Line]) -> dict[str, Any]:
             for block, first in zip(table.blocks, firsts, strict=True)
         ],
         "columns": [{"name": name, "numeric": name in NUMERIC} for name in table.columns],
-        "sections": [_section(section) for section in table.sections],
-        "footer": [cut_start(text, LONGEST_NOTE) for text in table.footer],
         "roles": {"rank": "#", "sensor": "sensor", "estimator": "estimator", "score": "score",
                   "interval": "95 % interval", "times": [name for name in DURATIONS if name in table.columns]},
         "groups": GROUPS,
@@ -103,47 +111,10 @@ def _id(entry: Mapping[str, Any]) -> str:
         return ""
 
 
-def _section(section: TextTable) -> dict[str, Any]:
-    """Return a table below the blocks, which no cell is behind."""
-    lines = [list(line) for line in section.lines[:MOST_LINES]]
-    more = len(section.lines) - len(lines)
-    notes = [*section.notes, *([f"{more} more lines are in the tables, not in this page."] if more else [])]
-    return {
-        "title": section.title,
-        "columns": [[name, name in section.numeric] for name in section.columns],
-        "lines": lines,
-        "alarms": [place for place, kind in enumerate(section.kinds) if kind == "alarm"],
-        "notes": [cut_start(note, LONGEST_NOTE) for note in notes],
-    }
-
-
 def _column(name: str, lines: Sequence[Line]) -> dict[str, Any]:
     """Return a column of the table: its texts, and of numbers what they are sorted by."""
     texts = [line.texts[name] for line in lines]
     return column(texts, [line.value(name) for line in lines]) if name in NUMERIC else column(plain_values(texts))
-
-
-def _frame(rows: Sequence[Row], tables: str) -> str:
-    """Return the page but for its data."""
-    style = house_style() + own(_HOME, "board.css")
-    script = '\n"use strict";\n(() => {\n' + own(_HOME, *_SCRIPTS) + "})();\n"
-    if not tables:
-        tables = (
-            f"<p class='missing'>This board has {len(rows):,} cells: a script of its own draws them, and needs "
-            "a browser that allows it. Nothing is fetched from anywhere. Without scripts, read "
-            "<code>leaderboard.md</code> or <code>leaderboard.csv</code> in the result folder.</p>"
-        )
-    return Template(own(_HOME, "board.html")).substitute(
-        title=escape(TITLE),
-        version=escape(tactbench.__version__),
-        style=style,
-        script=script,
-        style_hash=policy_hash(style),
-        script_hash=policy_hash(script),
-        summary=escape(_summary(rows)),
-        tables=tables,
-        data=_DATA_HERE,
-    )
 
 
 def _summary(rows: Sequence[Row]) -> str:

@@ -12,12 +12,12 @@ import numpy.typing as npt
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.metrics import Metric, metric_called
-from tactbench.core.leaderboard.numbers import interval, score, whole
 from tactbench.core.report.figures.group import Group, Panel, Remark
 from tactbench.core.report.figures.sketch import Sketch, coloured, heading, marks, metric_name
 from tactbench.core.report.figures.style import DASHES, GREY, MARKERS, cycled, panels
 from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
 from tactbench.core.samples import Answers, FloatArray
+from tactbench.core.tables.numbers import interval, score, whole
 
 EDGES_N = (1.5, 3.0)
 """A band is from one edge up to the next; the outer ones are open."""

@@ -17,8 +17,8 @@ from tactbench.core.leaderboard.board.columns import (
     rounded,
 )  # fmt: skip
 from tactbench.core.spec.row import FORMAT
-
 from tests.core.leaderboard.rows import row
+
 from .reading import opened, values
 
 PLAIN = st.recursive(
