@@ -57,7 +57,7 @@ def _print(found: Any, shape: str) -> None:
     if shape in ("json", "csv"):
         print_records([record_of(pair) for pair in found], shape)
     elif shape == "table":
-        print_tables(tables_of(found))
+        print_tables([table.compact() for table in tables_of(found)])
         for note in notes_of(found):
             remark(note)
     else:
