@@ -28,7 +28,7 @@ def print_comparisons(rows: Sequence[Mapping[str, Any]], by: str, shape: str) ->
     """
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.comparison import compare
+    from tactbench.core.leaderboard.side_by_side import compare
 
     if shape not in COMPARISON_FORMATS:
         raise UsageError(

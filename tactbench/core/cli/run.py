@@ -100,7 +100,7 @@ def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
 def _side_by_side(rows: Sequence[Mapping[str, Any]]) -> None:
     """Print what was asked under several protocols or splits once more, side by side."""
     from tactbench.core.cli.comparisons import print_comparisons
-    from tactbench.core.leaderboard.comparison import compare
+    from tactbench.core.leaderboard.side_by_side import compare
 
     for by in ("protocol", "split"):
         if compare(rows, by):

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.axes import AXES
-from tactbench.core.leaderboard.comparison import compare
 from tactbench.core.leaderboard.probe import NUMERIC, build_probe
+from tactbench.core.leaderboard.side_by_side import compare
 from tactbench.core.report.section import Section, Subject
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, sort_value, text_table
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from tactbench.core.errors import TactbenchError
-from tactbench.core.leaderboard.datasheet import details, table_one
 from tactbench.core.recording.reader import read_meta
+from tactbench.core.report.datasheet import details, sensor_table, table_one
 from tactbench.core.report.section import Section, Subject
 from tactbench.core.spec.sensor import SensorSpec
-from tactbench.core.tables.text_table import Entry, TextTable, text_table
 
 _READINGS = 5
 """So many first lines of `details` are about readings; the parameters behind them are for `tactbench show --all`."""
@@ -30,7 +29,10 @@ def sensors_section(subject: Subject) -> Section:
         "sensors",
         title,
         said=(f"Every parameter of these sensors, and who states it: `tactbench show {' '.join(found)} --all`.",),
-        tables=(_table("Sensor comparison", specs, table=1), _table("Readings", specs, table=2)),
+        tables=tuple(
+            sensor_table(name, specs, properties, with_source=True).compact()
+            for name, properties in (("Sensor comparison", table_one(specs)), ("Readings", details(specs)[:_READINGS]))
+        ),
         notes=unknown,
     )
 
@@ -48,15 +50,3 @@ def _spec(name: str, subject: Subject) -> SensorSpec | None:
     except TactbenchError:
         pass  # given twice, or a damaged file: the section says that it is not known
     return None
-
-
-def _table(title: str, specs: list[SensorSpec], *, table: int) -> TextTable:
-    rows = table_one(specs) if table == 1 else details(specs)[:_READINGS]
-    columns = ["", *(column for spec in specs for column in (spec.title, f"{spec.title}: source"))]
-    lines = []
-    for row in rows:
-        line = [Entry(row.title)]
-        for fact in row.facts:
-            line += [Entry(fact.text), Entry(": ".join(part for part in (fact.tag, fact.reference) if part))]
-        lines.append(line)
-    return text_table(title, columns, lines)

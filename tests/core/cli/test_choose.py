@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tactbench.core.cli.config import shipped_results
-from tactbench.core.leaderboard.datasheet import OF_DEVICES
+from tactbench.core.report.datasheet import OF_DEVICES
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.plugin import DataSheet, PhysicalRange, Source, UsageError, load_registry, sourced
 from tests.conftest import Shell, Verbs

@@ -12,8 +12,7 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
 
-from tactbench.core.leaderboard.blocks import no_better
-from tactbench.core.leaderboard.criteria import (
+from tactbench.core.choosing.criteria import (
     Criterion,
     Figure,
     Row,
@@ -24,6 +23,7 @@ from tactbench.core.leaderboard.criteria import (
     newtons,
     pressed_n,
 )
+from tactbench.core.leaderboard.blocks import no_better
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, hardware_name, metric_name, sensor_name
 from tactbench.core.spec.sensor import DataSheet, SensorSpec
 from tactbench.core.spec.task import TaskSpec
