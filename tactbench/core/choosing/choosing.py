@@ -14,8 +14,8 @@ from typing import Any
 
 from tactbench.core.choosing.criteria import (
     Criterion,
-    Figure,
     Row,
+    ScoreInterval,
     State,
     Wish,
     criteria_of,
@@ -160,7 +160,7 @@ class _Choosing:
         keys = ("score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high")
         value, low, high = (row.get(key) for key in (keys if self.beyond else ("score", "ci_low", "ci_high")))
         assert value is not None
-        figure, spec = Figure(value, low, high), self.sensors.get(row["sensor"])
+        figure, spec = ScoreInterval(value, low, high), self.sensors.get(row["sensor"])
         return Candidate(
             sensor_name(row), answer_name(row), *figure, criteria_of(row, figure, self.wish, self.task, spec), row
         )

@@ -56,7 +56,7 @@ class Criterion:
     """The same in words."""
 
 
-class Figure(NamedTuple):
+class ScoreInterval(NamedTuple):
     """A score and its interval, in the metric's unit."""
 
     value: float
@@ -64,7 +64,9 @@ class Figure(NamedTuple):
     high: float | None
 
 
-def criteria_of(row: Row, figure: Figure, wish: Wish, task: TaskSpec, spec: SensorSpec | None) -> tuple[Criterion, ...]:
+def criteria_of(
+    row: Row, figure: ScoreInterval, wish: Wish, task: TaskSpec, spec: SensorSpec | None
+) -> tuple[Criterion, ...]:
     """Return how an answer stands to each wish that there is.
 
     Parameters
@@ -160,7 +162,7 @@ def _sampled(task: TaskSpec, spec: SensorSpec | None) -> tuple[float | None, boo
     return min(rates), all(source is not None and source.tag != "assumed" for source in sources)
 
 
-def _score(figure: Figure, wish: Wish, task: TaskSpec, pressed: float | None) -> Criterion | None:
+def _score(figure: ScoreInterval, wish: Wish, task: TaskSpec, pressed: float | None) -> Criterion | None:
     lower = task.metric in LOWER_IS_BETTER
     wished = wish.max_error if lower else wish.min_score
     if wished is None:

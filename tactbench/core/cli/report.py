@@ -55,16 +55,16 @@ def command(
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.report.making import make_report
-    from tactbench.core.report.material import open_material
+    from tactbench.core.report.results import open_results
 
     if not (folder / "index.jsonl").is_file():
         raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
     store = Store(folder, recordings=recordings)
-    material = open_material(store, load_registry())
+    results = open_results(store, load_registry())
     for sentence in store.troubles:
         remark(f"{folder}: {sentence}")
     with progress() as told:
-        made = make_report(material, out or folder / "report", told, draw=_drawer(), calibrated=_calibrated(folder))
+        made = make_report(results, out or folder / "report", told, draw=_drawer(), calibrated=_calibrated(folder))
     _print(made, shape)
     for sentence in made.missing:
         remark(f"Left out: {sentence}")

@@ -36,10 +36,13 @@ def footer_of(rows: Sequence[Row], provenance: Sequence[Row], times: bool) -> tu
         seeds += (
             " One a replicate, which is everything recorded anew; scores are medians, intervals those of the median."
         )
-    return (f"{len(rows)} cells{of_runs}. {seeds}", *(cut(visible(said), LONGEST) for said in _told(provenance)))
+    return (
+        f"{len(rows)} cells{of_runs}. {seeds}",
+        *(cut(visible(sentence), LONGEST) for sentence in _made_by(provenance)),
+    )
 
 
-def _told(provenance: Sequence[Row]) -> tuple[str, ...]:
+def _made_by(provenance: Sequence[Row]) -> tuple[str, ...]:
     if not provenance:
         return ()
     from tactbench.core.matrix.provenance import foot

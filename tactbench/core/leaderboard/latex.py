@@ -51,8 +51,8 @@ def _caption(block: Block, grid: TextTable) -> str:
     task = f"{visible(str(block.lines[0].row['task']))}: "
     how = [f"95 % {text.removeprefix(task)}" for text in interval_notes(rows)] if rows else []
     rule = "Below the rule: trivial answers" if "#" not in grid.columns and _first_trivial(grid) else ""
-    said = [text.rstrip(".") for text in (block.title, *grid.summary[:1], n, *how, rule) if text]
-    return f"{'. '.join(said)}."
+    sentences = [text.rstrip(".") for text in (block.title, *grid.summary[:1], n, *how, rule) if text]
+    return f"{'. '.join(sentences)}."
 
 
 def _narrow(grid: TextTable) -> TextTable:

@@ -251,8 +251,8 @@ def _stopped_note(status: str, signal: int | None, reason: str, members: list[Ro
     more = len(names) - MOST_NAMES
     listed = ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
     by = f" by signal {signal}" if signal is not None else ""
-    said = cut(visible(reason), LONGEST_REASON)
-    sentence = f"{listed} {visible(status)}{by}: {said}"
+    why = cut(visible(reason), LONGEST_REASON)
+    sentence = f"{listed} {visible(status)}{by}: {why}"
     if status not in STOPPED:
         return sentence
     end = "" if sentence.endswith((".", "!", "?", "…")) else "."

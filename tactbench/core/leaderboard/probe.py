@@ -158,9 +158,9 @@ def _about_shuffled(row: Row, shuffled: Row | None) -> list[str]:
     if _skill(shuffled["score"], best, row) <= 0:
         return []
     by = score(abs(shuffled["score"] - row["score"]), row["unit"])
-    said = f"optimistic by {by}{suffix(row['unit'])} when shuffled"
+    sentence = f"optimistic by {by}{suffix(row['unit'])} when shuffled"
     same = shuffled["n_test"] == row["n_test"] and set(shuffled["recordings"]) == set(row["recordings"])
-    return [said if same else f"{said} (tested on other rows)"]
+    return [sentence if same else f"{sentence} (tested on other rows)"]
 
 
 def _skill(value: float, trivial: float, row: Row) -> float:

@@ -66,10 +66,10 @@ def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
 
 def document(table: Table, view: View) -> list[TextTable | tuple[str, ...]]:
     """Return the tables and notes that are printed, from above."""
-    told = (*notes(table, view), *commands(table, view))
+    sentences = (*notes(table, view), *commands(table, view))
     parts: tuple[TextTable | tuple[str, ...], ...] = (
         *grids(table, view),
-        told,
+        sentences,
         *sections(table, view),
         footer(table, view),
     )

@@ -88,18 +88,18 @@ def load_calibrated(results: Path) -> Calibrated | None:
     result = load_result(results)
     if result is None:
         return None
-    told = summary(result)
-    notes = (f"Read off {result.shown}.", acceptance(result.spec, told))
-    found = calibrated_from(result.spec.model_dump(mode="json"), records(told), notes, LEVEL)
+    found_summary = summary(result)
+    notes = (f"Read off {result.shown}.", acceptance(result.spec, found_summary))
+    found = calibrated_from(result.spec.model_dump(mode="json"), records(found_summary), notes, LEVEL)
     # Findings stand in a table of their own, with who states them.
-    tables = tuple(table for table in text_tables(result, told) if table.columns[0] != "finding")
-    return replace(found, tables=tables, sensitivity=lambda: _sensitivity(result, told))
+    tables = tuple(table for table in text_tables(result, found_summary) if table.columns[0] != "finding")
+    return replace(found, tables=tables, sensitivity=lambda: _sensitivity(result, found_summary))
 
 
-def _sensitivity(result: CalibrationResult, told: Summary) -> Any:
+def _sensitivity(result: CalibrationResult, found_summary: Summary) -> Any:
     from tactbench.core.calibration.figure import sensitivity_figure
 
-    return sensitivity_figure(result.spec, told.sensitivities)
+    return sensitivity_figure(result.spec, found_summary.sensitivities)
 
 
 def calibrated_from(

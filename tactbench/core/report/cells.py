@@ -6,19 +6,24 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.row_groups import APART, GROUPS, TITLES
-from tactbench.core.report.section import Details, Section, Subject
+from tactbench.core.report.section import Details, ReportData, Section
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 Row = Mapping[str, Any]
 
 
-def cells_section(subject: Subject) -> Section:
+def cells_section(subject: ReportData) -> Section:
     """Return the section of cells."""
-    said: tuple[str, ...] = ("Everything that is known about each cell. Times are in the unit that ends their name.",)
+    paragraphs: tuple[str, ...] = (
+        "Everything that is known about each cell. Times are in the unit that ends their name.",
+    )
     if any(len(row.get("seeds") or []) > 1 for row in subject.rows):
-        said += ("Of several replicates, key, recordings, candidates and effects are those of the first.",)
+        paragraphs += ("Of several replicates, key, recordings, candidates and effects are those of the first.",)
     return Section(
-        "cells", "Every cell", said=said, details=tuple(_details(row, subject.anchors) for row in subject.rows)
+        "cells",
+        "Every cell",
+        paragraphs=paragraphs,
+        details=tuple(_details(row, subject.anchors) for row in subject.rows),
     )
 
 

@@ -9,13 +9,13 @@ from typing import Any
 
 from tactbench.core.cost.ladder_file import VERSION
 from tactbench.core.report.ladder_table import COLUMNS, SORTED_BY, line, title
-from tactbench.core.report.section import Picture, Section, Subject
+from tactbench.core.report.section import Picture, ReportData, Section
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 FOLDER = "cost"
 
 
-def costs_section(subject: Subject) -> Section:
+def costs_section(subject: ReportData) -> Section:
     """Return the section of costs and comparisons."""
     tables: list[TextTable] = []
     pictures: list[Picture] = []
@@ -42,13 +42,13 @@ def costs_section(subject: Subject) -> Section:
     )
 
 
-def _command(subject: Subject) -> str:
+def _command(subject: ReportData) -> str:
     some = next((row for row in subject.rows if row["status"] == "done"), None)
     command = f"tactbench cost --sensor {some['sensor']} --task {some['task']}" if some else "tactbench cost"
     return f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."
 
 
-def read_table(path: Path, subject: Subject) -> TextTable:
+def read_table(path: Path, subject: ReportData) -> TextTable:
     """Return what a cost file says: an array of flat records, or an object that holds one, whatever their keys.
 
     What is the same in all records stands below the table, as do the object's own words; quartiles (``…_q1``,
@@ -77,10 +77,10 @@ def read_table(path: Path, subject: Subject) -> TextTable:
     alike = [name for name in names if len(records) > 1 and len({_text(one.get(name)) for one in records}) == 1]
     columns = [name for name in names if name not in alike]
     numeric = [name for name in columns if any(finite(one.get(name)) is not None for one in records)]
-    said = {name: value for name, value in about.items() if not isinstance(value, dict | list)} | {
+    shared = {name: value for name, value in about.items() if not isinstance(value, dict | list)} | {
         name: records[0].get(name) for name in alike
     }
-    facts = ", ".join(f"{name} {_text(value)}" for name, value in said.items() if _text(value) != ABSENT)
+    facts = ", ".join(f"{name} {_text(value)}" for name, value in shared.items() if _text(value) != ABSENT)
     words = [f"{name}: {text}." for name, text in (about.get("definitions") or {}).items()]
     lines = []
     for one in records:
@@ -90,7 +90,7 @@ def read_table(path: Path, subject: Subject) -> TextTable:
     return text_table(f"Cost: {about.get('title', path.stem)}", columns, lines, numeric=numeric, notes=notes)
 
 
-def _ladder(about: Mapping[str, Any], subject: Subject) -> TextTable:
+def _ladder(about: Mapping[str, Any], subject: ReportData) -> TextTable:
     """Return a ladder of estimators as the terminal shows it, each number leading to the cell it was timed for."""
     lines = []
     for row in about["rows"]:

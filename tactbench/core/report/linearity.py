@@ -44,7 +44,7 @@ class Contrast:
         return f"{better} is better by {score(abs(by), unit)}{suffix(unit)}; the intervals {apart}"
 
     @staticmethod
-    def told(row: Row) -> str:
+    def score_text(row: Row) -> str:
         """Return a score and its interval as text."""
         return f"{score(row['score'], row['unit'])} ({row_interval(row)})"
 

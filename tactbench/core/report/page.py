@@ -12,7 +12,7 @@ from tactbench.core.report.leaderboards import leaderboards_section
 from tactbench.core.report.opening import about_section, answers_section
 from tactbench.core.report.pictures import pictures_section
 from tactbench.core.report.published import published_section
-from tactbench.core.report.section import Maker, Section, Subject
+from tactbench.core.report.section import Maker, ReportData, Section
 from tactbench.core.report.sensors import sensors_section
 from tactbench.core.tables.html import render
 
@@ -44,7 +44,7 @@ class Page:
     """One sentence a section that could not be made although its results are there."""
 
 
-def make_page(subject: Subject) -> Page:
+def make_page(subject: ReportData) -> Page:
     """Return the page: the same results give the same bytes.
 
     A section that cannot be made takes no other with it: it says why.
@@ -55,9 +55,9 @@ def make_page(subject: Subject) -> Page:
         try:
             sections.append(make(subject))
         except Exception as error:
-            told = f"This section cannot be made from these results: {type(error).__name__}: {error}"
-            broken.append(f"{title}: {told}")
-            sections.append(Section(anchor, title, missing=(told,)))
+            reason = f"This section cannot be made from these results: {type(error).__name__}: {error}"
+            broken.append(f"{title}: {reason}")
+            sections.append(Section(anchor, title, missing=(reason,)))
     missing = [f"{section.title}: {lacked}" for section in sections for lacked in section.missing]
     html = render(
         "tactbench.core.report", "page.html", title=TITLE, styles=["page.css"], scripts=["page.js"], sections=sections

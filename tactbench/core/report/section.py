@@ -12,8 +12,8 @@ from typing import Any
 from tactbench.core.leaderboard.names import answer_name
 from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.report.calibrated import Calibrated
-from tactbench.core.report.drawn import Drawn
-from tactbench.core.report.material import Material
+from tactbench.core.report.results import Results
+from tactbench.core.report.saved_figure import SavedFigure
 from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
@@ -21,11 +21,11 @@ _DESCRIBED = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat
 
 
 @dataclass(frozen=True)
-class Subject:
+class ReportData:
     """Everything that a page is about."""
 
-    material: Material
-    drawn: Sequence[Drawn] = ()
+    results: Results
+    drawn: Sequence[SavedFigure] = ()
     calibrated: Calibrated | None = None
     undrawn: tuple[str, ...] = ()
     """Why figures are missing, a sentence each."""
@@ -33,12 +33,12 @@ class Subject:
     @property
     def rows(self) -> tuple[Row, ...]:
         """One a cell."""
-        return self.material.rows
+        return self.results.rows
 
     @property
     def folder(self) -> Path:
         """The result folder."""
-        return self.material.store.folder
+        return self.results.store.folder
 
     @cached_property
     def leaderboard(self) -> Table:
@@ -107,7 +107,7 @@ class Details:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Highlight:
     """One thing that came out, and where the page shows it."""
 
     text: str
@@ -122,8 +122,8 @@ class Section:
 
     anchor: str
     title: str
-    said: tuple[str, ...] = ()
-    answers: tuple[Answer, ...] = ()
+    paragraphs: tuple[str, ...] = ()
+    answers: tuple[Highlight, ...] = ()
     """Below the pictures: what came out, each with a link."""
     tables: tuple[TextTable, ...] = ()
     notes: tuple[str, ...] = ()
@@ -134,4 +134,4 @@ class Section:
     """What the section lacks: one sentence each, with the command that makes it."""
 
 
-Maker = Callable[[Subject], Section]
+Maker = Callable[[ReportData], Section]

@@ -5,14 +5,14 @@ from __future__ import annotations
 from tactbench.core.errors import TactbenchError
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.report.datasheet import details, sensor_table, table_one
-from tactbench.core.report.section import Section, Subject
+from tactbench.core.report.section import ReportData, Section
 from tactbench.core.spec.sensor import SensorSpec
 
 _READINGS = 5
 """So many first lines of `details` are about readings; the parameters behind them are for `tactbench show --all`."""
 
 
-def sensors_section(subject: Subject) -> Section:
+def sensors_section(subject: ReportData) -> Section:
     """Return the comparison of the sensors that the results are about."""
     title = "Sensors (the paper's Table I)"
     names = dict.fromkeys(str(row["sensor"]) for row in subject.rows)
@@ -28,7 +28,7 @@ def sensors_section(subject: Subject) -> Section:
     return Section(
         "sensors",
         title,
-        said=(f"Every parameter of these sensors, and who states it: `tactbench show {' '.join(found)} --all`.",),
+        paragraphs=(f"Every parameter of these sensors, and who states it: `tactbench show {' '.join(found)} --all`.",),
         tables=tuple(
             sensor_table(name, specs, properties, with_source=True).compact()
             for name, properties in (("Sensor comparison", table_one(specs)), ("Readings", details(specs)[:_READINGS]))
@@ -37,15 +37,15 @@ def sensors_section(subject: Subject) -> Section:
     )
 
 
-def _spec(name: str, subject: Subject) -> SensorSpec | None:
+def _spec(name: str, subject: ReportData) -> SensorSpec | None:
     """Return a sensor's spec: the installed one, else the one that a recording carries."""
-    registry = subject.material.registry
+    registry = subject.results.registry
     try:
         if name in registry.sensors:
             return registry.sensors[name].spec
         for row in subject.rows:
             if row["sensor"] == name:
-                for path in subject.material.recordings(row):
+                for path in subject.results.recordings(row):
                     return read_meta(path).sensor
     except TactbenchError:
         pass  # given twice, or a damaged file: the section says that it is not known

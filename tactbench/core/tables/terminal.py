@@ -26,12 +26,12 @@ def show(parts: Iterable[Part], console: Console) -> None:
     """Print tables and notes; text from plugins is never read as markup."""
     from rich.segment import Segment, Segments
 
-    said = [
+    segments = [
         part
         for text, style in _lines(parts, console.width)
         for part in (Segment(text, console.get_style(style) if style else None), Segment("\n"))
     ]
-    console.print(Segments(said), soft_wrap=True, end="")
+    console.print(Segments(segments), soft_wrap=True, end="")
 
 
 def plain_text(parts: Iterable[Part], width: int = 240) -> str:

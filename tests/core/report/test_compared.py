@@ -2,13 +2,13 @@ from tactbench.core.evaluation.protocols import FIRST_FRAME
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.compared import compared_section
-from tactbench.core.report.material import Material
-from tactbench.core.report.section import Subject
+from tactbench.core.report.results import Results
+from tactbench.core.report.section import ReportData
 from tests.core.leaderboard.rows import row
 
 
 def subject(folder, *rows):
-    return Subject(Material(Store(folder), load_registry(), rows))
+    return ReportData(Results(Store(folder), load_registry(), rows))
 
 
 def test_a_probe_s_numbers_lead_each_to_the_cell_they_are_from(tmp_path):

@@ -11,7 +11,6 @@ import numpy as np
 
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, hardware_name
-from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures.saving import write
 from tactbench.core.report.figures.sketch import with_unit
 from tactbench.core.report.figures.style import (
@@ -27,7 +26,8 @@ from tactbench.core.report.figures.style import (
     sensor_colours,
     styled,
 )
-from tactbench.core.report.material import Material
+from tactbench.core.report.results import Results
+from tactbench.core.report.saved_figure import SavedFigure
 
 Row = Mapping[str, Any]
 
@@ -79,7 +79,7 @@ def few_shot_curves(rows: Iterable[Row]) -> list[Curve]:
     return curves
 
 
-def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
+def draw_few_shot(results: Results, folder: Path) -> list[SavedFigure]:
     """Draw one panel a task, a line for each sensor and estimator; nothing where fewer than two numbers were tried.
 
     Raises
@@ -87,7 +87,7 @@ def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
     OSError
         If `folder` cannot be written.
     """
-    answers = [row for row in material.rows if not row["is_baseline"]]
+    answers = [row for row in results.rows if not row["is_baseline"]]
     curves = few_shot_curves(answers)
     if not curves:
         return []
@@ -101,14 +101,14 @@ def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
         for here in axes.flat[len(tasks) :]:
             here.set_visible(False)
         lines = list(dict.fromkeys(_name(curve) for curve in curves))
-        colours = sensor_colours(material.rows)
+        colours = sensor_colours(results.rows)
         for here, (task, own) in zip(axes.flat, tasks.items(), strict=False):
             _panel(here, own, lines, colours)
             here.set_title(task)
         legend(figure, axes.flat)
         png, pdf = write(figure, _NAME, folder)
     keys = tuple(row["key"] for row in answers if shots(str(row["split"])) and row["key"])
-    return [Drawn(_NAME, "What few sessions are worth", _caption(curves, colours), png, pdf, keys)]
+    return [SavedFigure(_NAME, "What few sessions are worth", _caption(curves, colours), png, pdf, keys)]
 
 
 def _panel(here: Any, own: Sequence[Curve], lines: Sequence[str], colours: Mapping[str, str]) -> None:
