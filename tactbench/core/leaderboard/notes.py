@@ -11,7 +11,8 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, asked_of, question_name
+from tactbench.core.leaderboard.names import answer_name, asked_of, question_name
+from tactbench.core.leaderboard.verdict import may_be_trivial
 from tactbench.core.spec.status import STATUSES, STOPPED
 from tactbench.core.tables.numbers import score, suffix
 from tactbench.core.tables.text import command_line, cut, visible
@@ -164,7 +165,8 @@ def _no_better_notes(rows: Sequence[Row]) -> list[str]:
     """Return one sentence a sensor and task on the answers that are not clearly better than the trivial one."""
     names: dict[tuple[str, str], dict[str, None]] = {}
     for row in rows:
-        if _no_better(row) and not is_probe(row["protocol"]):  # no better than trivial is what a probe should be
+        answer = row["status"] == "done" and not row["is_baseline"]
+        if answer and may_be_trivial(row) and not is_probe(row["protocol"]):  # a probe should be no better than trivial
             names.setdefault((question_name(row), _probing(row)), {})[f"{answer_name(row)} ({row['protocol']})"] = None
     return [
         visible(
@@ -193,15 +195,6 @@ def _other_knowledge_notes(rows: Sequence[Row]) -> list[str]:
         f"is no bar for answers from readings: {', '.join(where)}."
         for who, where in names.items()
     ]
-
-
-def _no_better(row: Row) -> bool:
-    """Return whether the interval of an answer holds the trivial score or lies beyond it on the worse side."""
-    if row["status"] != "done" or row["is_baseline"] or row["baseline"] is None:
-        return False
-    if row["metric"] in LOWER_IS_BETTER:
-        return row["ci_high"] is not None and bool(row["ci_high"] >= row["baseline"])
-    return row["ci_low"] is not None and bool(row["ci_low"] <= row["baseline"])
 
 
 def _left_out_notes(rows: Sequence[Row]) -> list[str]:
