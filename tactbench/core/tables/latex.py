@@ -39,8 +39,9 @@ def points(text: str) -> float:
 def _points(character: str) -> float:
     if character in _WIDTHS:
         return _WIDTHS[character]
-    letter = unicodedata.normalize("NFD", character)[0]
-    return _WIDTHS[letter] + 0.5 if letter in _WIDTHS else points(f"U+{ord(character):04X}")
+    letter, *marks = unicodedata.normalize("NFD", character)
+    known = letter in _WIDTHS and "".join(marks) in _ACCENTS
+    return _WIDTHS[letter] + 0.5 if known else points(f"U+{ord(character):04X}")
 
 
 _WIDTHS = {

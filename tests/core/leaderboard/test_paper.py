@@ -93,3 +93,7 @@ def test_widths_are_those_that_latex_sets(tmp_path, text):
     # Letters are set closer in pairs than alone, by less than half a point each; never wider apart.
     assert found <= points(text) + 0.05
     assert points(text) <= found + 0.5 * len(text)
+
+
+def test_a_letter_that_is_set_by_its_number_is_as_wide_as_that():
+    assert points("Å") == points("U+00C5")
