@@ -39,8 +39,8 @@ def points(text: str) -> float:
 def _points(character: str) -> float:
     if character in _WIDTHS:
         return _WIDTHS[character]
-    letter, *marks = unicodedata.normalize("NFD", character)
-    known = letter in _WIDTHS and "".join(marks) in _ACCENTS
+    parts = unicodedata.normalize("NFD", character)
+    letter, known = parts[0], parts[0] in _WIDTHS and parts[1:] in _ACCENTS
     return _WIDTHS[letter] + 0.5 if known else points(f"U+{ord(character):04X}")
 
 

@@ -87,7 +87,7 @@ def _table_lines(table: TextTable, width: int) -> tuple[list[Styled], list[str]]
             ]
             for place, room in widths.items()
         }
-        for number in range(max(map(len, parts.values()))):
+        for number in range(max(map(len, parts.values()), default=0)):
             texts = []
             for place, part in parts.items():
                 text = part[number] if number < len(part) else ""

@@ -81,6 +81,8 @@ class TextTable:
 
     def compact(self) -> TextTable:
         """Return the table without the columns in which no line says anything."""
+        if not self.lines:
+            return self
         kept = [place for place in range(len(self.columns)) if any(line[place].strip(ABSENT) for line in self.lines)]
         return replace(
             self,
