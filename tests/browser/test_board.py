@@ -7,9 +7,9 @@ import re
 
 import pytest
 
-from tactbench.core.leaderboard.columns import VALUES
+from tactbench.core.leaderboard.columns import OF_ROWS
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.tables.text import visible
 from tests.browser.boards import HOST, HOSTILE, PROVENANCE, board_rows
 from tests.browser.test_page import loaded
 from tests.core.leaderboard.rendering import to_page
@@ -138,7 +138,7 @@ def test_the_lines_are_those_of_the_table_digit_by_digit(board, rows):
 @pytest.mark.parametrize("name", ["score", "95 % interval", "fit", "latency p50", "sessions", "batch/row"])
 def test_a_column_sorts_by_value_inside_each_block_and_dashes_come_last(board, rows, name):
     by_name = {}
-    for one, value in zip(rows, map(VALUES[name], rows), strict=True):
+    for one, value in zip(rows, map(OF_ROWS[name].value, rows), strict=True):
         by_name.setdefault((one["task"], f"{visible(one['sensor'])} SIM"), []).append(value)
     heading = next(one for one in board.find_elements("css selector", "#lines th") if one.text.startswith(name))
     place = board.execute_script("return arguments[0].cellIndex", heading)

@@ -50,21 +50,15 @@ def kept_rows(folder: Path) -> list[dict[str, Any]]:
 
 
 def _print(found: Any, shape: str) -> None:
-    from tactbench.core.cli.grid import print_grid, print_records
+    from tactbench.core.cli.grid import print_records, print_tables
     from tactbench.core.cli.screen import remark
-    from tactbench.core.leaderboard.latex import latex_tables
-    from tactbench.core.leaderboard.markdown import markdown_tables
     from tactbench.core.leaderboard.pairwise_table import notes_of, record_of, tables_of
 
     if shape in ("json", "csv"):
         print_records([record_of(pair) for pair in found], shape)
-        return
-    tables, notes = tables_of(found), notes_of(found)
-    if shape != "table":
-        click.echo((markdown_tables if shape == "md" else latex_tables)(tables, notes), nl=False)
-        return
-    for table in tables:
-        lines = [{k: v for k, v in zip(table.columns, line, strict=True) if v != "–"} for line in table.lines]
-        print_grid(table.title, table.columns, lines, numeric=sorted(table.numeric))
-    for note in notes:
-        remark(note)
+    elif shape == "table":
+        print_tables([table.compact() for table in tables_of(found)])
+        for note in notes_of(found):
+            remark(note)
+    else:
+        print_tables([*tables_of(found), notes_of(found)], shape)

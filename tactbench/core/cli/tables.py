@@ -120,7 +120,7 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
         If the file cannot be written.
     """
     if shape == "table" and to is None and sys.stdout.isatty():
-        from tactbench.core.leaderboard.terminal import show
+        from tactbench.core.leaderboard.formats import show
 
         show(table, console(), view)
     elif shape == "parquet":
@@ -132,7 +132,7 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
 
         _put(xlsx(table), to)
     elif shape == "table":
-        from tactbench.core.leaderboard.terminal import plain_text
+        from tactbench.core.leaderboard.formats import plain_text
 
         _put(plain_text(table, width_without_terminal(), view).encode("utf-8", "backslashreplace"), to)
     else:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, interval, score, tail, whole
+from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, tail, whole
 
 Row = Mapping[str, Any]
 Value = Callable[[Row], float | None]
@@ -123,18 +123,10 @@ NUMERIC = frozenset(COLUMNS) - {"sensor", "estimator"}
 INTERVALS = ("95 % interval", "95 % beyond")
 IF_KNOWN = {name: column.if_known for name, column in OF_ROWS.items() if column.if_known}
 """Columns of errors of force, whose reference errs too, and of classifications with recordings of one class each."""
-VALUES = {name: column.value for name, column in OF_ROWS.items()}
-"""What a row is sorted by, by the name of the column. Other columns are sorted by their text."""
 
 
-def columns(rows: Mapping[str, Any], *, times: bool) -> tuple[str, ...]:
-    """Return the columns of a table with times, or of one without.
-
-    Parameters
-    ----------
-    rows
-        What its rows have under each key.
-    """
-    lacking = {name for name, key in IF_KNOWN.items() if all(one is None for one in rows.get(key) or ())}
+def columns(rows: Sequence[Row], *, times: bool) -> tuple[str, ...]:
+    """Return the columns of a table of `rows` with times, or of one without."""
+    lacking = {name for name, key in IF_KNOWN.items() if all(row.get(key) is None for row in rows)}
     timed = {name for name, column in OF_ROWS.items() if column.timed}
     return tuple(name for name in COLUMNS if name not in lacking and (times or name not in timed))

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.column_table import ColumnTable
-from tactbench.core.leaderboard.text import cut, visible
+from tactbench.core.tables.text import cut, visible
 
 Row = Mapping[str, Any]
 
@@ -16,33 +15,34 @@ LONGEST = 1000
 _WITHOUT = "Times, memory and hosts are left out: a seed decides all that stands here."
 
 
-def footer_of(by_key: ColumnTable, provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
+def footer_of(rows: Sequence[Row], provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
     """Return the sentences below a table.
 
     Parameters
     ----------
-    by_key
+    rows
         All rows of the table.
     provenance
         What is known of the runs they are from; possibly from a stranger's folder.
     times
         False: nothing is said of machines.
     """
-    own = zip(by_key.known("seeds"), by_key["seed"], strict=True)
-    seeds = _seeds([seed for several, first in own for seed in several or [first]])
+    seeds = _seeds([seed for row in rows for seed in row.get("seeds") or [row["seed"]]])
     if not times:
         return (f"{_WITHOUT} {seeds}",)
-    runs = len(set(filter(None, by_key.known("made_by"))))
+    runs = len({row.get("made_by") for row in rows} - {None, ""})
     of_runs = f" of {runs} kind{'s' if runs != 1 else ''} of runs (versions, machine, settings)" if runs else ""
-    if any((n or 0) > 1 and unit == "replicate" for n, unit in
-           zip(by_key.known("n_replicates"), by_key.known("replicate_unit"), strict=True)):  # fmt: skip
+    if any((row.get("n_replicates") or 0) > 1 and row.get("replicate_unit") == "replicate" for row in rows):
         seeds += (
             " One a replicate, which is everything recorded anew; scores are medians, intervals those of the median."
         )
-    return (f"{len(by_key.rows)} cells{of_runs}. {seeds}", *(cut(visible(said), LONGEST) for said in _told(provenance)))
+    return (
+        f"{len(rows)} cells{of_runs}. {seeds}",
+        *(cut(visible(sentence), LONGEST) for sentence in _made_by(provenance)),
+    )
 
 
-def _told(provenance: Sequence[Row]) -> tuple[str, ...]:
+def _made_by(provenance: Sequence[Row]) -> tuple[str, ...]:
     if not provenance:
         return ()
     from tactbench.core.matrix.provenance import foot

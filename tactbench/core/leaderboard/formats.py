@@ -1,16 +1,50 @@
-"""The one table in the formats that papers, pages and programs read; each shows the same digits."""
+"""The leaderboard in the formats that people, papers, pages and programs read; each shows the same digits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-from tactbench.core.leaderboard.csv_text import csv_text
+from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.latex import latex
-from tactbench.core.leaderboard.markdown import markdown
-from tactbench.core.leaderboard.records import JSON_KEYS as JSON_KEYS
-from tactbench.core.leaderboard.records import json_text, records
+from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, keys, records
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.view import View
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, View, document
+from tactbench.core.tables import markdown as markdown_format
+from tactbench.core.tables import terminal
+from tactbench.core.tables.csv_text import csv_text as csv_lines
+from tactbench.core.tables.text import json_text, visible
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
+    """Print a leaderboard on a terminal."""
+    terminal.show(document(table, view), console)
+
+
+def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
+    """Return what a terminal without colours shows."""
+    return terminal.plain_text(document(table, view), width)
+
+
+def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
+    """Return a leaderboard as Markdown, a heading a block."""
+    return markdown_format.markdown(document(table, view))
+
+
+def csv_text(table: Table) -> str:
+    """Return a leaderboard's records as CSV."""
+    names = [*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)]
+    lines = ([*(_stored(*one) for one in values.items()), *shown.values()] for values, shown in records(table))
+    return csv_lines(names, lines)
+
+
+def _stored(key: str, value: Any) -> Any:
+    if key in NESTED:
+        return json_text(value)
+    return visible(value) if isinstance(value, str) else value
 
 
 def json_array(table: Table) -> str:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import compress
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.column_table import ColumnTable
-from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.text import visible
-from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.leaderboard.names import answer_name, sensor_name
+from tactbench.core.tables.numbers import interval, score
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 
@@ -26,16 +25,15 @@ MOST_ROWS = 2000
 """Rows beyond which resampling all of them takes too long for a table."""
 
 
-def over_tasks(by_key: ColumnTable) -> TextTable | None:
+def over_tasks(rows: Sequence[Row]) -> TextTable | None:
     """Return the means of all answers that two tasks or more were given; None if there are none.
 
     A task that was asked under several splits is left out: none of them stands for it.
     """
     groups: dict[tuple[Any, ...], dict[str, list[Row]]] = {}
-    keys = (by_key.sensors, by_key.answers, map(visible, by_key["protocol"]), by_key["rig"])
-    given = zip(zip(*keys, strict=True), by_key["task"], by_key.rows, strict=True)
-    for key, task, row in compress(given, _counts(by_key)):
-        groups.setdefault(key, {}).setdefault(task, []).append(row)
+    for row in filter(_counts, rows):
+        key = sensor_name(row), answer_name(row), visible(row["protocol"]), row["rig"]
+        groups.setdefault(key, {}).setdefault(row["task"], []).append(row)
     alone = {
         key: [members[0] for _, members in sorted(tasks.items()) if len(members) == 1] for key, tasks in groups.items()
     }
@@ -57,19 +55,16 @@ def over_tasks(by_key: ColumnTable) -> TextTable | None:
     return TextTable(TITLE, COLUMNS, tuple(lines), NUMERIC, notes=tuple(notes)) if lines else None
 
 
-def _counts(by_key: ColumnTable) -> list[bool]:
-    """Return which rows are answers that are averaged."""
-    ours = {protocol: not is_probe(protocol) for protocol in set(by_key["protocol"])}
-    keys = ("status", "is_baseline", "protocol", "split", "replicates", "score")
-    return [
-        status == "done"
-        and not trivial
-        and ours[protocol]
-        and split not in ("shuffled", "in-session")
-        and bool(replicates)
-        and math.isfinite(score)
-        for status, trivial, protocol, split, replicates, score in zip(*map(by_key.known, keys), strict=True)
-    ]
+def _counts(row: Row) -> bool:
+    """Return whether a row is an answer that is averaged."""
+    return bool(
+        row["status"] == "done"
+        and not row["is_baseline"]
+        and not is_probe(row["protocol"])
+        and row["split"] not in ("shuffled", "in-session")
+        and row.get("replicates")
+        and math.isfinite(row["score"])
+    )
 
 
 def _mean(members: Sequence[Row]) -> tuple[float, float, float, tuple[str, ...]] | None:

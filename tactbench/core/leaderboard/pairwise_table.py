@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.names import hardware_name, metric_name
-from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.leaderboard.pairwise import PairwiseComparison
-from tactbench.core.leaderboard.text_table import TextTable
 from tactbench.core.statistics.aggregate import Aggregate, aggregate
+from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.text_table import TextTable
 
 NUMERIC = frozenset({"A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "effect", "P(A better)", "n"})
 COLUMNS = (

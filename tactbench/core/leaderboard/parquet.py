@@ -8,10 +8,10 @@ from typing import Any
 import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import SHOWN
-from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, json_text, keys, records
+from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, keys, records
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.text import visible
 from tactbench.core.spec.row import FORMAT
+from tactbench.core.tables.text import json_text, visible
 
 FORMAT_VERSION = "1"
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, sensor_name
-from tactbench.core.leaderboard.numbers import interval, score, suffix
-from tactbench.core.leaderboard.text import visible
-from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 
@@ -158,9 +158,9 @@ def _about_shuffled(row: Row, shuffled: Row | None) -> list[str]:
     if _skill(shuffled["score"], best, row) <= 0:
         return []
     by = score(abs(shuffled["score"] - row["score"]), row["unit"])
-    said = f"optimistic by {by}{suffix(row['unit'])} when shuffled"
+    sentence = f"optimistic by {by}{suffix(row['unit'])} when shuffled"
     same = shuffled["n_test"] == row["n_test"] and set(shuffled["recordings"]) == set(row["recordings"])
-    return [said if same else f"{said} (tested on other rows)"]
+    return [sentence if same else f"{sentence} (tested on other rows)"]
 
 
 def _skill(value: float, trivial: float, row: Row) -> float:

@@ -8,35 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
-from tactbench.core.leaderboard.column_table import ColumnTable
-from tactbench.core.leaderboard.columns import COLUMNS, NUMERIC, columns
+from tactbench.core.leaderboard.columns import columns
 from tactbench.core.leaderboard.footer import footer_of
 from tactbench.core.leaderboard.hosts import host_letters, timing_notes
-from tactbench.core.leaderboard.lines import Line, RowTexts
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name, sensor_name
+from tactbench.core.leaderboard.lines import Line
 from tactbench.core.leaderboard.notes import notes_of
-from tactbench.core.leaderboard.numbers import ABSENT
 from tactbench.core.leaderboard.over_tasks import over_tasks
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.published import published_section
-from tactbench.core.leaderboard.text_table import TextTable
-
-__all__ = [
-    "ABSENT",
-    "COLUMNS",
-    "LOWER_IS_BETTER",
-    "METRIC_NAMES",
-    "NUMERIC",
-    "Block",
-    "Line",
-    "Table",
-    "answer_name",
-    "build_table",
-    "sensor_name",
-]
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 
@@ -45,11 +29,9 @@ Row = Mapping[str, Any]
 class Table:
     """A leaderboard, ready to be shown."""
 
-    shown: RowTexts
-    """All rows, by the names of their cells, as text."""
     blocks: tuple[Block, ...]
+    columns: tuple[str, ...]
     notes: tuple[str, ...]
-    columns: tuple[str, ...] = COLUMNS
     sections: tuple[TextTable, ...] = ()
     """Tables below the blocks: averages over tasks, published figures, what was probed."""
     footer: tuple[str, ...] = ()
@@ -60,39 +42,44 @@ class Table:
     """Whether the table has what no seed decides: times, memory, hosts."""
 
     @property
+    def lines(self) -> list[Line]:
+        """The lines of all blocks."""
+        return [line for block in self.blocks for line in block.lines]
+
+    @property
     def rows(self) -> list[Row]:
         """The rows, in the order of the lines."""
-        return [self.shown.by_key.rows[place] for block in self.blocks for place in block.places]
+        return [line.row for line in self.lines]
 
 
-def build_table(rows: Sequence[Row] | ColumnTable, provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
+def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
     """Arrange `rows` into blocks, ranked, with their notes.
 
     Parameters
     ----------
     rows
-        Rows of one folder or of several, in any order; or these laid out already.
+        Rows of one folder or of several, in any order.
     provenance
         What is known of the runs they are from: see `tactbench.core.matrix.provenance`.
     times
         False: the table of what a seed decides, the same on every machine; no times, no hosts, no provenance.
     """
     known = tuple(provenance) if times else ()
-    by_key = rows if isinstance(rows, ColumnTable) else ColumnTable.by_name(rows)
-    letters = host_letters(by_key) if times else {}
-    shown, blocks = blocks_of(by_key, letters, times)
-    ordered = by_key.taken([place for block in blocks for place in block.places])
+    rows = sorted(rows, key=itemgetter("cell"))
+    letters = host_letters(rows) if times else {}
+    names = columns(rows, times=times)
+    blocks = blocks_of(rows, names, letters, times)
+    ordered = [line.row for block in blocks for line in block.lines]
     notes = notes_of(ordered, blocks)
     if times:
-        notes += timing_notes(by_key, letters, known)
-    sections = (over_tasks(by_key), published_section(by_key), build_probe(ordered.rows))
+        notes += timing_notes(rows, letters, known)
+    sections = (over_tasks(rows), published_section(rows), build_probe(ordered))
     return Table(
-        shown,
         blocks,
+        names,
         tuple(notes),
-        columns(by_key, times=times),
         tuple(section for section in sections if section is not None),
-        footer_of(by_key, known, times),
+        footer_of(rows, known, times),
         known,
         times,
     )

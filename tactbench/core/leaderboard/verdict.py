@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name
-from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.leaderboard.placing import Placing
-from tactbench.core.leaderboard.text import visible
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
+from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 
@@ -56,7 +56,7 @@ def verdict_of(
         return (_too_few(rows, names),)
     leaders = [place for place, (_, one) in enumerate(ranked) if not one.behind]
     best = rows[0]
-    if _may_be_trivial(best):
+    if may_be_trivial(best):
         bar = score(best["baseline"], best["unit"]) + suffix(best["unit"])
         sentence = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {bar}."
     elif len(rows) == 1:
@@ -159,12 +159,13 @@ def _replicates(row: Row) -> str:
     return counted(row["n_replicates"], str(row["replicate_unit"])) if row.get("n_replicates") else "replicates"
 
 
-def _may_be_trivial(row: Row) -> bool:
-    """Return whether the interval of a row holds its trivial answer's score."""
-    end = row["ci_high" if row["metric"] in LOWER_IS_BETTER else "ci_low"]
+def may_be_trivial(row: Row) -> bool:
+    """Return whether the interval of a row holds its trivial answer's score, or lies beyond it on the worse side."""
+    lower = row["metric"] in LOWER_IS_BETTER
+    end = row["ci_high" if lower else "ci_low"]
     if row["baseline"] is None or end is None:
         return False
-    return bool(end >= row["baseline"] if row["metric"] in LOWER_IS_BETTER else end <= row["baseline"])
+    return bool(end >= row["baseline"] if lower else end <= row["baseline"])
 
 
 def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:

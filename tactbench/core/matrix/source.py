@@ -26,8 +26,9 @@ OURS = "tactbench"
 _DOORS = frozenset({"tactbench", "tactbench.plugin", "tactbench.testing"})
 
 SHOWING = (
-    "core/calibration/", "core/cli/", "core/conformance/", "core/cost/", "core/leaderboard/", "core/report/",
-    "core/statistics/", "core/matrix/checkout.py", "core/matrix/files.py", "core/matrix/machine.py",
+    "core/calibration/", "core/choosing/", "core/cli/", "core/conformance/", "core/cost/", "core/leaderboard/",
+    "core/report/", "core/statistics/", "core/tables/",
+    "core/matrix/checkout.py", "core/matrix/files.py", "core/matrix/machine.py",
     "core/matrix/progress.py", "core/matrix/provenance.py", "core/matrix/store", "__main__.py", "testing.py",
     "benchmarks.yaml", "matrices/", "calibration.yaml", "calibration/",
 )  # fmt: skip

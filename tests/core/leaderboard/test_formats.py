@@ -14,14 +14,14 @@ from rich.cells import cell_len
 
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
-from tactbench.core.leaderboard.csv_text import csv_text, guarded, unguarded
-from tactbench.core.leaderboard.fitting import pieces
-from tactbench.core.leaderboard.latex import COLUMN_PT, latex, points
-from tactbench.core.leaderboard.markdown import markdown
+from tactbench.core.leaderboard.formats import csv_text, markdown, plain_text
+from tactbench.core.leaderboard.latex import COLUMN_PT, latex
 from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, OF_THE_MACHINE, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids, notes, sections
+from tactbench.core.tables.csv_text import guarded, unguarded
+from tactbench.core.tables.fitting import pieces
+from tactbench.core.tables.latex import points
 from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown, to_page, to_parquet
 
 from .board.reading import read_page, values

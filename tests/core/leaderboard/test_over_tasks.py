@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.column_table import ColumnTable
+from tactbench.core.leaderboard.formats import plain_text
 from tactbench.core.leaderboard.over_tasks import over_tasks
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
 from tactbench.core.statistics.aggregate import aggregate
 from tests.core.leaderboard.rendering import to_latex, to_markdown
 
@@ -24,7 +23,7 @@ def rows():
 
 
 def test_each_answer_to_several_tasks_has_its_mean(rows):
-    section = over_tasks(ColumnTable(rows))
+    section = over_tasks(rows)
     assert [line[0] for line in section.lines] == ["a SIM", "b SIM"]
     for line, members in zip(section.lines, (rows[:2], rows[2:]), strict=True):
         mean = aggregate(members)
@@ -35,14 +34,14 @@ def test_each_answer_to_several_tasks_has_its_mean(rows):
 
 
 def test_what_does_not_stand_for_a_task_is_not_in_it(rows):
-    assert over_tasks(ColumnTable(rows[::2])) is None
-    assert over_tasks(ColumnTable([row(task="force"), row(task="shear")])) is None
+    assert over_tasks(rows[::2]) is None
+    assert over_tasks([row(task="force"), row(task="shear")]) is None
     for change in ({"is_baseline": True}, {"split": "shuffled"}, {"protocol": "first-frame"}, {"status": "failed"}):
-        assert over_tasks(ColumnTable([rows[0] | change, rows[1]])) is None
-    assert over_tasks(ColumnTable([rows[0], rows[0] | {"split": "unit", "cell": "other"}, rows[1]])) is None
-    assert over_tasks(ColumnTable([rows[0] | {"baseline": None}, rows[1]])) is None
+        assert over_tasks([rows[0] | change, rows[1]]) is None
+    assert over_tasks([rows[0], rows[0] | {"split": "unit", "cell": "other"}, rows[1]]) is None
+    assert over_tasks([rows[0] | {"baseline": None}, rows[1]]) is None
 
 
 def test_replicates_of_strangers_are_no_traceback(rows):
     for nonsense in ({"sums": "x"}, {"unit": 3, "names": None, "strata": "a", "sums": [[1], "b"]}, {"sums": [[]]}):
-        assert over_tasks(ColumnTable([row | {"replicates": nonsense} for row in rows])) is None
+        assert over_tasks([row | {"replicates": nonsense} for row in rows]) is None

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.column_table import ColumnTable
 from tactbench.core.leaderboard.placing import Placing, places
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.ranking import ranks
@@ -19,7 +18,7 @@ def rows():
 
 def test_without_replicates_places_are_by_score_and_the_table_says_so():
     rows = [row("a"), row("b"), row("c", score=0.9)]
-    found, why = places(ColumnTable(rows))
+    found, why = places(rows)
     assert list(found.values()) == [
         Placing(1, None, None, True),
         Placing(1, None, None, True),
@@ -37,7 +36,7 @@ def test_with_replicates_ties_share_a_place_and_every_place_has_an_interval(rows
     lines = table.blocks[0].lines
     told = {one: (rank.place, rank.low, rank.high, rank.tied) for one, rank in ranks(rows).items()}
     for line in lines:
-        place, low, high, tied = told[line.cell]
+        place, low, high, tied = told[line.row["cell"]]
         assert line.cells[0] == f"{place}{'=' if tied else ''}"
         assert line.cells[5] == (f"{low}–{high}" if low != high else str(low))
     assert [line.cells[0] for line in lines] == ["1=", "1=", "3"]

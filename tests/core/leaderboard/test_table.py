@@ -5,12 +5,12 @@ import json
 import pytest
 from rich.console import Console
 
+from tactbench.core.leaderboard.formats import show
 from tactbench.core.leaderboard.notes import count_texts
-from tactbench.core.leaderboard.numbers import duration, score
 from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import show
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE
+from tactbench.core.tables.numbers import duration, score
 from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown
 
 from .rows import row
@@ -132,12 +132,12 @@ def test_latex_keeps_ordinary_spaces_and_sets_thin_ones_in_numbers():
 
 
 def test_notes_that_say_the_same_of_several_answers_are_one():
-    from tactbench.core.leaderboard.column_table import ColumnTable
+
     from tactbench.core.leaderboard.notes import interval_notes
 
     method = "block bootstrap in time within 5 recordings (blocks of {} rows): spread between sessions is not in it"
     rows = [{"task": "curvature", "is_baseline": False, "ci_method": method.format(blocks)} for blocks in (17, 198)]
-    (told,) = interval_notes(ColumnTable(rows))
+    (told,) = interval_notes(rows)
     assert told.endswith("within 5 recordings: spread between sessions is not in it.")
-    (alone,) = interval_notes(ColumnTable(rows[:1]))
+    (alone,) = interval_notes(rows[:1])
     assert "(blocks of 17 rows)" in alone

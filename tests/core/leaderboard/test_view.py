@@ -7,9 +7,8 @@ import pytest
 
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.leaderboard.columns import COLUMNS
-from tactbench.core.leaderboard.fitting import fit, pieces, wrapped
+from tactbench.core.leaderboard.formats import plain_text
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
 from tactbench.core.leaderboard.view import (
     DEFAULT_VIEW,
     WHOLE,
@@ -22,6 +21,7 @@ from tactbench.core.leaderboard.view import (
     notes,
 )
 from tactbench.core.leaderboard.xlsx import xlsx
+from tactbench.core.tables.fitting import fit, pieces, wrapped
 from tests.core.leaderboard.rendering import to_markdown
 
 from .rows import row
@@ -145,7 +145,7 @@ def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
 
 
 def to_markdown_of(table):
-    from tactbench.core.leaderboard.markdown import markdown
+    from tactbench.core.leaderboard.formats import markdown
 
     return markdown(table)
 

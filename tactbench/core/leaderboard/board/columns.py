@@ -6,10 +6,14 @@ import base64
 import json
 import math
 import zlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
-from tactbench.core.leaderboard.column_table import ColumnTable
+from tactbench.core.spec.row import FORMAT
+
+Row = Mapping[str, Any]
 
 MANY = 5_000
 """Cells beyond which numbers are told to few digits, and what is large and each cell's own is left to its file."""
@@ -19,6 +23,8 @@ KEY_DIGITS = 8
 """Of a key, where there are many: one of 50,000 others shares them once in 86,000 times."""
 LONGEST = 65_536
 """Characters of a text: what a cell may print is kept to as many bytes."""
+MOST_OTHERS = 200
+"""Keys of no format of ours, those that most rows have."""
 DEEPEST = 12
 """Levels of lists in lists."""
 _LENGTHS = (LONGEST, 8_192, 1_024, 200)
@@ -84,7 +90,14 @@ def rounded(numbers: Sequence[float | None]) -> list[float | None]:
     return [None if one is None or not math.isfinite(one) else float(f"{one:.{digits}g}") for one in numbers]
 
 
-def details(by_key: ColumnTable, room: int) -> tuple[dict[str, str], list[str]]:
+def keys_of(rows: Sequence[Row]) -> set[str]:
+    """Return the keys that rows have: of those of no format of ours the commonest, a stranger's may have a million."""
+    counts = Counter(chain.from_iterable(rows))
+    others = [key for key, _ in counts.most_common() if key not in FORMAT][:MOST_OTHERS]
+    return {*others, *(key for key in FORMAT if key in counts)}
+
+
+def details(rows: Sequence[Row], room: int) -> tuple[dict[str, str], list[str]]:
     """Return what is known of each cell besides its line in the table, by key, and the keys left out.
 
     Parameters
@@ -92,13 +105,13 @@ def details(by_key: ColumnTable, room: int) -> tuple[dict[str, str], list[str]]:
     room
         Characters for all of it. What does not fit is cut shorter, then left out, the least telling first.
     """
-    many = len(by_key.rows) > MANY
-    others = sorted(set(by_key) - {*_FIRST, *_IN_THE_TABLE, *_LARGE}, key=str)
+    many = len(rows) > MANY
+    others = sorted(keys_of(rows) - {*_FIRST, *_IN_THE_TABLE, *_LARGE}, key=str)
     kept = _FIRST if many else (*_FIRST, *_IN_THE_TABLE, *others, *_LARGE)
     fields: dict[str, str] = {}
-    left_out = [key for key in (*others, *_LARGE) if key not in kept and any(by_key.known(key))]
+    left_out = [key for key in (*others, *_LARGE) if key not in kept and any(row.get(key) for row in rows)]
     for key in kept:
-        values = by_key.known(key)
+        values = [row.get(key) for row in rows]
         if all(value in (None, "") or value == [] or value == {} for value in values):
             continue
         if many and key == "key":

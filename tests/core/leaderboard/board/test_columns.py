@@ -5,7 +5,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.board.columns import DEEPEST, MANY, column, deflated, plain, plain_values, rounded
+from tactbench.core.leaderboard.board.columns import (
+    DEEPEST,
+    MANY,
+    MOST_OTHERS,
+    column,
+    deflated,
+    keys_of,
+    plain,
+    plain_values,
+    rounded,
+)  # fmt: skip
+from tactbench.core.spec.row import FORMAT
+from tests.core.leaderboard.rows import row
 
 from .reading import opened, values
 
@@ -57,6 +69,12 @@ def test_what_json_has_no_word_for_becomes_text(value, expected):
 def test_what_has_no_end_is_cut():
     assert json.dumps(plain(LOOP)).count("[") == DEEPEST + 1
     assert plain("x" * 100 + "end", 50) == f"[cut: the last 50 of 103 characters] {'x' * 47}end"
+
+
+def test_a_strangers_rows_with_keys_of_their_own_do_not_fill_the_page():
+    rows = [{**row(f"s{n}"), f"own {n}": n} for n in range(3 * MOST_OTHERS)]
+    assert len(keys_of(rows)) <= len(FORMAT) + MOST_OTHERS
+    assert set(row()) <= keys_of(rows)
 
 
 def test_nothing_in_the_data_can_end_a_script():

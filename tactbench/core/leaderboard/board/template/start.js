@@ -113,21 +113,8 @@ const drawNotes = (most) => {
   if (!notes.length) byId("notes").append(make("li", {}, "Nothing to note."));
 };
 
-const drawSections = () => {
-  byId("sections").replaceChildren(...board.head.sections.flatMap(({ title, columns, lines, notes, alarms }) => [
-    make("h2", {}, title),
-    make("div", { class: "box" }, make("table", { "aria-label": title },
-      make("thead", {}, make("tr", {}, ...columns.map(([name, numeric]) =>
-        make("th", { scope: "col", class: numeric ? "number" : "" }, name)))),
-      make("tbody", {}, ...lines.map((line, at) => make("tr", { class: alarms.includes(at) ? "failed" : "" }, ...line.map((text, place) =>
-        make("td", { class: columns[place][1] ? "number" : "" }, text))))))),
-    make("ul", { class: "notes" }, ...notes.map((note) => make("li", {}, ...prose(note)))),
-  ]));
-};
-
 const drawProvenance = () => {
   const all = board.head.provenance;
-  byId("footer").replaceChildren(...board.head.footer.map((text) => make("p", { class: "note" }, ...prose(text))));
   byId("provenance").replaceChildren(...(all.length ? all.map(([, entry]) => make("details", {},
     make("summary", {}, Object.entries(entry).filter(([, value]) => !isEmpty(value) && !isRecord(value)).slice(0, 6)
       .map(([name, value]) => `${name} ${asText(value)}`).join(" · ")), ...provenanceTables(entry)))
@@ -173,7 +160,6 @@ const start = async () => {
     board = await readBoard();
     fillFilters();
     drawNotes(NOTES_AT_FIRST);
-    drawSections();
     drawProvenance();
     byId("app").hidden = false;
     byId("static").remove();

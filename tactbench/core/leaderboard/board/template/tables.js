@@ -9,24 +9,9 @@ const keysOf = (entry) => {
   if (entry.column.sort) return entry.column.sort;
   if (entry.keys) return entry.keys;
   const { dictionary, index } = entry.column;
-  const place = new Float64Array(dictionary.length).fill(NaN);
-  const texts = dictionary.map(asText);
-  [...texts.keys()].filter((one) => texts[one] && texts[one] !== ABSENT)
-    .sort((one, other) => words.compare(texts[one], texts[other]))
-    .forEach((one, order, all) => {
-      const before = order ? all[order - 1] : -1;
-      place[one] = order && !words.compare(texts[one], texts[before]) ? place[before] : order;
-    });
+  const place = textKeys(dictionary.map(asText));
   entry.keys = Float64Array.from(index, (one) => place[one]);
   return entry.keys;
-};
-
-// Sorting is stable, and what has no value comes last either way round.
-const sorted = (rows, keys, descending) => {
-  const there = [], missing = [];
-  for (const row of rows) (Number.isNaN(keys[row]) ? missing : there).push(row);
-  there.sort(descending ? (one, other) => keys[other] - keys[one] : (one, other) => keys[one] - keys[other]);
-  return there.concat(missing);
 };
 
 const turn = (sort, place, first = false) =>

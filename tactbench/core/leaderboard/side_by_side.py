@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.leaderboard.names import answer_name, hardware_name, metric_name, sensor_name
-from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.text_table import TextTable
+from tactbench.core.tables.numbers import interval, score
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 
@@ -18,21 +16,6 @@ _NOTE = (
     "Differences are against the first column; intervals are those of each score alone, and two that overlap may still "
     "differ. Δ is the interval of the difference, where both were tested on the same replicates."
 )
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A score against the number of training sessions."""
-
-    sensor: str
-    task: str
-    estimator: str
-    metric: str
-    unit: str
-    simulated: bool
-    baseline: float | None
-    points: tuple[tuple[int, float, float, float], ...]
-    """(training sessions, score, low, high), in order of the sessions"""
 
 
 def compare(rows: Iterable[Row], by: str) -> list[TextTable]:
@@ -58,34 +41,6 @@ def compare(rows: Iterable[Row], by: str) -> list[TextTable]:
         if len(ways) > 1:
             found.append(_comparison(shown, by, ways))
     return found
-
-
-def few_shot_curves(rows: Iterable[Row]) -> list[Curve]:
-    """Return a curve for each sensor, task, estimator and protocol that has answered several few-shot splits."""
-    groups: dict[tuple[Any, ...], list[tuple[int, Row]]] = {}
-    for row in rows:
-        number = shots(str(row["split"]))
-        if number and row["status"] == "done":
-            key = (*_key(row), row["protocol"], row["sensor"], answer_name(row))
-            groups.setdefault(key, []).append((number, row))
-    curves = []
-    for members in groups.values():
-        points = sorted((n, row["score"], row["ci_low"], row["ci_high"]) for n, row in members)
-        first = members[0][1]
-        if len(points) > 1:
-            curves.append(
-                Curve(
-                    sensor=first["sensor"],
-                    task=first["task"],
-                    estimator=answer_name(first),
-                    metric=first["metric"],
-                    unit=first["unit"],
-                    simulated=first["simulated"],
-                    baseline=max(members, key=lambda member: member[0])[1]["baseline"],
-                    points=tuple(points),
-                )
-            )
-    return curves
 
 
 def _key(row: Row) -> tuple[Any, ...]:

@@ -24,7 +24,7 @@ from tactbench.core.spec.task import TaskSpec
 
 
 @dataclass(frozen=True)
-class Contestant:
+class TimedEstimator:
     """An estimator with its parameters chosen, and the training and test rows of one fold."""
 
     name: str
@@ -49,7 +49,7 @@ class Contestant:
     """on these parts"""
 
 
-def contestant(
+def timed_estimator(
     task: TaskSpec,
     descriptor: EstimatorDescriptor,
     params: Mapping[str, Any],
@@ -59,7 +59,7 @@ def contestant(
     *,
     seed: int,
     threads: int,
-) -> Contestant:
+) -> TimedEstimator:
     """Prepare `descriptor` as a cell does, for the last fold: the one whose model a cell's times are taken from.
 
     Parameters
@@ -80,7 +80,7 @@ def contestant(
     fold = prepared(assignment, data, rules, k, Counter())
     chosen = choice.params if choice else {}
     parts, remarks = reading_delay_ms(data, rules, k) if descriptor.looks_at == "features" else ({}, ())
-    return Contestant(
+    return TimedEstimator(
         name=descriptor.name,
         build=lambda: build(chosen),
         fold=assignment.name,

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import math
+import re
 import shlex
 import unicodedata
+from typing import Any
+
+_ACTS = re.compile("[\x7f-\x9f\xad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]")
+"""Controls, marks of direction and lone surrogates."""
 
 
 def visible(text: str) -> str:
@@ -33,3 +40,25 @@ def command_line(*words: str) -> str:
 def cut(text: str, most: int) -> str:
     """Return the first `most` characters of `text`, and an ellipsis where there are more."""
     return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def json_text(value: Any, **how: Any) -> str:
+    """Return `value` as JSON: what acts on a terminal or is no UTF-8 is escaped; a number that is none is null."""
+    try:
+        text = json.dumps(value, ensure_ascii=False, allow_nan=False, **how)
+    except ValueError:
+        text = json.dumps(_finite(value), ensure_ascii=False, allow_nan=False, **how)
+    if text.isascii() and "\x7f" not in text:
+        return text
+    return _ACTS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def _finite(value: Any) -> Any:
+    """Return `value` with None in place of every number that is not finite."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return value

@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 @dataclass(frozen=True)
-class Drawn:
+class SavedFigure:
     """One figure."""
 
     name: str

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 
 ABSENT = "–"
 
@@ -57,7 +56,6 @@ def tail(p95_ms: float | None, largest_ms: float | None, calls: int | None) -> s
     return ABSENT if largest_ms is None else f"{duration(largest_ms / 1e3)} (largest of {calls})"
 
 
-@lru_cache(maxsize=4096, typed=True)  # rows of one data set have the same counts
 def whole(value: int | None) -> str:
     """Return a count with thin groups of three."""
     return ABSENT if value is None else f"{value:,}".replace(",", "\u202f")

@@ -12,11 +12,10 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
 
-from tactbench.core.leaderboard.blocks import no_better
-from tactbench.core.leaderboard.criteria import (
+from tactbench.core.choosing.criteria import (
     Criterion,
-    Figure,
     Row,
+    ScoreInterval,
     State,
     Wish,
     criteria_of,
@@ -24,11 +23,12 @@ from tactbench.core.leaderboard.criteria import (
     newtons,
     pressed_n,
 )
+from tactbench.core.leaderboard.blocks import no_better
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, hardware_name, metric_name, sensor_name
-from tactbench.core.leaderboard.numbers import ABSENT, interval
-from tactbench.core.leaderboard.text import command_line, visible
 from tactbench.core.spec.sensor import DataSheet, SensorSpec
 from tactbench.core.spec.task import TaskSpec
+from tactbench.core.tables.numbers import ABSENT, interval
+from tactbench.core.tables.text import command_line, visible
 
 _OF_DEVICES = ("length", "mass", "interface", "power", "availability")
 """Facts of a data sheet that no wish asks for and every integrator needs."""
@@ -160,7 +160,7 @@ class _Choosing:
         keys = ("score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high")
         value, low, high = (row.get(key) for key in (keys if self.beyond else ("score", "ci_low", "ci_high")))
         assert value is not None
-        figure, spec = Figure(value, low, high), self.sensors.get(row["sensor"])
+        figure, spec = ScoreInterval(value, low, high), self.sensors.get(row["sensor"])
         return Candidate(
             sensor_name(row), answer_name(row), *figure, criteria_of(row, figure, self.wish, self.task, spec), row
         )

@@ -10,6 +10,8 @@ from collections.abc import Callable, Collection, Sequence
 
 Measure = Callable[[str], float]
 
+_LEAST = 4
+"""Letters that a column of cut words keeps."""
 _PIECE = re.compile(r"(?<=[ ,])(?=[^ ,%…†‡‖])")
 """Where a text may be broken: at a space or a comma, but not before a mark, a unit or what closes an interval."""
 
@@ -31,6 +33,16 @@ def wrapped(text: str, room: float, measure: Measure) -> list[str]:
     return [line.rstrip() for line in lines]
 
 
+def cut(piece: str, room: float, measure: Measure) -> list[str]:
+    """Return `piece` in lines that fit into `room`, cut between letters."""
+    parts = [""]
+    for letter in piece:
+        if parts[-1] and letter.strip() and measure(parts[-1] + letter) > room:
+            parts.append("")
+        parts[-1] += letter
+    return parts
+
+
 def fit(
     headers: Sequence[str],
     lines: Sequence[Sequence[str]],
@@ -41,6 +53,7 @@ def fit(
     measure: Measure,
     first_to_go: Sequence[int] = (),
     broken_last: Collection[int] = (),
+    uncut: Collection[int] = (),
 ) -> tuple[dict[int, float], list[int]]:
     """Return the columns that fit with their widths, and those that do not fit even with all texts broken.
 
@@ -58,6 +71,8 @@ def fit(
         Columns to leave out, in this order, before a part of a text is broken.
     broken_last
         Columns whose texts are broken only where breaking the others is not enough.
+    uncut
+        Columns whose words are not cut; those of the others are, where no column may go and there is no room.
     """
     texts = [list({line[place] for line in lines}) for place in range(len(headers))]
     bodies = [max(map(measure, column), default=0.0) for column in texts]
@@ -84,6 +99,11 @@ def fit(
         widths = {place: max(_of_header(headers[place], measure), bodies[place]) for place in widths}
     while taken(widths) > room:
         slack = [place for place in widths if widths[place] - least[place] > 1e-9]
+        if not slack and not first_to_go:
+            shorter = {place: one if place in uncut else min(one, _LEAST) for place, one in least.items()}
+            if shorter != least:
+                least = shorter
+                continue
         if not slack:
             break
         widest = max(slack, key=lambda place: (place not in broken_last, widths[place]))

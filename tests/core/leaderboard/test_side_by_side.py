@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.comparison import compare, few_shot_curves
+from tactbench.core.leaderboard.side_by_side import compare
+from tactbench.core.report.figures.few_shot import few_shot_curves
 
 from .rows import row
 

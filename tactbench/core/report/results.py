@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Material:
+class Results:
     """A result folder, opened for reading.
 
     Parameters
@@ -66,10 +66,10 @@ class Material:
         return found
 
 
-def open_material(store: Store, registry: Registry) -> Material:
+def open_results(store: Store, registry: Registry) -> Results:
     """Return what `store` holds: a row a cell, baselines beside it, and rows of other versions as they are."""
     rows = store.rows()
     good = checked(rows)[0]
     known = {id(row) for row in good}
     shown = (*over_replicates(good), *(row for row in rows if id(row) not in known))
-    return Material(store, registry, shown, {str(row["key"]): row for row in good})
+    return Results(store, registry, shown, {str(row["key"]): row for row in good})

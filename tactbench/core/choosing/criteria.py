@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER
-from tactbench.core.leaderboard.numbers import duration, score, suffix
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.spec.units import conversion
+from tactbench.core.tables.numbers import duration, score, suffix
 
 Row = Mapping[str, Any]
 State = Literal["met", "missed", "unknown"]
@@ -56,7 +56,7 @@ class Criterion:
     """The same in words."""
 
 
-class Figure(NamedTuple):
+class ScoreInterval(NamedTuple):
     """A score and its interval, in the metric's unit."""
 
     value: float
@@ -64,7 +64,9 @@ class Figure(NamedTuple):
     high: float | None
 
 
-def criteria_of(row: Row, figure: Figure, wish: Wish, task: TaskSpec, spec: SensorSpec | None) -> tuple[Criterion, ...]:
+def criteria_of(
+    row: Row, figure: ScoreInterval, wish: Wish, task: TaskSpec, spec: SensorSpec | None
+) -> tuple[Criterion, ...]:
     """Return how an answer stands to each wish that there is.
 
     Parameters
@@ -115,7 +117,7 @@ def _delay(row: Row, wished: float, rate_stated: bool) -> Criterion:
     whole = delay_ms is not None and not assumed and not (parts and looks and "link" not in parts)
     if sure > wished or whole:
         how = "" if whole else "at least "
-        return _at_most(name, sure, wished, how + _ms(sure), lambda ms: how + _ms(ms), "too slow")
+        return _compared(name, sure, wished, how + _ms(sure), lambda ms: how + _ms(ms), "too slow", least=False)
     lacking = [part for part in _PARTS if part not in parts]
     without = f" without {listed(lacking)}" if lacking else ""
     text = f"{_ms(least)}{without}" if parts else f"prediction alone {_ms(least)}"
@@ -127,7 +129,7 @@ def _range(wished: float, spec: SensorSpec | None) -> Criterion:
     if stated is None or stated.source.tag == "assumed":
         return Criterion(name, "unknown", "not stated" if stated is None else f"{stated}, assumed")
     upper = stated.upper * conversion(stated.unit, "N")
-    return _at_least(name, upper, wished, str(stated), newtons, "short of range")
+    return _compared(name, upper, wished, str(stated), newtons, "short of range", least=True)
 
 
 def _rate(row: Row, wished: float, sampled: float | None, stated: bool) -> Criterion:
@@ -137,13 +139,13 @@ def _rate(row: Row, wished: float, sampled: float | None, stated: bool) -> Crite
     answered = 1e3 / taken if taken else None
     if answered is not None and answered < min(sampled, wished):
         text = f"{_hz(answered)}: an answer takes {_ms(1e3 / answered)}"
-        return _at_least(name, answered, wished, text, _hz, "too low")
+        return _compared(name, answered, wished, text, _hz, "too low", least=True)
     if not stated:
         return Criterion(name, "unknown", f"{_hz(sampled)}, assumed")
     if answered is None and sampled >= wished:
         return Criterion(name, "unknown", f"samples at {_hz(sampled)}, answers not timed")
     rate = sampled if answered is None else min(sampled, answered)
-    return _at_least(name, rate, wished, _hz(rate), _hz, "too low")
+    return _compared(name, rate, wished, _hz(rate), _hz, "too low", least=True)
 
 
 def _sampled(task: TaskSpec, spec: SensorSpec | None) -> tuple[float | None, bool]:
@@ -160,7 +162,7 @@ def _sampled(task: TaskSpec, spec: SensorSpec | None) -> tuple[float | None, boo
     return min(rates), all(source is not None and source.tag != "assumed" for source in sources)
 
 
-def _score(figure: Figure, wish: Wish, task: TaskSpec, pressed: float | None) -> Criterion | None:
+def _score(figure: ScoreInterval, wish: Wish, task: TaskSpec, pressed: float | None) -> Criterion | None:
     lower = task.metric in LOWER_IS_BETTER
     wished = wish.max_error if lower else wish.min_score
     if wished is None:
@@ -169,8 +171,8 @@ def _score(figure: Figure, wish: Wish, task: TaskSpec, pressed: float | None) ->
     def formatted(number: float) -> str:
         return score(number, task.unit) + suffix(task.unit)
 
-    compare, word = (_at_most, "above the wished error") if lower else (_at_least, "below the wished score")
-    found = compare("score", figure.value, wished, "", formatted, word)
+    word = "above the wished error" if lower else "below the wished score"
+    found = _compared("score", figure.value, wished, "", formatted, word, least=not lower)
     if found.state == "missed":
         return replace(found, text=found.missed_by)
     if wish.range_n is not None and pressed is None:
@@ -186,17 +188,11 @@ def _score(figure: Figure, wish: Wish, task: TaskSpec, pressed: float | None) ->
 _Formatter = Callable[[float], str]
 
 
-def _at_most(name: str, value: float, wished: float, text: str, formatted: _Formatter, word: str) -> Criterion:
-    return _compared(name, value, wished, value - wished, text, formatted, word)
-
-
-def _at_least(name: str, value: float, wished: float, text: str, formatted: _Formatter, word: str) -> Criterion:
-    return _compared(name, value, wished, wished - value, text, formatted, word)
-
-
 def _compared(
-    name: str, value: float, wished: float, short: float, text: str, formatted: _Formatter, word: str
+    name: str, value: float, wished: float, text: str, formatted: _Formatter, word: str, *, least: bool
 ) -> Criterion:
+    """Return how a value stands to the least, or else the most, that is wished."""
+    short = wished - value if least else value - wished
     if not short > 0:
         return Criterion(name, "met", text, value)
     missed = f"{formatted(short)} {word}"

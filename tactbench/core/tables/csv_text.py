@@ -1,4 +1,4 @@
-"""The table as CSV, for programs and for spreadsheets.
+"""Records as CSV, for programs and for spreadsheets.
 
 A spreadsheet runs a cell that begins like a formula. Names and reasons come from plugins and from strangers' folders:
 text that begins so is written with an apostrophe before it, numbers never are. `unguarded` takes it off again.
@@ -9,25 +9,27 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.columns import SHOWN
-from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, json_text, keys, records
-from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.tables.text import json_text
 
 _FORMULA = re.compile(r"'*[=+\-@＝＋－＠]")
 _NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]+)?([eE][-+]?[0-9]+)?")
 
 
-def csv_text(table: Table) -> str:
-    """Return a table's records as CSV with a header; lists and tables inside a cell are JSON."""
+def csv_text(names: Iterable[str], lines: Iterable[Iterable[Any]]) -> str:
+    """Return lines as CSV with a header; lists and mappings inside a cell are JSON."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)])
-    for values, shown in records(table):
-        writer.writerow([*(_cell(key, value) for key, value in values.items()), *map(guarded, shown.values())])
+    writer.writerow(names)
+    writer.writerows(map(_cell, line) for line in lines)
     return out.getvalue()
+
+
+def csv_of_records(records: Sequence[Mapping[str, Any]]) -> str:
+    """Return records, all with the keys of the first, as CSV with a header."""
+    return csv_text(records[0] if records else (), (one.values() for one in records))
 
 
 def guarded(text: str) -> str:
@@ -40,7 +42,7 @@ def unguarded(text: str) -> str:
     return text[1:] if text.startswith("'") and _FORMULA.match(text) else text
 
 
-def _cell(key: str, value: Any) -> Any:
-    if key in NESTED:
+def _cell(value: Any) -> Any:
+    if isinstance(value, list | tuple | dict):
         return json_text(value)
-    return "" if value is None else guarded(visible(value)) if isinstance(value, str) else value
+    return "" if value is None else guarded(value) if isinstance(value, str) else value

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from tactbench.core.spec.quantity import Quantity, Source
 from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, PhysicalRange, SensorSpec, Statement
 from tactbench.core.spec.skin import SheetTable
+from tactbench.core.tables.text_table import TextTable
 
 ABSENT = "-"
 UNKNOWN = "unknown"
@@ -78,6 +79,21 @@ def details(sensors: Sequence[SensorSpec]) -> list[Property]:
         for title in titles
     ]
     return rows
+
+
+def sensor_table(
+    title: str, sensors: Sequence[SensorSpec], properties: Iterable[Property], *, with_source: bool
+) -> TextTable:
+    """Return properties as a table, a column a sensor; with sources, a column more behind each."""
+    columns = [name for one in sensors for name in (one.title, *([f"{one.title}: source"] if with_source else []))]
+    lines = []
+    for row in properties:
+        line = [row.title]
+        for fact in row.facts:
+            source = ": ".join(filter(None, (fact.tag, fact.reference)))
+            line += [fact.text, source] if with_source else [fact.text]
+        lines.append(tuple(line))
+    return TextTable(title, ("", *columns), tuple(lines))
 
 
 def parameters_markdown(sensors: Sequence[SensorSpec]) -> str:

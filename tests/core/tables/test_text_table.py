@@ -1,6 +1,7 @@
 import math
 
-from tactbench.core.report.plain import Entry, finite, markdown, number, plain
+from tactbench.core.tables.markdown import markdown
+from tactbench.core.tables.text_table import finite, sort_value, text_table
 
 
 def test_a_bare_number_is_read_with_its_marks():
@@ -13,11 +14,11 @@ def test_a_bare_number_is_read_with_its_marks():
         "0.5 † ‡": 0.5,
         "0.4 … 0.6": 0.4,
     }
-    assert {text: number(text) for text in read} == read
+    assert {text: sort_value(text) for text in read} == read
 
 
 def test_text_with_a_unit_is_no_number_since_another_line_may_have_another_unit():
-    assert [number(text) for text in ("10.2 ms", "4 s", "–", "", "1 ms … 2 s", "base", "\u202f")] == [None] * 7
+    assert [sort_value(text) for text in ("10.2 ms", "4 s", "–", "", "1 ms … 2 s", "base", "\u202f")] == [None] * 7
 
 
 def test_what_is_not_finite_cannot_be_sorted():
@@ -25,12 +26,12 @@ def test_what_is_not_finite_cannot_be_sorted():
 
 
 def test_a_column_that_says_nothing_is_not_shown():
-    table = plain("t", ("a", "b", "c"), [("1", "–", "x"), ("2", "", "y")], numeric=("a", "b"))
+    table = text_table("t", ("a", "b", "c"), [("1", "–", "x"), ("2", "", "y")], numeric=("a", "b"))
     assert table.columns == ("a", "c")
-    assert table.numeric == {"a"}
-    assert table.lines[1] == (Entry("2", 2.0), Entry("y"))
+    assert table.right == (True, False)
+    assert table.lines[1] == ("2", "y")
 
 
 def test_markdown_escapes_what_would_break_the_table():
-    text = markdown(plain("t|t", ("a", "n"), [("x|<b>", "1")], numeric=("n",), notes=("note",)))
+    text = markdown([text_table("t|t", ("a", "n"), [("x|<b>", "1")], numeric=("n",), notes=("note",))])
     assert text.splitlines()[2:] == ["| a | n |", "|---|---:|", "| x\\|&lt;b> | 1 |", "", "- note"]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.text import command_line, cut, visible
+from tactbench.core.tables.text import command_line, cut, visible
 
 
 @pytest.mark.parametrize(
