@@ -28,7 +28,7 @@ from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.reference_floor import Floor, beyond_floor, hold_of
 from tactbench.core.evaluation.replicate_sums import summed_in_time
-from tactbench.core.evaluation.replication import Units
+from tactbench.core.evaluation.replication import ReplicateUnits
 from tactbench.core.samples import Answers
 from tactbench.core.statistics.over_folds import corrected_t
 from tactbench.core.statistics.paired import difference
@@ -269,7 +269,7 @@ def beyond(trials: int, seed: int) -> None:
                 row = np.tile(np.arange(hold, hold + n), sessions)
                 answers = Answers(y, answered, session, row, np.zeros_like(row), row.astype(np.float64), y)
                 floor = Floor({place: hold_of(noise[place, :hold]) for place in range(sessions)})
-                unit = Units("session", session, tuple(map(str, range(sessions))))
+                unit = ReplicateUnits("session", session, tuple(map(str, range(sessions))))
                 found = beyond_floor(floor, answers, unit, trial)
                 ours += found.low <= own <= found.high
                 clear += found.low > 0
