@@ -26,7 +26,7 @@ import trivial
 
 from tactbench.core.matrix.engines import cores
 from tactbench.core.matrix.engines.choice import EngineChoice, EngineName
-from tactbench.core.matrix.engines.family import can_fork
+from tactbench.core.matrix.pool.processes import can_fork
 from tactbench.core.matrix.run import carry_out
 from tactbench.core.matrix.store import Store
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice

@@ -24,7 +24,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 from tactbench.core.matrix.engines.dask import open_dask  # noqa: E402
 from tactbench.core.matrix.engines.isolated import Isolated  # noqa: E402
-from tactbench.core.matrix.engines.limits import Limits  # noqa: E402
+from tactbench.core.matrix.pool.limits import Limits  # noqa: E402
 
 JOBS, FEW = 2, 10
 LIMITS = Limits(timeout_s=60.0)

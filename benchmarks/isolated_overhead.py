@@ -17,9 +17,9 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from tactbench.core.matrix.engines.family import can_fork
+from tactbench.core.matrix.pool.processes import can_fork
 from tactbench.core.matrix.engines.isolated import Isolated
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 from tactbench.core.matrix.engines.processes import Processes
 
 BOUND_MS = 20.0

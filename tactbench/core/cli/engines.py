@@ -63,7 +63,7 @@ def choice_of(
         If options do not go together.
     """
     from tactbench.core.matrix.engines.choice import EngineChoice
-    from tactbench.core.matrix.engines.limits import Limits
+    from tactbench.core.matrix.pool.limits import Limits
 
     limits = Limits(
         timeout_s=matrix.timeout_s if timeout is None else timeout,

@@ -17,7 +17,6 @@ from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.solving import Job, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.samples import Answers
-from tactbench.core.spec.scene import Role
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,8 @@ def compute_again(
     told(f"evaluating {cell.name}")
     job: Job = (cell, tuple(order.path for order in orders) or tuple(paths), trouble)
     ((_, outcome),) = InProcess().each(solve, [job])
-    row, sets = (unanswered(cell, outcome), {}) if isinstance(outcome, BaseException) else outcome
+    row, columns = (unanswered(cell, outcome), {}) if isinstance(outcome, BaseException) else outcome
+    sets = {role: Answers(**columns[role]) for role in columns}
     found += _rows(before, row)
     if row["status"] == "done" and before["status"] == "done":
         found += _answers(store.answers(before["key"]), sets)
@@ -107,17 +107,16 @@ def _rows(before: Row, now: Row) -> list[str]:
     ]
 
 
-def _answers(before: Mapping[str, Answers], now: Mapping[Role, Answers]) -> list[str]:
+def _answers(before: Mapping[str, Answers], now: Mapping[str, Answers]) -> list[str]:
     if not before:
         return ["the answers in the folder cannot be read"]
     found = []
-    fresh: dict[str, Answers] = dict(now.items())
-    for role in sorted({*before, *fresh}):
-        if role not in before or role not in fresh:
+    for role in sorted({*before, *now}):
+        if role not in before or role not in now:
             found.append(f"answers on {role}: {'none before' if role not in before else 'none now'}")
             continue
         for column in fields(Answers):
-            old, new = getattr(before[role], column.name), getattr(fresh[role], column.name)
+            old, new = getattr(before[role], column.name), getattr(now[role], column.name)
             if len(old) != len(new):
                 found.append(f"answers on {role}: {len(old)} rows before, {len(new)} now")
                 break

@@ -25,7 +25,7 @@ def fault_in(given: Any, cell: str, keys: Set[str]) -> str:
     Parameters
     ----------
     given
-        What came; a row and its answers by role are wanted.
+        What came; a row and the columns of its answers by role are wanted.
     cell
         Name of the cell.
     keys
@@ -56,18 +56,18 @@ def fault_in(given: Any, cell: str, keys: Set[str]) -> str:
 def _fault_in_answers(sets: Any, row: Row) -> str:
     if not (isinstance(sets, Mapping) and "test" in sets):
         return "it has no answers to the test set"
-    for role, answers in sets.items():
-        if not isinstance(answers, Answers):
-            return f"its {role} answers are a {type(answers).__name__}"
-        columns = {name: getattr(answers, name) for name in _COLUMNS}
+    for role, columns in sets.items():
+        if not (isinstance(columns, Mapping) and columns.keys() == set(_COLUMNS)):
+            return f"its {role} answers are a {type(columns).__name__} without the columns of answers"
         for name, column in columns.items():
             if not (isinstance(column, np.ndarray) and column.ndim == 1 and column.dtype.kind in "biufSU"):
                 return f"its {role} answers have no plain column {name}"
         lengths = {name: len(column) for name, column in columns.items()}
         if len(set(lengths.values())) != 1:
             return f"the columns of its {role} answers differ in length: {lengths}"
-        if answers.y_pred.dtype.kind == "f" and not np.isfinite(answers.y_pred).all():
+        if columns["y_pred"].dtype.kind == "f" and not np.isfinite(columns["y_pred"]).all():
             return f"some of its {role} answers are NaN or infinite"
-    if len(sets["test"]) != row["n_test"]:
-        return f"it gave {len(sets['test'])} test answers and says {row['n_test']}"
+    given = len(sets["test"]["y_true"])
+    if given != row["n_test"]:
+        return f"it gave {given} test answers and says {row['n_test']}"
     return ""

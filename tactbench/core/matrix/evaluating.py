@@ -17,10 +17,11 @@ from tactbench.core.matrix.in_flight import InFlight
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.reading import read_apart
+from tactbench.core.matrix.reading import read_all
 from tactbench.core.matrix.recorded import read_digest
 from tactbench.core.matrix.store import NotPlainError, Row, Store
 from tactbench.core.plugins.registry import installed
+from tactbench.core.samples import Answers
 from tactbench.core.spec.status import STOPPED
 
 if TYPE_CHECKING:
@@ -122,13 +123,7 @@ class _Known:
 def _unreadable(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> dict[Path, BaseException]:
     """Have the digest of every recording at hand; return why some have none."""
     wanted = {path: None for cell in cells if material.trouble(cell) is None for path in material.paths(cell)}
-    found: dict[Path, BaseException] = {}
-    for path, read in read_apart(read_digest, material.recorded.unread(wanted, "digest"), choice).items():
-        if isinstance(read, BaseException):
-            found[path] = read
-        else:
-            material.recorded.learn(path, read)
-    return found
+    return read_all(read_digest, material.recorded.unread(wanted, "digest"), material.recorded, choice)
 
 
 def _compute(
@@ -181,18 +176,15 @@ def _each(*several: Iterable[tuple[Job, Any]]) -> Generator[tuple[Job, Any], Non
 
 def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
     """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
-    from tactbench.core.matrix.preloading import Shared, import_estimators
-    from tactbench.core.matrix.solving import our_own
+    from tactbench.core.matrix.preloading import import_estimators, shared
 
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
         groups.setdefault((job[0].task, job[1]), []).append(job)
-    if choice.shares(len(jobs)):
-        return Shared(groups, choice)
-    here = choice.here(len(jobs))
-    if here or choice.forks(len(jobs)):
-        # A stranger's that ends this process does so in its cell, which is noted then.
-        import_estimators([job[0] for job in jobs if not here or our_own(job[0].estimator)], choice)
+    if choice.forks(len(jobs)):
+        return shared(groups, choice)
+    if choice.here(len(jobs)):
+        import_estimators([job[0] for job in jobs], choice)
     return [job for group in groups.values() for job in group]
 
 
@@ -213,8 +205,8 @@ def _judged(cell: Cell, outcome: Any, known: _Known) -> Answer:
     fault = fault_in(outcome, cell.name, known.keys_of_rows(cell))
     if fault:
         return _refused(cell, fault)
-    row, sets = outcome
-    return row, sets
+    row, columns = outcome
+    return row, {role: Answers(**columns[role]) for role in columns}
 
 
 def _refused(cell: Cell, fault: str) -> Answer:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -138,10 +137,7 @@ def _carry_out(
         ready = partial(_import_estimators, some, choice) if inherited else None
         during = told if len(rounds) == 1 else Prefixed(told, f"replicate {number} of {len(rounds)}: ")
         acquire_missing(material, some, book, choice, during, ready, operator)
-        # A reader that nobody hears while libraries are imported would seem to take too long.
-        fresh = store.blank and choice.forks(len(some)) and choice.limits.timeout_s is None
-        with _read_ahead(some, material, choice) if fresh else nullcontext():
-            evaluated = evaluate_all(some, material, book, choice, store, made_by, during)
+        evaluated = evaluate_all(some, material, book, choice, store, made_by, during)
         found.rows |= evaluated.rows
         found.computed += evaluated.computed
         rows += [found.rows[cell.name] for cell in some]
@@ -165,12 +161,6 @@ def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: Material) -> 
         number = cell.repeat if material.orders else 1
         rounds.setdefault(min(number, 2) if choice.named(len(cells)) == "dask" else number, []).append(cell)
     return list(rounds.values())
-
-
-def _read_ahead(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> AbstractContextManager[None]:
-    from tactbench.core.matrix.ahead import read_ahead
-
-    return read_ahead(cells, material, choice)
 
 
 def _import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tactbench.core.errors import MissingRecordingError, UnknownNameError
 from tactbench.core.matrix.engines.choice import EngineChoice
-from tactbench.core.matrix.reading import read_apart
+from tactbench.core.matrix.reading import read_all
 from tactbench.core.matrix.recorded import Recorded, Subject, read_subject
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.task import TaskSpec
@@ -45,12 +45,7 @@ def holdings(
     if not paths:
         raise MissingRecordingError("The shelf is empty.", hint="Import recordings with `tactbench import`.")
     found: dict[str, dict[Path, Subject]] = {}
-    broken: dict[Path, BaseException] = {}
-    for path, read in read_apart(read_subject, recorded.unread(paths, "sensor"), choice).items():
-        if isinstance(read, BaseException):
-            broken[path] = read
-        else:
-            recorded.learn(path, read)
+    broken = read_all(read_subject, recorded.unread(paths, "sensor"), recorded, choice)
     for path in paths:
         if path not in broken:
             subject = recorded.subject(path)

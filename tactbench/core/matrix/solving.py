@@ -6,21 +6,22 @@ import os
 import random
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.libraries import import_libraries
-from tactbench.core.matrix.answer import Answer, answer, opening, stopped
+from tactbench.core.matrix.answer import answer, opening, stopped
 from tactbench.core.matrix.engines.company import company
-from tactbench.core.matrix.engines.family import can_fork
-from tactbench.core.matrix.engines.log import printed
 from tactbench.core.matrix.engines.share import Share
 from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.pool.log import printed
 from tactbench.core.matrix.provenance import host_id
+from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import installed, load_object
 
 if TYPE_CHECKING:
@@ -35,41 +36,29 @@ Wanted = tuple[str, tuple[Path, ...]]
 this_host = lru_cache(maxsize=1)(host_id)
 
 
-def prepare(cell: Cell) -> bool:
-    """Import what a cell's estimator needs, and use it once, so that no clock and no waiting person sees it later.
+def prepare(cell: Cell) -> None:
+    """Import what a cell's estimator needs, and have it learn a few made-up rows, before any clock is read.
 
-    Returns
-    -------
-    bool
-        Whether this process is its only thread afterwards, and may still fork.
+    Done once in a process; a child process does it again, since a fork copies each page of memory when it is first
+    written to. Raises whatever the estimator raises.
     """
     registry = installed()
     descriptor = registry.estimators[cell.estimator]
     kind = registry.tasks[cell.task].spec.kind
-    load_object(descriptor.where)(kind=kind, seed=0, threads=1, **descriptor.params)
-    _rehearse(cell)
-    return can_fork()
-
-
-def _rehearse(cell: Cell) -> None:
-    """Have this process use a cell's estimator, if it has not yet; nothing if the estimator has no rehearsal."""
-    registry = installed()
-    descriptor = registry.estimators[cell.estimator]
-    kind = registry.tasks[cell.task].spec.kind
     here = os.getpid(), cell.estimator, kind
-    if descriptor.rehearsal is None or here in _rehearsed:
+    if here in _prepared:
         return
-    _rehearsed.add(here)
-    from tactbench.core.evaluation.rehearsal import rehearse
+    _prepared.add(here)
+    build = load_object(descriptor.where)
+    build(kind=kind, seed=0, threads=1, **descriptor.params)
+    if descriptor.rehearsal is not None:
+        from tactbench.core.evaluation.rehearsal import rehearse
 
-    with suppress(Exception):  # the cell will tell
-        params = {**descriptor.params, **descriptor.rehearsal}
-        rehearse(load_object(descriptor.where)(kind=kind, seed=0, threads=1, **params), kind)
+        rehearse(build(kind=kind, seed=0, threads=1, **{**descriptor.params, **descriptor.rehearsal}), kind)
 
 
-_rehearsed: set[tuple[int, str, str]] = set()
-"""By process, estimator and kind of question: a fork copies each page of memory when it is first written to, and who is
-timed meanwhile is taken for slow."""
+_prepared: set[tuple[int, str, str]] = set()
+"""By process, estimator and kind of question."""
 
 
 class Datasets:
@@ -84,39 +73,32 @@ class Datasets:
     def __init__(self, most: int) -> None:
         self._most = most
         self._kept: OrderedDict[Wanted, Dataset] = OrderedDict()
-        self._ahead: dict[Wanted, Dataset] = {}
 
     def __contains__(self, wanted: Wanted) -> bool:
-        return wanted in self._kept or wanted in self._ahead
+        return wanted in self._kept
 
     def __call__(self, task: str, recordings: tuple[Path, ...]) -> Dataset:
         """Return `recordings` as `task` needs them; raises as `load_dataset` does."""
         from tactbench.core.evaluation.dataset import load_dataset
 
         wanted = (task, recordings)
-        if wanted in self._ahead:
-            return self._ahead[wanted]
         if wanted not in self._kept:
-            self.keep(wanted, load_dataset(installed().tasks[task].spec, recordings))
+            self._kept[wanted] = load_dataset(installed().tasks[task].spec, recordings)
+            while len(self._kept) > self._most:
+                self._kept.popitem(last=False)
         self._kept.move_to_end(wanted)
         return self._kept[wanted]
-
-    def keep(self, wanted: Wanted, dataset: Dataset) -> None:
-        """Keep what was read elsewhere, in place of the one used longest ago."""
-        self._kept[wanted] = dataset
-        while len(self._kept) > self._most:
-            self._kept.popitem(last=False)
-
-    def keep_ahead(self, several: Mapping[Wanted, Dataset]) -> None:
-        """Keep small ones that were read before their turn; those kept so before are let go."""
-        self._ahead = dict(several)
 
 
 DATASETS = Datasets(2)
 """Those of this process."""
 
 
-def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None = None) -> Answer:
+Solved = tuple[Row, dict[str, dict[str, Any]]]
+"""A row, and by role the columns of the answers: what a child process can send."""
+
+
+def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None = None) -> Solved:
     """Answer one cell.
 
     An exception of a plugin or a recording becomes a row. What is more than an exception, such as SystemExit, and a
@@ -131,12 +113,16 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     registry = installed()
     if trouble is not None:
         return unanswered(cell, trouble), {}
-    _rehearse(cell)
+    with suppress(Exception):  # the cell will tell
+        prepare(cell)
     began = time.perf_counter()
     _seed_everything(cell.seed)
     row, sets = answer(cell, registry, recordings, DATASETS, working)
     timed = {"wall_s": time.perf_counter() - began, "concurrency": company(concurrency), "host": this_host()}
-    return {**row, **timed, "log": printed()}, sets
+    columns = {
+        str(role): {one.name: getattr(answers, one.name) for one in fields(answers)} for role, answers in sets.items()
+    }
+    return {**row, **timed, "log": printed()}, columns
 
 
 def our_own(estimator: str) -> bool:
@@ -147,20 +133,15 @@ def our_own(estimator: str) -> bool:
 def _shares(job: Job) -> list[Share]:
     """Return what other cells need as well, so that a process may load it for its children."""
     cell, recordings, _ = job
+    ours = our_own(cell.estimator)
     return [
         Share("libraries", import_libraries, trusted=True),
-        Share(("estimator", cell.task, cell.estimator), lambda: prepare(cell), trusted=our_own(cell.estimator)),
+        *([Share(("estimator", cell.task, cell.estimator), lambda: prepare(cell), trusted=True)] if ours else []),
         Share(("recordings", cell.task, recordings), lambda: DATASETS(cell.task, recordings)),
     ]
 
 
-def _ready(job: Job) -> None:
-    """Do what a process can do for its cell before it is asked to carry it out."""
-    _rehearse(job[0])
-
-
 setattr(solve, "shares", _shares)  # noqa: B010  (type checkers know no attributes of functions)
-setattr(solve, "ready", _ready)  # noqa: B010
 
 
 def unanswered(cell: Cell, trouble: BaseException) -> dict[str, object]:

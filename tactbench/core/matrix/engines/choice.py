@@ -6,9 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 from tactbench.core.errors import UsageError
+from tactbench.core.evaluation.libraries import EVERY_CELL
 from tactbench.core.matrix.engines.engine import Engine
-from tactbench.core.matrix.engines.family import can_fork
-from tactbench.core.matrix.engines.limits import UNLIMITED, Limits
+from tactbench.core.matrix.pool.limits import UNLIMITED, Limits
+from tactbench.core.matrix.pool.processes import can_fork
 
 EngineName = Literal["in-process", "isolated", "dask"]
 ENGINES: tuple[EngineName, ...] = get_args(EngineName)
@@ -61,55 +62,37 @@ class EngineChoice:
         return 1 if self.named(cells) == "in-process" else max(1, min(self.jobs, cells))
 
     def forks(self, cells: int) -> bool:
-        """Return whether cells are carried out in processes forked off this one, which inherit what it has imported."""
+        """Return whether each cell is forked off this process, and shares what it holds at that moment."""
         return self.named(cells) != "dask" and not self.here(cells) and can_fork()
-
-    def shares(self, cells: int) -> bool:
-        """Return whether every cell is forked off this process, and inherits what it holds at that moment."""
-        return self.named(cells) == "isolated" and self.forks(cells)
 
     def here(self, cells: int) -> bool:
         """Return whether cells are really carried out in this process: one that aborts ends it."""
-        return self.named(cells) == "in-process" and (cells == 1 or not can_fork())
+        return self.named(cells) == "in-process" and cells == 1
 
     def engine(self, cells: int) -> Engine:
         """Return the engine for so many cells.
 
-        In process, one cell is carried out here. Several are carried out in one forked process, one after the other,
-        that this one looks after: a cell that ends it costs its own row and nobody else's.
+        In process, one cell is carried out here; of several, each in a child process, one at a time.
         """
-        from tactbench.core.matrix.engines.in_process import InProcess
-        from tactbench.core.matrix.engines.isolated import Isolated
-        from tactbench.core.matrix.engines.processes import Processes
-
         name = self.named(cells)
         if name == "dask":
-            return _dask(self)
+            from tactbench.core.matrix.engines.dask import Dask
+
+            return Dask(self.jobs, self.limits, self.scheduler)
         if self.here(cells):
+            from tactbench.core.matrix.engines.in_process import InProcess
+
             return InProcess(self.limits)
-        if not can_fork():
-            return _served(self)
-        return Processes(1, self.limits) if name == "in-process" else Isolated(self.jobs, self.limits)
+        from tactbench.core.matrix.pool.pool import Pool
 
-    def pool(self, hands: int, *, grace_s: float = 0.0) -> Engine:
-        """Return reused processes for `hands` items at once, for what is no cell."""
-        from tactbench.core.matrix.engines.in_process import InProcess
-        from tactbench.core.matrix.engines.processes import Processes
+        return Pool(self.concurrency(cells), self.limits, preload=_preload())
 
-        limits = replace(self.limits, grace_s=grace_s)
-        if can_fork():
-            return Processes(hands, limits)
-        return _served(replace(self, limits=limits, jobs=hands)) if hands > 1 else InProcess(limits)
+    def pool(self, jobs: int, *, grace_s: float = 0.0) -> Engine:
+        """Return reused processes for `jobs` items at once, for what is no cell."""
+        from tactbench.core.matrix.pool.pool import Pool
+
+        return Pool(jobs, replace(self.limits, grace_s=grace_s), reuse=True, preload=_preload())
 
 
-def _dask(choice: EngineChoice) -> Engine:
-    from tactbench.core.matrix.engines.dask import Dask
-
-    return Dask(choice.jobs, choice.limits, choice.scheduler)
-
-
-def _served(choice: EngineChoice) -> Engine:
-    """Return an engine for a process that must not fork."""
-    from tactbench.core.matrix.engines.served import Served
-
-    return Served(choice.jobs, choice.limits)
+def _preload() -> tuple[str, ...] | None:
+    return None if can_fork() else EVERY_CELL

@@ -16,10 +16,10 @@ from tactbench.core.matrix.engines.dask_cluster import client_of
 from tactbench.core.matrix.engines.dask_crew import Crew
 from tactbench.core.matrix.engines.dask_flights import Flight, Round
 from tactbench.core.matrix.engines.engine import R, T
-from tactbench.core.matrix.engines.limits import Limits
 from tactbench.core.matrix.engines.request import Setting
 from tactbench.core.matrix.engines.sight import fingerprints
 from tactbench.core.matrix.engines.surroundings import sources_remembered, surroundings
+from tactbench.core.matrix.pool.limits import Limits
 from tactbench.core.plugins.registry import installed
 
 ALONE_S = 60.0

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from tactbench.core.errors import UsageError
-from tactbench.core.matrix.engines.family import interrupts_held_back
+from tactbench.core.matrix.pool.processes import interrupts_blocked
 
 CONNECT_S = 10.0
 """How long a scheduler may take to answer."""
@@ -91,7 +91,7 @@ def client_of(address: str | None, jobs: int) -> Iterator[tuple[Any, Path]]:
 def _own_cluster(jobs: int) -> Iterator[Any]:
     """Start a scheduler and `jobs` workers of one thread each on the loopback; leave no process."""
     resource_tracker.ensure_running()  # it lets interrupts in again where it is started: let that be before
-    with interrupts_held_back():
+    with interrupts_blocked():
         # What cells take is watched by the engine; the workers themselves only pass requests on.
         cluster = import_distributed().LocalCluster(
             n_workers=jobs, threads_per_worker=1, processes=True, host="127.0.0.1", memory_limit=0,
@@ -101,7 +101,7 @@ def _own_cluster(jobs: int) -> Iterator[Any]:
     try:
         yield cluster
     finally:
-        with interrupts_held_back():
+        with interrupts_blocked():
             cluster.close(timeout=CONNECT_S)
 
 

@@ -12,10 +12,10 @@ from typing import Any
 
 from tactbench.core.errors import OutOfMemory, TimedOut
 from tactbench.core.matrix.engines.engine import R, T
-from tactbench.core.matrix.engines.limits import UNLIMITED, Limits
-from tactbench.core.matrix.engines.log import open_log, printing_to, tail
-from tactbench.core.matrix.engines.memory import data_limit
-from tactbench.core.matrix.engines.verdict import out_of_memory, too_slow
+from tactbench.core.matrix.pool.endings import out_of_memory, too_slow
+from tactbench.core.matrix.pool.limits import UNLIMITED, Limits
+from tactbench.core.matrix.pool.log import open_log, printing_to, tail
+from tactbench.core.matrix.pool.memory import data_limit
 
 AGAIN_S = 0.2
 """Seconds until whoever swallowed the alarm hears it again."""

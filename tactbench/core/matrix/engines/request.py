@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tactbench.core.errors import EngineError, TactbenchError
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 
 
 @dataclass(frozen=True)

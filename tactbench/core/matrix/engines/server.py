@@ -20,11 +20,11 @@ from typing import Any
 
 from tactbench.core.errors import EngineError
 from tactbench.core.matrix.engines.company import keep_company
-from tactbench.core.matrix.engines.isolated import Isolated
 from tactbench.core.matrix.engines.request import Request, Setting, pack, pack_reply
 from tactbench.core.matrix.engines.share import Share, shares_of
 from tactbench.core.matrix.engines.sight import unseen
 from tactbench.core.matrix.engines.surroundings import differences, sources_remembered, surroundings
+from tactbench.core.matrix.pool.pool import Pool
 
 IDLE_S = 600.0
 """A server that nobody has asked for so long ends: whoever started it may have forgotten it."""
@@ -114,7 +114,7 @@ class _Children:
 
     def __init__(self, channel: Connection[Any, Any], setting: Setting) -> None:
         self._channel = channel
-        self._engine = Isolated(1, setting.limits)
+        self._engine = Pool(1, setting.limits)
         self._tried: set[Hashable] = set()
 
     def one(self, work: Callable[[Any], Any], item: Any) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -23,22 +22,7 @@ class Share:
 
 def shares_of(work: Any, item: Any) -> list[Share]:
     """Return what `work` needs for `item` beside others: a function says it in its attribute ``shares``."""
-    shares = _said(work, "shares")
-    return [] if shares is None else list(shares(item))
-
-
-def get_ready(work: Any, item: Any) -> None:
-    """Do what `work` can do for `item` before it is begun: a function says it in its attribute ``ready``.
-
-    Whatever it raises, the item will tell.
-    """
-    ready = _said(work, "ready")
-    if ready is not None:
-        with suppress(BaseException):
-            ready(item)
-
-
-def _said(work: Any, name: str) -> Any:
     while isinstance(work, partial):
         work = work.func
-    return getattr(work, name, None)
+    shares = getattr(work, "shares", None)
+    return [] if shares is None else list(shares(item))

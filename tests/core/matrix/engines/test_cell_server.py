@@ -11,7 +11,7 @@ import pytest
 
 from tactbench.core.errors import Crashed, DataError, EngineError, TimedOut
 from tactbench.core.matrix.engines.cell_server import CellServer, ServerEndedError
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 from tactbench.core.matrix.engines.request import Request, Setting, pack, unpack_reply
 from tactbench.core.matrix.engines.served import Served
 from tests.core.matrix.engines.patience import ending, gone, until
@@ -97,7 +97,7 @@ def test_a_server_says_what_it_computes_with_otherwise():
 OWNER = """
 import os, sys, threading
 from pathlib import Path
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 from tactbench.core.matrix.engines.served import Served
 from tests.core.matrix.engines.patience import gone, until
 from tests.core.matrix.engines.remote_work import wait_for

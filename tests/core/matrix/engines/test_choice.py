@@ -5,7 +5,7 @@ import pytest
 from tactbench.core.errors import UsageError
 from tactbench.core.matrix.engines.choice import EngineChoice
 from tactbench.core.matrix.engines.in_process import InProcess
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import pytest
 from tactbench.core.errors import Crashed, OutOfMemory
 from tactbench.core.matrix.engines import cores, family
 from tactbench.core.matrix.engines.isolated import Isolated
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 from tactbench.core.matrix.engines.processes import Processes
 from tests.core.matrix.engines.patience import ending, gone, pause, until
 from tests.core.matrix.engines.works import flees, leaves, work

@@ -10,7 +10,7 @@ import pytest
 
 from tactbench.core.errors import Crashed, DataError, TimedOut, UsageError
 from tactbench.core.matrix.engines.dask import DaskEngine, open_dask
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 from tests.core.matrix.engines.patience import gone, until
 from tests.core.matrix.engines.remote_work import kill_once, misbehave, process, square, wait_for
 

@@ -11,7 +11,7 @@ import pytest
 from tactbench.core.errors import EngineError, UsageError
 from tactbench.core.matrix.engines import dask_cluster, dask_crew
 from tactbench.core.matrix.engines.dask import open_dask
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 from tactbench.core.matrix.engines.sight import fingerprints
 from tests.core.matrix.engines.patience import ending, gone, until
 from tests.core.matrix.engines.remote_work import square, wait_for
@@ -61,7 +61,7 @@ RUN = """
 import sys
 from pathlib import Path
 from tactbench.core.matrix.engines.dask import open_dask
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 from tests.core.matrix.engines.remote_work import wait_for
 with open_dask(sys.argv[1], 1, Limits()) as engine:
     list(engine.each(wait_for, [(Path(sys.argv[2]), Path("/no/such/file"))]))

@@ -10,9 +10,8 @@ import pytest
 
 from tactbench.core.errors import Crashed, NotApplicable, OutOfMemory, Raised, TimedOut
 from tactbench.core.matrix.engines.in_process import InProcess
-from tactbench.core.matrix.engines.isolated import Isolated
-from tactbench.core.matrix.engines.limits import Limits
-from tactbench.core.matrix.engines.processes import Processes
+from tactbench.core.matrix.pool.limits import Limits
+from tactbench.core.matrix.pool.pool import Pool
 from tests.core.matrix.engines.works import work
 
 LIMITS = Limits(timeout_s=1.0, memory_mb=64)
@@ -22,10 +21,10 @@ PATIENT = Limits(timeout_s=60.0, memory_mb=64)
 
 def guards(limits):
     return {
-        "isolated": Isolated(1, limits),
-        "isolated-3": Isolated(3, limits),
-        "reused": Processes(1, limits),
-        "reused-2": Processes(2, limits),
+        "isolated": Pool(1, limits),
+        "isolated-3": Pool(3, limits),
+        "reused": Pool(1, limits, reuse=True),
+        "reused-2": Pool(2, limits, reuse=True),
     }
 
 
@@ -77,7 +76,7 @@ def alive(pid):
         ("hangs", TimedOut, "longer than 1 s"),
         ("deaf", TimedOut, "longer than 1 s"),
         ("eats", OutOfMemory, "more than 64 MB"),
-        ("unspeakable", Raised, "pickle"),
+        ("unspeakable", Raised, "cannot be sent as JSON"),
         ("closes", Crashed, "gave no result"),
     ],
 )
@@ -137,7 +136,7 @@ def test_what_is_printed_reaches_no_stream_of_ours(engine, capfd):
 
 def test_endless_talk_is_cut_to_its_end(guarded):
     def chatty(what):
-        from tactbench.core.matrix.engines.log import printed
+        from tactbench.core.matrix.pool.log import printed
 
         work(what)
         return printed()
@@ -172,10 +171,10 @@ def test_nobody_is_left_behind(guarded, what):
 
 
 def test_isolated_items_have_a_process_each_and_reused_ones_share():
-    pids = [pid for _, pid in Isolated(2).each(work, ["whoami"] * 4)]
+    pids = [pid for _, pid in Pool(2).each(work, ["whoami"] * 4)]
     assert len(set(pids)) == 4
     assert os.getpid() not in pids
-    assert len({pid for _, pid in Processes(1).each(work, ["whoami"] * 4)}) == 1
+    assert len({pid for _, pid in Pool(1, reuse=True).each(work, ["whoami"] * 4)}) == 1
     assert {pid for _, pid in InProcess().each(work, ["whoami"] * 2)} == {os.getpid()}
 
 
@@ -187,7 +186,7 @@ def test_no_more_than_jobs_are_at_work_and_items_are_taken_as_there_is_room():
             taken.append(number)
             yield number
 
-    ahead = [len(taken) - heard for heard, _ in enumerate(Isolated(2).each(lambda item: item, items()))]
+    ahead = [len(taken) - heard for heard, _ in enumerate(Pool(2).each(lambda item: item, items()))]
     assert max(ahead) <= 3, "two at work, one just heard"
     assert taken == list(range(6))
 
@@ -200,12 +199,12 @@ def test_what_is_prepared_while_an_item_is_taken_its_process_inherits():
             prepared.append(number)
             yield number
 
-    assert dict(Isolated(1).each(lambda item: item in prepared, items())) == {0: True, 1: True, 2: True}
+    assert dict(Pool(1).each(lambda item: item in prepared, items())) == {0: True, 1: True, 2: True}
 
 
 def test_meanwhile_is_done_once_here_while_others_work():
     did = []
-    assert len(list(Processes(2).each(work, ["whoami"] * 5, lambda: did.append(os.getpid())))) == 5
+    assert len(list(Pool(2, reuse=True).each(work, ["whoami"] * 5, lambda: did.append(os.getpid())))) == 5
     assert did == [os.getpid()]
 
 
@@ -220,7 +219,7 @@ def test_memory_is_counted_beyond_what_is_shared():
     def reads(item):
         return sum(memoryview(shared)[:: 2**20]) >= 0
 
-    assert dict(Isolated(1, Limits(memory_mb=64)).each(reads, [0])) == {0: True}
+    assert dict(Pool(1, Limits(memory_mb=64)).each(reads, [0])) == {0: True}
 
 
 def test_memory_of_a_child_of_the_cell_counts_even_where_nobody_asks_it():
@@ -233,7 +232,7 @@ def test_memory_of_a_child_of_the_cell_counts_even_where_nobody_asks_it():
             work("eats")
         os.wait()
 
-    ((_, outcome),) = Isolated(1, Limits(timeout_s=30, memory_mb=256)).each(feeds_a_child, [0])
+    ((_, outcome),) = Pool(1, Limits(timeout_s=30, memory_mb=256)).each(feeds_a_child, [0])
     assert type(outcome) is OutOfMemory
 
 
@@ -245,7 +244,7 @@ def test_a_device_has_time_to_be_let_go_of(tmp_path):
             path.write_text("let go")
 
     path = tmp_path / "device"
-    engine = Processes(1, Limits(timeout_s=0.3, grace_s=20.0))
+    engine = Pool(1, Limits(timeout_s=0.3, grace_s=20.0), reuse=True)
     ((_, outcome),) = engine.each(holds, [path])
     assert type(outcome) is TimedOut
     assert path.read_text() == "let go"
@@ -259,7 +258,7 @@ def test_an_iteration_given_up_ends_everybody():
         work(item)
 
     reading, writing = os.pipe()
-    running = Isolated(2).each(told, ["vanishes", "hangs", "hangs"])
+    running = Pool(2).each(told, ["vanishes", "hangs", "hangs"])
     next(running)
     while len(pids) < 2:
         pids += os.read(reading, 100).split()

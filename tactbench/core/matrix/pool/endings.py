@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import signal
 
 from tactbench.core.errors import Crashed, OutOfMemory, TimedOut
-from tactbench.core.matrix.engines.limits import Limits
+from tactbench.core.matrix.pool.limits import Limits
 
 FATAL = "Fatal Python error"
 """Begins what Python's fault handler writes when the process is about to end."""
@@ -39,19 +38,31 @@ def silenced() -> Crashed:
     )
 
 
-def crashed(status: int, log: str, *, memory_was_short: bool) -> Crashed | OutOfMemory:
+def garbled(error: Exception) -> Crashed:
+    """Say that what came through the pipe of the result is none."""
+    return Crashed(
+        f"What came through the pipe of its result is no result: {error}.",
+        hint="Something in it writes to a descriptor that is not its own.",
+    )
+
+
+def never_began(seconds: float) -> Crashed:
+    """Say that a process did not begin with its item."""
+    return Crashed(f"Its process did not begin within {seconds:g} s.", hint="Run fewer at once (--jobs).")
+
+
+def crashed(code: int, log: str, *, memory_was_short: bool) -> Crashed | OutOfMemory:
     """Say how a process ended that gave no result.
 
     Parameters
     ----------
-    status
-        Its wait status.
+    code
+        Its exit code, or the number of the signal that ended it, negative.
     log
         What it printed, with what Python's fault handler has to say at its end.
     memory_was_short
         Whether the system has ended processes for want of memory while it ran.
     """
-    code = os.waitstatus_to_exitcode(status)
     where = FATAL + log.rpartition(FATAL)[2] if FATAL in log else ""
     if code >= 0:
         return Crashed(

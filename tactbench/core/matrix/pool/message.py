@@ -1,0 +1,148 @@
+"""What a child process sends to its parent: JSON and arrays, never pickle, so that no code of a plugin runs there."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import traceback
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from tactbench.core import errors
+from tactbench.core.errors import CellStopped, Raised, TactbenchError, _rebuild
+
+_HEADER = struct.Struct("<8sQQ")
+"""Magic number, bytes of JSON, bytes of arrays."""
+_MAGIC = b"tactpool"
+MOST_BYTES = 2**34
+"""No message is longer: 16 GiB."""
+_ARRAY, _TUPLE = "__array__", "__tuple__"
+
+
+def pack(message: dict[str, Any]) -> bytes:
+    """Return a message as bytes: JSON, then its arrays in numpy's npy format.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it holds anything but dictionaries by strings, lists, tuples, text, numbers, None and arrays of these.
+    """
+    arrays: list[np.ndarray[Any, Any]] = []
+    text = json.dumps(_plain(message, arrays)).encode()
+    file = BytesIO()
+    for array in arrays:
+        np.save(file, array, allow_pickle=False)
+    content = file.getvalue()
+    return _HEADER.pack(_MAGIC, len(text), len(content)) + text + content
+
+
+def _plain(value: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
+    if isinstance(value, np.ndarray):
+        arrays.append(value)
+        return {_ARRAY: len(arrays) - 1}
+    if isinstance(value, dict):
+        if not all(isinstance(key, str) for key in value) or value.keys() & {_ARRAY, _TUPLE}:
+            raise TypeError("a dictionary's keys must be text")
+        return {key: _plain(one, arrays) for key, one in value.items()}
+    if isinstance(value, tuple):
+        return {_TUPLE: [_plain(one, arrays) for one in value]}
+    if isinstance(value, list):
+        return [_plain(one, arrays) for one in value]
+    return value
+
+
+def _restored(value: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
+    if isinstance(value, list):
+        return [_restored(one, arrays) for one in value]
+    if isinstance(value, dict):
+        if value.keys() == {_ARRAY}:
+            return arrays[value[_ARRAY]]
+        if value.keys() == {_TUPLE}:
+            return tuple(_restored(one, arrays) for one in value[_TUPLE])
+        return {key: _restored(one, arrays) for key, one in value.items()}
+    return value
+
+
+class Inbox:
+    """Gathers the bytes that come through one pipe until a message is whole.
+
+    Parameters
+    ----------
+    descriptor
+        The reading end; it must not block.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._bytes = bytearray()
+
+    def read(self) -> bool:
+        """Take what is there; return False once nothing will ever come again."""
+        while True:
+            try:
+                piece = os.read(self._descriptor, 2**20)
+            except BlockingIOError:
+                return True
+            except OSError:  # the other end was closed before it had read all
+                return False
+            if not piece:
+                return False
+            self._bytes += piece
+
+    def message(self) -> dict[str, Any] | None:
+        """Return the first whole message, or None.
+
+        Raises
+        ------
+        ValueError
+            If what came is no message of `pack`, as soon as its header is there.
+        """
+        if len(self._bytes) < _HEADER.size:
+            return None
+        magic, text, arrays = _HEADER.unpack_from(self._bytes)
+        if magic != _MAGIC or text + arrays > MOST_BYTES:
+            raise ValueError("the bytes do not begin with the length of a result")
+        middle, end = _HEADER.size + text, _HEADER.size + text + arrays
+        if len(self._bytes) < end:
+            return None
+        try:
+            file = BytesIO(bytes(self._bytes[middle:end]))
+            found = []
+            while file.tell() < arrays:
+                found.append(np.load(file, allow_pickle=False))
+            message = _restored(json.loads(self._bytes[_HEADER.size : middle]), found)
+        except Exception as error:
+            raise ValueError(f"{type(error).__name__}: {error}") from error
+        del self._bytes[:end]
+        if not isinstance(message, dict):
+            raise ValueError(f"a {type(message).__name__} came")
+        return message
+
+
+def told(error: BaseException) -> dict[str, str]:
+    """Return an exception as text; `kind` is the name of its class if that is one of `tactbench.core.errors`."""
+    where = "".join(traceback.format_exception(error))
+    name = type(error).__name__
+    if isinstance(error, TactbenchError) and getattr(errors, name, None) is type(error):
+        where = str(error.traceback_text) or where
+        return {"kind": name, "message": str(error.message), "hint": str(error.hint), "traceback": where}
+    try:
+        said = str(error)
+    except Exception:
+        said = "(its text cannot be read)"
+    return {"kind": "", "message": f"{name}: {said}", "hint": "", "traceback": where}
+
+
+def error_of(text: dict[str, str], log: str) -> TactbenchError:
+    """Return the exception that `told` has put into words; `log` is what was printed."""
+    kind = getattr(errors, text["kind"], None) if text["kind"] else Raised
+    if not (isinstance(kind, type) and issubclass(kind, TactbenchError)):
+        raise ValueError(f"there is no error called {text['kind']!r}")
+    if issubclass(kind, CellStopped):
+        return kind(text["message"], hint=text["hint"], log=log, traceback_text=text["traceback"])
+    error = _rebuild(kind, text["message"], text["hint"])
+    error.traceback_text = text["traceback"]
+    return error
