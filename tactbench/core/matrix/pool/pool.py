@@ -59,17 +59,18 @@ class Pool:
         every = list(items) if self._reuse else []
         coming = enumerate(every) if self._reuse else ((0, item) for item in items)
         again: deque[tuple[int, T]] = deque()
-        retried: set[int] = set()
+        """Items whose processes ended before they had begun."""
         busy: list[Worker] = []
         idle: list[Worker] = []
         with _children_of_items(busy, idle) as spared:
             while True:
                 while len(busy) < self._jobs:
+                    second = bool(again)
                     index, item = again.popleft() if again else next(coming, (-1, None))
                     if index < 0:
                         break
                     try:
-                        self._begin(work, every or [item], index, busy, idle)
+                        self._begin(work, every or [item], index, second, busy, idle)
                     except Exception as error:  # it cannot be pickled, or the system starts no more processes
                         yield item, error  # type: ignore[misc]
                 if not busy:
@@ -83,22 +84,27 @@ class Pool:
                     if outcome is PENDING:
                         continue
                     item = worker.items[worker.index]
-                    retry = not (worker.begun or id(item) in retried or worker.alive)
+                    retry = not (worker.begun or worker.second or worker.alive)
                     self._end_item(worker, busy, idle)
                     kill_orphans(spared)
                     if retry:
-                        retried.add(id(item))
                         again.append((worker.index, item))
                     else:
                         yield item, outcome
 
     def _begin(
-        self, work: Callable[[Any], Any], items: Sequence[Any], index: int, busy: list[Worker], idle: list[Worker]
+        self,
+        work: Callable[[Any], Any],
+        items: Sequence[Any],
+        index: int,
+        second: bool,
+        busy: list[Worker],
+        idle: list[Worker],
     ) -> None:
         with interrupts_blocked():
             worker = idle.pop() if idle else Worker(work, items, self._limits, self._preload)
             busy.append(worker)
-            worker.begin(index)
+            worker.begin(index, second)
 
     def _end_item(self, worker: Worker, busy: list[Worker], idle: list[Worker]) -> None:
         """End whatever an item that is over has started, and its process unless another item may have it."""

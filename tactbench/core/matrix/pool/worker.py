@@ -91,9 +91,9 @@ class Worker:
         """What becomes readable when there is something to look at."""
         return self.connection, self._process.sentinel
 
-    def begin(self, index: int) -> None:
-        """Have it carry out an item."""
-        self.index, self.begun = index, False
+    def begin(self, index: int, second: bool) -> None:
+        """Have it carry out an item; `second`: another process has ended before it had begun with that."""
+        self.index, self.second, self.begun = index, second, False
         self._began_s = time.monotonic()
         self._ends_s: float | None = self._began_s + START_S
         self._shared_mb = max(self._shared_mb, memory.resident_mb(self._process.pid))
@@ -120,8 +120,8 @@ class Worker:
             if message is not None and "begun" in message:
                 self._note_beginning()
                 message = self._inbox.message()
-            if message is not None and self._stopped is None:
-                return self._result(message)
+            if message is not None:
+                return self._result(message) if self._stopped is None else self._stop(self._stopped)
         except (ValueError, KeyError, TypeError) as error:
             return self._stop(endings.garbled(error))
         if over:

@@ -8,12 +8,12 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from tactbench.core.matrix.engines.served import Served
 
 from tactbench.core.errors import Crashed, DataError, EngineError, TimedOut
 from tactbench.core.matrix.engines.cell_server import CellServer, ServerEndedError
-from tactbench.core.matrix.pool.limits import Limits
 from tactbench.core.matrix.engines.request import Request, Setting, pack, unpack_reply
-from tactbench.core.matrix.engines.served import Served
+from tactbench.core.matrix.pool.limits import Limits
 from tests.core.matrix.engines.patience import ending, gone, until
 from tests.core.matrix.engines.remote_work import misbehave, process, read, square, what_is_loaded
 

@@ -11,8 +11,8 @@ import pytest
 from tactbench.core.errors import EngineError, UsageError
 from tactbench.core.matrix.engines import dask_cluster, dask_crew
 from tactbench.core.matrix.engines.dask import open_dask
-from tactbench.core.matrix.pool.limits import Limits
 from tactbench.core.matrix.engines.sight import fingerprints
+from tactbench.core.matrix.pool.limits import Limits
 from tests.core.matrix.engines.patience import ending, gone, until
 from tests.core.matrix.engines.remote_work import square, wait_for
 from tests.core.matrix.engines.started import posing_as, started
