@@ -1,7 +1,5 @@
 """What comes back from a cell is looked at before it is kept."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -18,7 +16,7 @@ OPENED = opening(CELL, force_task())
 def answers(n=5):
     number = np.arange(n)
     column = np.linspace(0.0, 1.0, n)
-    return Answers(column, column, number, number, number, column, column)
+    return vars(Answers(column, column, number, number, number, column, column))
 
 
 def row(**changes):
@@ -46,11 +44,12 @@ def test_an_honest_result_has_no_fault():
         ((row(recordings=[b"one"]), {"test": answers()}), "its recordings are [b'one']"),
         ((row(), {}), "no answers to the test set"),
         ((row(), {"test": [1, 2, 3]}), "are a list"),
+        ((row(), {"test": {"y_true": np.arange(5)}}), "without the columns of answers"),
         ((row(n_test=6), {"test": answers()}), "gave 5 test answers and says 6"),
-        ((row(), {"test": replace(answers(), row=np.arange(4))}), "differ in length"),
-        ((row(), {"test": replace(answers(), y_pred=np.full(5, np.nan))}), "NaN or infinite"),
-        ((row(), {"test": replace(answers(), y_pred=np.zeros((5, 1)))}), "no plain column y_pred"),
-        ((row(), {"test": replace(answers(), y_pred=np.array([object()] * 5))}), "no plain column y_pred"),
+        ((row(), {"test": answers() | {"row": np.arange(4)}}), "differ in length"),
+        ((row(), {"test": answers() | {"y_pred": np.full(5, np.nan)}}), "NaN or infinite"),
+        ((row(), {"test": answers() | {"y_pred": np.zeros((5, 1))}}), "no plain column y_pred"),
+        ((row(), {"test": answers() | {"y_pred": np.array([object()] * 5)}}), "no plain column y_pred"),
     ],
 )
 def test_a_lie_is_named(given, says):

@@ -126,9 +126,12 @@ def _children_of_items(busy: list[Worker], idle: list[Worker]) -> Iterator[set[i
     """
     if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGCHLD) == signal.SIG_IGN:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else the system reaps children, and nobody hears how they ended
-    before = set_subreaper(True)
-    spared = own_children()
+    before: bool | None = None
+    spared: set[int] = set()
     try:
+        with interrupts_blocked():
+            spared |= own_children()
+            before = set_subreaper(True)
         yield spared
     finally:
         try:
@@ -140,5 +143,6 @@ def _children_of_items(busy: list[Worker], idle: list[Worker]) -> Iterator[set[i
                     worker.kill()
                 for worker in (*busy, *idle):
                     worker.close()
-                kill_orphans(spared)
-                set_subreaper(before)
+                if before is not None:
+                    kill_orphans(spared)
+                    set_subreaper(before)
