@@ -23,8 +23,8 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 from tactbench.core.matrix.engines.dask import open_dask  # noqa: E402
-from tactbench.core.matrix.engines.isolated import Isolated  # noqa: E402
 from tactbench.core.matrix.pool.limits import Limits  # noqa: E402
+from tactbench.core.matrix.pool.pool import Pool  # noqa: E402
 
 JOBS, FEW = 2, 10
 LIMITS = Limits(timeout_s=60.0)
@@ -99,6 +99,6 @@ def main(cells: int, rounds: int) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["isolated"]:
-        print(per_cell_ms(Isolated(JOBS, LIMITS), int(sys.argv[2])))
+        print(per_cell_ms(Pool(JOBS, LIMITS), int(sys.argv[2])))
     else:
         main(*(int(word) for word in (*sys.argv[1:], *("300", "5")[len(sys.argv) - 1 :])))
