@@ -7,6 +7,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+import h5py
 import pytest
 
 from tactbench.core.matrix.store import Store
@@ -43,6 +44,7 @@ ENDS = {
     "evil-scribble": ("done", None, ""),
     "evil-kill": ("crashed", 9, "SIGKILL"),
     "evil-import": ("crashed", 6, "SIGABRT"),
+    "evil-patch": ("done", None, ""),
 }
 """Status, signal and a part of the reason of every evil cell."""
 
@@ -115,6 +117,14 @@ def test_every_evil_cell_has_one_row_and_the_others_are_right(engine, alone, tmp
     assert until(lambda: not processes_in(tmp_path)), processes_in(tmp_path)
 
 
+@pytest.mark.parametrize("engine", ["in-process", "isolated", "dask"])
+def test_a_library_that_a_strangers_estimator_patches_is_patched_for_no_other_cell(engine, alone, tmp_path):
+    honest, shelf = alone
+    (tmp_path / "shelf").symlink_to(shelf)
+    run(Shell(tmp_path), "--estimator", "evil-patch", "--estimator", "ols", *ENGINES[engine], code=0)
+    assert [line for line in lines_of(tmp_path / "out") if "/evil-patch/" not in line] == honest
+
+
 def test_what_a_cell_prints_is_in_its_row(alone, tmp_path):
     (tmp_path / "shelf").symlink_to(alone[1])
     for engine in ("in-process", "isolated"):
@@ -147,6 +157,16 @@ def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
     assert {(row["status"], "flat.h5" in row["reason"]) for row in rows if row["sensor"] == "icub"} == {
         ("failed", True)
     }
+
+
+def test_a_recording_that_lacks_its_streams_is_told_by_its_cells(tmp_path):
+    presses(tmp_path / "shelf")
+    damaged = sorted((tmp_path / "shelf").rglob("*.h5"))[0]
+    with h5py.File(damaged, "a") as file:
+        del file["streams"]
+    asked = (*ASKED, "--estimator", "ols", "--estimator", "ridge", "--format", "json")
+    rows = json.loads(Shell(tmp_path)(*asked, code=1).stdout)
+    assert all(row["status"] == "failed" and damaged.name in row["reason"] for row in rows)
 
 
 @pytest.mark.parametrize("asked", [("--sensor", "made"), ()])

@@ -22,10 +22,7 @@ class Engine(Protocol):
         work
             Called with one item. Whatever it does, the other items are carried out.
         items
-            Engines may take them one by one, as there is room for them, or all at once. One that is at hand may be
-            taken while others are at work: where ``operator.length_hint`` of their iterator is not 0. That of a list
-            knows how many are left, that of a generator does not; one that prepares something when an item is taken
-            says in its ``__length_hint__`` how many it can give without.
+            Engines may take them one by one, as there is room for them, or all at once.
         meanwhile
             Done here while workers elsewhere are busy.
 

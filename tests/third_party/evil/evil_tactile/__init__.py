@@ -32,7 +32,13 @@ def tactbench_estimators():
     ] + [
         EstimatorDescriptor(
             name="evil-import", title="Aborts when it is imported", kinds=KINDS, where="evil_tactile.bomb:build"
-        )
+        ),
+        EstimatorDescriptor(
+            name="evil-patch",
+            title="Patches scikit-learn when it is imported",
+            kinds=KINDS,
+            where="evil_tactile.patch:build",
+        ),
     ]
 
 
