@@ -184,7 +184,7 @@ def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
     if choice.forks(len(jobs)):
         return shared(groups, choice)
     if choice.here(len(jobs)):
-        import_estimators([job[0] for job in jobs], choice)
+        import_estimators([job[0] for job in jobs])
     return [job for group in groups.values() for job in group]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from tactbench.core.evaluation.libraries import import_libraries
@@ -21,7 +20,7 @@ def shared(groups: Groups, choice: EngineChoice) -> Iterator[Job]:
     from tactbench.core.evaluation.thread_limit import find_libraries
 
     for (task, recordings), jobs in groups.items():
-        import_estimators([job[0] for job in jobs], choice)
+        import_estimators([job[0] for job in jobs])
         trouble = _read_here(task, recordings, choice) if len(jobs) > 1 else None
         find_libraries()
         for cell, paths, _ in jobs:
@@ -47,7 +46,7 @@ def _readable(wanted: Wanted) -> bool:
     return True
 
 
-def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
+def import_estimators(cells: Sequence[Cell]) -> None:
     """Prepare each of our own estimators once; what is wrong with it is its cells'.
 
     Those of others are imported in their cells' processes only: what an import changes there, such as a library that it
@@ -57,9 +56,9 @@ def import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
 
     import_libraries()
     several = {(cell.task, cell.estimator): cell for cell in cells if our_own(cell.estimator)}
-    # No limit of memory here: a BLAS that is refused some asks again for ever.
-    here = InProcess(replace(choice.limits, memory_mb=None))
-    for _ in here.each(prepare, [cell for key, cell in several.items() if key not in _prepared]):
+    # No limits here: a BLAS that is refused memory asks again for ever, and a library half imported when time is up
+    # is broken for every cell.
+    for _ in InProcess().each(prepare, [cell for key, cell in several.items() if key not in _prepared]):
         pass
     _prepared.update(several)
     find_libraries()

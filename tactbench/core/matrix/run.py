@@ -134,7 +134,7 @@ def _carry_out(
     rows: list[Row] = []
     rounds = _rounds(cells, choice, material)
     for number, some in enumerate(rounds, 1):
-        ready = partial(_import_estimators, some, choice) if inherited else None
+        ready = partial(_import_estimators, some) if inherited else None
         during = told if len(rounds) == 1 else Prefixed(told, f"replicate {number} of {len(rounds)}: ")
         acquire_missing(material, some, book, choice, during, ready, operator)
         evaluated = evaluate_all(some, material, book, choice, store, made_by, during)
@@ -163,7 +163,7 @@ def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: Material) -> 
     return list(rounds.values())
 
 
-def _import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
+def _import_estimators(cells: Sequence[Cell]) -> None:
     from tactbench.core.matrix.preloading import import_estimators
 
-    import_estimators(cells, choice)
+    import_estimators(cells)

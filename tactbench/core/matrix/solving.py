@@ -7,7 +7,6 @@ import random
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
@@ -113,8 +112,12 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     registry = installed()
     if trouble is not None:
         return unanswered(cell, trouble), {}
-    with suppress(Exception):  # the cell will tell
+    try:
         prepare(cell)
+    except MemoryError:
+        raise
+    except Exception:
+        pass  # the cell will tell
     began = time.perf_counter()
     _seed_everything(cell.seed)
     row, sets = answer(cell, registry, recordings, DATASETS, working)
