@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
 from functools import lru_cache
 
 from tactbench.core.errors import UnwritableError
@@ -62,21 +63,22 @@ def acquire_missing(
     simulated = all(_computed(order) for order in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     told.begin("recording", len(missing), alone=False)
-    outcomes: Iterator[tuple[Order, str | BaseException]]
+    outcomes: Generator[tuple[Order, str | BaseException]]
     try:
         if operator is not None and not simulated:
             outcomes = _one_by_one(missing, operator)
         else:
             outcomes = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S).each(record, missing, meanwhile)
-        for order, outcome in outcomes:
-            if isinstance(outcome, UnwritableError):
-                raise outcome  # the disk is no cell's fault, and refuses the next one too
-            if isinstance(outcome, BaseException):
-                material.refused[order.path] = outcome
-                partial_path(order.path).unlink(missing_ok=True)
-            else:
-                material.recorded.made(order.path, outcome)
-            told.advance(f"{order.sensor} {order.scene.name}", stopped=isinstance(outcome, BaseException))
+        with closing(outcomes):
+            for order, outcome in outcomes:
+                if isinstance(outcome, UnwritableError):
+                    raise outcome  # the disk is no cell's fault, and refuses the next one too
+                if isinstance(outcome, BaseException):
+                    material.refused[order.path] = outcome
+                    partial_path(order.path).unlink(missing_ok=True)
+                else:
+                    material.recorded.made(order.path, outcome)
+                told.advance(f"{order.sensor} {order.scene.name}", stopped=isinstance(outcome, BaseException))
     except BaseException:
         # Workers that were ended in the middle could not tidy up behind themselves.
         for order in missing:
@@ -95,7 +97,7 @@ def _computed(order: Order) -> bool:
     return devices.emulation.time == "virtual" and all(entry is None or entry.emulated for entry in used)
 
 
-def _one_by_one(orders: Sequence[Order], operator: Operator) -> Iterator[tuple[Order, str | BaseException]]:
+def _one_by_one(orders: Sequence[Order], operator: Operator) -> Generator[tuple[Order, str | BaseException]]:
     """Carry out scenes in this process; what a rig raises is the scene's outcome."""
     for order in orders:
         try:

@@ -8,12 +8,14 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import wait
-from typing import Any
+from typing import Any, TypeVar
 
-from tactbench.core.matrix.engines.engine import R, T
 from tactbench.core.matrix.pool.limits import UNLIMITED, Limits
 from tactbench.core.matrix.pool.processes import interrupts_blocked, kill_orphans, own_children, set_subreaper
 from tactbench.core.matrix.pool.worker import PENDING, Worker
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 
 class Pool:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
 
+from tests.conftest import ROOT
 from tests.core.matrix.engines.patience import until
 
 
@@ -35,7 +36,7 @@ class Started:
 
     def _start(self, program, *arguments, path=(), cwd=None):
         log = self._stack.enter_context((self.folder / f"{program}.log").open("ab"))
-        env = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path)), "OMP_NUM_THREADS": "1"}
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, [*path, ROOT])), "OMP_NUM_THREADS": "1"}
         env["TMPDIR"] = str(self.folder)  # what they keep for themselves goes with the test
         host = ("--host", "127.0.0.1")
         process = subprocess.Popen(
