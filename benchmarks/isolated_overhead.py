@@ -17,9 +17,9 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from tactbench.core.matrix.pool.limits import Limits
-from tactbench.core.matrix.pool.pool import Pool
-from tactbench.core.matrix.pool.processes import can_fork
+from tactbench.core.pool.limits import Limits
+from tactbench.core.pool.pool import Pool
+from tactbench.core.pool.processes import can_fork
 
 BOUND_MS = 40.0
 

@@ -42,7 +42,7 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         trivial.use(folder / "plugin")
         from tactbench.core.evaluation.cell import evaluate
         from tactbench.core.evaluation.dataset import load_dataset
-        from tactbench.core.matrix.engines.choice import EngineChoice
+        from tactbench.core.matrix.engine import EngineChoice
         from tactbench.core.matrix.run import run_matrix
         from tactbench.core.matrix.store import Store
         from tactbench.core.plugins.registry import installed

@@ -14,7 +14,7 @@ from tactbench.core.calibration.journal import Journal
 from tactbench.core.calibration.placing import as_procedure
 from tactbench.core.calibration.trial import Trial, carry_out
 from tactbench.core.errors import TactbenchError
-from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.keys import versions
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.provenance import gather

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import closing
 from functools import lru_cache
 
 from tactbench.core.errors import UnwritableError
-from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.explanation import Book
 from tactbench.core.matrix.installed import built
 from tactbench.core.matrix.material import Order, need_of
@@ -30,7 +30,6 @@ def acquire_missing(
     book: Book,
     choice: EngineChoice,
     told: Progress,
-    meanwhile: Callable[[], None] | None = None,
     operator: Operator | None = None,
 ) -> None:
     """Make the recordings that `cells` lack, and note in `material` which were made and what went wrong.
@@ -42,8 +41,6 @@ def acquire_missing(
 
     Parameters
     ----------
-    meanwhile
-        Done here while others are busy.
     operator
         Who stands at a rig of real devices.
 
@@ -63,12 +60,12 @@ def acquire_missing(
     simulated = all(_computed(order) for order in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     told.begin("recording", len(missing), alone=False)
-    outcomes: Generator[tuple[Order, str | BaseException]]
+    outcomes: Generator[tuple[Order, str | BaseException], None, None]
     try:
         if operator is not None and not simulated:
             outcomes = _one_by_one(missing, operator)
         else:
-            outcomes = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S).each(record, missing, meanwhile)
+            outcomes = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S).each(record, missing)
         with closing(outcomes):
             for order, outcome in outcomes:
                 if isinstance(outcome, UnwritableError):
@@ -97,7 +94,9 @@ def _computed(order: Order) -> bool:
     return devices.emulation.time == "virtual" and all(entry is None or entry.emulated for entry in used)
 
 
-def _one_by_one(orders: Sequence[Order], operator: Operator) -> Generator[tuple[Order, str | BaseException]]:
+def _one_by_one(
+    orders: Sequence[Order], operator: Operator
+) -> Generator[tuple[Order, str | BaseException], None, None]:
     """Carry out scenes in this process; what a rig raises is the scene's outcome."""
     for order in orders:
         try:

@@ -9,13 +9,13 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from tactbench.core.matrix.acquiring import record
-from tactbench.core.matrix.engines.in_process import InProcess
 from tactbench.core.matrix.leaving import SEED_DECIDES
 from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.solving import Job, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.pool.in_process import InProcess
 from tactbench.core.samples import Answers
 
 
@@ -71,7 +71,7 @@ def compute_again(
     if orders and trouble is None:
         found += _recordings(paths, [(order.scene.name, made[order.path]) for order in orders])
     told(f"evaluating {cell.name}")
-    job: Job = (cell, tuple(order.path for order in orders) or tuple(paths), trouble)
+    job = Job(cell, tuple(order.path for order in orders) or tuple(paths), trouble=trouble)
     ((_, outcome),) = InProcess().each(solve, [job])
     row, columns = (unanswered(cell, outcome), {}) if isinstance(outcome, BaseException) else outcome
     sets = {role: Answers(**columns[role]) for role in columns}

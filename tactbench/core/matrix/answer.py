@@ -76,6 +76,11 @@ def answer(
     return row, dict(result.sets)
 
 
+ASKED = ("cell", "sensor", "task", "rig", "protocol", "estimator", "params", "is_baseline", "repeat", "repeats", "seed",
+         "simulation", "metric", "unit", "equivalence", "reference_score")  # fmt: skip
+"""What a row says of the question: computing the answer does not change it."""
+
+
 def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with what is known before anything is computed; every key of the format is there."""
     return {

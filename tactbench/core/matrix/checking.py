@@ -6,12 +6,13 @@ Whether its row is plain data, the store finds out when it writes it (`NotPlainE
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
+from tactbench.core.matrix.answer import ASKED
 from tactbench.core.matrix.store import Row
 from tactbench.core.samples import Answers
 from tactbench.core.spec.status import STATUSES
@@ -19,25 +20,29 @@ from tactbench.core.spec.status import STATUSES
 _COLUMNS = tuple(column.name for column in fields(Answers))
 
 
-def fault_in(given: Any, cell: str, keys: Set[str]) -> str:
+SAME_SCORE = 1e-9
+"""Relative difference of two scores of the same answers: sums of a million terms in another order, as on another kind
+of processor, differ by less."""
+
+
+def fault_in(given: Any, asked: Row) -> str:
     """Return what is wrong with what a cell gave, as a clause; "" if nothing is.
 
     Parameters
     ----------
     given
         What came; a row and the columns of its answers by role are wanted.
-    cell
-        Name of the cell.
-    keys
-        What every row has.
+    asked
+        The row as it was before anything was computed: it has every key, and says what was asked.
     """
     if not (isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], dict)):
         return f"it gave a {type(given).__name__} and not a row with its answers"
     row, sets = given
-    if row.keys() != keys:
-        return f"its row has other keys: {', '.join(sorted(map(str, row.keys() ^ keys)))}"
-    if row["cell"] != cell:
-        return f"its row is that of another cell, {row['cell']!r}"
+    if row.keys() != asked.keys():
+        return f"its row has other keys: {', '.join(sorted(map(str, row.keys() ^ asked.keys())))}"
+    for name in ASKED:
+        if row[name] != asked[name]:
+            return f"its row is that of another cell: its {name} is {row[name]!r}, not {asked[name]!r}"
     if row["status"] not in STATUSES:
         return f"its status is {row['status']!r}"
     recordings = row["recordings"]
@@ -70,4 +75,17 @@ def _fault_in_answers(sets: Any, row: Row) -> str:
     given = len(sets["test"]["y_true"])
     if given != row["n_test"]:
         return f"it gave {given} test answers and says {row['n_test']}"
+    return _fault_in_score(sets["test"], row)
+
+
+def _fault_in_score(test: Mapping[str, Any], row: Row) -> str:
+    """Compute the score anew from the answers that are kept, in this process, where no plugin has run."""
+    from tactbench.core.evaluation.metrics import metric_called
+
+    try:
+        found = metric_called(row["metric"]).of(test["y_true"], test["y_pred"], len(row["classes"]))
+    except (TypeError, ValueError, IndexError) as error:
+        return f"its answers have no {row['metric']}: {error}"
+    if not math.isclose(found, row["score"], rel_tol=SAME_SCORE, abs_tol=SAME_SCORE):
+        return f"its score is {row['score']!r}, and its answers give {found!r}"
     return ""

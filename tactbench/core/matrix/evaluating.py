@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tactbench.core.errors import PluginContractError
 from tactbench.core.matrix.answer import Answer, opening, reused
-from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.explanation import Book, beside
-from tactbench.core.matrix.in_flight import InFlight
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.reading import read_all
 from tactbench.core.matrix.recorded import read_digest
+from tactbench.core.matrix.solving import Job, solve, this_host, unanswered
 from tactbench.core.matrix.store import NotPlainError, Row, Store
 from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Answers
 from tactbench.core.spec.status import STOPPED
-
-if TYPE_CHECKING:
-    from tactbench.core.matrix.solving import Job
 
 
 @dataclass
@@ -70,13 +67,15 @@ def evaluate_all(
             done.rows[cell.name] = reused(found, cell, installed().tasks[cell.task].spec)
             store.reuse(done.rows[cell.name])
         else:
-            waiting.append((cell, tuple(paths), trouble))
+            remote = choice.name == "dask" and trouble is None
+            digests = tuple(material.recorded.digest(path) for path in paths) if remote else ()
+            waiting.append(Job(cell, tuple(paths), digests, trouble))
     done.computed = len(waiting)
     if waiting:
-        keyed = ((cell, known.keys[cell.name], paths) for cell, paths, _ in waiting if cell.name in known.keys)
+        keyed = ((one.cell, known.keys[one.cell.name], one.recordings) for one in waiting if one.trouble is None)
         book.note_cells(keyed, material.recorded, store.folder)
         _compute(waiting, known, choice, store, told, done)
-        spoilt = [job for job in waiting if _spoilt(done.rows[job[0].name], store)]
+        spoilt = [job for job in waiting if _spoilt(done.rows[job.cell.name], store)]
         if spoilt:
             _compute(spoilt, known, choice, store, told, done)
     return done
@@ -98,19 +97,9 @@ class _Known:
     made_by: str
     read: dict[tuple[str, ...], Row] = field(default_factory=dict)
     """What rows say of the same recordings."""
-    opened: set[str] = field(default_factory=set)
-    """The keys that every row has, once the first was looked at."""
-
-    def keys_of_rows(self, cell: Cell) -> set[str]:
-        """Return the keys that the row of `cell` must have, and that of any other."""
-        if not self.opened:
-            self.opened.update(opening(cell, installed().tasks[cell.task].spec))
-        return self.opened
 
     def told(self, row: Row) -> Row:
         """Return `row` with all of it."""
-        from tactbench.core.matrix.solving import this_host
-
         named = tuple(row["recordings"])
         if named not in self.read:
             paths = [Path(path) for path in named]
@@ -129,27 +118,17 @@ def _unreadable(cells: Sequence[Cell], material: Material, choice: EngineChoice)
 def _compute(
     waiting: list[Job], known: _Known, choice: EngineChoice, store: Store, told: Progress, done: Evaluated
 ) -> None:
-    from tactbench.core.matrix.solving import solve, unanswered
-
-    jobs = [job for job in waiting if job[2] is None]
-    marks = InFlight(store.folder)
-    if len(jobs) == 1 and choice.here(1) and marks.ended_a_run(known.keys[jobs[0][0].name]):
-        choice = EngineChoice("isolated", 1, choice.limits)
+    jobs = [job for job in waiting if job.trouble is None]
     here = choice.here(len(jobs))
     told.begin("evaluating", len(waiting), alone=here)
     work = partial(solve, concurrency=choice.concurrency(len(jobs)), working=told.working if here else None)
     engine = choice.engine(len(jobs))
     hopeless: Iterator[tuple[Job, Any]] = (
-        (job, (unanswered(job[0], job[2]), {})) for job in waiting if job[2] is not None
+        (job, (unanswered(job.cell, job.trouble), {})) for job in waiting if job.trouble is not None
     )
-    ordered = _ordered(jobs, choice)
-    computed = engine.each(work, _marked(ordered, marks, known.keys) if here else ordered)
-    try:
-        with closing(_each(hopeless, computed)) as outcomes:
-            for job, outcome in outcomes:
-                _entered(job[0], outcome, known, store, told, done)
-    finally:
-        marks.clear()
+    with closing(_each(hopeless, engine.each(work, _ordered(jobs, choice)))) as outcomes:
+        for job, outcome in outcomes:
+            _entered(job.cell, outcome, known, store, told, done)
 
 
 def _entered(cell: Cell, outcome: Any, known: _Known, store: Store, told: Progress, done: Evaluated) -> None:
@@ -180,29 +159,21 @@ def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
 
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
-        groups.setdefault((job[0].task, job[1]), []).append(job)
+        groups.setdefault((job.cell.task, job.recordings), []).append(job)
     if choice.forks(len(jobs)):
         return shared(groups, choice)
     if choice.here(len(jobs)):
-        import_estimators([job[0] for job in jobs])
+        import_estimators([job.cell for job in jobs])
     return [job for group in groups.values() for job in group]
-
-
-def _marked(jobs: Iterable[Job], marks: InFlight, keys: Mapping[str, str]) -> Iterator[Job]:
-    """Yield `jobs`, and note each before it begins: one that ends this process is known to the next."""
-    for job in jobs:
-        marks.set(keys[job[0].name])
-        yield job
 
 
 def _judged(cell: Cell, outcome: Any, known: _Known) -> Answer:
     """Return the row and answers of a cell; what stopped it, or what is wrong with them, makes the row."""
     from tactbench.core.matrix.checking import fault_in
-    from tactbench.core.matrix.solving import unanswered
 
     if isinstance(outcome, BaseException):
         return unanswered(cell, outcome), {}
-    fault = fault_in(outcome, cell.name, known.keys_of_rows(cell))
+    fault = fault_in(outcome, opening(cell, installed().tasks[cell.task].spec))
     if fault:
         return _refused(cell, fault)
     row, columns = outcome
@@ -210,7 +181,5 @@ def _judged(cell: Cell, outcome: Any, known: _Known) -> Answer:
 
 
 def _refused(cell: Cell, fault: str) -> Answer:
-    from tactbench.core.matrix.solving import unanswered
-
     error = PluginContractError(f"The cell's result is not one: {fault}.", hint="Its estimator or task is at fault.")
     return unanswered(cell, error), {}

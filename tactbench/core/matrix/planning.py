@@ -9,7 +9,7 @@ from typing import TypeVar, cast
 
 from tactbench.core.errors import NotApplicable, TactbenchError, UnknownNameError, UsageError
 from tactbench.core.evaluation.few_shot import shots
-from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.installed import built, listed
 from tactbench.core.matrix.material import Need, Order, need_of, orders_for
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells
@@ -123,7 +123,7 @@ def _in_vain(
 
 def _greeted(ask: Callable[[], R], choice: EngineChoice) -> R | BaseException:
     """Return what a rig says, or why it does not; raises what is the user's to mend."""
-    from tactbench.core.matrix.engines.in_process import InProcess
+    from tactbench.core.pool.in_process import InProcess
 
     ((_, outcome),) = InProcess(choice.limits).each(lambda _: ask(), [None])
     if isinstance(outcome, TactbenchError) and outcome.exit_code == UsageError.exit_code:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
+from contextlib import suppress
 from pathlib import Path
 
 from tactbench.core.evaluation.libraries import import_libraries
-from tactbench.core.matrix.engines.choice import EngineChoice
-from tactbench.core.matrix.engines.in_process import InProcess
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.solving import DATASETS, Job, Wanted, our_own, prepare
+from tactbench.core.plugins.registry import installed
 
 Groups = Mapping[Wanted, Sequence[Job]]
 """Cells by task and recordings."""
@@ -20,11 +21,11 @@ def shared(groups: Groups, choice: EngineChoice) -> Iterator[Job]:
     from tactbench.core.evaluation.thread_limit import find_libraries
 
     for (task, recordings), jobs in groups.items():
-        import_estimators([job[0] for job in jobs])
+        import_estimators([job.cell for job in jobs])
         trouble = _read_here(task, recordings, choice) if len(jobs) > 1 else None
         find_libraries()
-        for cell, paths, _ in jobs:
-            yield cell, paths, trouble
+        for job in jobs:
+            yield job._replace(trouble=trouble)
 
 
 def _read_here(task: str, recordings: tuple[Path, ...], choice: EngineChoice) -> BaseException | None:
@@ -47,21 +48,29 @@ def _readable(wanted: Wanted) -> bool:
 
 
 def import_estimators(cells: Sequence[Cell]) -> None:
-    """Prepare each of our own estimators once; what is wrong with it is its cells'.
+    """Prepare each of our own estimators that `cells` use, once; what is wrong with it is its cells'.
 
     Those of others are imported in their cells' processes only: what an import changes there, such as a library that it
     patches, changes no other cell.
     """
+    _import({(cell.estimator, installed().tasks[cell.task].spec.kind) for cell in cells})
+
+
+def import_ours() -> None:
+    """Prepare all of our own estimators."""
+    _import({(one.name, kind) for one in installed().estimators for kind in one.kinds})
+
+
+def _import(several: Set[tuple[str, str]]) -> None:
     from tactbench.core.evaluation.thread_limit import find_libraries
 
     import_libraries()
-    several = {(cell.task, cell.estimator): cell for cell in cells if our_own(cell.estimator)}
-    # No limits here: a BLAS that is refused memory asks again for ever, and a library half imported when time is up
-    # is broken for every cell.
-    for _ in InProcess().each(prepare, [cell for key, cell in several.items() if key not in _prepared]):
-        pass
-    _prepared.update(several)
+    for estimator, kind in sorted(several - _tried):
+        _tried.add((estimator, kind))
+        if our_own(estimator):
+            with suppress(Exception):
+                prepare(estimator, kind)
     find_libraries()
 
 
-_prepared: set[tuple[str, str]] = set()
+_tried: set[tuple[str, str]] = set()

@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.recorded import Recorded, stat_of
 from tactbench.core.matrix.remembered import Facts
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tactbench.core.matrix.acquiring import acquire_missing
-from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluating import Evaluated, evaluate_all
 from tactbench.core.matrix.explanation import Book
 from tactbench.core.matrix.key_book import KeyBook
@@ -127,16 +126,14 @@ def _carry_out(
     recorded = Recorded(store.folder / "cache" / "recordings.json")
     book = Book(KeyBook(store.folder / "cache" / "keys"), keys_of(registry, sources))
     cells, material = plan(matrix, registry, sources, store, recordings, recorded, choice)
-    provenance = gather(sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.named(len(cells)))
+    provenance = gather(sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
     made_by = store.begin(provenance)
-    inherited = choice.named(len(cells)) != "dask"
     found = Evaluated()
     rows: list[Row] = []
     rounds = _rounds(cells, choice, material)
     for number, some in enumerate(rounds, 1):
-        ready = partial(_import_estimators, some) if inherited else None
         during = told if len(rounds) == 1 else Prefixed(told, f"replicate {number} of {len(rounds)}: ")
-        acquire_missing(material, some, book, choice, during, ready, operator)
+        acquire_missing(material, some, book, choice, during, operator)
         evaluated = evaluate_all(some, material, book, choice, store, made_by, during)
         found.rows |= evaluated.rows
         found.computed += evaluated.computed
@@ -159,11 +156,5 @@ def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: Material) -> 
     rounds: dict[int, list[Cell]] = {}
     for cell in cells:
         number = cell.repeat if material.orders else 1
-        rounds.setdefault(min(number, 2) if choice.named(len(cells)) == "dask" else number, []).append(cell)
+        rounds.setdefault(min(number, 2) if choice.name == "dask" else number, []).append(cell)
     return list(rounds.values())
-
-
-def _import_estimators(cells: Sequence[Cell]) -> None:
-    from tactbench.core.matrix.preloading import import_estimators
-
-    import_estimators(cells)

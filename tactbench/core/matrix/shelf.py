@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tactbench.core.errors import MissingRecordingError, UnknownNameError
-from tactbench.core.matrix.engines.choice import EngineChoice
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.reading import read_all
 from tactbench.core.matrix.recorded import Recorded, Subject, read_subject
 from tactbench.core.plugins.registry import Registry

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import random
 import time
 from collections import OrderedDict
@@ -10,24 +11,34 @@ from collections.abc import Callable
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.libraries import import_libraries
+from tactbench.core.errors import EngineError, NotApplicable, RecordingError
 from tactbench.core.matrix.answer import answer, opening, stopped
-from tactbench.core.matrix.engines.company import company
-from tactbench.core.matrix.engines.share import Share
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.pool.log import printed
 from tactbench.core.matrix.provenance import host_id
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import installed, load_object
+from tactbench.core.pool.log import printed
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset
 
-Job = tuple[Cell, tuple[Path, ...], "BaseException | None"]
-"""A cell, its recordings, and why there are none if the rig could not make them."""
+
+PRELOAD = ("tactbench.core.matrix.preloaded",)
+"""Imported by the fork server of processes that cannot fork themselves."""
+
+
+class Job(NamedTuple):
+    """A cell to be answered."""
+
+    cell: Cell
+    recordings: tuple[Path, ...]
+    digests: tuple[str, ...] = ()
+    """Of the recordings' content, which a process on another machine compares with what it sees; none: it need not."""
+    trouble: BaseException | None = None
+    """Why there are no recordings."""
+
 
 Wanted = tuple[str, tuple[Path, ...]]
 """A task and recordings."""
@@ -35,19 +46,17 @@ Wanted = tuple[str, tuple[Path, ...]]
 this_host = lru_cache(maxsize=1)(host_id)
 
 
-def prepare(cell: Cell) -> None:
-    """Import what a cell's estimator needs, and have it learn a few made-up rows, before any clock is read.
+def prepare(estimator: str, kind: str) -> None:
+    """Import what an estimator needs, and have it learn a few made-up rows, before any clock is read.
 
     Done once in a process; a child process does it again, since a fork copies each page of memory when it is first
     written to. Raises whatever the estimator raises.
     """
-    registry = installed()
-    descriptor = registry.estimators[cell.estimator]
-    kind = registry.tasks[cell.task].spec.kind
-    here = os.getpid(), cell.estimator, kind
+    here = os.getpid(), estimator, kind
     if here in _prepared:
         return
     _prepared.add(here)
+    descriptor = installed().estimators[estimator]
     build = load_object(descriptor.where)
     build(kind=kind, seed=0, threads=1, **descriptor.params)
     if descriptor.rehearsal is not None:
@@ -106,14 +115,15 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     Parameters
     ----------
     concurrency
-        Cells that may be at work at once while this one is timed, where the engine does not know better.
+        Cells that may be at work at once while this one is timed.
     """
-    cell, recordings, trouble = job
+    cell, recordings, digests, trouble = job
     registry = installed()
+    trouble = trouble or _unseen(recordings, digests)
     if trouble is not None:
         return unanswered(cell, trouble), {}
     try:
-        prepare(cell)
+        prepare(cell.estimator, registry.tasks[cell.task].spec.kind)
     except MemoryError:
         raise
     except Exception:
@@ -121,30 +131,34 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     began = time.perf_counter()
     _seed_everything(cell.seed)
     row, sets = answer(cell, registry, recordings, DATASETS, working)
-    timed = {"wall_s": time.perf_counter() - began, "concurrency": company(concurrency), "host": this_host()}
+    timed = {"wall_s": time.perf_counter() - began, "concurrency": concurrency, "host": this_host()}
     columns = {
         str(role): {one.name: getattr(answers, one.name) for one in fields(answers)} for role, answers in sets.items()
     }
     return {**row, **timed, "log": printed()}, columns
 
 
+def _unseen(recordings: tuple[Path, ...], digests: tuple[str, ...]) -> BaseException | None:
+    """Return what is wrong if this process sees other recordings than the run does."""
+    from tactbench.core.recording.reader import content_digest
+
+    for path, digest in zip(recordings, digests, strict=False):
+        try:
+            if content_digest(path) == digest:
+                continue
+            why = f"its {path} is another file"
+        except RecordingError as error:
+            why = f"it cannot read {path} ({error.message})"
+        return EngineError(
+            f"The worker on {platform.node()} cannot compute this cell: {why}.",
+            hint="Every worker must see the files of the run, unchanged, at the same paths.",
+        )
+    return None
+
+
 def our_own(estimator: str) -> bool:
     """Return whether an estimator comes with this package: tested with it, and trusted not to end whoever builds it."""
     return installed().estimators.owned(estimator).module.partition(".")[0] == __name__.partition(".")[0]
-
-
-def _shares(job: Job) -> list[Share]:
-    """Return what other cells need as well, so that a process may load it for its children."""
-    cell, recordings, _ = job
-    ours = our_own(cell.estimator)
-    return [
-        Share("libraries", import_libraries, trusted=True),
-        *([Share(("estimator", cell.task, cell.estimator), lambda: prepare(cell), trusted=True)] if ours else []),
-        Share(("recordings", cell.task, recordings), lambda: DATASETS(cell.task, recordings)),
-    ]
-
-
-setattr(solve, "shares", _shares)  # noqa: B010  (type checkers know no attributes of functions)
 
 
 def unanswered(cell: Cell, trouble: BaseException) -> dict[str, object]:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from tests.core.matrix.engines.patience import ending
+from tests.core.pool.patience import ending
 
 COMMAND = [
     *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "icub", "--task", "curvature"),

@@ -5,14 +5,14 @@ from __future__ import annotations
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import Any, TypeVar
 
-from tactbench.core.matrix.pool.limits import UNLIMITED, Limits
-from tactbench.core.matrix.pool.processes import interrupts_blocked, kill_orphans, own_children, set_subreaper
-from tactbench.core.matrix.pool.worker import PENDING, Worker
+from tactbench.core.pool.limits import UNLIMITED, Limits
+from tactbench.core.pool.processes import interrupts_blocked, kill_orphans, own_children, set_subreaper
+from tactbench.core.pool.worker import PENDING, Worker
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -34,6 +34,8 @@ class Pool:
     preload
         None: this process forks, which must have one thread. Else a fork server of `multiprocessing` does, which first
         imports these modules; work and items are pickled.
+    wanted
+        Asked while items are at work whether anybody still waits for them; the iteration ends where nobody does.
 
     Notes
     -----
@@ -42,16 +44,21 @@ class Pool:
     """
 
     def __init__(
-        self, jobs: int = 1, limits: Limits = UNLIMITED, *, reuse: bool = False, preload: Sequence[str] | None = None
+        self,
+        jobs: int = 1,
+        limits: Limits = UNLIMITED,
+        *,
+        reuse: bool = False,
+        preload: Sequence[str] | None = None,
+        wanted: Callable[[], bool] = lambda: True,
     ) -> None:
         self._jobs = jobs
         self._limits = limits
         self._reuse = reuse
         self._preload = preload
+        self._wanted = wanted
 
-    def each(
-        self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
-    ) -> Iterator[tuple[T, R | BaseException]]:
+    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
         """Yield every item with its result or what stopped it, in the order in which they end.
 
         Notes
@@ -75,11 +82,8 @@ class Pool:
                         self._begin(work, every or [item], index, second, busy, idle)
                     except Exception as error:  # it cannot be pickled, or the system starts no more processes
                         yield item, error  # type: ignore[misc]
-                if not busy:
+                if not busy or not self._wanted():
                     return
-                if meanwhile is not None:
-                    meanwhile()
-                    meanwhile = None
                 wait([one for worker in busy for one in worker.waits_on], min(worker.wait_s() for worker in busy))
                 for worker in list(busy):
                     outcome = worker.outcome()

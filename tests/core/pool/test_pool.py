@@ -12,12 +12,12 @@ import pytest
 
 from tactbench.core.errors import Crashed, OutOfMemory, TimedOut
 from tactbench.core.evaluation.libraries import EVERY_CELL
-from tactbench.core.matrix.pool import processes
-from tactbench.core.matrix.pool.limits import Limits
-from tactbench.core.matrix.pool.pool import Pool
-from tests.core.matrix.engines.patience import ending, gone, pause, until
-from tests.core.matrix.engines.remote_work import misbehave, square
-from tests.core.matrix.engines.works import flees, leaves, work
+from tactbench.core.pool import processes
+from tactbench.core.pool.limits import Limits
+from tactbench.core.pool.pool import Pool
+from tests.core.pool.patience import ending, gone, pause, until
+from tests.core.pool.remote_work import misbehave, square
+from tests.core.pool.works import flees, leaves, work
 
 LIMITS = Limits(timeout_s=20.0, memory_mb=64)
 POOLS = {
@@ -282,8 +282,8 @@ class TestForkServer:
 
 def test_an_item_that_kills_the_fork_server_has_crashed_and_the_others_are_right():
     code = (
-        "from tests.core.matrix.engines.remote_work import misbehave\n"
-        "from tactbench.core.matrix.pool.pool import Pool\n"
+        "from tests.core.pool.remote_work import misbehave\n"
+        "from tactbench.core.pool.pool import Pool\n"
         "for item, outcome in Pool(1, preload=()).each(misbehave, ['fine', 'kill-parent', 'fine']):\n"
         "    print(type(outcome).__name__)\n"
     )
@@ -294,8 +294,8 @@ def test_an_item_that_kills_the_fork_server_has_crashed_and_the_others_are_right
 OWNER = """
 import sys
 from pathlib import Path
-from tactbench.core.matrix.pool.pool import Pool
-from tests.core.matrix.engines.remote_work import wait_for
+from tactbench.core.pool.pool import Pool
+from tests.core.pool.remote_work import wait_for
 preload = () if sys.argv[2] == "served" else None
 for _ in Pool(1, preload=preload).each(wait_for, [(Path(sys.argv[1]), Path("/no/such/file"))]):
     pass

@@ -6,16 +6,14 @@ import shutil
 import subprocess
 import sys
 
-from tactbench.core.matrix.engines.surroundings import differences
+from tactbench.core.matrix.dask import differences
 from tests.conftest import THIRD_PARTY
 
 ASK = """
 import json
-from tactbench.core.matrix.engines.surroundings import sources_remembered, surroundings
+from tactbench.core.matrix.dask import environment
 from tactbench.core.plugins.registry import installed
-sources = sources_remembered("")
-print(json.dumps(surroundings(installed(), sources)))
-sources.save()  # nowhere
+print(json.dumps(environment(installed())))
 """
 
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
 from tactbench.core.errors import OutOfMemory, TimedOut
-from tactbench.core.matrix.engines.engine import R, T
-from tactbench.core.matrix.pool.endings import out_of_memory, too_slow
-from tactbench.core.matrix.pool.limits import UNLIMITED, Limits
-from tactbench.core.matrix.pool.log import open_log, printing_to, tail
-from tactbench.core.matrix.pool.memory import data_limit
+from tactbench.core.pool.endings import out_of_memory, too_slow
+from tactbench.core.pool.limits import UNLIMITED, Limits
+from tactbench.core.pool.log import open_log, printing_to, tail
+from tactbench.core.pool.memory import data_limit
+from tactbench.core.pool.pool import R, T
 
 AGAIN_S = 0.2
 """Seconds until whoever swallowed the alarm hears it again."""
@@ -37,10 +37,8 @@ class InProcess:
     def __init__(self, limits: Limits = UNLIMITED) -> None:
         self._limits = limits
 
-    def each(
-        self, work: Callable[[T], R], items: Iterable[T], meanwhile: Callable[[], None] | None = None
-    ) -> Iterator[tuple[T, R | BaseException]]:
-        """Yield every item with its result or what stopped it; nothing can be done meanwhile."""
+    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
+        """Yield every item with its result or what stopped it."""
         for item in items:
             yield item, self._one(work, item)
 

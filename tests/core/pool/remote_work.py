@@ -6,16 +6,19 @@ import time
 from pathlib import Path
 
 from tactbench.core.errors import DataError
-from tactbench.core.matrix.engines.share import Share
 
 
-def square(number):
+def square(number, concurrency=1):
     return number * number
 
 
-def process(_):
-    """The process, its parent, and its grandparent."""
-    return os.getpid(), os.getppid(), parent_of(os.getppid())
+def process(_, concurrency=1):
+    """The process, its parent, its grandparent, and how many are at work at once."""
+    return os.getpid(), os.getppid(), parent_of(os.getppid()), concurrency
+
+
+def where(_, concurrency=1):
+    return str(Path.cwd())
 
 
 def parent_of(pid):
@@ -23,9 +26,9 @@ def parent_of(pid):
 
 
 def kill_worker():
-    """Kill the Dask worker that has started the server of this cell, and never another process.
+    """Kill the Dask worker whose fork server has started this process, and never another process.
 
-    Where the worker is gone already, the server has another parent by now: whoever takes orphans.
+    Where the worker is gone already, the fork server has another parent by now.
     """
     worker = parent_of(os.getppid())
     words = Path(f"/proc/{worker}/cmdline").read_text()
@@ -33,7 +36,7 @@ def kill_worker():
         os.kill(worker, signal.SIGKILL)
 
 
-def misbehave(what):
+def misbehave(what, concurrency=1):
     if what == "raise":
         raise DataError("Nothing fits.", hint="Try again.")
     if what == "abort":
@@ -51,7 +54,7 @@ def misbehave(what):
     return f"{what} is well"
 
 
-def kill_once(job):
+def kill_once(job, concurrency=1):
     """Kill the worker the first time anybody asks, as a power cut would; `marks` remembers."""
     number, marks = job
     if number == 3:
@@ -65,31 +68,10 @@ def kill_once(job):
     return number * number
 
 
-def read(path):
-    return path.read_text()
-
-
-def wait_for(job):
+def wait_for(job, concurrency=1):
     """Tell that it has begun, then wait to be let go."""
     begun, go = job
     begun.write_text(str(os.getpid()))
     while not go.exists():
         time.sleep(0.02)
     return "went"
-
-
-loaded = []
-
-
-def what_is_loaded(item):
-    """What this process has inherited and what it has loaded itself."""
-    return list(loaded)
-
-
-def _load(item):
-    if item == "bomb":
-        os.abort()
-    loaded.append(item)
-
-
-what_is_loaded.shares = lambda item: [Share(item, lambda: _load(item), trusted=item == "trusted")]

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from tactbench.core.matrix.pool.log import LOG_BYTES, OVERFLOW_BYTES, cut_back, open_log, tail
+from tactbench.core.pool.log import LOG_BYTES, OVERFLOW_BYTES, cut_back, open_log, tail
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 
-from tactbench.core.matrix.pool.processes import descendants
+from tactbench.core.pool.processes import descendants
 
 MB = 2**20
 

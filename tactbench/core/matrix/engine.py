@@ -1,26 +1,38 @@
-"""Which engine: the one asked for, or the one that fits the work."""
+"""Which engine carries out cells: the one asked for, or the one that fits the work."""
 
 from __future__ import annotations
 
+import importlib.util
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Literal, Protocol, get_args
 
 from tactbench.core.errors import UsageError
-from tactbench.core.evaluation.libraries import EVERY_CELL
-from tactbench.core.matrix.engines.engine import Engine
-from tactbench.core.matrix.pool.limits import UNLIMITED, Limits
-from tactbench.core.matrix.pool.processes import can_fork
+from tactbench.core.matrix.solving import PRELOAD
+from tactbench.core.pool.limits import Limits
+from tactbench.core.pool.pool import Pool, R, T
+from tactbench.core.pool.processes import can_fork
 
 EngineName = Literal["in-process", "isolated", "dask"]
 ENGINES: tuple[EngineName, ...] = get_args(EngineName)
+
+
+class Engine(Protocol):
+    """Carries out work; what comes of an item does not depend on which engine it was."""
+
+    def each(self, work: Callable[..., R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
+        """Yield every item exactly once with its result, or with what stopped it, as they come.
+
+        What stopped an item is the exception that was raised, or `tactbench.core.errors.CellStopped`. Only a real
+        Ctrl-C by the user ends the iteration. Items may be taken one by one, as there is room for them, or all at once.
+        """
 
 
 @dataclass(frozen=True)
 class EngineChoice:
     """How cells are to be carried out."""
 
-    name: EngineName | None = None
-    """None: in process for one cell without limits, isolated otherwise."""
+    name: EngineName = "isolated"
     jobs: int = 1
     """Cells at once."""
     limits: Limits = field(default_factory=Limits)
@@ -47,52 +59,47 @@ class EngineChoice:
             If the library of the Dask engine is missing, or nobody answers at the scheduler's address.
         """
         if self.name == "dask":
-            from tactbench.core.matrix.engines.dask_cluster import check_scheduler
+            if importlib.util.find_spec("distributed") is None:
+                raise UsageError(
+                    "The Dask engine needs the library distributed, which is not installed.",
+                    hint="Install it with: pip install 'tactbench[dask]'.",
+                )
+            from tactbench.core.matrix.dask import check_scheduler
 
             check_scheduler(self.scheduler)
 
-    def named(self, cells: int) -> EngineName:
-        """Return the name of the engine for so many cells."""
-        if self.name is not None:
-            return self.name
-        return "in-process" if cells == 1 and self.limits == UNLIMITED else "isolated"
-
     def concurrency(self, cells: int) -> int:
         """Return how many of so many cells are carried out at once."""
-        return 1 if self.named(cells) == "in-process" else max(1, min(self.jobs, cells))
+        return 1 if self.name == "in-process" else max(1, min(self.jobs, cells))
 
     def forks(self, cells: int) -> bool:
         """Return whether each cell is forked off this process, and shares what it holds at that moment."""
-        return self.named(cells) != "dask" and not self.here(cells) and can_fork()
+        return self.name != "dask" and not self.here(cells) and can_fork()
 
     def here(self, cells: int) -> bool:
         """Return whether cells are really carried out in this process: one that aborts ends it."""
-        return self.named(cells) == "in-process" and cells == 1
+        return self.name == "in-process" and cells == 1
 
     def engine(self, cells: int) -> Engine:
         """Return the engine for so many cells.
 
         In process, one cell is carried out here; of several, each in a child process, one at a time.
         """
-        name = self.named(cells)
-        if name == "dask":
-            from tactbench.core.matrix.engines.dask import Dask
+        if self.name == "dask":
+            from tactbench.core.matrix.dask import Dask
 
             return Dask(self.jobs, self.limits, self.scheduler)
         if self.here(cells):
-            from tactbench.core.matrix.engines.in_process import InProcess
+            from tactbench.core.pool.in_process import InProcess
 
             return InProcess(self.limits)
-        from tactbench.core.matrix.pool.pool import Pool
+        return Pool(self.concurrency(cells), self.limits, preload=preload())
 
-        return Pool(self.concurrency(cells), self.limits, preload=_preload())
-
-    def pool(self, jobs: int, *, grace_s: float = 0.0) -> Engine:
+    def pool(self, jobs: int, *, grace_s: float = 0.0) -> Pool:
         """Return reused processes for `jobs` items at once, for what is no cell."""
-        from tactbench.core.matrix.pool.pool import Pool
-
-        return Pool(jobs, replace(self.limits, grace_s=grace_s), reuse=True, preload=_preload())
+        return Pool(jobs, replace(self.limits, grace_s=grace_s), reuse=True, preload=preload())
 
 
-def _preload() -> tuple[str, ...] | None:
-    return None if can_fork() else EVERY_CELL
+def preload() -> tuple[str, ...] | None:
+    """Return what a fork server is to import; None where this process may fork itself."""
+    return None if can_fork() else PRELOAD

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 
 from tactbench.core.errors import Crashed, OutOfMemory, TimedOut
-from tactbench.core.matrix.pool.limits import Limits
+from tactbench.core.pool.limits import Limits
 
 FATAL = "Fatal Python error"
 """Begins what Python's fault handler writes when the process is about to end."""

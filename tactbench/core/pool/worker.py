@@ -12,12 +12,12 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from tactbench.core.errors import CellStopped
-from tactbench.core.matrix.pool import endings, memory
-from tactbench.core.matrix.pool.child import WHERE_SIGNAL, run_child
-from tactbench.core.matrix.pool.limits import Limits
-from tactbench.core.matrix.pool.log import cut_back, flush, open_log, tail
-from tactbench.core.matrix.pool.message import Inbox, error_of
-from tactbench.core.matrix.pool.processes import kill_below, kill_tree
+from tactbench.core.pool import endings, memory
+from tactbench.core.pool.child import WHERE_SIGNAL, run_child
+from tactbench.core.pool.limits import Limits
+from tactbench.core.pool.log import cut_back, flush, open_log, tail
+from tactbench.core.pool.message import Inbox, error_of
+from tactbench.core.pool.processes import kill_below, kill_tree
 
 STACK_S = 0.1
 """Seconds that a process which is about to be ended has to write where it is."""
@@ -64,7 +64,7 @@ class Worker:
         self._stopped: CellStopped | None = None
         """Why it was told to end."""
         context: Any = multiprocessing.get_context("fork" if preload is None else "forkserver")
-        if preload is not None:
+        if preload:
             context.set_forkserver_preload(list(preload))
         log = Connection(open_log())
         self._log: Connection[Any, Any] = log

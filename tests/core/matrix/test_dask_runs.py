@@ -10,8 +10,8 @@ from contextlib import contextmanager
 import pytest
 
 from tests.conftest import Shell
-from tests.core.matrix.engines.patience import ending, until
-from tests.core.matrix.engines.started import started
+from tests.core.matrix.started import started
+from tests.core.pool.patience import ending, until
 
 RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--estimator", "lasso")
 

@@ -6,6 +6,7 @@ import json
 import os
 import struct
 import traceback
+from collections.abc import Mapping
 from io import BytesIO
 from typing import Any
 
@@ -17,8 +18,8 @@ from tactbench.core.errors import CellStopped, Raised, TactbenchError, _rebuild
 _HEADER = struct.Struct("<8sQQ")
 """Magic number, bytes of JSON, bytes of arrays."""
 _MAGIC = b"tactpool"
-MOST_BYTES = 2**34
-"""No message is longer: 16 GiB."""
+MOST_BYTES = 2**30
+"""No message is longer: 1 GiB is a hundred million answers."""
 _ARRAY, _TUPLE = "__array__", "__tuple__"
 
 
@@ -108,41 +109,63 @@ class Inbox:
         middle, end = _HEADER.size + text, _HEADER.size + text + arrays
         if len(self._bytes) < end:
             return None
-        try:
-            file = BytesIO(bytes(self._bytes[middle:end]))
-            found = []
-            while file.tell() < arrays:
-                found.append(np.load(file, allow_pickle=False))
-            message = _restored(json.loads(self._bytes[_HEADER.size : middle]), found)
-        except Exception as error:
-            raise ValueError(f"{type(error).__name__}: {error}") from error
+        message = _read(bytes(self._bytes[_HEADER.size : middle]), bytes(self._bytes[middle:end]))
         del self._bytes[:end]
-        if not isinstance(message, dict):
-            raise ValueError(f"a {type(message).__name__} came")
         return message
 
 
-def told(error: BaseException) -> dict[str, str]:
+def unpack(content: bytes) -> dict[str, Any]:
+    """Return the message that `pack` made into `content`; raises ValueError if it is none."""
+    if len(content) < _HEADER.size or not content.startswith(_MAGIC):
+        raise ValueError("it does not begin as a message")
+    middle = _HEADER.size + _HEADER.unpack_from(content)[1]
+    return _read(content[_HEADER.size : middle], content[middle:])
+
+
+def _read(text: bytes, arrays: bytes) -> dict[str, Any]:
+    try:
+        file = BytesIO(arrays)
+        found = []
+        while file.tell() < len(arrays):
+            found.append(np.load(file, allow_pickle=False))
+        message = _restored(json.loads(text), found)
+    except Exception as error:
+        raise ValueError(f"{type(error).__name__}: {error}") from error
+    if not isinstance(message, dict):
+        raise ValueError(f"a {type(message).__name__} came")
+    return message
+
+
+def told(error: BaseException) -> dict[str, Any]:
     """Return an exception as text; `kind` is the name of its class if that is one of `tactbench.core.errors`."""
     where = "".join(traceback.format_exception(error))
     name = type(error).__name__
     if isinstance(error, TactbenchError) and getattr(errors, name, None) is type(error):
         where = str(error.traceback_text) or where
-        return {"kind": name, "message": str(error.message), "hint": str(error.hint), "traceback": where}
+        said: dict[str, Any] = {
+            "kind": name,
+            "message": str(error.message),
+            "hint": str(error.hint),
+            "traceback": where,
+        }
+        if isinstance(error, CellStopped):
+            said |= {"signal": error.signal, "log": error.log, "spent_s": error.spent_s}
+        return said
     try:
-        said = str(error)
+        text = str(error)
     except Exception:
-        said = "(its text cannot be read)"
-    return {"kind": "", "message": f"{name}: {said}", "hint": "", "traceback": where}
+        text = "(its text cannot be read)"
+    return {"kind": "", "message": f"{name}: {text}", "hint": "", "traceback": where}
 
 
-def error_of(text: dict[str, str], log: str) -> TactbenchError:
-    """Return the exception that `told` has put into words; `log` is what was printed."""
-    kind = getattr(errors, text["kind"], None) if text["kind"] else Raised
+def error_of(said: Mapping[str, Any], log: str = "") -> TactbenchError:
+    """Return the exception that `told` has put into words; `log` is what was printed, if the words do not hold it."""
+    kind = getattr(errors, said["kind"], None) if said["kind"] else Raised
     if not (isinstance(kind, type) and issubclass(kind, TactbenchError)):
-        raise ValueError(f"there is no error called {text['kind']!r}")
-    if issubclass(kind, CellStopped):
-        return kind(text["message"], hint=text["hint"], log=log, traceback_text=text["traceback"])
-    error = _rebuild(kind, text["message"], text["hint"])
-    error.traceback_text = text["traceback"]
+        raise ValueError(f"there is no error called {said['kind']!r}")
+    error = _rebuild(kind, said["message"], said["hint"])
+    error.traceback_text = said["traceback"]
+    if isinstance(error, CellStopped):
+        error.signal, error.log = said.get("signal"), said.get("log") or log
+        error.spent_s = said.get("spent_s")
     return error

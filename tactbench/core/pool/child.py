@@ -15,12 +15,12 @@ from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any, NoReturn
 
-from tactbench.core.matrix.pool.endings import out_of_memory
-from tactbench.core.matrix.pool.limits import Limits
-from tactbench.core.matrix.pool.log import flush, print_to
-from tactbench.core.matrix.pool.memory import data_limit, first_to_go
-from tactbench.core.matrix.pool.message import pack, told
-from tactbench.core.matrix.pool.processes import die_with_parent, reap_finished, set_subreaper
+from tactbench.core.pool.endings import out_of_memory
+from tactbench.core.pool.limits import Limits
+from tactbench.core.pool.log import flush, print_to
+from tactbench.core.pool.memory import data_limit, first_to_go
+from tactbench.core.pool.message import pack, told
+from tactbench.core.pool.processes import die_with_parent, reap_finished, set_subreaper
 
 WHERE_SIGNAL = getattr(signal, "SIGUSR2", None)
 """Has the process write the stack of every thread to its log."""

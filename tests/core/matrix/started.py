@@ -7,7 +7,7 @@ import sys
 from contextlib import ExitStack, contextmanager
 
 from tests.conftest import ROOT
-from tests.core.matrix.engines.patience import until
+from tests.core.pool.patience import until
 
 
 class Started:
@@ -15,6 +15,7 @@ class Started:
 
     def __init__(self, folder):
         self.folder = folder
+        folder.mkdir(exist_ok=True)
         self._stack = ExitStack()
         file = folder / "scheduler.json"
         self.scheduler = self._start("dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))

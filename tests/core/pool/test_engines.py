@@ -9,10 +9,10 @@ import time
 import pytest
 
 from tactbench.core.errors import Crashed, NotApplicable, OutOfMemory, Raised, TimedOut
-from tactbench.core.matrix.engines.in_process import InProcess
-from tactbench.core.matrix.pool.limits import Limits
-from tactbench.core.matrix.pool.pool import Pool
-from tests.core.matrix.engines.works import work
+from tactbench.core.pool.in_process import InProcess
+from tactbench.core.pool.limits import Limits
+from tactbench.core.pool.pool import Pool
+from tests.core.pool.works import work
 
 LIMITS = Limits(timeout_s=1.0, memory_mb=64)
 PATIENT = Limits(timeout_s=60.0, memory_mb=64)
@@ -136,7 +136,7 @@ def test_what_is_printed_reaches_no_stream_of_ours(engine, capfd):
 
 def test_endless_talk_is_cut_to_its_end(guarded):
     def chatty(what):
-        from tactbench.core.matrix.pool.log import printed
+        from tactbench.core.pool.log import printed
 
         work(what)
         return printed()
@@ -154,8 +154,8 @@ def test_who_forks_is_heard_once(name):
 
 def test_in_process_who_forks_is_heard_once():
     code = (
-        "from tactbench.core.matrix.engines.in_process import InProcess\n"
-        "from tests.core.matrix.engines.works import work\n"
+        "from tactbench.core.pool.in_process import InProcess\n"
+        "from tests.core.pool.works import work\n"
         "for item, outcome in InProcess().each(work, ['forks', 'fine']):\n"
         "    print(item, outcome, flush=True)\n"
     )
@@ -200,12 +200,6 @@ def test_what_is_prepared_while_an_item_is_taken_its_process_inherits():
             yield number
 
     assert dict(Pool(1).each(lambda item: item in prepared, items())) == {0: True, 1: True, 2: True}
-
-
-def test_meanwhile_is_done_once_here_while_others_work():
-    did = []
-    assert len(list(Pool(2, reuse=True).each(work, ["whoami"] * 5, lambda: did.append(os.getpid())))) == 5
-    assert did == [os.getpid()]
 
 
 def test_no_items_no_processes(engine):
