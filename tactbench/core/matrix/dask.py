@@ -15,7 +15,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
-from multiprocessing import resource_tracker
+from multiprocessing import forkserver, resource_tracker
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
@@ -216,6 +216,7 @@ class SameEnvironment(WorkerPlugin):
         multiprocessing.current_process().daemon = False  # a daemon of `multiprocessing` may have no children
         os.environ.update(self._threads)
         multiprocessing.get_context("forkserver").set_forkserver_preload(list(PRELOAD))
+        forkserver.ensure_running()  # before the registry wants one for plugins
         set_subreaper(True)  # what a crashed cell leaves behind becomes a child of this process, and is ended
         found = differences(self._expected, environment(installed()))
         self.differs = bool(found)
