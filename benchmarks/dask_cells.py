@@ -22,7 +22,6 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
 from tactbench.core.matrix.dask import Dask, client_of  # noqa: E402
-
 from tactbench.core.pool.limits import Limits  # noqa: E402
 from tactbench.core.pool.pool import Pool  # noqa: E402
 

@@ -15,9 +15,9 @@ from tactbench.core.calibration.placing import as_procedure
 from tactbench.core.calibration.trial import Trial, carry_out
 from tactbench.core.errors import TactbenchError
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.keys import versions
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.provenance import gather
+from tactbench.core.provenance.gather import gather
+from tactbench.core.provenance.source import versions
 from tactbench.core.spec.calibration import CalibrationSpec
 
 Work = Callable[[Trial], tuple[Draw, float]]

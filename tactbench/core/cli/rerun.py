@@ -77,7 +77,7 @@ def _compute(found: Subject) -> Again:
         orders = []
         if found.orders:
             elsewhere = Store(Path(place))
-            made = orders_for([found.cell], installed(), found.sources, elsewhere, found.cell.simulation)
+            made = orders_for([found.cell], installed(), found.keys, elsewhere, found.cell.simulation)
             orders = made[need_of(found.cell)]
         with redirect_stdout(sys.stderr):  # what a plugin prints is no result
             return compute_again(found.cell, row, found.store, before or found.paths, orders, remark)

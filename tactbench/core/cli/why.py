@@ -132,7 +132,7 @@ def _rests_on(row: Row) -> list[str]:
 
 def _provenance(found: Subject) -> list[str]:
     from tactbench.core.cli.results import provenance_of
-    from tactbench.core.matrix.provenance import foot
+    from tactbench.core.provenance.gather import foot
 
     return list(foot(provenance_of(found.store, [found.row or {}])))
 

@@ -45,7 +45,7 @@ def foot_of(sheet: Sheet, provenance: Sequence[Row], times: bool) -> tuple[str, 
 def _told(provenance: Sequence[Row]) -> tuple[str, ...]:
     if not provenance:
         return ()
-    from tactbench.core.matrix.provenance import foot
+    from tactbench.core.provenance.gather import foot
 
     try:
         return foot(provenance)

@@ -75,7 +75,7 @@ def build_table(rows: Sequence[Row] | Sheet, provenance: Sequence[Row] = (), *, 
     rows
         Rows of one folder or of several, in any order; or these laid out already.
     provenance
-        What is known of the runs they are from: see `tactbench.core.matrix.provenance`.
+        What is known of the runs they are from: see `tactbench.core.provenance.gather`.
     times
         False: the table of what a seed decides, the same on every machine; no times, no hosts, no provenance.
     """

@@ -27,14 +27,13 @@ from distributed.core import Status  # noqa: TID253
 from distributed.versions import VersionMismatchWarning  # noqa: TID253
 
 from tactbench.core.errors import Crashed, EngineError, UsageError
-from tactbench.core.matrix.keys import RELEVANT, versions
 from tactbench.core.matrix.solving import PRELOAD
-from tactbench.core.matrix.source import SourceDigests, digest_of
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.message import error_of, pack, told, unpack
 from tactbench.core.pool.pool import Pool, R, T
 from tactbench.core.pool.processes import interrupts_blocked, set_subreaper
+from tactbench.core.provenance.source import RELEVANT, SourceDigests, digest_of, versions
 
 CONNECT_S = 10.0
 """Seconds that a scheduler may take to answer."""
@@ -235,7 +234,7 @@ def environment(registry: Registry) -> dict[str, str]:
     """
     modules = {shelf.owned(one.name).module for shelf in registry.shelves().values() for one in shelf}
     modules |= {one.where for one in registry.estimators}
-    behind = SourceDigests(Path(os.devnull)).behind(modules, "answer")
+    behind = SourceDigests().behind(modules, "answer")
     found = {f"the source of {package}": digest_of(files) for package, files in sorted(behind.packages.items())}
     found |= {f"the version of {name}": version for name, version in sorted(behind.versions.items())}
     more = {name for estimator in registry.estimators for name in estimator.distributions} - set(RELEVANT)

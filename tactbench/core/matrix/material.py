@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tactbench.core.matrix.keys import recording_key
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell, serves
-from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.scene import Role, Scene, Simulation
@@ -38,7 +37,7 @@ class Order:
 
 
 def orders_for(
-    cells: Iterable[Cell], registry: Registry, sources: SourceDigests, store: Store, simulation: Simulation
+    cells: Iterable[Cell], registry: Registry, keys: Keys, store: Store, simulation: Simulation
 ) -> dict[Need, list[Order]]:
     """Return the recordings needed, in the campaign's order, carried out as `simulation` asks.
 
@@ -55,7 +54,7 @@ def orders_for(
             scene = planned.scene
             if simulation != Simulation():
                 scene = scene.model_copy(update={"simulation": simulation})
-            key = recording_key(cell.sensor, cell.rig, scene, planned.role, cell.seed, registry, sources, cell.rig_file)
+            key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
             path = store.recording_path(cell.sensor, scene.name, key)
             orders[wanted].append(Order(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, cell.rig_file))
     return orders

@@ -11,11 +11,11 @@ from tactbench.core.errors import NotApplicable, TactbenchError, UnknownNameErro
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.installed import built, listed
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.material import Need, Order, need_of, orders_for
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.shelf import holdings, sensors_on, serving
-from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.interfaces import Shelf
 from tactbench.core.plugins.registry import Registry
@@ -65,7 +65,7 @@ class Material:
 def plan(
     matrix: MatrixSpec,
     registry: Registry,
-    sources: SourceDigests,
+    keys: Keys,
     store: Store,
     recordings: Path | None,
     recorded: Recorded,
@@ -91,7 +91,7 @@ def plan(
     cells = plan_cells(matrix, _named(matrix, registry), registry, rig_file)
     for task in {cell.task for cell in cells}:
         _known_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
-    return cells, Material(recorded, orders_for(cells, registry, sources, store, matrix.simulation))
+    return cells, Material(recorded, orders_for(cells, registry, keys, store, matrix.simulation))
 
 
 def _from_shelf(

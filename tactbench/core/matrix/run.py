@@ -13,17 +13,16 @@ from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluating import Evaluated, evaluate_all
 from tactbench.core.matrix.explanation import Book
 from tactbench.core.matrix.key_book import KeyBook
-from tactbench.core.matrix.keys import keys_of
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.leaving import fill_baselines, scores_text
-from tactbench.core.matrix.personal import sources_of_this_user
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material, plan
 from tactbench.core.matrix.progress import Prefixed, Progress, Silence
-from tactbench.core.matrix.provenance import gather
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import installed
+from tactbench.core.provenance.gather import gather
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
 
@@ -122,11 +121,11 @@ def _carry_out(
     shown: Callable[[Sequence[Row]], None],
 ) -> Outcome:
     registry = installed()
-    sources = sources_of_this_user()
+    keys = Keys(registry)
     recorded = Recorded(store.folder / "cache" / "recordings.json")
-    book = Book(KeyBook(store.folder / "cache" / "keys"), keys_of(registry, sources))
-    cells, material = plan(matrix, registry, sources, store, recordings, recorded, choice)
-    provenance = gather(sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
+    book = Book(KeyBook(store.folder / "cache" / "keys"), keys)
+    cells, material = plan(matrix, registry, keys, store, recordings, recorded, choice)
+    provenance = gather(keys.sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
     made_by = store.begin(provenance)
     found = Evaluated()
     rows: list[Row] = []
@@ -141,7 +140,6 @@ def _carry_out(
         if number < len(rounds) and evaluated.computed:
             shown(tuple(rows))
     fill_baselines(rows)
-    sources.save()
     recorded.save()
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, found.computed, recorded.number_made, used)

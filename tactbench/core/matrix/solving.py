@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tactbench.core.errors import EngineError, NotApplicable, RecordingError
 from tactbench.core.matrix.answer import answer, opening, stopped
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.provenance import host_id
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.pool.log import printed
+from tactbench.core.provenance.gather import host_id
 
 if TYPE_CHECKING:
     from tactbench.core.evaluation.dataset import Dataset

@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import os
 import struct
+import sys
 import traceback
 from collections.abc import Mapping
 from io import BytesIO
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core import errors
 from tactbench.core.errors import CellStopped, Raised, TactbenchError, _rebuild
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 _HEADER = struct.Struct("<8sQQ")
 """Magic number, bytes of JSON, bytes of arrays."""
@@ -31,17 +33,34 @@ def pack(message: dict[str, Any]) -> bytes:
     TypeError, ValueError
         If it holds anything but dictionaries by strings, lists, tuples, text, numbers, None and arrays of these.
     """
-    arrays: list[np.ndarray[Any, Any]] = []
+    arrays: list[npt.NDArray[Any]] = []
     text = json.dumps(_plain(message, arrays)).encode()
-    file = BytesIO()
-    for array in arrays:
-        np.save(file, array, allow_pickle=False)
-    content = file.getvalue()
+    content = _saved(arrays) if arrays else b""
     return _HEADER.pack(_MAGIC, len(text), len(content)) + text + content
 
 
-def _plain(value: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
-    if isinstance(value, np.ndarray):
+def _saved(arrays: list[npt.NDArray[Any]]) -> bytes:
+    import numpy as np
+
+    file = BytesIO()
+    for array in arrays:
+        np.save(file, array, allow_pickle=False)
+    return file.getvalue()
+
+
+def _loaded(content: bytes) -> list[npt.NDArray[Any]]:
+    import numpy as np
+
+    file = BytesIO(content)
+    found = []
+    while file.tell() < len(content):
+        found.append(np.load(file, allow_pickle=False))
+    return found
+
+
+def _plain(value: Any, arrays: list[npt.NDArray[Any]]) -> Any:
+    numpy = sys.modules.get("numpy")  # where it is not loaded, there are no arrays
+    if numpy is not None and isinstance(value, numpy.ndarray):
         arrays.append(value)
         return {_ARRAY: len(arrays) - 1}
     if isinstance(value, dict):
@@ -55,7 +74,7 @@ def _plain(value: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
     return value
 
 
-def _restored(value: Any, arrays: list[np.ndarray[Any, Any]]) -> Any:
+def _restored(value: Any, arrays: list[npt.NDArray[Any]]) -> Any:
     if isinstance(value, list):
         return [_restored(one, arrays) for one in value]
     if isinstance(value, dict):
@@ -124,11 +143,7 @@ def unpack(content: bytes) -> dict[str, Any]:
 
 def _read(text: bytes, arrays: bytes) -> dict[str, Any]:
     try:
-        file = BytesIO(arrays)
-        found = []
-        while file.tell() < len(arrays):
-            found.append(np.load(file, allow_pickle=False))
-        message = _restored(json.loads(text), found)
+        message = _restored(json.loads(text), _loaded(arrays) if arrays else [])
     except Exception as error:
         raise ValueError(f"{type(error).__name__}: {error}") from error
     if not isinstance(message, dict):

@@ -7,7 +7,7 @@ from collections import Counter
 from typing import Any
 
 from tactbench.core.leaderboard.numbers import score
-from tactbench.core.matrix.keys import RELEVANT
+from tactbench.core.provenance.source import RELEVANT
 from tactbench.core.report.figures.published_and_ours import COLUMN
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.leaderboards import block_anchor

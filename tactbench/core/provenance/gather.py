@@ -13,13 +13,18 @@ from pathlib import Path
 from typing import Any
 
 import tactbench
-from tactbench.core.matrix.checkout import checkout_of
-from tactbench.core.matrix.distributions import installed_distributions, is_installed
-from tactbench.core.matrix.keys import RELEVANT
-from tactbench.core.matrix.machine import blas, container, cpu_model, host_id, memory_mb, system
-from tactbench.core.matrix.packages import location_of, package_of
-from tactbench.core.matrix.source import OURS, SourceDigests
 from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.provenance.checkout import checkout_of
+from tactbench.core.provenance.machine import blas, container, cpu_model, host_id, memory_mb, system
+from tactbench.core.provenance.source import (
+    OURS,
+    RELEVANT,
+    SourceDigests,
+    installed_distributions,
+    is_installed,
+    location_of,
+    package_of,
+)
 
 __all__ = ["foot", "gather", "host_id"]
 
@@ -36,7 +41,7 @@ def gather(sources: SourceDigests | None = None, **circumstances: Any) -> dict[s
     -----
     About 10 ms, half of it a call of git a checkout: once a run, never once a cell.
     """
-    digests = sources or SourceDigests(Path(os.devnull))
+    digests = sources or SourceDigests()
     return {
         "tactbench": tactbench.__version__,
         "commit": _state(Path(tactbench.__file__).parent),
