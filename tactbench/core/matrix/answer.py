@@ -14,6 +14,7 @@ from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.samples import Answers
 from tactbench.core.spec.recording import RecordingMeta, Scalar
+from tactbench.core.spec.row import RowModel
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
 
@@ -83,7 +84,9 @@ ASKED = ("cell", "sensor", "task", "rig", "protocol", "estimator", "params", "is
 
 def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
     """Return a row with what is known before anything is computed; every key of the format is there."""
+    unknown = {name: field.get_default(call_default_factory=True) for name, field in RowModel.model_fields.items()}
     return {
+        **unknown,
         "cell": cell.name,
         "sensor": cell.sensor,
         "task": cell.task,
@@ -93,66 +96,17 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
         "estimator": cell.estimator,
         "params": dict(cell.params),
         "is_baseline": cell.baseline,
-        "looks_at": "",
         "repeat": cell.repeat,
         "repeats": cell.repeats,
         "seed": cell.seed,
         "simulation": cell.simulation.model_dump(exclude_defaults=True),
         "status": "planned",
-        "reason": "",
-        "traceback": "",
-        "signal": None,
-        "log": "",
         "metric": task.metric,
         "unit": task.unit,
         "equivalence": task.equivalence,
         "reference_score": task.reference_score,
-        "score": None,
-        "ci_low": None,
-        "ci_high": None,
-        "ci_method": "",
-        **dict.fromkeys(_OF_FORCE),
-        "tare_s": None,
-        "baseline": None,
-        **_published(cell, task, cell.split),
-        "n_recordings": None,
-        "n_sessions": None,
-        "n_train": None,
-        "n_test": None,
-        "sim_s": None,
-        "search_s": None,
-        "fit_s": None,
-        "predict_s": None,
-        "batch_rows": None,
-        "latency_ms_p50": None,
-        "latency_ms_p95": None,
-        "latency_ms_max": None,
-        "latency_n": None,
-        "answer_delay_ms": None,
-        "delay_parts_ms": {},
-        "threads": None,
-        "peak_rss_mb": None,
-        "wall_s": None,
-        "concurrency": None,
-        "host": "",
-        "made_by": "",
         "simulated": simulated,
-        "emulated": False,
-        "dagger": False,
-        "stamps": [],
-        "remarks": [],
-        "assumptions": {},
-        "plan": [],
-        "counts": {},
-        "chosen": {},
-        "search": [],
-        "recordings": [],
-        "digests": [],
-        "scores": {},
-        "fold_sizes": {},
-        "confusion": None,
-        "classes": [],
-        "replicates": {},
+        **_published(cell, task, cell.split),
     }
 
 
