@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.errors import UsageError
 
 if TYPE_CHECKING:
-    from tactbench.core.matrix.explanation import Explanation
     from tactbench.core.matrix.keys import Keys
     from tactbench.core.matrix.material import Order
     from tactbench.core.matrix.plan import Cell
     from tactbench.core.matrix.recorded import Recorded
     from tactbench.core.matrix.store import Row, Store
+    from tactbench.core.matrix.why import Explanation
     from tactbench.core.plugins.registry import Registry
 
 
@@ -35,8 +35,8 @@ class Subject:
 
     def explain(self) -> Explanation:
         """Return whether its result would be reused, and what differs."""
-        from tactbench.core.matrix.explanation import explain
         from tactbench.core.matrix.key_book import KeyBook
+        from tactbench.core.matrix.why import explain
 
         known = str(self.row["key"]) if self.row is not None and self.row["status"] == "done" else ""
         book = KeyBook(self.store.folder / "cache" / "keys")

@@ -15,7 +15,7 @@ from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import Subject
-    from tactbench.core.matrix.again import Again
+    from tactbench.core.matrix.rerun import Again
 
 
 @click.command(name="rerun")
@@ -61,8 +61,8 @@ def _compute(found: Subject) -> Again:
     from tactbench.core.cli.cells import recordings_of
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import TactbenchError
-    from tactbench.core.matrix.again import compute_again
     from tactbench.core.matrix.material import need_of, orders_for
+    from tactbench.core.matrix.rerun import compute_again
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
 

@@ -14,8 +14,8 @@ from tactbench.core.leaderboard.text import visible
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import Subject
-    from tactbench.core.matrix.explanation import Explanation
     from tactbench.core.matrix.store import Row
+    from tactbench.core.matrix.why import Explanation
 
 _TAIL = 15
 """Lines of a traceback or log that are shown; the whole of it stands in ``--format json``."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.matrix.answer import ASKED
+from tactbench.core.matrix.evaluate_cell import ASKED
 from tactbench.core.matrix.store import Row
 from tactbench.core.samples import Answers
 from tactbench.core.spec.status import STATUSES

@@ -27,7 +27,7 @@ from distributed.core import Status  # noqa: TID253
 from distributed.versions import VersionMismatchWarning  # noqa: TID253
 
 from tactbench.core.errors import Crashed, EngineError, UsageError
-from tactbench.core.matrix.solving import PRELOAD
+from tactbench.core.matrix.evaluate_cell import PRELOAD
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.message import error_of, pack, told, unpack

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, get_args
 
 from tactbench.core.errors import UsageError
-from tactbench.core.matrix.solving import PRELOAD
+from tactbench.core.matrix.evaluate_cell import PRELOAD
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.pool import Pool, R, T
 from tactbench.core.pool.processes import can_fork

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.remembered import Facts, FileMemory
 
 
@@ -112,3 +114,24 @@ def stat_of(path: Path) -> os.stat_result | None:
         return path.stat()
     except OSError:
         return None
+
+
+def read_all(
+    read: Callable[[Path], Facts], paths: Sequence[Path], recorded: Recorded, choice: EngineChoice
+) -> dict[Path, BaseException]:
+    """Have `recorded` learn what `read` finds in every path; return what stopped it where it did.
+
+    One child process reads one file after the other; a file that ends it, or takes longer than a cell may, costs its
+    own result only.
+    """
+    if not paths:
+        return {}
+    importlib.import_module("h5py")  # once here, not once in every process that reads
+    before = {path: stat_of(path) for path in paths}
+    failed: dict[Path, BaseException] = {}
+    for path, facts in choice.pool(1).each(read, paths):
+        if isinstance(facts, BaseException):
+            failed[path] = facts
+        else:
+            recorded.learn(path, facts, before[path])
+    return failed

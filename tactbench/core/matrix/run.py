@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.matrix.acquiring import acquire_missing
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.evaluating import Evaluated, evaluate_all
-from tactbench.core.matrix.explanation import Book
+from tactbench.core.matrix.evaluate import Evaluated, evaluate_all
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import Keys
-from tactbench.core.matrix.leaving import fill_baselines, scores_text
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material, plan
 from tactbench.core.matrix.progress import Prefixed, Progress, Silence
+from tactbench.core.matrix.record import acquire_missing
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.matrix.summary import fill_baselines, scores_text
+from tactbench.core.matrix.why import Book
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import installed
 from tactbench.core.provenance.gather import gather

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from tactbench.core.errors import MissingRecordingError, UnknownNameError
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.reading import read_all
-from tactbench.core.matrix.recorded import Recorded, Subject, read_subject
+from tactbench.core.matrix.recorded import Recorded, Subject, read_all, read_subject
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.task import TaskSpec
 

@@ -20,7 +20,7 @@ Numbers = dict[str, float]
 class RowModel(BaseModel):
     """One cell. Times are seconds unless the name says otherwise; a row may have other keys, of which nothing is asked.
 
-    Rows are handed about as plain mappings; this model says what they hold, has what stands there while nothing is known,
+    Rows are handed about as plain mappings; this model says what they hold, what stands there before anything is known,
     and checks what comes from a file.
     """
 

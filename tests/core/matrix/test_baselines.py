@@ -3,7 +3,7 @@
 import pytest
 
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.matrix.leaving import fill_baselines
+from tactbench.core.matrix.summary import fill_baselines
 from tests.core.leaderboard.rows import row
 
 

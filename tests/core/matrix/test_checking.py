@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tactbench.core.matrix.answer import opening
 from tactbench.core.matrix.checking import fault_in
+from tactbench.core.matrix.evaluate_cell import opening
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.samples import Answers
 from tests.core.evaluation.made import force_task

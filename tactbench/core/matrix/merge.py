@@ -26,13 +26,13 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FolderError, FormatError, MissingRecordingError
-from tactbench.core.matrix.leaving import SEED_DECIDES
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.store.disk import sync_folder, writing
 from tactbench.core.matrix.store.ledger import NAME, Entry, whole_text
 from tactbench.core.matrix.store.leftovers import alive
 from tactbench.core.matrix.store.rows import NAMING, named
 from tactbench.core.matrix.store.sharing import canonical
+from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.spec.status import STATUSES
 
 _SHOWN = 10

@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from tactbench.core.matrix.acquiring import record
-from tactbench.core.matrix.leaving import SEED_DECIDES
+from tactbench.core.matrix.evaluate_cell import Job, solve, unanswered
 from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.record import record
 from tactbench.core.matrix.recorded import Recorded
-from tactbench.core.matrix.solving import Job, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.matrix.summary import SEED_DECIDES
 from tactbench.core.pool.in_process import InProcess
 from tactbench.core.samples import Answers
 

@@ -1,17 +1,28 @@
-"""One cell to one row, whatever happens in it."""
+"""One cell: carried out in whatever process an engine has chosen for it, to one row, whatever happens in it."""
 
 from __future__ import annotations
 
+import os
+import platform
+import random
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
+from dataclasses import fields
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from tactbench.core.errors import CellStopped, NotApplicable, TactbenchError
+from tactbench.core.errors import CellStopped, EngineError, NotApplicable, RecordingError, TactbenchError
+from tactbench.core.evaluation.libraries import import_libraries
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.store import Row
-from tactbench.core.plugins.registry import Registry
+from tactbench.core.plugins.registry import Registry, installed, load_object
+from tactbench.core.pool.log import printed
+from tactbench.core.pool.pool import Pool
+from tactbench.core.provenance.gather import host_id
 from tactbench.core.samples import Answers
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.row import RowModel
@@ -21,6 +32,159 @@ from tactbench.core.spec.task import TaskSpec
 if TYPE_CHECKING:
     from tactbench.core.evaluation.cell import CellResult
     from tactbench.core.evaluation.dataset import Dataset
+
+PRELOAD = ("tactbench.core.matrix.preloaded",)
+"""Imported by the fork server of processes that cannot fork themselves."""
+
+
+class Job(NamedTuple):
+    """A cell to be answered."""
+
+    cell: Cell
+    recordings: tuple[Path, ...]
+    digests: tuple[str, ...] = ()
+    """Of the recordings' content, which a process on another machine compares with what it sees; none: it need not."""
+    trouble: BaseException | None = None
+    """Why there are no recordings."""
+
+
+Wanted = tuple[str, tuple[Path, ...]]
+"""A task and recordings."""
+
+this_host = lru_cache(maxsize=1)(host_id)
+
+
+def prepare(estimator: str, kind: str) -> None:
+    """Import what an estimator needs, and have it learn a few made-up rows, before any clock is read.
+
+    Done once in a process; a child process does it again, since a fork copies each page of memory when it is first
+    written to. Raises whatever the estimator raises.
+    """
+    here = os.getpid(), estimator, kind
+    if here in _prepared:
+        return
+    _prepared.add(here)
+    descriptor = installed().estimators[estimator]
+    build = load_object(descriptor.where)
+    build(kind=kind, seed=0, threads=1, **descriptor.params)
+    if descriptor.rehearsal is not None:
+        from tactbench.core.evaluation.rehearsal import rehearse
+
+        rehearse(build(kind=kind, seed=0, threads=1, **{**descriptor.params, **descriptor.rehearsal}), kind)
+
+
+_prepared: set[tuple[int, str, str]] = set()
+"""By process, estimator and kind of question."""
+
+
+class Datasets:
+    """Recordings as a task needs them, the last used of them kept: forked children share what is here.
+
+    Parameters
+    ----------
+    most
+        So many are kept.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._kept: OrderedDict[Wanted, Dataset] = OrderedDict()
+
+    def __contains__(self, wanted: Wanted) -> bool:
+        return wanted in self._kept
+
+    def __call__(self, task: str, recordings: tuple[Path, ...]) -> Dataset:
+        """Return `recordings` as `task` needs them; raises as `load_dataset` does."""
+        from tactbench.core.evaluation.dataset import load_dataset
+
+        wanted = (task, recordings)
+        if wanted not in self._kept:
+            self._kept[wanted] = load_dataset(installed().tasks[task].spec, recordings)
+            while len(self._kept) > self._most:
+                self._kept.popitem(last=False)
+        self._kept.move_to_end(wanted)
+        return self._kept[wanted]
+
+
+DATASETS = Datasets(2)
+"""Those of this process."""
+
+
+Solved = tuple[Row, dict[str, dict[str, Any]]]
+"""A row, and by role the columns of the answers: what a child process can send."""
+
+
+def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None = None) -> Solved:
+    """Answer one cell.
+
+    An exception of a plugin or a recording becomes a row. What is more than an exception, such as SystemExit, and a
+    MemoryError are left to the engine that called.
+
+    Parameters
+    ----------
+    concurrency
+        Cells that may be at work at once while this one is timed.
+    """
+    cell, recordings, digests, trouble = job
+    registry = installed()
+    trouble = trouble or _unseen(recordings, digests)
+    if trouble is not None:
+        return unanswered(cell, trouble), {}
+    try:
+        prepare(cell.estimator, registry.tasks[cell.task].spec.kind)
+    except MemoryError:
+        raise
+    except Exception:
+        pass  # the cell will tell
+    began = time.perf_counter()
+    _seed_everything(cell.seed)
+    row, sets = answer(cell, registry, recordings, DATASETS, working)
+    timed = {"wall_s": time.perf_counter() - began, "concurrency": concurrency, "host": this_host()}
+    columns = {
+        str(role): {one.name: getattr(answers, one.name) for one in fields(answers)} for role, answers in sets.items()
+    }
+    return {**row, **timed, "log": printed()}, columns
+
+
+def _unseen(recordings: tuple[Path, ...], digests: tuple[str, ...]) -> BaseException | None:
+    """Return what is wrong if this process sees other recordings than the run does."""
+    from tactbench.core.recording.reader import content_digest
+
+    for path, digest in zip(recordings, digests, strict=False):
+        try:
+            if content_digest(path) == digest:
+                continue
+            why = f"its {path} is another file"
+        except RecordingError as error:
+            why = f"it cannot read {path} ({error.message})"
+        return EngineError(
+            f"The worker on {platform.node()} cannot compute this cell: {why}.",
+            hint="Every worker must see the files of the run, unchanged, at the same paths.",
+        )
+    return None
+
+
+def our_own(estimator: str) -> bool:
+    """Return whether an estimator comes with this package: tested with it, and trusted not to end whoever builds it."""
+    return installed().estimators.owned(estimator).module.partition(".")[0] == __name__.partition(".")[0]
+
+
+def unanswered(cell: Cell, trouble: BaseException) -> dict[str, object]:
+    """Return the row of a cell that could not be carried out, or not to its end."""
+    registry = installed()
+    row = opening(cell, registry.tasks[cell.task].spec, simulated=registry.rigs[cell.rig].simulated)
+    if isinstance(trouble, NotApplicable):
+        return {**row, "status": "skipped", "reason": str(trouble)}
+    return stopped(row, trouble)
+
+
+def _seed_everything(seed: int) -> None:
+    """Give the global generators the cell's seed: who draws from them shall not depend on the cells before."""
+    import numpy as np
+
+    random.seed(seed)
+    np.random.seed(seed % 2**32)  # noqa: NPY002  (it is this old generator that others draw from)
+
 
 Answer = tuple[Row, Mapping[Role, Answers]]
 """A row, and the answers that go into its shard, by role."""
@@ -226,3 +390,67 @@ def _scored(result: CellResult) -> Row:
         "classes": list(result.classes),
         "replicates": dict(result.replicates),
     }
+
+
+Groups = Mapping[Wanted, Sequence[Job]]
+"""Cells by task and recordings."""
+
+
+def shared(groups: Groups, pool: Pool) -> Iterator[Job]:
+    """Yield the cells group by group; before each group, load here what several of its cells need."""
+    from tactbench.core.evaluation.thread_limit import find_libraries
+
+    for (task, recordings), jobs in groups.items():
+        import_estimators([job.cell for job in jobs])
+        trouble = _read_here(task, recordings, pool) if len(jobs) > 1 else None
+        find_libraries()
+        for job in jobs:
+            yield job._replace(trouble=trouble)
+
+
+def _read_here(task: str, recordings: tuple[Path, ...], pool: Pool) -> BaseException | None:
+    """Have recordings in memory; return what is wrong with them.
+
+    They are read by a child process first: only what that survives is read here as well.
+    """
+    if (task, recordings) in DATASETS:
+        return None
+    ((_, outcome),) = pool.each(_readable, [(task, recordings)])
+    if isinstance(outcome, BaseException):
+        return outcome
+    DATASETS(task, recordings)
+    return None
+
+
+def _readable(wanted: Wanted) -> bool:
+    DATASETS(*wanted)
+    return True
+
+
+def import_estimators(cells: Sequence[Cell]) -> None:
+    """Prepare each of our own estimators that `cells` use, once; what is wrong with it is its cells'.
+
+    Those of others are imported in their cells' processes only: what an import changes there, such as a library that it
+    patches, changes no other cell.
+    """
+    _import({(cell.estimator, installed().tasks[cell.task].spec.kind) for cell in cells})
+
+
+def import_ours() -> None:
+    """Prepare all of our own estimators."""
+    _import({(one.name, kind) for one in installed().estimators for kind in one.kinds})
+
+
+def _import(several: Set[tuple[str, str]]) -> None:
+    from tactbench.core.evaluation.thread_limit import find_libraries
+
+    import_libraries()
+    for estimator, kind in sorted(several - _tried):
+        _tried.add((estimator, kind))
+        if our_own(estimator):
+            with suppress(Exception):
+                prepare(estimator, kind)
+    find_libraries()
+
+
+_tried: set[tuple[str, str]] = set()

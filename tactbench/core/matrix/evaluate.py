@@ -10,16 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import PluginContractError
-from tactbench.core.matrix.answer import Answer, opening, reused
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.explanation import Book, beside
+from tactbench.core.matrix.evaluate_cell import Answer, Job, opening, reused, solve, this_host, unanswered
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.reading import read_all
-from tactbench.core.matrix.recorded import read_digest
-from tactbench.core.matrix.solving import Job, solve, this_host, unanswered
+from tactbench.core.matrix.recorded import read_all, read_digest
 from tactbench.core.matrix.store import NotPlainError, Row, Store
+from tactbench.core.matrix.why import Book, beside
 from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Answers
 from tactbench.core.spec.status import STOPPED
@@ -155,13 +153,13 @@ def _each(*several: Iterable[tuple[Job, Any]]) -> Generator[tuple[Job, Any], Non
 
 def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
     """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
-    from tactbench.core.matrix.preloading import import_estimators, shared
+    from tactbench.core.matrix.evaluate_cell import import_estimators, shared
 
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
         groups.setdefault((job.cell.task, job.recordings), []).append(job)
     if choice.forks(len(jobs)):
-        return shared(groups, choice)
+        return shared(groups, choice.pool(1))
     if choice.here(len(jobs)):
         import_estimators([job.cell for job in jobs])
     return [job for group in groups.values() for job in group]

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FolderError
-from tactbench.core.matrix.merging import merge
+from tactbench.core.matrix.merge import merge
 from tactbench.core.matrix.store import Store
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.spec.recording import RecordingMeta
@@ -191,7 +191,7 @@ def test_what_stands_in_the_way_is_named_and_nothing_is_written(tmp_path):
 def test_a_merge_that_was_killed_leaves_no_folder_and_the_next_one_clears_up(tmp_path):
     folder = kept(tmp_path / "one", "a", 1.0)
     code = (
-        "import os, signal, sys\nfrom pathlib import Path\nfrom tactbench.core.matrix.merging import merge\n"
+        "import os, signal, sys\nfrom pathlib import Path\nfrom tactbench.core.matrix.merge import merge\n"
         "merge([Path(sys.argv[1])], Path(sys.argv[2]), also=lambda *_: os.kill(os.getpid(), signal.SIGKILL))\n"
     )
     dead = subprocess.run([sys.executable, "-c", code, str(folder), str(tmp_path / "out")])

@@ -10,12 +10,12 @@ from functools import lru_cache
 
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.explanation import Book
 from tactbench.core.matrix.installed import built
 from tactbench.core.matrix.material import Order, need_of
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.planning import Material
 from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.why import Book
 from tactbench.core.plugins.interfaces import Operator, Rig
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.rig_file import RigFile
