@@ -11,8 +11,8 @@ from tactbench.core.errors import UsageError
 
 if TYPE_CHECKING:
     from tactbench.core.matrix.keys import Keys
-    from tactbench.core.matrix.material import Order
     from tactbench.core.matrix.plan import Cell
+    from tactbench.core.matrix.plan_recordings import RecordingRequest
     from tactbench.core.matrix.recorded import Recorded
     from tactbench.core.matrix.store import Row, Store
     from tactbench.core.matrix.why import Explanation
@@ -30,7 +30,7 @@ class Subject:
     row: Row | None
     """What the folder says of it."""
     paths: tuple[Path, ...]
-    orders: tuple[Order, ...]
+    requests: tuple[RecordingRequest, ...]
     """How the recordings are made; none if they were made elsewhere, or cannot be made anew."""
 
     def explain(self) -> Explanation:
@@ -40,7 +40,7 @@ class Subject:
 
         known = str(self.row["key"]) if self.row is not None and self.row["status"] == "done" else ""
         book = KeyBook(self.store.folder / "cache" / "keys")
-        return explain(self.cell, self.paths, self.orders, self.keys, self.recorded, book, self.store, known)
+        return explain(self.cell, self.paths, self.requests, self.keys, self.recorded, book, self.store, known)
 
 
 def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> Subject:
@@ -63,9 +63,8 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
     """
     from tactbench.core.cli.selection import matrix_asked
     from tactbench.core.matrix.keys import Keys
-    from tactbench.core.matrix.material import need_of
     from tactbench.core.matrix.naming import cell_of, meant
-    from tactbench.core.matrix.planning import plan
+    from tactbench.core.matrix.plan_recordings import plan, request_key
     from tactbench.core.matrix.recorded import Recorded
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
@@ -85,8 +84,8 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
                 raise
         else:
             cell = cell_of(row)
-            paths, orders = _material(cell, row, registry, keys, store)
-            return Subject(store, keys, recorded, cell, row, paths, orders)
+            paths, requests = _material(cell, row, registry, keys, store)
+            return Subject(store, keys, recorded, cell, row, paths, requests)
     asked = dict(options or {})
     if not asked["config"] and any(given in name for name in rows):
         given = meant(given, list(rows), known)
@@ -96,7 +95,7 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
     matrix, folder = matrix_asked(registry, **asked)
     cells, needed = plan(matrix, registry, keys, store, folder, recorded)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
-    made = tuple(needed.orders.get(need_of(cell), ()))
+    made = tuple(needed.requests.get(request_key(cell), ()))
     return Subject(store, keys, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)
 
 
@@ -106,13 +105,13 @@ def _given(option: str, value: Any) -> bool:
 
 def _material(
     cell: Cell, row: Row, registry: Registry, keys: Keys, store: Store
-) -> tuple[tuple[Path, ...], tuple[Order, ...]]:
+) -> tuple[tuple[Path, ...], tuple[RecordingRequest, ...]]:
     """Return the recordings a row was answered from, and how to make them where a simulation did."""
-    from tactbench.core.matrix.material import need_of, orders_for
+    from tactbench.core.matrix.plan_recordings import request_key, requests_for
 
     if registry.rigs[cell.rig].simulated:
-        made = orders_for([cell], registry, keys, store, cell.simulation)[need_of(cell)]
-        return tuple(order.path for order in made), tuple(made)
+        made = requests_for([cell], registry, keys, store, cell.simulation)[request_key(cell)]
+        return tuple(request.path for request in made), tuple(made)
     return recordings_of(row, store), ()
 
 

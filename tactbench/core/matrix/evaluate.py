@@ -13,7 +13,7 @@ from tactbench.core.errors import PluginContractError
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluate_cell import Answer, Job, opening, reused, solve, this_host, unanswered
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.planning import Material
+from tactbench.core.matrix.plan_recordings import RecordingPlan
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.recorded import read_all, read_digest
 from tactbench.core.matrix.store import NotPlainError, Row, Store
@@ -35,7 +35,7 @@ class Evaluated:
 
 def evaluate_all(
     cells: Sequence[Cell],
-    material: Material,
+    material: RecordingPlan,
     book: Book,
     choice: EngineChoice,
     store: Store,
@@ -73,13 +73,13 @@ def evaluate_all(
         keyed = ((one.cell, known.keys[one.cell.name], one.recordings) for one in waiting if one.trouble is None)
         book.note_cells(keyed, material.recorded, store.folder)
         _compute(waiting, known, choice, store, told, done)
-        spoilt = [job for job in waiting if _spoilt(done.rows[job.cell.name], store)]
-        if spoilt:
-            _compute(spoilt, known, choice, store, told, done)
+        overwritten = [job for job in waiting if _overwritten(done.rows[job.cell.name], store)]
+        if overwritten:
+            _compute(overwritten, known, choice, store, told, done)
     return done
 
 
-def _spoilt(row: Row, store: Store) -> bool:
+def _overwritten(row: Row, store: Store) -> bool:
     """Return whether a cell was finished and its shard is not what was written: a later cell has laid hands on it."""
     return row["status"] == "done" and store.finished(row["key"]) is None
 
@@ -90,7 +90,7 @@ class _Known:
 
     keys: dict[str, str]
     """By name of the cell."""
-    material: Material
+    material: RecordingPlan
     folder: Path
     made_by: str
     read: dict[tuple[str, ...], Row] = field(default_factory=dict)
@@ -107,7 +107,7 @@ class _Known:
         return {**row, **self.read[named], **known}
 
 
-def _unreadable(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> dict[Path, BaseException]:
+def _unreadable(cells: Sequence[Cell], material: RecordingPlan, choice: EngineChoice) -> dict[Path, BaseException]:
     """Have the digest of every recording at hand; return why some have none."""
     wanted = {path: None for cell in cells if material.trouble(cell) is None for path in material.paths(cell)}
     return read_all(read_digest, material.recorded.unread(wanted, "digest"), material.recorded, choice)
@@ -121,10 +121,10 @@ def _compute(
     told.begin("evaluating", len(waiting), alone=here)
     work = partial(solve, concurrency=choice.concurrency(len(jobs)), working=told.working if here else None)
     engine = choice.engine(len(jobs))
-    hopeless: Iterator[tuple[Job, Any]] = (
+    without_recordings: Iterator[tuple[Job, Any]] = (
         (job, (unanswered(job.cell, job.trouble), {})) for job in waiting if job.trouble is not None
     )
-    with closing(_each(hopeless, engine.each(work, _ordered(jobs, choice)))) as outcomes:
+    with closing(_each(without_recordings, engine.each(work, _ordered(jobs, choice)))) as outcomes:
         for job, outcome in outcomes:
             _entered(job.cell, outcome, known, store, told, done)
 

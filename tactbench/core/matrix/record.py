@@ -11,9 +11,8 @@ from functools import lru_cache
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.installed import built
-from tactbench.core.matrix.material import Order, need_of
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.planning import Material
+from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, request_key
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.why import Book
 from tactbench.core.plugins.interfaces import Operator, Rig
@@ -25,7 +24,7 @@ GRACE_S = 5.0
 
 
 def acquire_missing(
-    material: Material,
+    material: RecordingPlan,
     cells: Sequence[Cell],
     book: Book,
     choice: EngineChoice,
@@ -49,60 +48,60 @@ def acquire_missing(
     UnwritableError
         If the disk refuses them.
     """
-    needs = dict.fromkeys(map(need_of, cells))
-    unique = {order.path: order for need in needs for order in material.orders.get(need, ())}
-    missing = [order for path, order in unique.items() if not path.exists()]
+    needs = dict.fromkeys(map(request_key, cells))
+    unique = {request.path: request for need in needs for request in material.requests.get(need, ())}
+    missing = [request for path, request in unique.items() if not path.exists()]
     if not missing:
         return
     book.note_recordings(missing)
     from tactbench.core.recording.format import partial_path
 
-    simulated = all(_computed(order) for order in missing)
+    simulated = all(_computed(request) for request in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     told.begin("recording", len(missing), alone=False)
-    outcomes: Generator[tuple[Order, str | BaseException], None, None]
+    outcomes: Generator[tuple[RecordingRequest, str | BaseException], None, None]
     try:
         if operator is not None and not simulated:
             outcomes = _one_by_one(missing, operator)
         else:
             outcomes = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S).each(record, missing)
         with closing(outcomes):
-            for order, outcome in outcomes:
+            for request, outcome in outcomes:
                 if isinstance(outcome, UnwritableError):
                     raise outcome  # the disk is no cell's fault, and refuses the next one too
                 if isinstance(outcome, BaseException):
-                    material.refused[order.path] = outcome
-                    partial_path(order.path).unlink(missing_ok=True)
+                    material.refused[request.path] = outcome
+                    partial_path(request.path).unlink(missing_ok=True)
                 else:
-                    material.recorded.made(order.path, outcome)
-                told.advance(f"{order.sensor} {order.scene.name}", stopped=isinstance(outcome, BaseException))
+                    material.recorded.made(request.path, outcome)
+                told.advance(f"{request.sensor} {request.scene.name}", stopped=isinstance(outcome, BaseException))
     except BaseException:
         # Workers that were ended in the middle could not tidy up behind themselves.
-        for order in missing:
-            partial_path(order.path).unlink(missing_ok=True)
+        for request in missing:
+            partial_path(request.path).unlink(missing_ok=True)
         raise
 
 
-def _computed(order: Order) -> bool:
+def _computed(request: RecordingRequest) -> bool:
     """Whether a scene needs nothing but this machine, and no wall clock."""
-    if installed().rigs[order.rig].simulated:
+    if installed().rigs[request.rig].simulated:
         return True
-    if not order.rig_file:
+    if not request.rig_file:
         return False
-    devices = RigFile.model_validate_json(order.rig_file)
-    used = [devices.sensors.get(order.sensor), devices.force, *devices.devices.values()]
+    devices = RigFile.model_validate_json(request.rig_file)
+    used = [devices.sensors.get(request.sensor), devices.force, *devices.devices.values()]
     return devices.emulation.time == "virtual" and all(entry is None or entry.emulated for entry in used)
 
 
 def _one_by_one(
-    orders: Sequence[Order], operator: Operator
-) -> Generator[tuple[Order, str | BaseException], None, None]:
+    requests: Sequence[RecordingRequest], operator: Operator
+) -> Generator[tuple[RecordingRequest, str | BaseException], None, None]:
     """Carry out scenes in this process; what a rig raises is the scene's outcome."""
-    for order in orders:
+    for request in requests:
         try:
-            yield order, record(order, operator)
+            yield request, record(request, operator)
         except Exception as error:
-            yield order, error
+            yield request, error
 
 
 @lru_cache(maxsize=4)
@@ -111,20 +110,20 @@ def _rig(name: str, rig_file: str, operator: Operator | None) -> Rig:
     return built(name, installed(), rig_file=devices, operator=operator)  # type: ignore[return-value]
 
 
-def record(order: Order, operator: Operator | None = None) -> str:
+def record(request: RecordingRequest, operator: Operator | None = None) -> str:
     """Make one recording and return its content digest. Raises whatever the rig raises."""
     from tactbench.core.acquisition import acquire
 
     registry = installed()
-    rig = registry.rigs[order.rig]
+    rig = registry.rigs[request.rig]
     made = acquire(
-        _rig(order.rig, order.rig_file, operator),  # type: ignore[arg-type]
-        registry.sensors[order.sensor],
+        _rig(request.rig, request.rig_file, operator),  # type: ignore[arg-type]
+        registry.sensors[request.sensor],
         rig,
-        order.scene,
-        role=order.role,
-        seed=order.seed,
-        path=order.path,
+        request.scene,
+        role=request.role,
+        seed=request.seed,
+        path=request.path,
         # Simulations run side by side: what they cost is the processor's time. A real rig is waited for.
         clock=time.process_time if rig.simulated else time.perf_counter,
         provenance={},

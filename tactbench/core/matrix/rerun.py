@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from tactbench.core.matrix.evaluate_cell import Job, solve, unanswered
-from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan_recordings import RecordingRequest
 from tactbench.core.matrix.record import record
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
@@ -40,7 +40,7 @@ def compute_again(
     before: Row,
     store: Store,
     paths: Sequence[Path],
-    orders: Sequence[Order],
+    requests: Sequence[RecordingRequest],
     told: Callable[[str], None],
 ) -> Again:
     """Compute `cell` again; nothing in the result folder changes.
@@ -51,7 +51,7 @@ def compute_again(
         Its row in `store`.
     paths
         The recordings it was answered from.
-    orders
+    requests
         How to make them anew, into another place; none where they cannot be made anew.
     told
         Told what is being done.
@@ -59,19 +59,19 @@ def compute_again(
     found: list[str] = []
     trouble: BaseException | None = None
     made: dict[Path, str] = {}
-    for order in orders:
-        if order.path in made:
+    for request in requests:
+        if request.path in made:
             continue
-        told(f"recording {order.sensor} {order.scene.name}")
+        told(f"recording {request.sensor} {request.scene.name}")
         try:
-            made[order.path] = record(order)
+            made[request.path] = record(request)
         except Exception as error:
             trouble = error
             break
-    if orders and trouble is None:
-        found += _recordings(paths, [(order.scene.name, made[order.path]) for order in orders])
+    if requests and trouble is None:
+        found += _recordings(paths, [(request.scene.name, made[request.path]) for request in requests])
     told(f"evaluating {cell.name}")
-    job = Job(cell, tuple(order.path for order in orders) or tuple(paths), trouble=trouble)
+    job = Job(cell, tuple(request.path for request in requests) or tuple(paths), trouble=trouble)
     ((_, outcome),) = InProcess().each(solve, [job])
     row, columns = (unanswered(cell, outcome), {}) if isinstance(outcome, BaseException) else outcome
     sets = {role: Answers(**columns[role]) for role in columns}

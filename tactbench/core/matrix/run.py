@@ -13,7 +13,7 @@ from tactbench.core.matrix.evaluate import Evaluated, evaluate_all
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.planning import Material, plan
+from tactbench.core.matrix.plan_recordings import RecordingPlan, plan
 from tactbench.core.matrix.progress import Prefixed, Progress, Silence
 from tactbench.core.matrix.record import acquire_missing
 from tactbench.core.matrix.recorded import Recorded
@@ -145,7 +145,7 @@ def _carry_out(
     return Outcome(tuple(rows), provenance, found.computed, recorded.number_made, used)
 
 
-def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: Material) -> list[list[Cell]]:
+def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: RecordingPlan) -> list[list[Cell]]:
     """Return the cells of each replicate that has to be recorded; all at once where recordings exist already.
 
     Between rounds nothing is under way, so that a table can be shown. On a cluster, which takes seconds to start, all
@@ -153,6 +153,6 @@ def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: Material) -> 
     """
     rounds: dict[int, list[Cell]] = {}
     for cell in cells:
-        number = cell.repeat if material.orders else 1
+        number = cell.repeat if material.requests else 1
         rounds.setdefault(min(number, 2) if choice.name == "dask" else number, []).append(cell)
     return list(rounds.values())

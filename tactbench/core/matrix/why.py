@@ -11,8 +11,8 @@ from typing import Any
 from tactbench.core.errors import TactbenchError
 from tactbench.core.matrix.key_book import Entry, KeyBook, Sections, recording_names
 from tactbench.core.matrix.keys import Fixed, Keys, Section, configuration_of
-from tactbench.core.matrix.material import Order
 from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan_recordings import RecordingRequest
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Store
 
@@ -30,10 +30,12 @@ class Explanation:
     """Why nothing can be said about what differs."""
 
 
-def recording_entry(order: Order, keys: Keys) -> Entry:
+def recording_entry(request: RecordingRequest, keys: Keys) -> Entry:
     """Return what went into a recording's key, for the book."""
-    scene = {"role": order.role, "seed": order.seed, "scene": order.scene.model_dump()}
-    return Entry(_name(order), order.path.stem[-12:], scene, keys.maker(order.sensor, order.rig, order.rig_file))
+    scene = {"role": request.role, "seed": request.seed, "scene": request.scene.model_dump()}
+    return Entry(
+        _name(request), request.path.stem[-12:], scene, keys.maker(request.sensor, request.rig, request.rig_file)
+    )
 
 
 @dataclass(frozen=True)
@@ -43,9 +45,9 @@ class Book:
     pages: KeyBook
     keys: Keys
 
-    def note_recordings(self, orders: Sequence[Order]) -> None:
+    def note_recordings(self, requests: Sequence[RecordingRequest]) -> None:
         """Note what goes into the keys of recordings that are to be made."""
-        self.pages.write(recording_entry(order, self.keys) for order in orders)
+        self.pages.write(recording_entry(request, self.keys) for request in requests)
 
     def note_cells(self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path) -> None:
         """Note what goes into the keys of cells that are to be computed: each with its key and its recordings."""
@@ -65,7 +67,7 @@ class Book:
 def explain(
     cell: Cell,
     paths: Sequence[Path],
-    orders: Sequence[Order],
+    requests: Sequence[RecordingRequest],
     keys: Keys,
     recorded: Recorded,
     book: KeyBook,
@@ -78,7 +80,7 @@ def explain(
     ----------
     paths
         Its recordings, whether they are there or not.
-    orders
+    requests
         How they are made; none if they were made elsewhere.
     known
         Key of the latest result of that name, or nothing.
@@ -89,7 +91,7 @@ def explain(
     if missing or not paths:
         reasons = differences({name: part for name, part in (before or {}).items() if name != "data"}, now)
         reasons = reasons if before else []
-        return Explanation("", False, (*reasons, *_unmade(paths, orders, missing, keys, book)))
+        return Explanation("", False, (*reasons, *_unmade(paths, requests, missing, keys, book)))
     try:
         key = keys.of_cell(cell, [recorded.digest(path) for path in paths])
         now["data"] = _plain(_data(paths, recorded, store.folder))
@@ -104,31 +106,31 @@ def explain(
 
 
 def _unmade(
-    paths: Sequence[Path], orders: Sequence[Order], missing: Sequence[Path], keys: Keys, book: KeyBook
+    paths: Sequence[Path], requests: Sequence[RecordingRequest], missing: Sequence[Path], keys: Keys, book: KeyBook
 ) -> list[str]:
     """Say why recordings have to be made; a reason that several share is said once."""
     if not paths:
         return ["There are no recordings of it."]
-    if not orders:
+    if not requests:
         return [f"recording {path} is not there" for path in missing]
     reasons: dict[str, None] = {}
     never: list[str] = []
-    for order in orders:
-        if order.path not in missing:
+    for request in requests:
+        if request.path not in missing:
             continue
-        entry = recording_entry(order, keys)
+        entry = recording_entry(request, keys)
         before = book.sections(entry.name)
         if before is None:
-            never.append(order.scene.name)
+            never.append(request.scene.name)
             continue
         found = differences(before, _sections(entry.fixed, entry.configuration))
-        reasons.update(dict.fromkeys(found or [f"recording {order.scene.name} was removed"]))
-    said = [f"{len(never)} of {len(orders)} recordings were never made, {never[0]} first"] if never else []
+        reasons.update(dict.fromkeys(found or [f"recording {request.scene.name} was removed"]))
+    said = [f"{len(never)} of {len(requests)} recordings were never made, {never[0]} first"] if never else []
     return [*said, *reasons]
 
 
-def _name(order: Order) -> str:
-    return f"recording {order.sensor} {order.rig} {order.scene.name} {order.role} {order.seed}"
+def _name(request: RecordingRequest) -> str:
+    return f"recording {request.sensor} {request.rig} {request.scene.name} {request.role} {request.seed}"
 
 
 def _configuration(cell: Cell) -> Section:

@@ -12,8 +12,8 @@ from tactbench.core.matrix.store.limits import DEPTH
 from tactbench.core.spec.row import FORMAT, ReplicatedRow, in_words
 
 Row = dict[str, Any]
-"""One cell, as `tactbench.core.spec.row.RowModel` describes it. What comes from a ledger shares its big values with other
-rows: they are never changed in place."""
+"""One cell, as `tactbench.core.spec.row.RowModel` describes it. What comes from a ledger shares its big values
+with other rows: they are never changed in place."""
 
 NAMING = ("cell", "repeat", "repeats")
 """What a matrix calls a cell; the key covers everything else."""
