@@ -38,22 +38,8 @@ import numpy as np
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.yaml_file import load_yaml
-from tactbench.plugin import (
-    Block,
-    ChannelSpec,
-    Clock,
-    Driver,
-    LinkTimeout,
-    Quality,
-    Reading,
-    RigFile,
-    SensorSpec,
-    Source,
-    StreamSpec,
-    Unwrap,
-    load_registry,
-    open_link,
-)
+from tactbench.plugin import Block, ChannelSpec, Quality, SensorSpec, Source, StreamSpec, load_registry
+from tactbench.plugin.devices import Clock, Driver, LinkTimeout, Reading, RigFile, Unwrap, open_link
 
 HEAD = struct.Struct("<IQ")
 """Number of the first row, modulo 2^16; its time on the device's clock, nanoseconds."""

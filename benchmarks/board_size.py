@@ -23,7 +23,7 @@ from pathlib import Path
 
 from board_rows import make_rows
 
-from tactbench.core.leaderboard.board.page import to_html
+from tactbench.core.leaderboard.formats import page as page_of
 from tactbench.core.leaderboard.table import build_table
 
 ESTIMATORS = 10
@@ -107,7 +107,7 @@ def main() -> None:
     print(f"{len(rows):,} cells, {os.cpu_count()} cores, {asked.rounds} rounds; median [min, max]")
     plain, text = timed(lambda: json.dumps(rows), asked.rounds)
     tables, _ = timed(lambda: build_table(rows), asked.rounds)
-    pages, page = timed(lambda: to_html(rows), asked.rounds)
+    pages, page = timed(lambda: page_of(build_table(rows)), asked.rounds)
     told("json.dumps of the rows, s", plain)
     told("the table alone, s", tables)
     told("the page, its table included, s", pages)

@@ -13,8 +13,8 @@ import time
 
 import numpy as np
 
+from tactbench.links.bridge_emulator import BridgeEmulator
 from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode_frame
-from tactbench.plugin import BridgeEmulator
 
 PIECE = 1000
 

@@ -88,7 +88,8 @@ def own_elements(cells: int, tolerance: float, layer: bool) -> Solve:
 
 def own_newton(cells: int, penalty: float) -> Solve:
     """Return the default solver of this project on the layer, from a cold start."""
-    from tactbench.plugin import BondedLayer, SkinSheet, assumed
+    from tactbench.plugin import assumed
+    from tactbench.plugin.simulation import BondedLayer, SkinSheet
     from tactbench.rigs.twin.contact.newton import NewtonSolver
     from tactbench.rigs.twin.contact.skins import medium_of
     from tactbench.rigs.twin.geometry import skin_grid

@@ -30,7 +30,7 @@ from tactbench.core.evaluation.reference_floor import Floor, beyond_floor, hold_
 from tactbench.core.evaluation.replicate_sums import summed_in_time
 from tactbench.core.evaluation.replication import Units
 from tactbench.core.samples import Answers
-from tactbench.core.statistics.overlap import corrected_t
+from tactbench.core.statistics.over_folds import corrected_t
 from tactbench.core.statistics.paired import difference
 from tactbench.core.statistics.ranking import ranks
 

@@ -14,21 +14,19 @@ import sys
 import time
 from collections.abc import Sequence
 
+from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import (
-    EffectDescriptor,
     ForceRamp,
     Indenter,
     Placement,
-    Reason,
     RigContext,
     Scene,
     SensorDescriptor,
     SensorSpec,
-    Simulation,
-    Slide,
     assumed,
     load_registry,
 )
+from tactbench.plugin.simulation import EffectDescriptor, Reason, Slide
 from tactbench.rigs.twin.contact.stages import forget_tables
 from tactbench.rigs.twin.rig import Twin, build
 

@@ -20,8 +20,8 @@ from pathlib import Path
 
 from sklearn.ensemble import RandomForestClassifier
 
-from tactbench.core.cost.contestants import Contestant, contestant
 from tactbench.core.cost.rounds import measure
+from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.matrix.progress import Silence
 from tactbench.core.matrix.run import carry_out
@@ -34,17 +34,17 @@ GOAL_LATENCY, GOAL_F1 = 5.0, 0.01
 """Stated before measuring: at least so many times quicker for one row, and no further apart in macro F1."""
 
 
-def arrays(sensor: str, folder: Path) -> Contestant:
+def arrays(sensor: str, folder: Path) -> TimedEstimator:
     """Return the plain forest with the arrays of its cell."""
     registry = load_registry()
     choice = TaskChoice(name=TASK, protocol=PROTOCOL, estimators=(EstimatorChoice(name="majority"),))
     outcome = carry_out(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder))
     spec = registry.tasks[TASK].spec
     data = load_dataset(spec, outcome.recordings[outcome.rows[0]["cell"]])
-    return contestant(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1, threads=1)
+    return timed_estimator(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1, threads=1)
 
 
-def of_seed(one: Contestant, name: str, seed: int) -> Contestant:
+def of_seed(one: TimedEstimator, name: str, seed: int) -> TimedEstimator:
     """Return another forest on the same arrays."""
     if name == "scikit-learn alone":
         return dataclasses.replace(
@@ -57,7 +57,7 @@ def of_seed(one: Contestant, name: str, seed: int) -> Contestant:
     )
 
 
-def f1(one: Contestant) -> float:
+def f1(one: TimedEstimator) -> float:
     """Return the macro F1 on the test rows."""
     model = one.build()
     model.fit(one.X_train, one.y_train)

@@ -19,7 +19,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tactbench.plugin import DriverSettings, EmulatedDevice, EmulatedDevices, assumed
+from tactbench.plugin import assumed
+from tactbench.plugin.devices import DriverSettings, EmulatedDevice, EmulatedDevices
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import build as build_force
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.emulator import DatagramFault, RdtEmulator
 from tactbench.rigs.parallel_manipulator.guard import LocalGuard
@@ -68,6 +69,7 @@ class Setting:
     wanted_n: float = 5.0
     seed: int = 1
     force_age_s: float = 13e-3
+    same_samples: int = 50
     heartbeat_s: float | None = None
     """None: three periods, and 30 ms at least."""
     time: Literal["virtual", "real"] = "virtual"
@@ -86,6 +88,7 @@ class Setting:
             retreat_speed_m_s=0.05,
             heartbeat_s=self.heartbeat_s or max(3 * self.period_s, 30e-3),
             force_age_s=self.force_age_s,
+            same_samples=self.same_samples,
             channel=2,
             sign=1,
             zero=(0.0,) * 6,

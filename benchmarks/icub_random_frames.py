@@ -15,7 +15,7 @@ import sys
 import time
 from dataclasses import fields
 
-from tactbench.plugin import CanFrame
+from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
     BoardSetup,
     Counts,

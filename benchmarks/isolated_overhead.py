@@ -47,7 +47,7 @@ def bare(items: Iterable[int]) -> int:
 
 
 def by(engine: Pool) -> Callable[[Iterable[int]], int]:
-    """Return a contestant that has an engine carry out the cells."""
+    """Return a timed_estimator that has an engine carry out the cells."""
     return lambda items: sum(not isinstance(outcome, BaseException) for _, outcome in engine.each(cell, items))
 
 
@@ -62,15 +62,15 @@ def main() -> None:
     if not can_fork():
         sys.exit("This process has threads: set OMP_NUM_THREADS=1.")
     limits = Limits(timeout_s=60.0, memory_mb=4096)
-    contestants = {
+    timed_estimators = {
         "bare fork and pipe": bare,
         "isolated": by(Pool(1)),
         "isolated, limited": by(Pool(1, limits)),
         "reused process": by(Pool(1, limits, reuse=True)),
     }
-    spent: dict[str, list[float]] = {name: [] for name in contestants}
+    spent: dict[str, list[float]] = {name: [] for name in timed_estimators}
     for _ in range(rounds):
-        for name, run in contestants.items():
+        for name, run in timed_estimators.items():
             began = time.perf_counter()
             assert run(range(cells)) == cells
             spent[name].append(1e3 * (time.perf_counter() - began) / cells)

@@ -29,21 +29,21 @@ from threadpoolctl import threadpool_limits
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.calibration.readoff import thinned
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import PlannedScene, in_drawn_order
 from tactbench.plugin import (
     ForceRamp,
-    Nuisances,
     Placement,
     RigContext,
     Scene,
     SensorDescriptor,
-    Simulation,
     assumed,
     load_object,
     load_registry,
 )
+from tactbench.plugin.simulation import Nuisances
 from tactbench.rigs.twin.likeness.statistics import warming
 
 REGISTRY = load_registry()
@@ -140,9 +140,9 @@ def score(sensor: str, task: str, undone: frozenset[str], seed: int, *, full: bo
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return evaluate(
-            spec, REGISTRY.estimators[name], params, "karl2016", None, [], seed=seed, clock=time.perf_counter,
-            dataset=thinned(data, every),
-        ).score  # fmt: skip
+            CellContext(spec, REGISTRY.estimators[name], params, "karl2016", None, seed=seed, clock=time.perf_counter),
+            thinned(data, every),
+        ).score
 
 
 def time_constants(seeds: Sequence[int], scenario: str | None = None) -> list[float]:

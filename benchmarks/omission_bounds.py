@@ -28,9 +28,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import (
     ChannelKind,
-    Environment,
     ForceRamp,
     Indenter,
     Placement,
@@ -39,11 +39,11 @@ from tactbench.plugin import (
     RigContext,
     Scene,
     SensorDescriptor,
-    Simulation,
     TactbenchError,
     assumed,
     load_registry,
 )
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.contact.stages import skin_under_load
 from tactbench.rigs.twin.effects import creep
 from tactbench.rigs.twin.preparation import carried_out

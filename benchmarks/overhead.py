@@ -40,7 +40,7 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         folder = Path(made)
         shelf = trivial.install(folder / "plugin")
         trivial.use(folder / "plugin")
-        from tactbench.core.evaluation.cell import evaluate
+        from tactbench.core.evaluation.cell import CellContext, evaluate
         from tactbench.core.evaluation.dataset import load_dataset
         from tactbench.core.matrix.engine import EngineChoice
         from tactbench.core.matrix.run import run_matrix
@@ -61,8 +61,19 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         data = load_dataset(task, sorted(shelf.glob("*.h5")))
         began = time.perf_counter()
         for seed in range(1, cells + 1):
-            evaluate(task, installed().estimators["nothing"], {}, "deployable", "session", data.paths, seed=seed,
-                     clock=time.perf_counter, dataset=data, latency=False)  # fmt: skip
+            evaluate(
+                CellContext(
+                    task,
+                    installed().estimators["nothing"],
+                    {},
+                    "deployable",
+                    "session",
+                    seed=seed,
+                    clock=time.perf_counter,
+                    latency=False,
+                ),
+                data,
+            )
         found["plain"] = time.perf_counter() - began
     return found
 

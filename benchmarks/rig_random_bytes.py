@@ -14,7 +14,8 @@ from contextlib import suppress
 
 import numpy as np
 
-from tactbench.plugin import Received, RigError
+from tactbench.plugin import RigError
+from tactbench.plugin.devices import Received
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import AtiFileError
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import read_calibration
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.emulator import EMULATED_CALIBRATION, GaugeEmulator

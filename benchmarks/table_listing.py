@@ -20,10 +20,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tactbench.core.leaderboard.formats import TEXTS
+from tactbench.core.leaderboard.formats import TEXTS, plain_text
 from tactbench.core.leaderboard.parquet import parquet
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
 from tactbench.core.matrix.evaluate_cell import opening
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.store import Row, Store

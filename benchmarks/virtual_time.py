@@ -11,7 +11,7 @@ import sys
 import time
 
 from tactbench.core.plugins.registry import load_registry
-from tactbench.plugin import EmulatedDevices, RigFile, drivers_of, emulators_of
+from tactbench.plugin.devices import EmulatedDevices, RigFile, drivers_of, emulators_of
 
 
 def main() -> None:

@@ -42,7 +42,8 @@ def acquire(
     ----------
     rig, descriptor
         The rig, and what it says about itself. If its acquisition is one of devices (DeviceAcquisition), what it says
-        of clocks, counts and emulation is recorded too.
+        of clocks, counts and emulation is recorded too. If something moves in it (MovingAcquisition), it is stopped
+        before an interrupted recording is completed.
     role
         What the recording is for, or None.
     clock
@@ -87,10 +88,12 @@ def acquire(
                         hint="Look at the rig, and record it again.",
                     )
             except (KeyboardInterrupt, LinkError, RigError) as error:
+                alarm = _stopped(acquisition, error)
                 if interrupted is not None and not descriptor.simulated and any(writer.rows.values()):
-                    why = "stopped by hand" if isinstance(error, KeyboardInterrupt) else str(error)
-                    _conclude(writer, acquisition, descriptor, {**provenance, key: spent}, why)
+                    _conclude(writer, acquisition, descriptor, {**provenance, key: spent}, _why(error))
                     writer.complete_at(interrupted)
+                if alarm and isinstance(error, KeyboardInterrupt):
+                    raise RigError(f"It was interrupted, and the rig is not as it should be: {alarm}.") from error
                 raise
             _conclude(writer, acquisition, descriptor, {**provenance, key: spent})
     return Acquired(writer.meta, writer.content_digest)
@@ -114,6 +117,16 @@ def _conclude(
         provenance=provenance,
         **_of_devices(acquisition, descriptor, writer.rows, cut_short=bool(why)),
     )
+
+
+def _stopped(acquisition: Acquisition, error: BaseException) -> str:
+    """End what moves before anything is written; return what is to be done where it cannot be ended."""
+    stop: Callable[[str], str] | None = getattr(acquisition, "stop", None)
+    return "" if stop is None else stop(_why(error))
+
+
+def _why(error: BaseException) -> str:
+    return "stopped by hand" if isinstance(error, KeyboardInterrupt) else str(error)
 
 
 def _settled(counts: StreamCounts, written: int, cut_short: bool) -> StreamCounts:

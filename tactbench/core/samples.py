@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     FloatArray = npt.NDArray[np.float64]
+    """An array of float64 of any shape."""
     IntArray = npt.NDArray[np.int64]
 
 

@@ -19,7 +19,11 @@ Sent: TypeAlias = tuple[float, "bytes | CanFrame"]
 
 
 class DeviceEmulator(Protocol):
-    """A device on a byte stream, a CAN bus or datagrams. Times are seconds of one clock and never go back."""
+    """A device on a byte stream, a CAN bus or datagrams. Times are seconds of one clock and never go back.
+
+    One that has an attribute ``keeps_pace = True`` gives the bytes of a serial line their time itself, in both
+    directions; for others their link does, where their options state a `baud`.
+    """
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
         """Take what came from the host; return what has left the device by `now_s` and was not yet returned."""
@@ -28,7 +32,7 @@ class DeviceEmulator(Protocol):
         """Return what has left the device by `now_s` and was not yet returned, in order, each with its time."""
 
     def next_s(self) -> float:
-        """Return when `poll` has something to do next; infinite: not before something comes."""
+        """Return when `poll` has something to do next; infinite: not before something comes. Only calls change it."""
 
 
 class SpiDeviceEmulator(Protocol):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import FloatArray, NotApplicable
+from tactbench.plugin import Estimator, FloatArray, NotApplicable
 
 
 class FastForest:
@@ -52,7 +52,7 @@ class FastForest:
 
 def fast_forest(
     *, kind: str, seed: int, threads: int, n_estimators: int, max_depth: int | None, min_samples_leaf: int
-) -> Any:
+) -> Estimator:
     """Return a forest of `n_estimators` trees.
 
     Raises

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import FloatArray
+from tactbench.plugin import Estimator, FloatArray
 
 
 class Forest:
@@ -39,7 +39,7 @@ class Forest:
 
 def forest(
     *, kind: str, seed: int, threads: int, n_estimators: int, max_depth: int | None, min_samples_leaf: int
-) -> Any:
+) -> Estimator:
     """Return a forest of `n_estimators` trees; the paper's curvature forest has 500."""
     from sklearn.ensemble import RandomForestClassifier, RandomForestRegressor
 

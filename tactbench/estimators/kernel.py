@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.estimators.target import OfUnitSpread
-from tactbench.plugin import FloatArray
+from tactbench.plugin import Estimator, FloatArray
 
 
 class EveryNth:
@@ -32,7 +32,7 @@ class EveryNth:
         return np.asarray(self.model.predict(X))
 
 
-def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: float | str, rows: int) -> Any:
+def support_vectors(*, kind: str, seed: int, threads: int, C: float, gamma: float | str, rows: int) -> Estimator:
     """Return a support vector machine: one against one for classes, a tube of 0.1 of y's deviation for numbers.
 
     ``gamma="scale"`` is one over (features times their variance): the width of the cloud itself.

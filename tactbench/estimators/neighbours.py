@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import FloatArray
+from tactbench.plugin import Estimator, FloatArray
 
 
 class Neighbours:
@@ -26,7 +26,7 @@ class Neighbours:
         return np.asarray(self.model.predict(X))
 
 
-def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Any:
+def neighbours(*, kind: str, seed: int, threads: int, n_neighbors: int) -> Estimator:
     """Return the vote, or the mean, of the `n_neighbors` nearest rows; all count alike.
 
     Fifteen (assumed): neighbours in feature space are mostly samples that followed each other; at 100 Hz five of them

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from tactbench.estimators.target import OfUnitSpread
+from tactbench.plugin import Estimator
 
 
-def perceptron(*, kind: str, seed: int, threads: int, hidden: int, alpha: float, max_iter: int) -> Any:
+def perceptron(*, kind: str, seed: int, threads: int, hidden: int, alpha: float, max_iter: int) -> Estimator:
     """Return one hidden layer of `hidden` rectified units, taught by Adam (Kingma and Ba 2015).
 
     A tenth of the training rows, drawn by the seed, says when to stop: ten epochs without gain. Its rows have

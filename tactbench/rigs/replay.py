@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from tactbench.plugin import MissingRecordingError, RigContext, RigDescriptor, UsageError, hookimpl
+from tactbench.plugin import MissingRecordingError, RigContext, RigDescriptor, Shelf, UsageError, hookimpl
 
 TACTBENCH_API = 1
 
@@ -13,7 +13,7 @@ ENDING = ".h5"
 _HINT = "Make some with `tactbench import MAPPING.yaml --out DIR` or `tactbench record --out FILE`."
 
 
-class RecordingShelf:
+class RecordingShelf(Shelf):
     """The recordings of one folder and all folders below it.
 
     Parameters

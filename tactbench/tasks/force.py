@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import (
-    ChannelTarget,
-    Indenter,
-    PlannedScene,
-    Published,
-    Scene,
-    TaskDescriptor,
-    TaskSpec,
-    hookimpl,
-)
+from tactbench.plugin import ChannelTarget, Indenter, PlannedScene, Published, Scene, TaskDescriptor, TaskSpec, hookimpl
 from tactbench.tasks import eflesh
 from tactbench.tasks.surfaces import at_places, few_shots, on_units
 

@@ -11,17 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from tactbench.plugin import (
-    ForceRamp,
-    Indenter,
-    Placement,
-    PlannedScene,
-    Quantity,
-    Role,
-    Scene,
-    assumed,
-    sourced,
-)
+from tactbench.plugin import ForceRamp, Indenter, Placement, PlannedScene, Quantity, Role, Scene, assumed, sourced
 
 PAPER = "Karl et al. 2016"
 RADII_MM = (5.0, 7.5, 10.0, 20.0, 40.0)

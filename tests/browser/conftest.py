@@ -10,7 +10,7 @@ import pytest
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.making import make_report
-from tactbench.core.report.material import open_material
+from tactbench.core.report.results import open_results
 from tests.conftest import Shell
 from tests.core.report.results import draw_one, make_results
 
@@ -47,7 +47,7 @@ def chromium():
 def page(tmp_path_factory) -> Path:
     """The page of a small run, with a figure, a cost file and skipped cells."""
     folder = make_results(Shell(tmp_path_factory.mktemp("page")))
-    material = open_material(Store(folder), load_registry())
+    material = open_results(Store(folder), load_registry())
     (folder / "cost").mkdir()
     row = next(row for row in material.rows if row["status"] == "done")
     row["fit_s"] = 2.5  # as on a slow machine: its neighbours' times are in milliseconds

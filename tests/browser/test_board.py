@@ -7,13 +7,12 @@ import re
 
 import pytest
 
-from tactbench.core.leaderboard.board.page import to_html
-from tactbench.core.leaderboard.sheet import Sheet
+from tactbench.core.leaderboard.columns import OF_ROWS
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.text import visible
-from tactbench.core.leaderboard.values import VALUES
+from tactbench.core.tables.text import visible
 from tests.browser.boards import HOST, HOSTILE, PROVENANCE, board_rows
 from tests.browser.test_page import loaded
+from tests.core.leaderboard.rendering import to_page
 from tests.core.leaderboard.rows import row
 
 pytestmark = pytest.mark.browser
@@ -33,7 +32,7 @@ def rows():
 def path(tmp_path_factory, rows):
     """The board, as a file."""
     file = tmp_path_factory.mktemp("board") / "board.html"
-    file.write_text(to_html(rows, PROVENANCE), encoding="utf-8")
+    file.write_text(to_page(rows, PROVENANCE), encoding="utf-8")
     return file
 
 
@@ -139,7 +138,7 @@ def test_the_lines_are_those_of_the_table_digit_by_digit(board, rows):
 @pytest.mark.parametrize("name", ["score", "95 % interval", "fit", "latency p50", "sessions", "batch/row"])
 def test_a_column_sorts_by_value_inside_each_block_and_dashes_come_last(board, rows, name):
     by_name = {}
-    for one, value in zip(rows, VALUES[name](Sheet(rows)), strict=True):
+    for one, value in zip(rows, map(OF_ROWS[name].value, rows), strict=True):
         by_name.setdefault((one["task"], f"{visible(one['sensor'])} SIM"), []).append(value)
     heading = next(one for one in board.find_elements("css selector", "#lines th") if one.text.startswith(name))
     place = board.execute_script("return arguments[0].cellIndex", heading)
@@ -254,7 +253,7 @@ def test_an_address_with_a_cell_opens_it(board, path, cell, texts):
 
 def test_a_name_for_no_shell_has_no_command_and_others_are_quoted(chromium, tmp_path):
     file = tmp_path / "names.html"
-    file.write_text(to_html([row("a'b; rm -rf ~", cell="a'b; rm -rf ~"), row("c\nd", cell="c\nd")]), encoding="utf-8")
+    file.write_text(to_page([row("a'b; rm -rf ~", cell="a'b; rm -rf ~"), row("c\nd", cell="c\nd")]), encoding="utf-8")
     show(chromium, file)
     told = []
     for link in hashes(chromium, "#lines a[href]:not([tabindex])"):
@@ -384,7 +383,7 @@ def test_a_keyboard_reader_can_skip_to_the_results(board):
 def test_a_large_board_is_turned_over_page_by_page(chromium, tmp_path):
     rows = [row(f"s{n:03d}", score=0.1 + n / 1000) for n in range(650)]
     file = tmp_path / "large.html"
-    file.write_text(to_html(rows), encoding="utf-8")
+    file.write_text(to_page(rows), encoding="utf-8")
     show(chromium, file)
     seen = [line[1][1] for line in lines(chromium)]
     assert len(seen) == 200
@@ -444,7 +443,7 @@ def test_a_browser_that_cannot_unpack_says_so_and_shows_the_plain_tables(chromiu
     try:
         show(chromium, path)
         assert "DecompressionStream" in chromium.find_element("id", "trouble").text
-        assert chromium.find_element("id", "still").is_displayed()
+        assert chromium.find_element("id", "static").is_displayed()
     finally:
         chromium.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
 
@@ -453,10 +452,10 @@ def test_data_that_was_cut_short_is_said_so(chromium, path, tmp_path):
     page = path.read_text(encoding="utf-8")
     start = page.index('id="data">') + len('id="data">')
     data = json.loads(page[start : page.index("</script>", start)])
-    data["blobs"][data["head"]] = data["blobs"][data["head"]][:40]
+    data[0] = data[0][:40]
     damaged = tmp_path / "damaged.html"
     damaged.write_text(page[:start] + json.dumps(data) + page[page.index("</script>", start) :], encoding="utf-8")
     show(chromium, damaged)
     assert "cannot be shown" in chromium.find_element("id", "trouble").text
-    assert chromium.find_element("id", "still").is_displayed()
+    assert chromium.find_element("id", "static").is_displayed()
     chromium.get_log("browser")

@@ -231,6 +231,36 @@ def test_what_a_real_rig_had_recorded_is_kept_where_asked(tmp_path, stops, raise
     assert meta.provenance["acquisition_s"] > 0
 
 
+class Moving(Devices):
+    """Also moves something: `left` is what it says once it was told to stop."""
+
+    def __init__(self, kept, left="", **more):
+        super().__init__(**more)
+        self.kept, self.left, self.told = kept, left, []
+
+    def stop(self, why):
+        self.told.append((why, self.kept.exists()))
+        return self.left
+
+
+@pytest.mark.parametrize(("stops", "raised", "says"), STOPS)
+def test_what_moves_is_stopped_before_anything_is_completed(tmp_path, stops, raised, says):
+    rig = Moving(tmp_path / "kept.h5", stops=stops)
+    with pytest.raises(raised):
+        run(tmp_path / "r.h5", rig, simulated=False, interrupted=rig.kept)
+    ((why, kept),) = rig.told
+    assert says in why
+    assert not kept
+    assert rig.kept.exists()
+
+
+def test_an_interrupt_after_which_it_still_moves_is_an_error_that_says_so(tmp_path):
+    rig = Moving(tmp_path / "kept.h5", "stand clear", stops=KeyboardInterrupt())
+    with pytest.raises(RigError, match=r"interrupted, .* stand clear\."):
+        run(tmp_path / "r.h5", rig, simulated=False, interrupted=rig.kept)
+    assert rig.kept.exists()
+
+
 @pytest.mark.parametrize(("stops", "raised", "says"), STOPS)
 @pytest.mark.parametrize(("simulated", "asked"), [(True, True), (False, False)])
 def test_nothing_is_kept_of_a_simulation_or_unasked(tmp_path, stops, raised, says, simulated, asked):

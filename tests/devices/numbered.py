@@ -9,7 +9,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from tactbench.plugin import Block, ChannelSpec, Clock, DatagramLink, Driver, LinkTimeout, StreamSpec, Unwrap, open_link
+from tactbench.plugin import Block, ChannelSpec, StreamSpec
+from tactbench.plugin.devices import Clock, DatagramLink, Driver, LinkTimeout, Unwrap, open_link
 
 HEAD = struct.Struct("<I")
 BITS = 16

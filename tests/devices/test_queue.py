@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from tactbench.core.samples import Block, Quality
 from tactbench.devices.queue import MOST_BYTES, BlockQueue
 from tactbench.devices.sequence import SequenceCheck
-from tactbench.plugin import ChannelSpec, RigError, StreamSpec, Unwrap
+from tactbench.plugin import ChannelSpec, RigError, StreamSpec
+from tactbench.plugin.devices import Unwrap
 from tests.devices.test_sequence import arrivals
 
 STREAM = StreamSpec(

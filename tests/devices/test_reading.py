@@ -14,7 +14,8 @@ import pytest
 
 from tactbench.core.samples import Block, Quality
 from tactbench.devices import reading as module
-from tactbench.plugin import LinkTimeout, LinkUnplugged, Reading, StreamCounts, UsageError
+from tactbench.plugin import UsageError
+from tactbench.plugin.devices import LinkTimeout, LinkUnplugged, Reading, StreamCounts
 from tests.devices.numbered import Far, NumberedDriver, numbered, stream_of
 
 WIDE = stream_of("wide", 5000.0, 64)

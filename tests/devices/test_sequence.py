@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from tactbench.core.samples import Block, Quality
 from tactbench.devices.sequence import SequenceCheck
-from tactbench.plugin import Unwrap, UsageError
+from tactbench.plugin import UsageError
+from tactbench.plugin.devices import Unwrap
 
 BITS = (8, 16, 32)
 

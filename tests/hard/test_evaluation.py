@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.interval import block_length
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.plugin import load_registry
@@ -40,7 +40,10 @@ def test_no_case_of_the_family_fails(name):
 def _score(task, estimator, protocol, paths, params=None):
     ticks = itertools.count()
     result = evaluate(
-        task, ESTIMATORS[estimator], params or {}, protocol, "roles", paths, seed=1, clock=lambda: next(ticks) * 1e-3
+        CellContext(
+            task, ESTIMATORS[estimator], params or {}, protocol, "roles", seed=1, clock=lambda: next(ticks) * 1e-3
+        ),
+        paths,
     )
     assert np.isfinite([result.score, result.ci_low, result.ci_high]).all()
     return result

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import RigError, SkinSheet, assumed
+from tactbench.plugin import RigError, assumed
+from tactbench.plugin.simulation import SkinSheet
 from tactbench.rigs.twin.geometry import BEYOND_THE_CAP_MM, STEEPEST, Contact, check_contact, gap_mm, skin_grid
 
 SHEET = SkinSheet(

@@ -12,7 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from tactbench.plugin import BridgeEmulator, CanFrame, Link, SpiStep, open_link
+from tactbench.links.bridge_emulator import BridgeEmulator
+from tactbench.plugin.devices import CanFrame, Link, SpiStep, open_link
 
 
 @dataclass

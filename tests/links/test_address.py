@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.links.address import KINDS
-from tactbench.plugin import LinkAddress, LinkError, UsageError, open_link
+from tactbench.links.address import KINDS, LinkAddress
+from tactbench.plugin import UsageError
+from tactbench.plugin.devices import LinkError, open_link
 
 
 @pytest.mark.parametrize("kind", KINDS)

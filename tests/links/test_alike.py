@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tactbench.plugin import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
+from tactbench.plugin.devices import LinkClosed, LinkError, LinkTimeout, LinkUnplugged
 from tests.links.ends import ENDS
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")

@@ -10,9 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tactbench.links.bridge_emulator import BridgeEmulator
 from tactbench.links.bridge_frame import Frame, FrameDecoder, Kind, encode_frame
+from tactbench.links.byte_link import SerialLink
 from tactbench.links.spi_bridge import HELLO, SETUP
-from tactbench.plugin import BridgeEmulator, LinkError, LinkTimeout, SerialLink, SpiBridge, SpiStep
+from tactbench.plugin.devices import LinkError, LinkTimeout, SpiBridge, SpiStep
 from tests.links.ends import loopback, pty, serving
 
 ROOT = Path(__file__).resolve().parents[2]

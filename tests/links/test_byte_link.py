@@ -7,7 +7,8 @@ import threading
 
 import pytest
 
-from tactbench.plugin import LinkError, LinkTimeout, SerialLink, open_link
+from tactbench.links.byte_link import SerialLink
+from tactbench.plugin.devices import LinkError, LinkTimeout, open_link
 from tests.links.ends import pty
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")

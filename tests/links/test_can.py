@@ -10,7 +10,8 @@ import sys
 import can
 import pytest
 
-from tactbench.plugin import CanBus, CanFrame, LinkError, LinkTimeout, LinkUnplugged, open_link
+from tactbench.links.can_link import CanBus
+from tactbench.plugin.devices import CanFrame, LinkError, LinkTimeout, LinkUnplugged, open_link
 from tests.links.ends import pty
 
 FRAMES = [
@@ -89,7 +90,7 @@ def test_noise_on_slcan_costs_what_it_hit(noise):
 
 
 CHILD = """
-from tactbench.plugin import CanFrame, open_link
+from tactbench.plugin.devices import CanFrame, open_link
 with open_link("can://udp_multicast/239.74.163.2?port={port}") as link:
     print("ready", flush=True)
     while True:

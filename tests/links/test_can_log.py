@@ -5,7 +5,7 @@ from __future__ import annotations
 import can
 import pytest
 
-from tactbench.plugin import LinkClosed, LinkEnded, LinkError, open_link
+from tactbench.plugin.devices import LinkClosed, LinkEnded, LinkError, open_link
 
 EPOCH_S = 1_700_000_000.25
 OFFSETS_S = [0.0, 0.0000015, 0.02, 0.04, 3600.5]

@@ -6,7 +6,8 @@ import socket
 
 import pytest
 
-from tactbench.plugin import LinkError, LinkTimeout, UdpLink, open_link
+from tactbench.links.datagram_link import UdpLink
+from tactbench.plugin.devices import LinkError, LinkTimeout, open_link
 
 
 @pytest.fixture

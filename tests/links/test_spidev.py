@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tactbench.plugin import LinkError, SpidevLink
+from tactbench.links.spidev import SpidevLink
+from tactbench.plugin.devices import LinkError
 
 
 def test_a_missing_package_is_named():

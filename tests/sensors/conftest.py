@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tactbench.plugin import BondedLayer, FloatArray, FluidBackedShell, FoamPad, SensorSpec, SkinGrid, SkinState
+from tactbench.plugin import FloatArray, SensorSpec
+from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad, SkinGrid, SkinState
 
 
 def grid_of(spec: SensorSpec, factor: float = 1.0) -> SkinGrid:

@@ -42,7 +42,7 @@ def parameters_of(spec: CalibrationSpec, seed: int, number: int) -> tuple[int, d
     and one nuisance more or fewer leaves the other values as they are.
     """
     values = {
-        nuisance.name: sample(nuisance.prior, _generator(seed, number, nuisance.name)) for nuisance in spec.nuisances
+        nuisance.name: sample(nuisance.prior, _generator(seed, number, nuisance.stream)) for nuisance in spec.nuisances
     }
     return int(_generator(seed, number, "recordings and estimators").integers(2**31)), values
 

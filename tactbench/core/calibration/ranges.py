@@ -30,7 +30,7 @@ class ParameterRange(NamedTuple):
     """What the published numbers say about one nuisance."""
 
     name: str
-    path: str
+    sets: str
     unit: str
     before: Range | None
     after: Range | None
@@ -78,7 +78,7 @@ def parameter_ranges(spec: CalibrationSpec, draws: Sequence[Draw]) -> list[Param
     kept = by_fitted(spec, draws).draws
     return [
         ParameterRange(
-            one.name, one.path, one.unit,
+            one.name, one.sets, one.unit,
             range_of(parameter_values(draws, one.name)), range_of(parameter_values(kept, one.name)),
         )
         for one in spec.nuisances if not isinstance(one.prior, Fixed)

@@ -75,7 +75,7 @@ def records(told: Summary) -> dict[str, list[dict[str, Any]]]:
     """Return the tables of a summary as flat records, by name of the table."""
     return {
         "parameters": [
-            {"name": one.name, "path": one.path, "unit": one.unit, **_range(one.before, "prior"),
+            {"name": one.name, "sets": one.sets, "unit": one.unit, **_range(one.before, "prior"),
              **_range(one.after, "accepted")}
             for one in told.parameters
         ],

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.calibration.draw import finished
@@ -11,20 +10,10 @@ from tactbench.core.calibration.ranges import median_and_ends
 from tactbench.core.calibration.result import CalibrationResult
 from tactbench.core.calibration.summary import Summary, acceptance, records, summary
 from tactbench.core.spec.calibration import CalibrationSpec, Fixed, Prior, Variation
+from tactbench.core.tables.markdown import markdown as tables_as_markdown
+from tactbench.core.tables.text_table import TextTable, text_table
 
 Line = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class TextTable:
-    """A title, columns, rows of text by column, and sentences below."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[Mapping[str, str], ...]
-    numeric: tuple[str, ...] = ()
-    """Columns aligned to the right."""
-    below: tuple[str, ...] = ()
 
 
 def text_tables(result: CalibrationResult, told: Summary) -> list[TextTable]:
@@ -39,7 +28,7 @@ def text_tables(result: CalibrationResult, told: Summary) -> list[TextTable]:
         *(_variation(result, one) for one in result.spec.variations),
         *(() if result.earlier is None else (_beside(result, lines, result.earlier),)),
     )
-    return [table for table in tables if table.rows]
+    return [table for table in tables if table.lines]
 
 
 def markdown(result: CalibrationResult, told: Summary) -> str:
@@ -51,19 +40,19 @@ def markdown(result: CalibrationResult, told: Summary) -> str:
         f"SIM. {len(result.draws)} draws with seed {result.seed}{failed}; {result.cpu_s / 60:.0f} minutes of processor "
         f"time; {makers}.",
     ]
-    for table in text_tables(result, told):
-        out += [f"### {table.title}", _grid(table), *table.below]
-    return "\n\n".join(out) + "\n"
+    return "\n\n".join([*out, tables_as_markdown(text_tables(result, told))])
 
 
-def _grid(table: TextTable) -> str:
-    rule = ["---:" if column in table.numeric else "---" for column in table.columns]
-    rows = [[row.get(column, "") for column in table.columns] for row in table.rows]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in (list(table.columns), rule, *rows))
+def _table(
+    title: str, columns: Sequence[str], rows: Iterable[Mapping[str, str]], *, numeric: Sequence[str] = (),
+    notes: Sequence[str] = (),
+) -> TextTable:  # fmt: skip
+    lines = [[row.get(column, "") for column in columns] for row in rows]
+    return text_table(title, columns, lines, numeric=numeric, notes=notes)
 
 
 def _published(spec: CalibrationSpec, told: Summary, lines: Sequence[Line]) -> TextTable:
-    return TextTable(
+    return _table(
         f"Published numbers: {len(told.draws)} draws from the prior, {told.n_accepted} accepted",
         ("number", "use", "published", "prior", "accepted", "inside", "by all others", "inside those", "their reach"),
         tuple(
@@ -75,16 +64,16 @@ def _published(spec: CalibrationSpec, told: Summary, lines: Sequence[Line]) -> T
             }
             for line in lines
         ),
-        below=(acceptance(spec, told),),
+        notes=(acceptance(spec, told),),
     )  # fmt: skip
 
 
 def _nuisances(lines: Sequence[Line]) -> TextTable:
-    return TextTable(
+    return _table(
         "Nuisances: median and middle 80 %",
-        ("nuisance", "where", "unit", "prior", "accepted"),
+        ("nuisance", "sets", "unit", "prior", "accepted"),
         tuple(
-            {"nuisance": line["name"], "where": line["path"], "unit": line["unit"], "prior": _range(line, "prior"),
+            {"nuisance": line["name"], "sets": line["sets"], "unit": line["unit"], "prior": _range(line, "prior"),
              "accepted": _range(line, "accepted")}
             for line in lines
         ),
@@ -92,7 +81,7 @@ def _nuisances(lines: Sequence[Line]) -> TextTable:
 
 
 def _findings(lines: Sequence[Line]) -> TextTable:
-    return TextTable(
+    return _table(
         "Findings: share of the draws in which they come out, with Wilson's 95 %",
         ("finding", "prior", "accepted"),
         tuple(
@@ -109,7 +98,7 @@ def _sensitivity(spec: CalibrationSpec, lines: Sequence[Line]) -> TextTable:
         + ("*" if line["low"] > 0 or line["high"] < 0 else "")
         for line in lines
     }
-    return TextTable(
+    return _table(
         "Partial rank correlations; *: the 95 % interval leaves out 0",
         ("number", *names),
         tuple(
@@ -123,7 +112,7 @@ def _sensitivity(spec: CalibrationSpec, lines: Sequence[Line]) -> TextTable:
 
 def _agreement(spec: CalibrationSpec, lines: Sequence[Line], verdicts: Sequence[Line]) -> TextTable:
     statements = {finding.name: finding.statement for finding in spec.findings}
-    return TextTable(
+    return _table(
         "Cheap answers beside the dear ones they stand for",
         ("cheap", "dear", "draws", "rank correlation", "mean difference", "largest"),
         tuple(
@@ -133,7 +122,7 @@ def _agreement(spec: CalibrationSpec, lines: Sequence[Line], verdicts: Sequence[
             for line in lines
         ),
         numeric=("draws", "rank correlation", "mean difference", "largest"),
-        below=tuple(
+        notes=tuple(
             f"Cheap and dear answer alike in {_share(line, 'alike')}: {statements[line['finding']]}."
             for line in verdicts
         ),
@@ -149,12 +138,12 @@ def _variation(result: CalibrationResult, variation: Variation) -> TextTable:
         found = {name: median_and_ends(draws, name) for name in variation.outputs}
         cells = {titles[name]: _spread(one) for name, one in found.items()}
         rows.append({"setting": setting.label, "seeds": str(len(finished(draws))), **cells})
-    return TextTable(
+    return _table(
         f"{variation.title}: median (least … largest) over seeds",
         ("setting", "seeds", *titles.values()),
         tuple(rows),
         numeric=("seeds",),
-        below=(f"{variation.reason} Nothing is drawn from a prior here; the seeds are the same in every setting.",),
+        notes=(f"{variation.reason} Nothing is drawn from a prior here; the seeds are the same in every setting.",),
     )
 
 
@@ -183,11 +172,11 @@ def _beside(result: CalibrationResult, lines: Mapping[str, Sequence[Line]], earl
         for name in dict.fromkeys((*then, *now))
         if then.get(name) != now.get(name)
     ]
-    return TextTable(
+    return _table(
         f"Beside the earlier {len(told.draws)} draws",
         ("number or finding", "earlier prior", "prior", "earlier accepted", "accepted"),
         tuple(rows),
-        below=(f"Priors that differ: {'; '.join(other) or 'none'}. Earlier: {acceptance(earlier.spec, told)}",),
+        notes=(f"Priors that differ: {'; '.join(other) or 'none'}. Earlier: {acceptance(earlier.spec, told)}",),
     )
 
 

@@ -13,16 +13,15 @@ from typing import cast
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.calibration.draw import Draw, parameters_of
-from tactbench.core.calibration.placing import procedures, with_parameters
+from tactbench.core.calibration.placing import procedures, simulation_of
 from tactbench.core.calibration.readoff import read_off, thinned
 from tactbench.core.errors import TactbenchError, UsageError
-from tactbench.core.evaluation.cell import CellResult, evaluate
+from tactbench.core.evaluation.cell import CellContext, CellResult, evaluate
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.matrix.installed import rig_of
 from tactbench.core.plugins.interfaces import Rig
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.spec.calibration import CalibrationSpec, Output
-from tactbench.core.spec.scene import Simulation
 from tactbench.core.spec.task import PlannedScene, TaskSpec, in_drawn_order
 
 
@@ -71,11 +70,9 @@ def scenes_of(
 ) -> list[PlannedScene]:
     """Return the task's scenes with the drawn values in their places, in the order that belongs to the draw's seed."""
     found = []
+    simulation = simulation_of(spec, sensor, values)
     for planned in in_drawn_order(task.scenes, seed):
-        scene = with_parameters(planned.scene, spec, sensor, values)
-        if spec.simulation != Simulation():
-            scene = scene.model_copy(update={"simulation": spec.simulation})
-        found.append(planned.model_copy(update={"scene": scene}))
+        found.append(planned.model_copy(update={"scene": planned.scene.asked(simulation)}))
     return found
 
 
@@ -85,7 +82,7 @@ def checked(spec: CalibrationSpec) -> None:
     Raises
     ------
     UnknownNameError, UsageError
-        If a sensor, task, estimator, rig, parameter or path of a scene is not there, or the rig is not a simulated one.
+        If a sensor, task, estimator, rig or parameter is not there, or the rig is not a simulated one.
     """
     registry = installed()
     if not registry.rigs[spec.rig].simulated:
@@ -143,7 +140,15 @@ def _answer(
         key = json.dumps([output.estimator.model_dump(), output.every], sort_keys=True)
         if key not in answers:
             answers[key] = evaluate(
-                task, registry.estimators[output.estimator.name], output.estimator.params, protocol, None, [],
-                seed=seed, clock=time.perf_counter, dataset=thinned(data, output.every),
-            )  # fmt: skip
+                CellContext(
+                    task,
+                    registry.estimators[output.estimator.name],
+                    output.estimator.params,
+                    protocol,
+                    None,
+                    seed=seed,
+                    clock=time.perf_counter,
+                ),
+                thinned(data, output.every),
+            )
         yield output.name, read_off(output, answers[key], data.metas)

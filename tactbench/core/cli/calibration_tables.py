@@ -20,7 +20,7 @@ def print_calibration(result: CalibrationResult, told: Summary, shape: str) -> N
     """Print what a calibration says in one of `CALIBRATION_FORMATS`."""
     from tactbench.core.calibration.summary import records
     from tactbench.core.calibration.tables import markdown, text_tables
-    from tactbench.core.cli.grid import print_grid, print_records
+    from tactbench.core.cli.grid import print_records, print_tables
     from tactbench.core.cli.screen import remark
 
     if shape == "md":
@@ -29,10 +29,7 @@ def print_calibration(result: CalibrationResult, told: Summary, shape: str) -> N
         print_records(_long(records(told)), shape)
     else:
         click.echo(f"{result.spec.title} (SIM)\n")
-        for table in text_tables(result, told):
-            print_grid(table.title, table.columns, table.rows, numeric=table.numeric)
-            for sentence in table.below:
-                click.echo(f"{sentence}\n")
+        print_tables(text_tables(result, told))
     if told.failed:
         reasons = sorted({draw.reason for draw in result.draws if draw.status == "failed"})
         remark(f"{told.failed} draws failed: {reasons[0]}" + (" …" if len(reasons) > 1 else ""))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,10 @@ import click
 from tactbench.core.cli.results import is_results, opened, shown_rows
 
 if TYPE_CHECKING:
-    from tactbench.core.leaderboard.choosing import Choice
-    from tactbench.core.leaderboard.criteria import Wish
+    from tactbench.core.choosing.choosing import Choice
+    from tactbench.core.choosing.criteria import Wish
     from tactbench.core.spec.task import TaskSpec
+    from tactbench.core.tables.text_table import TextTable
 
 Row = dict[str, Any]
 _DEFAULT = Path("tactbench-results")
@@ -53,10 +54,10 @@ def command(
     FOLDER is what `run --out` wrote; default: tactbench-results, and the results that came with tactbench where that
     has none of the task.
     """
-    from tactbench.core.leaderboard.choosing import choose
-    from tactbench.core.leaderboard.criteria import Wish
-    from tactbench.core.leaderboard.records import json_text
+    from tactbench.core.choosing.choosing import choose
+    from tactbench.core.choosing.criteria import Wish
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.tables.text import json_text
 
     registry = load_registry()
     task = registry.tasks[task_name].spec
@@ -152,12 +153,13 @@ def _print(choice: Choice, heading: str) -> None:
     from rich.text import Text
 
     from tactbench.core.cli.screen import console
+    from tactbench.core.tables.terminal import show
 
     screen = console()
     screen.print(Text(choice.verdict, style="bold"))
     screen.print(Text(heading, style="dim"))
     if choice.candidates:
-        screen.print(_table(choice))
+        show([_table(choice)], screen)
     for title, sentences in (
         ("interval", choice.intervals),
         ("unknown", choice.unknown),
@@ -168,16 +170,13 @@ def _print(choice: Choice, heading: str) -> None:
     screen.print()
 
 
-def _table(choice: Choice) -> Any:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    from tactbench.core.leaderboard.choosing import interval_text
-    from tactbench.core.leaderboard.numbers import score
+def _table(choice: Choice) -> TextTable:
+    from tactbench.core.choosing.choosing import interval_text
+    from tactbench.core.tables.numbers import score
+    from tactbench.core.tables.text_table import TextTable
 
     wishes = dict.fromkeys(one.wish for candidate in choice.candidates for one in candidate.criteria)
-    head = ["sensor / estimator", "score, interval", *(wish for wish in wishes if wish != "score")]
+    head = ("sensor / estimator", "score, interval", *(wish for wish in wishes if wish != "score"))
     lines = []
     for one in choice.candidates:
         told = {
@@ -185,15 +184,5 @@ def _table(choice: Choice) -> Any:
         }
         known = f"{score(one.score, choice.unit)}, {interval_text(one, choice.unit)}"
         wished = f"; {told['score']}" if "score" in told else ""
-        lines.append([f"{one.sensor} / {one.estimator}", known + wished, *(told.get(wish, "") for wish in head[2:])])
-    grid = Table(box=box.SIMPLE_HEAD, pad_edge=False, title=Text(f"score: {choice.quantity}"), title_justify="left")
-    for title, column in zip(head, zip(*lines, strict=True), strict=True):
-        grid.add_column(Text(title), min_width=_longest((title, *column)))
-    for line in lines:
-        grid.add_row(*map(Text, line))
-    return grid
-
-
-def _longest(texts: Sequence[str]) -> int:
-    """Return the length of the longest word: a column as wide breaks none."""
-    return max(len(word) for text in texts for word in text.split())
+        lines.append((f"{one.sensor} / {one.estimator}", known + wished, *(told.get(wish, "") for wish in head[2:])))
+    return TextTable(f"score: {choice.quantity}", head, tuple(lines))

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-DUEL_FORMATS = ("table", "json", "md", "latex", "csv")
+COMPARISON_FORMATS = ("table", "json", "md", "latex", "csv")
 
 
 @click.command(name="compare")
@@ -17,7 +17,7 @@ DUEL_FORMATS = ("table", "json", "md", "latex", "csv")
               help="Result folder that sensors or estimators are compared in.")  # fmt: skip
 @click.option("--task", help="This task only.")
 @click.option("--config", metavar="FILE", help="Matrix whose declared comparisons p-values are corrected for.")
-@click.option("--format", "shape", type=click.Choice(DUEL_FORMATS), default="table", show_default=True)
+@click.option("--format", "shape", type=click.Choice(COMPARISON_FORMATS), default="table", show_default=True)
 def command(first: str, second: str, folder: Path, task: str | None, config: str | None, shape: str) -> None:
     """Compare A and B replicate by replicate: two sensors, two estimators, or two result folders.
 
@@ -26,14 +26,14 @@ def command(first: str, second: str, folder: Path, task: str | None, config: str
     from tactbench.core.cli.config import default_matrix, matrix_called
     from tactbench.core.cli.results import is_results
     from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.duel import duels, folder_duels, with_declared
+    from tactbench.core.leaderboard.pairwise import comparisons, folder_comparisons, with_declared
 
     if all(is_results(Path(one)) for one in (first, second)):
-        found = folder_duels(kept_rows(Path(first)), kept_rows(Path(second)), first, second, task)
+        found = folder_comparisons(kept_rows(Path(first)), kept_rows(Path(second)), first, second, task)
     else:
         matrix = matrix_called(config) if config else default_matrix()
         rows = kept_rows(folder)
-        found = with_declared(duels(rows, first, second, task), rows, matrix.comparisons)
+        found = with_declared(comparisons(rows, first, second, task), rows, matrix.comparisons)
     if not found:
         raise UsageError(
             f"{first} and {second} have no cell to compare" + (f" in task {task!r}." if task else "."),
@@ -50,20 +50,15 @@ def kept_rows(folder: Path) -> list[dict[str, Any]]:
 
 
 def _print(found: Any, shape: str) -> None:
-    from tactbench.core.cli.grid import print_grid, print_records
+    from tactbench.core.cli.grid import print_records, print_tables
     from tactbench.core.cli.screen import remark
-    from tactbench.core.leaderboard.duel_table import NUMERIC, notes_of, record_of, tables_of
-    from tactbench.core.leaderboard.duel_text import latex, markdown
+    from tactbench.core.leaderboard.pairwise_table import notes_of, record_of, tables_of
 
     if shape in ("json", "csv"):
-        print_records([record_of(duel) for duel in found], shape)
-        return
-    tables, notes = tables_of(found), notes_of(found)
-    if shape != "table":
-        click.echo((markdown if shape == "md" else latex)(tables, notes), nl=False)
-        return
-    for table in tables:
-        lines = [{k: v for k, v in zip(table.columns, line, strict=True) if v != "–"} for line in table.lines]
-        print_grid(table.title, table.columns, lines, numeric=sorted(NUMERIC))
-    for note in notes:
-        remark(note)
+        print_records([record_of(pair) for pair in found], shape)
+    elif shape == "table":
+        print_tables([table.compact() for table in tables_of(found)])
+        for note in notes_of(found):
+            remark(note)
+    else:
+        print_tables([*tables_of(found), notes_of(found)], shape)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-import click
-
-from tactbench.core.cli.grid import print_grid, print_records
+from tactbench.core.cli.grid import print_records, print_tables
 
 COMPARISON_FORMATS = ("table", "md", "json", "csv")
 
@@ -29,7 +28,7 @@ def print_comparisons(rows: Sequence[Mapping[str, Any]], by: str, shape: str) ->
     """
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.comparison import compare
+    from tactbench.core.leaderboard.side_by_side import compare
 
     if shape not in COMPARISON_FORMATS:
         raise UsageError(
@@ -44,16 +43,6 @@ def print_comparisons(rows: Sequence[Mapping[str, Any]], by: str, shape: str) ->
     if shape in ("json", "csv"):
         print_records([record for table in tables for record in table.records], shape)
         return
-    for table in tables:
-        if shape == "md":
-            click.echo(f"### {table.title}\n")
-            click.echo("| " + " | ".join(table.columns) + " |")
-            click.echo("|" + "---|" * 2 + "---:|" * (len(table.columns) - 2))
-            for line in table.lines:
-                click.echo("| " + " | ".join(cell.replace("|", "\\|").replace("\n", "<br>") for cell in line) + " |")
-            click.echo()
-        else:
-            shown = [dict(zip(table.columns, line, strict=True)) for line in table.lines]
-            print_grid(table.title, table.columns, shown, numeric=table.columns[2:])
+    print_tables([replace(table, notes=()) for table in tables], shape)
     for note in dict.fromkeys(note for table in tables for note in table.notes):
         remark(note)

@@ -40,7 +40,7 @@ def show_ladder(
     from tactbench.core.cli.screen import remark
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import flat_csv, write_ladder
-    from tactbench.core.leaderboard.table import METRIC_NAMES
+    from tactbench.core.leaderboard.names import METRIC_NAMES
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()
@@ -112,8 +112,8 @@ def _print(ladder: Ladder) -> None:
 
     about = ladder.about
     lines = [line(row, about["unit"]) for row in ladder.rows]
-    styles = ["bold" if row["front_fit"] or row["front_delay"] else "" for row in ladder.rows]
-    print_grid(title(about), COLUMNS, lines, numeric=RIGHT, styles=styles)
+    kinds = ["result" if row["front_fit"] or row["front_delay"] else "" for row in ladder.rows]
+    print_grid(title(about), COLUMNS, lines, numeric=RIGHT, kinds=kinds)
     if about["load"] is not None and about["load"] > about["cores"]:
         remark(
             f"The machine was busy: {about['load']:.1f} processes wanted its {about['cores']} cores. Others' work is "

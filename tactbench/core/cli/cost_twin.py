@@ -133,9 +133,9 @@ def _show(
         best = precise(group)
         lines = [_line(point, point in best) for point in group]
         lines += _lines_of(skipped, subject)
-        styles = ["bold" if point.default else "" for point in group]
-        styles += ["dim"] * (len(lines) - len(styles))
-        print_grid(f"{subject}, {observable}: {study.title}", _COLUMNS, lines, styles=styles,
+        kinds = ["result" if point.default else "" for point in group]
+        kinds += ["skipped"] * (len(lines) - len(kinds))
+        print_grid(f"{subject}, {observable}: {study.title}", _COLUMNS, lines, kinds=kinds,
                    numeric=("time", "rms", "worst", "noise / 3"))  # fmt: skip
         click.echo(verdict(group))
     measured = {point.subject for point in points}
@@ -248,15 +248,15 @@ def _keys(records: Sequence[Mapping[str, Any]]) -> list[str]:
 def _write(points: Sequence[CostPoint], records: Sequence[dict[str, Any]], study: CostStudy, folder: Path) -> None:
     import json
 
-    from tactbench.core.cli.grid import csv_text
     from tactbench.core.cli.screen import remark
     from tactbench.core.cost.precision_figure import draw
     from tactbench.core.errors import UnwritableError
     from tactbench.core.matrix.files import replace_file
+    from tactbench.core.tables.csv_text import csv_of_records
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        replace_file(folder / "twin.csv", csv_text(records).encode())
+        replace_file(folder / "twin.csv", csv_of_records(records).encode())
         replace_file(folder / "twin.json", (json.dumps(records, indent=1, ensure_ascii=False) + "\n").encode())
         if points:
             draw(points, study.title, [folder / "twin.png", folder / "twin.pdf"])

@@ -256,8 +256,8 @@ def _say_where(
 ) -> None:
     import yaml
 
-    from tactbench.core.leaderboard.text import command_line
     from tactbench.core.spec.rig_file import FORCE
+    from tactbench.core.tables.text import command_line
 
     found: dict[str, Any] = {
         name: entry.model_copy(update={"link": emulated.addresses[name], "faults": (), "emulator": True})

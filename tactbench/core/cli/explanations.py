@@ -11,7 +11,7 @@ from tactbench.core.cli.progress import progress
 from tactbench.core.cli.screen import remark
 from tactbench.core.cost.task_score import in_unit, quick_estimator, task_score, with_all_effects
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
-from tactbench.core.leaderboard.table import METRIC_NAMES
+from tactbench.core.leaderboard.names import METRIC_NAMES
 from tactbench.core.plugins.interfaces import RigContext
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.spec.scene import Simulation
@@ -149,7 +149,7 @@ def _scenes(registry: Registry, task: str, wanted: str | None, simulation: Simul
     if wanted is not None and wanted not in planned:
         raise UnknownNameError(f"scene of task {task!r}", wanted, planned)
     scenes = [planned[wanted]] if wanted is not None else list(planned.values())
-    return [scene.model_copy(update={"simulation": simulation}) if simulation else scene for scene in scenes]
+    return [scene.asked(simulation) if simulation else scene for scene in scenes]
 
 
 def _alike(rig: Explaining, sensor: SensorDescriptor, scenes: list[Scene]) -> list[list[Scene]]:
@@ -174,9 +174,9 @@ def _print(sensor: str, task: str, group: list[Scene], rows: Any, rounds: int) -
         }
         for row in rows
     ]
-    styles = ["" if row.entry.included else "dim" for row in rows]
+    kinds = ["" if row.entry.included else "skipped" for row in rows]
     others = f", and {len(group) - 1} scenes with the same effects" if len(group) > 1 else ""
-    print_grid(f"{sensor}, {task}: {group[0].name}{others}", _COLUMNS, lines, numeric=("cost",), styles=styles)
+    print_grid(f"{sensor}, {task}: {group[0].name}{others}", _COLUMNS, lines, numeric=("cost",), kinds=kinds)
     included = [row.cost_s for row in rows if row.entry.included and row.cost_s is not None]
     if rounds:
         remark(f"{1e3 * sum(included):.1f} ms for one recording on this machine, medians of {rounds}; behind a minus "

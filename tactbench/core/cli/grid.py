@@ -1,12 +1,15 @@
-"""How verbs print records that are no leaderboard: a table for people, JSON or CSV for programs."""
+"""How verbs print tables and records: for people as a table, Markdown or LaTeX, for programs as JSON or CSV."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from tactbench.core.tables.terminal import Part
 
 GRID_FORMATS = ("table", "json", "csv")
 
@@ -16,55 +19,44 @@ def print_grid(
     columns: Sequence[str],
     rows: Sequence[Mapping[str, str]],
     *,
-    numeric: Sequence[str] = (),
-    styles: Sequence[str] = (),
+    numeric: Collection[str] = (),
+    kinds: Sequence[str] = (),
 ) -> None:
-    """Print rows of text on stdout; text from plugins is never read as markup.
+    """Print rows of text on stdout as a table.
 
     Parameters
     ----------
-    title
-        Stands above the table.
     columns
         Keys of the rows, in order; a column without any entry is not shown.
     numeric
         Columns aligned to the right.
-    styles
-        One style a row, or none at all.
+    kinds
+        One word a row, by which it looks; see `tactbench.core.tables.terminal`.
     """
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
+    from tactbench.core.tables.text_table import text_table
 
+    lines = [[row.get(column, "") for column in columns] for row in rows]
+    print_tables([text_table(title, columns, lines, numeric=numeric, kinds=kinds)])
+
+
+def print_tables(parts: Sequence[Part], shape: str = "table") -> None:
+    """Print tables and notes on stdout as ``table``, ``md`` or ``latex``."""
     from tactbench.core.cli.screen import console
+    from tactbench.core.tables.latex import latex
+    from tactbench.core.tables.markdown import markdown
+    from tactbench.core.tables.terminal import show
 
-    screen = console()
-    screen.print(Text(title, style="bold"))
-    grid = Table(box=box.SIMPLE_HEAD)
-    shown = [column for column in columns if any(row.get(column) for row in rows)]
-    for column in shown:
-        grid.add_column(Text(column), justify="right" if column in numeric else "left", overflow="fold")
-    for place, row in enumerate(rows):
-        style = styles[place] if styles else ""
-        grid.add_row(*(Text(row.get(column, "")) for column in shown), style=style)
-    screen.print(grid)
+    if shape == "table":
+        show(parts, console())
+    else:
+        click.echo((markdown if shape == "md" else latex)(parts), nl=False)
 
 
 def print_records(records: Sequence[Mapping[str, Any]], shape: str) -> None:
     """Print records on stdout as ``json`` or ``csv``; all have the keys of the first."""
+    from tactbench.core.tables.csv_text import csv_of_records
+
     if shape == "json":
         click.echo(json.dumps(list(records), indent=1, ensure_ascii=False, allow_nan=False))
-        return
-    click.echo(csv_text(records), nl=False)
-
-
-def csv_text(records: Sequence[Mapping[str, Any]]) -> str:
-    """Return records as CSV with a header."""
-    import csv
-    import io
-
-    out = io.StringIO()
-    writer = csv.DictWriter(out, fieldnames=list(records[0]) if records else [], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(records)
-    return out.getvalue()
+    else:
+        click.echo(csv_of_records(records), nl=False)

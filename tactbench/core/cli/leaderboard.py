@@ -47,13 +47,11 @@ def command(
 ) -> None:  # fmt: skip
     """Show the table of all results in a folder, in any format. FOLDER is what `run --out` wrote."""
     from tactbench.core.cli.tables import check_destination
-    from tactbench.core.leaderboard.collector import collector_at_rest
 
     shape = format_of(shape, to)
     check_destination(shape, to, times=times)
     view = view_of(folder, wide=wide, notes=notes, columns=columns, shape=shape)
-    with collector_at_rest():
-        _show(opened(folder), shape, to, by, times, best, view, filters)
+    _show(opened(folder), shape, to, by, times, best, view, filters)
 
 
 def _show(
@@ -61,12 +59,12 @@ def _show(
     filters: Mapping[str, Sequence[str]],
 ) -> None:  # fmt: skip
     from tactbench.core.errors import UsageError
-    from tactbench.core.leaderboard.files import table_of
+    from tactbench.core.leaderboard.table import build_table
     from tactbench.core.leaderboard.view import best
 
     rows = _only(shown_rows(store), filters)
     if by is None:
-        table = table_of(rows, store.folder, provenance_of(store, rows), times=times)
+        table = build_table(rows, provenance_of(store, rows), times=times)
         print_table(best(table, count) if count else table, shape, view, to=to)
     elif to is not None or not times or count:
         raise UsageError("A comparison is printed whole, and has no times.", hint="Leave out --to, --best, --no-times.")

@@ -10,10 +10,10 @@ from typing import Any
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES
-from tactbench.core.leaderboard.numbers import suffix
 from tactbench.core.spec.rig import EffectDescriptor, EstimatorDescriptor, RigDescriptor
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.task import ChannelTarget, Published, TaskSpec
+from tactbench.core.tables.numbers import suffix
 
 Pair = tuple[str, str]
 

@@ -54,6 +54,7 @@ def command(
     rung: str | None,
     tolerance: float | None,
     scenario: str | None,
+    nuisances: tuple[str, ...],
 ) -> None:
     """Carry out one scene into one recording."""
     import time
@@ -74,9 +75,11 @@ def command(
         scene = _sliding(scene, slide_mm_s, descriptor)
     devices = load_rig_file(Path(rig_file), registry) if rig_file else None
     rig = rig or (devices.rig if devices else "twin")
-    simulation = simulation_of(registry, rig, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario)
+    simulation = simulation_of(
+        registry, rig, [sensor], effects=effects, rung=rung, tolerance=tolerance, scenario=scenario, nuisances=nuisances
+    )
     if simulation is not None:
-        scene = scene.model_copy(update={"simulation": simulation})
+        scene = scene.asked(simulation)
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
     provenance = gather()

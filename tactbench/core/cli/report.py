@@ -55,16 +55,16 @@ def command(
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.report.making import make_report
-    from tactbench.core.report.material import open_material
+    from tactbench.core.report.results import open_results
 
     if not (folder / "index.jsonl").is_file():
         raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
     store = Store(folder, recordings=recordings)
-    material = open_material(store, load_registry())
+    results = open_results(store, load_registry())
     for sentence in store.troubles:
         remark(f"{folder}: {sentence}")
     with progress() as told:
-        made = make_report(material, out or folder / "report", told, draw=_drawer(), calibrated=_calibrated(folder))
+        made = make_report(results, out or folder / "report", told, draw=_drawer(), calibrated=_calibrated(folder))
     _print(made, shape)
     for sentence in made.missing:
         remark(f"Left out: {sentence}")
@@ -97,19 +97,9 @@ def _calibrated(folder: Path) -> Calibrated | None:
 
 
 def _print(made: Report, shape: str) -> None:
-    from tactbench.core.cli.grid import print_grid, print_records
-    from tactbench.core.report.plain import markdown
+    from tactbench.core.cli.grid import print_records, print_tables
 
-    if shape == "md":
-        click.echo(markdown(made.reproduction), nl=False)
-    elif shape != "table":
+    if shape in ("json", "csv"):
         print_records(made.records, shape)
     else:
-        table = made.reproduction
-        lines = [
-            {name: entry.text for name, entry in zip(table.columns, line, strict=True)} for line in table.lines
-        ]  # fmt: skip
-        styles = ["bold" if kind == "inside" else "" for kind in table.kinds]
-        print_grid(table.title, table.columns, lines, numeric=tuple(table.numeric), styles=styles)
-        for note in table.notes:
-            click.echo(f" {note}")
+        print_tables([made.reproduction], shape)

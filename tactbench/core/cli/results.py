@@ -39,8 +39,8 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.checked import checked
-    from tactbench.core.leaderboard.text import cut, visible
     from tactbench.core.statistics.replicates import over_replicates
+    from tactbench.core.tables.text import cut, visible
 
     rows, wrong = checked(store.rows())
     told = [cut(visible(one), 300) for one in (*store.troubles, *wrong)]

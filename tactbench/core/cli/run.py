@@ -59,7 +59,8 @@ def command(
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
-    from tactbench.core.leaderboard.files import table_of, write_tables
+    from tactbench.core.leaderboard.files import write_tables
+    from tactbench.core.leaderboard.table import build_table
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
@@ -76,7 +77,7 @@ def command(
         )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
     rows = over_replicates(outcome.rows)
-    table = table_of(rows, store.folder, provenance)
+    table = build_table(rows, provenance)
     print_table(table, shape, view_of(store.folder, wide=wide, notes=notes))
     if shape == "table":
         _side_by_side(rows)
@@ -89,16 +90,17 @@ def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the replicates that are finished, as wide as the terminal."""
     from tactbench.core.cli.screen import console
     from tactbench.core.leaderboard.table import build_table
-    from tactbench.core.leaderboard.terminal import blocks_text
+    from tactbench.core.leaderboard.view import DEFAULT_VIEW, grids
     from tactbench.core.statistics.replicates import over_replicates
+    from tactbench.core.tables.terminal import plain_text
 
-    return blocks_text(build_table(over_replicates(rows)), console().width)
+    return plain_text(grids(build_table(over_replicates(rows)), DEFAULT_VIEW), console().width)
 
 
 def _side_by_side(rows: Sequence[Mapping[str, Any]]) -> None:
     """Print what was asked under several protocols or splits once more, side by side."""
     from tactbench.core.cli.comparisons import print_comparisons
-    from tactbench.core.leaderboard.comparison import compare
+    from tactbench.core.leaderboard.side_by_side import compare
 
     for by in ("protocol", "split"):
         if compare(rows, by):

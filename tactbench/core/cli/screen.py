@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -41,18 +41,11 @@ def print_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], 
 
     The column `whole` is not broken: it holds commands to copy.
     """
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
+    from tactbench.core.tables.terminal import show
+    from tactbench.core.tables.text_table import TextTable
 
-    screen = console()
-    screen.print(Text(title, style="bold"))
     if not rows:
-        screen.print("  none\n")
+        click.echo(f"{title}\n  none\n")
         return
-    table: Any = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in head:
-        table.add_column(Text(name), overflow="fold", no_wrap=name == whole)
-    for row in rows:
-        table.add_row(*map(Text, row))
-    screen.print(table)
+    table = TextTable(title, tuple(head), tuple(map(tuple, rows)), unbroken=frozenset({whole}))
+    show([table], console())

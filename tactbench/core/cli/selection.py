@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,6 +55,7 @@ def matrix_asked(
     rung: str | None,
     tolerance: float | None,
     scenario: str | None,
+    nuisances: Sequence[str],
     latency: bool | None,
     **asked: Any,
 ) -> tuple[MatrixSpec, Path | None]:
@@ -66,7 +67,10 @@ def matrix_asked(
         If a file, a name or a combination of options is wrong.
     """
     matrix = _matrix(**asked, replaying=recordings is not None)
-    simulation = simulation_of(registry, matrix.rig, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario)
+    simulation = simulation_of(
+        registry, matrix.rig, matrix.sensors, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario,
+        nuisances=nuisances, stated=matrix.simulation,
+    )  # fmt: skip
     if probe:
         matrix = matrix.model_copy(update={"probe": True})
     if latency is not None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from tactbench.core.leaderboard.datasheet import Comparison
     from tactbench.core.plugins.registry import Owned, Registry
     from tactbench.core.spec.sensor import SensorSpec
 
@@ -94,7 +93,8 @@ def _pages(owners: list[Owned[Any]]) -> None:
 
 
 def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
-    from tactbench.core.leaderboard.datasheet import data_sheets, details, parameters_markdown, table_one
+    from tactbench.core.cli.grid import print_tables
+    from tactbench.core.report.datasheet import data_sheets, details, parameters_markdown, sensor_table, table_one
 
     if shape == "json":
         click.echo(json.dumps([_sensor(sensor) for sensor in sensors], indent=1, ensure_ascii=False))
@@ -103,37 +103,16 @@ def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
         click.echo(parameters_markdown(sensors), nl=False)
         return
     rows = table_one(sensors)
-    _grid("Sensor comparison (Table I of Karl et al. 2016)", sensors, rows, with_source=everything)
-    _grid("Data sheet", sensors, data_sheets(sensors), with_source=everything)
+    print_tables(
+        [sensor_table("Sensor comparison (Table I of Karl et al. 2016)", sensors, rows, with_source=everything)]
+    )
+    print_tables([sensor_table("Data sheet", sensors, data_sheets(sensors), with_source=everything)])
     rows += data_sheets(sensors)
     more = details(sensors)
     if everything:
-        _grid("Everything the specs state", sensors, more, with_source=True)
+        print_tables([sensor_table("Everything the specs state", sensors, more, with_source=True)])
     else:
-        _grid("Readings", sensors, more[:6], with_source=False)
+        print_tables([sensor_table("Readings", sensors, more[:6], with_source=False)])
         tags = [fact.tag for row in more + rows for fact in row.facts if fact.tag]
         counted = ", ".join(f"{tags.count(tag)} {tag}" for tag in ("sourced", "measured", "derived", "assumed"))
         click.echo(f"Facts behind these sensors: {counted}. See them all with --all.")
-
-
-def _grid(title: str, sensors: list[SensorSpec], rows: list[Comparison], *, with_source: bool) -> None:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    from tactbench.core.cli.screen import console
-
-    grid = Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
-    grid.add_column("")
-    for sensor in sensors:
-        grid.add_column(Text(sensor.title), overflow="fold")
-        if with_source:
-            grid.add_column("source", style="dim", overflow="fold")
-    for row in rows:
-        cells = []
-        for fact in row.facts:
-            cells.append(Text(fact.text))
-            if with_source:
-                cells.append(Text(f"{fact.tag}: {fact.reference}" if fact.tag else ""))
-        grid.add_row(Text(row.title), *cells)
-    console().print(grid)

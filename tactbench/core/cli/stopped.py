@@ -17,7 +17,7 @@ def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
     """Name every cell of `rows` with its reason in one line, and the commands that look into it."""
     if not rows:
         return
-    from tactbench.core.leaderboard.text import command_line
+    from tactbench.core.tables.text import command_line
 
     counts = Counter(row["status"] for row in rows)
     remark(f"\nStopped: {', '.join(f'{number} {status}' for status, number in sorted(counts.items()))}.")
@@ -30,6 +30,6 @@ def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
 
 def one_line(reason: str) -> str:
     """Return `reason` in one line of readable length; what could move a terminal's cursor is shown, not done."""
-    from tactbench.core.leaderboard.text import cut, visible
+    from tactbench.core.tables.text import cut, visible
 
     return cut(visible(" ".join(str(reason).split())), WIDTH)

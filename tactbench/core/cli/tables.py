@@ -119,10 +119,8 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     UsageError
         If the file cannot be written.
     """
-    from tactbench.core.leaderboard.collector import collector_at_rest
-
     if shape == "table" and to is None and sys.stdout.isatty():
-        from tactbench.core.leaderboard.terminal import show
+        from tactbench.core.leaderboard.formats import show
 
         show(table, console(), view)
     elif shape == "parquet":
@@ -134,14 +132,13 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
 
         _put(xlsx(table), to)
     elif shape == "table":
-        from tactbench.core.leaderboard.terminal import plain_text
+        from tactbench.core.leaderboard.formats import plain_text
 
         _put(plain_text(table, width_without_terminal(), view).encode("utf-8", "backslashreplace"), to)
     else:
         from tactbench.core.leaderboard.formats import TEXTS, VIEWED
 
-        with collector_at_rest():
-            text = VIEWED[shape](table, view) if shape in VIEWED else TEXTS[shape](table)
+        text = VIEWED[shape](table, view) if shape in VIEWED else TEXTS[shape](table)
         _put(text.encode("utf-8", "replace"), to)
 
 

@@ -49,6 +49,7 @@ def explain(
     rung: str | None,
     tolerance: float | None,
     scenario: str | None,
+    nuisances: tuple[str, ...],
 ) -> None:
     """Say which effects a task's scenes get, which they do not, why, and what each costs or would cost.
 
@@ -61,7 +62,10 @@ def explain(
 
     registry = load_registry()
     name = simulated_rig(registry, rig)
-    simulation = simulation_of(registry, name, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario)
+    simulation = simulation_of(
+        registry, name, [sensor], effects=effects, rung=rung, tolerance=tolerance, scenario=scenario,
+        nuisances=nuisances,
+    )  # fmt: skip
     if score is None and (wanted is not None or not rounds):
         score = False
     print_explanations(

@@ -91,8 +91,8 @@ def print_verdicts(found: Sequence[Found], shape: str, *, real: bool) -> None:
     else:
         for group in dict.fromkeys(check.group for check, _, _ in found):
             rows = [one for one in found if one[0].group == group]
-            styles = ["" if verdict.met else "red" for _, verdict, _ in rows]
-            print_grid(group, _COLUMNS, _lines(rows), numeric=("found", "s"), styles=styles)
+            kinds = ["" if verdict.met else "failed" for _, verdict, _ in rows]
+            print_grid(group, _COLUMNS, _lines(rows), numeric=("found", "s"), kinds=kinds)
         notes: dict[str, list[str]] = {}
         for check, verdict, _ in found:
             if not verdict.met and verdict.note:

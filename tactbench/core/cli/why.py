@@ -10,7 +10,7 @@ import click
 
 from tactbench.core.cli.selection import selecting_options
 from tactbench.core.cli.threads import one_thread
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.tables.text import visible
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import Subject
@@ -74,9 +74,9 @@ def _facts(found: Subject, why: Explanation) -> dict[str, Any]:
 def _replicates(found: Subject) -> list[str]:
     """Return what the cell came to over its replicates, and what each of them scored."""
     from tactbench.core.leaderboard.names import metric_name
-    from tactbench.core.leaderboard.numbers import ABSENT, interval, score
     from tactbench.core.statistics.median import counted, percent
     from tactbench.core.statistics.replicates import over_replicates
+    from tactbench.core.tables.numbers import ABSENT, interval, score
 
     name = found.cell.name.removesuffix(f"/{found.cell.repeat}")
     (row,) = over_replicates([row for row in found.store.rows() if row["cell"].rpartition("/")[0] == name])
@@ -104,10 +104,9 @@ def _replicates(found: Subject) -> list[str]:
 
 def _rests_on(row: Row) -> list[str]:
     """Return what the score of a finished cell is made of and what it is to be held against."""
-    from tactbench.core.leaderboard.counts import told_counts
     from tactbench.core.leaderboard.names import metric_name
-    from tactbench.core.leaderboard.notes import picked
-    from tactbench.core.leaderboard.numbers import score, suffix
+    from tactbench.core.leaderboard.notes import count_texts, picked
+    from tactbench.core.tables.numbers import score, suffix
 
     unit = str(row["unit"])
     told = [f"{metric_name(row)} {score(row['score'], unit)}"]
@@ -123,7 +122,9 @@ def _rests_on(row: Row) -> list[str]:
         parts.append(("chosen on validation data", picked(row)))
     parts.append(("samples", f"{row['n_train']} to train on, {row['n_test']} to test on, from {row['n_recordings']} "
                              f"recordings of {row['n_sessions']} sessions"))  # fmt: skip
-    counted = told_counts(row.get("counts") or {})
+    if row.get("assumptions"):
+        parts.append(("assumed", ", ".join(f"{name} {value}" for name, value in sorted(row["assumptions"].items()))))
+    counted = count_texts(row.get("counts") or {})
     if counted:
         parts.append(("left out", "; ".join(counted)))
     parts += [("remark", str(remark)) for remark in (*row.get("remarks", ()), *row.get("stamps", ()))]
@@ -140,7 +141,7 @@ def _provenance(found: Subject) -> list[str]:
 def _try(found: Subject, why: Explanation) -> str:
     if found.row is None or (not why.hit and found.row["status"] == "done"):
         return "tactbench run: computes it"
-    from tactbench.core.leaderboard.text import command_line
+    from tactbench.core.tables.text import command_line
 
     return command_line("tactbench", "rerun", found.cell.name, "--out", str(found.store.folder))
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tactbench.core.cost.contestants import Contestant, contestant
 from tactbench.core.cost.ladder_rows import Record, by_score, mark_fronts, opening, stopped, timed
 from tactbench.core.cost.rounds import measure
+from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
 from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import metric_called
@@ -74,33 +74,39 @@ def climb(
     data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None
     answers = over_replicates(outcome.rows)
     rows: dict[str, Record] = {}
-    contestants: dict[str, Contestant] = {}
+    timed_estimators: dict[str, TimedEstimator] = {}
     for row in answers:
         descriptor = registry.estimators[row["estimator"]]
         rows[row["cell"]] = opening(row, descriptor)
         if row["status"] != "done" or data is None:
             continue
         try:
-            contestants[row["cell"]] = contestant(
+            timed_estimators[row["cell"]] = timed_estimator(
                 task, descriptor, row["params"], row["protocol"], row["split"], data, seed=matrix.seed, threads=threads
             )
         except Exception as error:
             rows[row["cell"]] |= stopped(error)
     times = measure(
-        contestants, rounds=rounds, budget_s=budget_s, threads=threads, seed=matrix.seed, clock=clock, progress=progress
+        timed_estimators,
+        rounds=rounds,
+        budget_s=budget_s,
+        threads=threads,
+        seed=matrix.seed,
+        clock=clock,
+        progress=progress,
     )
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     scores = {row["cell"].removesuffix(f"/{row['repeat']}"): row["scores"] for row in done}
-    for cell, one in contestants.items():
+    for cell, one in timed_estimators.items():
         rows[cell] |= timed(one, times[cell], scores[cell], rounds, budget_s)
     better = metric_called(task.metric).higher_is_better
     found = by_score(list(rows.values()), higher_is_better=better)
     mark_fronts(found, higher_is_better=better)
-    fold = next((one.fold for one in contestants.values()), "")
+    fold = next((one.fold for one in timed_estimators.values()), "")
     measured = {
         "higher_is_better": better,
         "fold": fold,
-        "remarks": _remarks(contestants.values()),
+        "remarks": _remarks(timed_estimators.values()),
         "rounds": rounds,
         "budget_s": budget_s,
         "threads": threads,
@@ -108,8 +114,8 @@ def climb(
     return Ladder({**_about(outcome), **measured, "load": load, "cores": os.cpu_count()}, found)
 
 
-def _remarks(contestants: Iterable[Contestant]) -> list[str]:
-    return list(dict.fromkeys(remark for one in contestants for remark in one.remarks))
+def _remarks(timed_estimators: Iterable[TimedEstimator]) -> list[str]:
+    return list(dict.fromkeys(remark for one in timed_estimators for remark in one.remarks))
 
 
 def _about(outcome: Outcome) -> dict[str, Any]:

@@ -62,8 +62,8 @@ def draw_ladder(ladder: Ladder, paths: Sequence[Path], metric: str = "") -> Any:
                            textcoords="offset points", ha="center", va="bottom", fontsize=8)  # fmt: skip
     if beyond:
         worse, height, side = ("below", 0.01, "bottom") if about["higher_is_better"] else ("above", 0.99, "top")
-        told = ", ".join(f"{row['estimator']} at {row['score']:.3g}" for row in beyond)
-        panels[0].annotate(f"further {worse}: {told}", (0.01, height), xycoords="axes fraction", va=side, fontsize=8,
+        listed = ", ".join(f"{row['estimator']} at {row['score']:.3g}" for row in beyond)
+        panels[0].annotate(f"further {worse}: {listed}", (0.01, height), xycoords="axes fraction", va=side, fontsize=8,
                            color="#555555")  # fmt: skip
     unit = "" if about["unit"] == "1" else f" [{about['unit']}]"
     better = "higher" if about["higher_is_better"] else "lower"

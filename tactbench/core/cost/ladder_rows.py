@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.cost.contestants import Contestant
 from tactbench.core.cost.front import front
 from tactbench.core.cost.rounds import Timing
+from tactbench.core.cost.timed_estimators import TimedEstimator
 from tactbench.core.errors import NotApplicable, TactbenchError
 from tactbench.core.evaluation.delay import answer_delay_ms
 from tactbench.core.evaluation.timing import tail_ms
@@ -59,11 +59,11 @@ def opening(row: Row, descriptor: EstimatorDescriptor) -> Record:
 
 def stopped(error: Exception) -> Record:
     """Return what changes in a row whose estimator could not be timed: it was skipped, or failed, and why."""
-    said = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-    return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": said}
+    reason = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+    return {"status": "skipped" if isinstance(error, NotApplicable) else "failed", "reason": reason}
 
 
-def timed(one: Contestant, timing: Timing, scores: Mapping[str, float], rounds: int, budget_s: float) -> Record:
+def timed(one: TimedEstimator, timing: Timing, scores: Mapping[str, float], rounds: int, budget_s: float) -> Record:
     """Return what changes in a row by having been timed; `scores` are those of the cell, by fold among others."""
     if timing.trouble is not None:
         return stopped(timing.trouble)
@@ -118,7 +118,7 @@ def _cut_short(timing: Timing, rounds: int, budget_s: float) -> list[str]:
     ]
 
 
-def _other_answers(one: Contestant, timing: Timing, scores: Mapping[str, float]) -> list[str]:
+def _other_answers(one: TimedEstimator, timing: Timing, scores: Mapping[str, float]) -> list[str]:
     """Return a note if the model that was timed is not the one whose score stands beside its times."""
     stored = scores.get(f"fold {one.fold}")
     if timing.answers is None or stored is None:
@@ -155,8 +155,8 @@ def mark_fronts(rows: Sequence[Record], *, higher_is_better: bool) -> None:
     bar = min((sign * row["score"] for row in trivial), default=float("inf"))
     able = [row for row in done if not row["is_baseline"] and sign * row["score"] < bar]
     for mark, time in (("front_fit", "fit_s"), ("front_delay", "answer_delay_ms")):
-        told = [row for row in able if row[time] is not None]
-        for row in front(told, seconds=lambda row, key=time: row[key], error=lambda row: sign * row["score"]):  # type: ignore[misc]
+        measured = [row for row in able if row[time] is not None]
+        for row in front(measured, seconds=lambda row, key=time: row[key], error=lambda row: sign * row["score"]):  # type: ignore[misc]
             row[mark] = True
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.cost.contestants import Contestant
+from tactbench.core.cost.timed_estimators import TimedEstimator
 from tactbench.core.evaluation.fitting import answers, fit
 from tactbench.core.evaluation.timing import single_row_latency_s, single_row_preparation_s
 from tactbench.core.matrix.progress import Progress
@@ -48,7 +48,7 @@ class Timing:
 
 
 def measure(
-    contestants: Mapping[str, Contestant],
+    timed_estimators: Mapping[str, TimedEstimator],
     *,
     rounds: int,
     budget_s: float,
@@ -57,7 +57,7 @@ def measure(
     clock: Callable[[], float],
     progress: Progress,
 ) -> Mapping[str, Timing]:
-    """Time every contestant in every round, in an order drawn anew each round.
+    """Time every estimator in every round, in an order drawn anew each round.
 
     Parameters
     ----------
@@ -73,19 +73,19 @@ def measure(
     Returns
     -------
     mapping
-        Under the keys of `contestants`. What an estimator raises ends its own timing only.
+        Under the keys of `timed_estimators`. What an estimator raises ends its own timing only.
     """
-    found = {key: Timing() for key in contestants}
+    found = {key: Timing() for key in timed_estimators}
     rng = np.random.default_rng(seed)
-    for one in contestants.values():
+    for one in timed_estimators.values():
         progress.working(f"warm-up of {one.name}")
         _warm_up(one)
     limits = importlib.import_module("threadpoolctl").threadpool_limits(limits=threads)
-    progress.begin("timing", rounds * len(contestants))
+    progress.begin("timing", rounds * len(timed_estimators))
     with limits, _what_is_there_kept():
         for number in range(rounds):
-            for key in rng.permutation(sorted(contestants)).tolist():
-                one, timing = contestants[key], found[key]
+            for key in rng.permutation(sorted(timed_estimators)).tolist():
+                one, timing = timed_estimators[key], found[key]
                 progress.working(f"{one.name}, round {number + 1}")
                 if timing.trouble is None:
                     try:
@@ -96,7 +96,7 @@ def measure(
     return found
 
 
-def _turn(one: Contestant, timing: Timing, budget_s: float, clock: Callable[[], float]) -> None:
+def _turn(one: TimedEstimator, timing: Timing, budget_s: float, clock: Callable[[], float]) -> None:
     with _no_garbage_collection():
         if timing._model is None or max(timing.fit_s) <= budget_s:
             timing._model = None  # two forests at once would be one too many for some machines
@@ -109,13 +109,13 @@ def _turn(one: Contestant, timing: Timing, budget_s: float, clock: Callable[[], 
             timing.features_s.extend(single_row_preparation_s(one.X_test, one.k, clock, tared=one.tared))
 
 
-def _fit(one: Contestant, timing: Timing) -> None:
+def _fit(one: TimedEstimator, timing: Timing) -> None:
     model = one.build()
     fit(model, one.X_train, one.y_train, one.name, Counter())
     timing._model = model
 
 
-def _answer(one: Contestant, timing: Timing) -> None:
+def _answer(one: TimedEstimator, timing: Timing) -> None:
     assert timing._model is not None
     timing.answers = answers(timing._model, one.X_test, one.name, one.n_classes)
 
@@ -129,7 +129,7 @@ def _median_s(work: Callable[[], None], clock: Callable[[], float]) -> float:
     return float(np.median(spent))
 
 
-def _warm_up(one: Contestant) -> None:
+def _warm_up(one: TimedEstimator) -> None:
     places = np.linspace(0, len(one.X_train) - 1, min(WARM_UP_ROWS, len(one.X_train))).astype(int)
     with warnings.catch_warnings(), suppress(Exception):  # what is wrong with it shows when it is timed
         warnings.simplefilter("ignore")

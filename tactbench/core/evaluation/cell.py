@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
 from tactbench.core.evaluation.reference_floor import BeyondFloor, beyond_floor, reference_floor, true_force
 from tactbench.core.evaluation.replicate_sums import summed
-from tactbench.core.evaluation.replication import Units, replicates
+from tactbench.core.evaluation.replication import ReplicateUnits, replicates
 from tactbench.core.evaluation.selection import Build, Choice, features_of, select
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
@@ -105,60 +105,109 @@ class CellResult:
     """what could not be done, and why"""
 
 
-@dataclass
-class _Sum:
-    """What the folds add up to."""
+@dataclass(frozen=True)
+class CellContext:
+    """What one cell asks, but for the recordings."""
 
-    sets: dict[Role, list[Answers]] = field(default_factory=dict)
-    scores: dict[str, float] = field(default_factory=dict)
-    fold_sizes: dict[str, tuple[int, int]] = field(default_factory=dict)
-    chosen: list[Choice] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    folds: int = 0
-    search_s: float = 0.0
-    fit_s: float = 0.0
-    predict_s: float = 0.0
-    n_train: int = 0
-    model: Estimator | None = None
-    test: Any = None
-    k: int = 0
+    task: TaskSpec
+    estimator: EstimatorDescriptor
+    params: Mapping[str, Any]
+    """other than the estimator's defaults; they are not searched"""
+    protocol: str
+    """how recordings become X and y"""
+    split: str | None
+    """what is kept apart; None: the task's first that fits"""
+    seed: int
+    """decides everything random: the same seed gives the same score in any process"""
+    clock: Callable[[], float]
+    """seconds, monotonic"""
+    threads: int = 1
+    """that estimator and BLAS may use"""
+    latency: bool = True
+    """whether to measure how long the answer to one row takes"""
+    progress: Callable[[str], None] | None = None
+    """told what is being done"""
 
 
-def evaluate(
-    task: TaskSpec,
-    estimator: EstimatorDescriptor,
-    params: Mapping[str, Any],
-    protocol: str,
-    split: str | None,
-    recordings: Sequence[Path],
-    *,
-    seed: int,
-    clock: Callable[[], float],
-    threads: int = 1,
-    progress: Callable[[str], None] | None = None,
-    dataset: Dataset | None = None,
-    latency: bool = True,
-) -> CellResult:
-    """Answer `task` from `recordings` with `estimator`, and measure how well and at what cost.
+class _Folds:
+    """The folds of one cell, and what they add up to."""
+
+    def __init__(self, context: CellContext, data: Dataset) -> None:
+        self.context, self.data = context, data
+        self.rules: ProtocolSpec = protocol_called(context.protocol)
+        self.metric: Metric = metric_called(context.task.metric)
+        self.split: str = choose_split(context.task, self.rules, data, context.split)
+        self.counts: Counter[str] = Counter(data.counts)
+        self.sets: dict[Role, list[Answers]] = {}
+        self.scores: dict[str, float] = {}
+        self.fold_sizes: dict[str, tuple[int, int]] = {}
+        self.chosen: list[Choice] = []
+        self.names: list[str] = []
+        self.folds = self.n_train = self.k = 0
+        self.search_s = self.fit_s = self.predict_s = 0.0
+        self.model: Estimator | None = None
+        self.test: Any = None
+
+    def add(self, number: int, assignment: Assignment, build: Build, *, alone: bool) -> None:
+        """Choose, fit and test on one fold; `alone`: it is the only one."""
+        context, data, rules, metric, counts = self.context, self.data, self.rules, self.metric, self.counts
+        estimator, clock = context.estimator, context.clock
+        began = clock()
+        choice = select(estimator, context.params, build, data, rules, assignment, metric, counts)
+        self.search_s += clock() - began
+        k = choice.k if choice else estimator.window_grid[0]
+        fold = prepared(assignment, data, rules, k, counts)
+        _worth_answering(fold, data)
+        X_train, X_test = features_of(fold.train, estimator), features_of(fold.test, estimator)
+        model = build(choice.params if choice else {})
+        began = clock()
+        fit(model, X_train, fold.train.y, estimator.name, counts)
+        self.fit_s += clock() - began
+        n_classes = len(data.classes)
+        began = clock()
+        predicted = answers_of(model, X_test, estimator.name, n_classes)
+        self.predict_s += clock() - began
+        self.scores[f"fold {fold.name}"] = metric.of(fold.test.y, predicted, n_classes)
+        self.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(fold.test))
+        self._keep("test", fold.test, predicted, number)
+        if alone and not n_classes:
+            self._keep("train", fold.train, answers_of(model, X_train, estimator.name, n_classes), number)
+        if fold.validation is not None and len(fold.validation):
+            on_validation = answers_of(model, features_of(fold.validation, estimator), estimator.name, n_classes)
+            if not choice:
+                self.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
+            if alone:
+                self._keep("validation", fold.validation, on_validation, number)
+        if choice:
+            self.chosen.append(choice)
+            self.names.append(fold.name)
+            self.scores["validation"] = choice.score
+        self.n_train += len(fold.train)
+        self.folds += 1
+        self.model, self.test, self.k = model, fold.test, k
+
+    def _keep(self, role: Role, asked: Part, given: npt.NDArray[Any], number: int) -> None:
+        """Keep what was answered, with time and reference force beside it."""
+        force = np.full(len(asked), np.nan)
+        for place in np.unique(asked.recording):
+            table = self.data.tables[place]
+            if table.force is not None:
+                mine = asked.recording == place
+                force[mine] = table.force[np.searchsorted(table.row, asked.row[mine])]
+        fold = np.full(len(asked), number, dtype=np.int64)
+        answered = Answers(asked.y, given, asked.recording, asked.row, fold, asked.time_s, force)
+        self.sets.setdefault(role, []).append(answered)
+
+
+def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> CellResult:
+    """Answer a task from recordings with an estimator, and measure how well and at what cost.
 
     Parameters
     ----------
-    params
-        Parameters other than the estimator's defaults; they are not searched.
-    protocol, split
-        How recordings become X and y, and what is kept apart; None chooses the task's first fitting split.
-    seed
-        Decides everything random: the same seed gives the same score in any process.
-    clock
-        Seconds, monotonic.
-    threads
-        Threads the estimator and BLAS may use.
-    progress
-        Told what is being done.
-    dataset
-        The recordings, if they have been read already.
-    latency
-        Whether to measure how long the answer to one row takes.
+    context
+        Task, estimator, protocol, split.
+    recordings
+        Files, or what was read of them already.
 
     Raises
     ------
@@ -169,28 +218,24 @@ def evaluate(
     DataError
         If a set is empty, has one class only, or its labels never change.
     """
-    say = progress or (lambda _: None)
-    data = dataset if dataset is not None else load_dataset(task, recordings)
-    rules = protocol_called(protocol)
-    metric = metric_called(task.metric)
-    chosen_split = choose_split(task, rules, data, split)
-    if rules.tare:
+    say = context.progress or (lambda _: None)
+    data = recordings if isinstance(recordings, Dataset) else load_dataset(context.task, recordings)
+    estimator = context.estimator
+    folds = _Folds(context, data)
+    if folds.rules.tare:
         tare_s(data)  # refuses recordings of which only some can be tared
-    assignments = assigned(task, estimator, data, chosen_split, seed)
+    assignments = assigned(context.task, estimator, data, folds.split, context.seed)
     assert_disjoint(assignments)
-    build = builder(estimator, params, task, seed, threads)
-    counts: Counter[str] = Counter(data.counts)
-    total = _Sum()
-    with thread_limit(threads):
+    build = builder(estimator, context.params, context.task, context.seed, context.threads)
+    with thread_limit(context.threads):
         for number, assignment in enumerate(assignments):
             say(f"{estimator.name}: {assignment.name}")
-            alone = len(assignments) == 1
-            _fold(total, number, assignment, estimator, params, build, data, rules, metric, counts, clock, alone)
-        if total.model is None:
+            folds.add(number, assignment, build, alone=len(assignments) == 1)
+        if folds.model is None:
             raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
-        waits = _latency_ms(total.model, features_of(total.test, estimator), clock) if latency else {}
-        late = _delay(total, estimator, data, rules, waits, clock)
-    return _result(task, rules, metric, chosen_split, data, total, counts, waits, late, seed, threads)
+        latency = _latency_ms(folds.model, features_of(folds.test, estimator), context.clock) if context.latency else {}
+        delay = _delay(folds, latency)
+    return _result(folds, latency, delay)
 
 
 def _latency_ms(model: Estimator, X: FloatArray, clock: Callable[[], float]) -> dict[str, Any]:
@@ -208,91 +253,24 @@ class _Delay(NamedTuple):
     remarks: tuple[str, ...]
 
 
-def _delay(
-    total: _Sum,
-    estimator: EstimatorDescriptor,
-    data: Dataset,
-    rules: ProtocolSpec,
-    latency: Mapping[str, Any],
-    clock: Callable[[], float],
-) -> _Delay:
+def _delay(folds: _Folds, latency: Mapping[str, Any]) -> _Delay:
     """Return how late answers of the last fold's model are: the one whose latency was measured, if it was."""
+    looks_at, tared = folds.context.estimator.looks_at, folds.rules.tare
     parts: dict[str, float] = {}
     remarks: tuple[str, ...] = ()
-    if estimator.looks_at == "features":
-        parts, remarks = reading_delay_ms(data, rules, total.k)
+    if looks_at == "features":
+        parts, remarks = reading_delay_ms(folds.data, folds.rules, folds.k)
         if latency:
             # A median needs no more calls, and a row keeps nothing else of them.
-            ready_s = single_row_preparation_s(total.test.X, total.k, clock, tared=rules.tare, at_most=AT_LEAST)
+            ready_s = single_row_preparation_s(
+                folds.test.X, folds.k, folds.context.clock, tared=tared, at_most=AT_LEAST
+            )
             parts["features"] = float(1e3 * np.median(ready_s))
     if latency:
         parts["prediction"] = latency["latency_ms_p50"]
     else:
         remarks = tuple(one for one in remarks if one not in (NO_LINK, NO_RATE))  # there is no delay to speak of
-    return _Delay(parts, answer_delay_ms(parts, estimator.looks_at), remarks)
-
-
-def _fold(
-    total: _Sum,
-    number: int,
-    assignment: Assignment,
-    estimator: EstimatorDescriptor,
-    params: Mapping[str, Any],
-    build: Build,
-    data: Dataset,
-    rules: ProtocolSpec,
-    metric: Metric,
-    counts: Counter[str],
-    clock: Callable[[], float],
-    alone: bool,
-) -> None:
-    began = clock()
-    choice = select(estimator, params, build, data, rules, assignment, metric, counts)
-    total.search_s += clock() - began
-    k = choice.k if choice else estimator.window_grid[0]
-    fold = prepared(assignment, data, rules, k, counts)
-    _worth_answering(fold, data)
-    X_train, X_test = features_of(fold.train, estimator), features_of(fold.test, estimator)
-    model = build(choice.params if choice else {})
-    began = clock()
-    fit(model, X_train, fold.train.y, estimator.name, counts)
-    total.fit_s += clock() - began
-    n_classes = len(data.classes)
-    began = clock()
-    predicted = answers_of(model, X_test, estimator.name, n_classes)
-    total.predict_s += clock() - began
-    total.scores[f"fold {fold.name}"] = metric.of(fold.test.y, predicted, n_classes)
-    total.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(fold.test))
-    _add(total, "test", fold.test, predicted, number, data)
-    if alone and not n_classes:
-        fitted = answers_of(model, X_train, estimator.name, n_classes)
-        _add(total, "train", fold.train, fitted, number, data)
-    if fold.validation is not None and len(fold.validation):
-        on_validation = answers_of(model, features_of(fold.validation, estimator), estimator.name, n_classes)
-        if not choice:
-            total.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
-        if alone:
-            _add(total, "validation", fold.validation, on_validation, number, data)
-    if choice:
-        total.chosen.append(choice)
-        total.names.append(fold.name)
-        total.scores["validation"] = choice.score
-    total.n_train += len(fold.train)
-    total.folds += 1
-    total.model, total.test, total.k = model, fold.test, k
-
-
-def _add(total: _Sum, role: Role, asked: Part, given: npt.NDArray[Any], number: int, data: Dataset) -> None:
-    """Keep what was answered, with time and reference force beside it."""
-    force = np.full(len(asked), np.nan)
-    for place in np.unique(asked.recording):
-        table = data.tables[place]
-        if table.force is not None:
-            mine = asked.recording == place
-            force[mine] = table.force[np.searchsorted(table.row, asked.row[mine])]
-    fold = np.full(len(asked), number, dtype=np.int64)
-    answered = Answers(asked.y, given, asked.recording, asked.row, fold, asked.time_s, force)
-    total.sets.setdefault(role, []).append(answered)
+    return _Delay(parts, answer_delay_ms(parts, looks_at), remarks)
 
 
 def _joined(folds: Sequence[Answers]) -> Answers:
@@ -315,20 +293,10 @@ def _worth_answering(fold: Fold, data: Dataset) -> None:
         )
 
 
-def _result(
-    task: TaskSpec,
-    rules: ProtocolSpec,
-    metric: Metric,
-    split: str,
-    data: Dataset,
-    total: _Sum,
-    counts: Counter[str],
-    latency: Mapping[str, Any],
-    late: _Delay,
-    seed: int,
-    threads: int,
-) -> CellResult:
-    sets = {role: _joined(folds) for role, folds in total.sets.items()}
+def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellResult:
+    task, seed, split = folds.context.task, folds.context.seed, folds.split
+    data, rules, metric = folds.data, folds.rules, folds.metric
+    sets = {role: _joined(parts) for role, parts in folds.sets.items()}
     tested = sets["test"]
     y, predicted, recording, row = tested.y_true, tested.y_pred, tested.recording, tested.row
     n_classes = len(data.classes)
@@ -343,7 +311,7 @@ def _result(
             hint="Choose another --split.",
         )
     interval = score_interval(metric, y, predicted, recording, unit.codes, unit.name, n_classes, seed)
-    scores = dict(total.scores)
+    scores = dict(folds.scores)
     for other in METRICS.values():
         if other.kind == task.kind and other is not metric:
             scores[other.name] = other.of(y, predicted, n_classes)
@@ -363,45 +331,47 @@ def _result(
         ci_level=LEVEL,
         ci_method=interval.method,
         scores=scores,
-        fold_sizes=total.fold_sizes,
+        fold_sizes=folds.fold_sizes,
         confusion=table,
         classes=data.classes,
         split=split,
-        folds=total.folds,
+        folds=folds.folds,
         n_recordings=len(data.tables),
         n_sessions=len({meta.session for meta in data.metas}),
-        n_train=total.n_train,
+        n_train=folds.n_train,
         n_test=len(y),
-        counts=dict(counts),
-        chosen=_chosen(total.chosen, total.names),
+        counts=dict(folds.counts),
+        chosen=_chosen(folds.chosen, folds.names),
         dagger=rules.uses_test_statistics,
         stamps=(SHUFFLED_STAMP,) if split == "shuffled" else (),
-        search_s=total.search_s,
-        fit_s=total.fit_s,
-        predict_s=total.predict_s,
+        search_s=folds.search_s,
+        fit_s=folds.fit_s,
+        predict_s=folds.predict_s,
         batch_rows=len(y),
         latency_ms_p50=latency.get("latency_ms_p50"),
         latency_ms_p95=latency.get("latency_ms_p95"),
         latency_ms_max=latency.get("latency_ms_max"),
         latency_n=latency.get("latency_n"),
-        answer_delay_ms=late.total_ms,
-        delay_parts_ms=late.parts_ms,
-        threads=threads,
+        answer_delay_ms=delay.total_ms,
+        delay_parts_ms=delay.parts_ms,
+        threads=folds.context.threads,
         peak_rss_mb=peak_rss_mb(),
-        search=_search(total.chosen, total.names),
+        search=_search(folds.chosen, folds.names),
         sets=sets,
         replicates=summed(metric, tested, unit, data, floor),
         beyond=None if floor is None else beyond_floor(floor, tested, unit, seed),
         true=None if truth is None else _against(truth, metric, tested, unit, seed),
         tare_s=held or None,
-        remarks=tuple(one for one in (no_floor, NOT_TARED if rules.tare and not held else "", *late.remarks) if one),
+        remarks=tuple(one for one in (no_floor, NOT_TARED if rules.tare and not held else "", *delay.remarks) if one),
     )
 
 
 NOT_TARED = "not tared: no recording states an unloaded hold"
 
 
-def _against(truth: FloatArray, metric: Metric, tested: Answers, unit: Units, seed: int) -> tuple[float, float, float]:
+def _against(
+    truth: FloatArray, metric: Metric, tested: Answers, unit: ReplicateUnits, seed: int
+) -> tuple[float, float, float]:
     """Return the metric against (n,) another truth than the recorded one, and its interval."""
     found = score_interval(metric, truth, tested.y_pred, tested.recording, unit.codes, unit.name, 0, seed)
     return metric.of(truth, tested.y_pred), found.low, found.high

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tactbench.core.evaluation.jackknife import influences
 from tactbench.core.evaluation.metrics import Metric
-from tactbench.core.evaluation.scales import Scale, scale_of
+from tactbench.core.evaluation.score_transform import ScoreTransform, transform_of
 from tactbench.core.samples import FloatArray, IntArray
 
 LEVEL = 0.95
@@ -53,7 +53,7 @@ def score_interval(
     Notes
     -----
     With at least five clusters, each is left out in turn, those of one class standing in for each other only, and the
-    interval is Student's over clusters [4]_, on a scale that suits the metric (:func:`scale_of`). Percentiles of
+    interval is Student's over clusters [4]_, on a scale that suits the metric (:func:`transform_of`). Percentiles of
     resampled clusters cover less than they say where there are few: ``benchmarks/coverage.py``. With fewer clusters, or
     when a class is in fewer than five, time is resampled instead: circular blocks within each recording [1]_, whose
     length follows from the autocorrelation of the loss [2]_ [3]_. Such an interval knows nothing of the spread between
@@ -89,7 +89,7 @@ def score_interval(
     many = f"{len(lengths)} recording" + ("s" if len(lengths) > 1 else "")
     method = f"block bootstrap in time within {many} (blocks of {spread} rows): spread between sessions is not in it"
     score = float(metric.score(rows.sum(axis=0), n_classes))
-    scale = scale_of(metric.name, score, len(y))
+    scale = transform_of(metric.name, score, len(y))
     resampled = scale.there(metric.score(total, n_classes))
     resampled = resampled[np.isfinite(resampled)]  # R² of a resample whose labels are all alike
     freedom = max(sum(sizes) - len(lengths), 1.0)
@@ -107,7 +107,7 @@ def _of_clusters(
 ) -> Interval:
     """Return Student's interval over clusters, from what leaving each out changes."""
     score = float(metric.score(sums.sum(axis=0), n_classes))
-    scale = scale_of(metric.name, score, n)
+    scale = transform_of(metric.name, score, n)
     code = np.zeros(len(sums), dtype=np.int64)
     for place, one in enumerate(strata):
         code[one] = place
@@ -120,7 +120,9 @@ def _of_clusters(
     return _student(metric, score, deviation, freedom, scale, method)
 
 
-def _student(metric: Metric, score: float, deviation: float, freedom: float, scale: Scale, method: str) -> Interval:
+def _student(
+    metric: Metric, score: float, deviation: float, freedom: float, scale: ScoreTransform, method: str
+) -> Interval:
     """Return Student's interval of a score whose standard error on `scale` is `deviation`."""
     if metric.kind == "classification" and score in (0.0, 1.0):
         deviation = NOT_ONE

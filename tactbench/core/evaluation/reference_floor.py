@@ -27,7 +27,7 @@ from tactbench.core.evaluation.interval import (
 )
 from tactbench.core.evaluation.jackknife import influences
 from tactbench.core.evaluation.metrics import Metric
-from tactbench.core.evaluation.replication import Units
+from tactbench.core.evaluation.replication import ReplicateUnits
 from tactbench.core.evaluation.unloaded import hold_s, unloaded
 from tactbench.core.samples import Answers, FloatArray, IntArray
 from tactbench.core.spec.recording import RecordingMeta
@@ -38,7 +38,7 @@ FEWEST = 30
 
 
 @dataclass(frozen=True)
-class Hold:
+class UnloadedHold:
     """What one recording's reference says while nothing presses."""
 
     squares: FloatArray
@@ -66,7 +66,7 @@ class BeyondFloor:
 class Floor:
     """What is known of the reference of the recordings that were tested."""
 
-    holds: dict[int, Hold]
+    holds: dict[int, UnloadedHold]
     """By number of the recording."""
 
     @property
@@ -91,7 +91,7 @@ def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answe
     """
     if metric.name != "rmse" or not isinstance(task.target, ChannelTarget) or task.target.kind != "force":
         return None, ""
-    holds: dict[int, Hold] = {}
+    holds: dict[int, UnloadedHold] = {}
     for place in np.unique(tested.recording).tolist():
         table = data.tables[place]
         why = _no_hold(table)
@@ -113,13 +113,13 @@ def _no_hold(table: Table) -> str:
     return ""
 
 
-def hold_of(y: npt.NDArray[Any]) -> Hold:
+def hold_of(y: npt.NDArray[Any]) -> UnloadedHold:
     """Return what (n,) samples of an unloaded reference say, n at least 2, in time order."""
     centred = np.asarray(y, dtype=np.float64) - np.mean(y)
-    return Hold(centred**2, len(centred) - min(integrated_correlation(centred), len(centred) / 2))
+    return UnloadedHold(centred**2, len(centred) - min(integrated_correlation(centred), len(centred) / 2))
 
 
-def beyond_floor(floor: Floor, tested: Answers, unit: Units, seed: int) -> BeyondFloor:
+def beyond_floor(floor: Floor, tested: Answers, unit: ReplicateUnits, seed: int) -> BeyondFloor:
     """Return what a RMSE is beyond the floor, with its 95 % interval.
 
     Notes
@@ -159,7 +159,9 @@ def floor_sums(floor: Floor, recording: IntArray, code: IntArray, replicates: in
     return out
 
 
-def _over_units(floor: Floor, loss: FloatArray, tested: Answers, unit: Units, excess: float) -> tuple[float, float]:
+def _over_units(
+    floor: Floor, loss: FloatArray, tested: Answers, unit: ReplicateUnits, excess: float
+) -> tuple[float, float]:
     n = len(unit.labels)
     sums = np.zeros((n, 2))
     np.add.at(sums, unit.codes, np.column_stack([loss, np.ones(len(loss))]))

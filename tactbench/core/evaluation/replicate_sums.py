@@ -27,7 +27,7 @@ from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.interval import block_length, enough, loss_of, strata_of
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED, Metric
 from tactbench.core.evaluation.reference_floor import Floor, floor_sums
-from tactbench.core.evaluation.replication import Units
+from tactbench.core.evaluation.replication import ReplicateUnits
 from tactbench.core.samples import Answers, FloatArray, IntArray
 
 BLOCKS = 40
@@ -39,7 +39,7 @@ FEWEST = 4
 
 
 def summed(
-    metric: Metric, tested: Answers, unit: Units, data: Dataset, floor: Floor | None = None
+    metric: Metric, tested: Answers, unit: ReplicateUnits, data: Dataset, floor: Floor | None = None
 ) -> dict[str, Any]:  # fmt: skip
     """Return what a row keeps of its replicates.
 

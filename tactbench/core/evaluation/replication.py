@@ -16,7 +16,7 @@ from tactbench.core.spec.task import TaskSpec
 
 
 @dataclass(frozen=True)
-class Units:
+class ReplicateUnits:
     """What was repeated: sessions, groups or recordings."""
 
     name: str
@@ -29,7 +29,7 @@ class Units:
 
 def replicates(
     data: Dataset, task: TaskSpec, split: str, y: npt.NDArray[Any], recording: IntArray, row: IntArray
-) -> Units:
+) -> ReplicateUnits:
     """Return the unit of replication of every test row.
 
     The coarsest unit of which there are enough to resample: the group that the split keeps apart, or else the session;
@@ -51,7 +51,7 @@ def replicates(
     return there[0]
 
 
-def _unit(data: Dataset, name: str, recording: IntArray, row: IntArray) -> Units | None:
+def _unit(data: Dataset, name: str, recording: IntArray, row: IntArray) -> ReplicateUnits | None:
     """Return the groups of one name; None if some test row is in none."""
     values = np.empty(len(recording), dtype=object)
     for place in np.unique(recording):
@@ -61,4 +61,4 @@ def _unit(data: Dataset, name: str, recording: IntArray, row: IntArray) -> Units
         mine = recording == place
         values[mine] = table.groups[name][np.searchsorted(table.row, row[mine])]
     labels, codes = np.unique(values.astype(np.str_), return_inverse=True)
-    return Units(name, codes.reshape(-1).astype(np.int64), tuple(labels.tolist()))
+    return ReplicateUnits(name, codes.reshape(-1).astype(np.int64), tuple(labels.tolist()))

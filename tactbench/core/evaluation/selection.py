@@ -15,7 +15,7 @@ from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.fitting import answers, fit
 from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import Kept, Scale, keep, part
+from tactbench.core.evaluation.sets import FeatureScale, SetRows, keep, part
 from tactbench.core.evaluation.splits import Assignment, inner_splits
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray, Part
@@ -51,10 +51,10 @@ def features_of(one: Part, descriptor: EstimatorDescriptor) -> FloatArray:
     return one.X
 
 
-def scales(protocol: ProtocolSpec, train: Kept, other: Kept) -> tuple[Scale, Scale]:
+def scales(protocol: ProtocolSpec, train: SetRows, other: SetRows) -> tuple[FeatureScale, FeatureScale]:
     """Return the scales of a training set and another, as the protocol has it."""
-    first = Scale.of(train.X)
-    return first, Scale.of(other.X) if protocol.scaled_by == "each set" else first
+    first = FeatureScale.of(train.X)
+    return first, FeatureScale.of(other.X) if protocol.scaled_by == "each set" else first
 
 
 def select(
@@ -102,7 +102,7 @@ def select(
 
 def _pairs(
     data: Dataset, protocol: ProtocolSpec, assignment: Assignment, gap: int
-) -> list[tuple[Kept, Scale, Kept, Scale]]:
+) -> list[tuple[SetRows, FeatureScale, SetRows, FeatureScale]]:
     if assignment.validation is not None:
         masks = [(assignment.train, assignment.validation)]
     else:

@@ -20,14 +20,14 @@ Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Scale:
+class FeatureScale:
     """Mean and deviation of each feature."""
 
     mean: FloatArray
     deviation: FloatArray
 
     @classmethod
-    def of(cls, X: FloatArray) -> Scale:
+    def of(cls, X: FloatArray) -> FeatureScale:
         """Measure `X`."""
         return cls(*moments(X))
 
@@ -49,7 +49,7 @@ def moments(X: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @dataclass(frozen=True)
-class Kept:
+class SetRows:
     """The rows of one set before scaling, in order of recording and time."""
 
     X: FloatArray
@@ -63,7 +63,7 @@ class Kept:
     """Windows stay within one number."""
 
 
-def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str, counts: Counter[str]) -> Kept:
+def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str, counts: Counter[str]) -> SetRows:
     """Collect the rows of a set and drop what the protocol drops.
 
     Parameters
@@ -107,7 +107,7 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     sessions = {name: place for place, name in enumerate(sorted({meta.session for meta in data.metas}))}
     cluster = np.repeat([sessions[meta.session] for meta in data.metas], sizes)
     consecutive = protocol.window_over == "consecutive samples"
-    return Kept(
+    return SetRows(
         X=X[good],
         y=np.concatenate([table.y[mask] for table, mask in zip(tables, chosen, strict=True)])[good],
         labelled=np.concatenate([table.labelled[mask] for table, mask in zip(tables, chosen, strict=True)])[good],
@@ -158,7 +158,7 @@ def _segments(recording: IntArray, place: IntArray, *, consecutive: bool) -> Int
     return np.cumsum(breaks).astype(np.int64)
 
 
-def part(kept: Kept, scale: Scale, k: int) -> Part:
+def part(kept: SetRows, scale: FeatureScale, k: int) -> Part:
     """Scale and filter a set, and leave the rows that have a label."""
     X = causal_mean(scale(kept.X), k, kept.segment)
     there = kept.labelled
@@ -168,7 +168,7 @@ def part(kept: Kept, scale: Scale, k: int) -> Part:
     )  # fmt: skip
 
 
-def constant_features(kept: Kept, features: Sequence[str]) -> list[str]:
+def constant_features(kept: SetRows, features: Sequence[str]) -> list[str]:
     """Return the features that never change in a set."""
     spread = np.ptp(kept.X, axis=0)
     return [name for name, width in zip(features, spread, strict=True) if width == 0]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tactbench.core.evaluation.sets import Scale
+from tactbench.core.evaluation.sets import FeatureScale
 from tactbench.core.evaluation.windows import causal_mean
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray
@@ -37,7 +37,7 @@ def single_row_preparation_s(
     sets: taring if `tared`, scaling, the mean over the window. Rows of `X` stand for raw readings:
     values change no time.
     """
-    rest, scale = np.zeros(X.shape[1]), Scale(np.zeros(X.shape[1]), np.ones(X.shape[1]))
+    rest, scale = np.zeros(X.shape[1]), FeatureScale(np.zeros(X.shape[1]), np.ones(X.shape[1]))
     segment = np.zeros(k + 1, dtype=np.int64)
 
     def ready(readings: FloatArray) -> FloatArray:

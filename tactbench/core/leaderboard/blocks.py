@@ -9,21 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.lines import Line, Shown, shown_of
+from tactbench.core.leaderboard.lines import Line, line_of
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
 from tactbench.core.leaderboard.placing import Placing, errors, places
-from tactbench.core.leaderboard.sheet import Sheet
-from tactbench.core.leaderboard.text import visible
 from tactbench.core.leaderboard.verdict import verdict_of
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 _Key = tuple[str, str, str, str]
-_ORIGIN = ("task", "protocol", "rig", "simulated", "status", "split")
-"""All that says in which block a row stands."""
 
 
 @dataclass(frozen=True)
@@ -31,61 +27,41 @@ class Block:
     """Rows that may be compared."""
 
     title: str
-    shown: Shown
-    """All rows of the table."""
-    places: tuple[int, ...]
-    """Those of this block, in order."""
+    lines: tuple[Line, ...]
     unranked: str = ""
     """Why there are no rank intervals; empty where there are."""
     verdict: tuple[str, ...] = ()
     """What its rows come to, in sentences."""
 
-    @cached_property
-    def lines(self) -> tuple[Line, ...]:
-        """Its lines, in order."""
-        return tuple(map(self.shown.line, self.places))
 
-
-def blocks_of(sheet: Sheet, letters: Mapping[str, str], times: bool) -> tuple[Shown, tuple[Block, ...]]:
+def blocks_of(
+    rows: Sequence[Row], columns: Sequence[str], letters: Mapping[str, str], times: bool
+) -> tuple[Block, ...]:
     """Arrange rows into blocks, ranked.
 
     Parameters
     ----------
-    sheet
-        Rows in the order of their cells' names.
+    rows
+        In the order of their cells' names.
     letters
         The mark of each host.
     times
-        Whether lines have times.
-
-    Returns
-    -------
-    Shown, tuple of Block
-        All rows as text, and which of them stand together.
+        Whether verdicts may name costs.
     """
-    groups = _grouped(sheet)
-    placings: list[Placing | None] = [None] * len(sheet.rows)
-    arranged = [(key, *_arranged(sheet, groups[key], placings)) for key in sorted(groups, key=_order)]
-    shown = shown_of(sheet, placings, letters, times)
-    blocks = [
-        Block(
-            _title(key, [sheet.rows[place] for place in groups[key]]),
-            shown,
-            members,
-            unranked,
-            _verdict(sheet, members, placings, times),
-        )
-        for key, members, unranked in arranged
-    ]
-    return shown, tuple(blocks)
+    groups = _grouped(rows)
+    return tuple(_block(key, groups[key], columns, letters, times) for key in sorted(groups, key=_order))
 
 
-def _verdict(sheet: Sheet, members: Sequence[int], placings: Sequence[Placing | None], times: bool) -> tuple[str, ...]:
-    ranked = [(sheet.rows[place], placing) for place in members if (placing := placings[place]) is not None]
-    status, trivial = sheet["status"], sheet["is_baseline"]
-    below = sum(status[place] == "done" and not trivial[place] and placings[place] is None for place in members)
-    baselines = [sheet.rows[place] for place in members if status[place] == "done" and trivial[place]]
-    return tuple(map(visible, verdict_of(ranked, below, baselines, times=times)))
+def _block(
+    key: _Key, members: Sequence[Row], columns: Sequence[str], letters: Mapping[str, str], times: bool
+) -> Block:  # fmt: skip
+    arranged, unranked = _arranged(members)
+    lines = tuple(line_of(row, placing, columns, letters) for row, placing in arranged)
+    ranked = [(row, placing) for row, placing in arranged if placing is not None]
+    below = sum(line.kind == "result" and line.placing is None for line in lines)
+    trivial = [line.row for line in lines if line.kind == "baseline"]
+    verdict = tuple(map(visible, verdict_of(ranked, below, trivial, times=times)))
+    return Block(_title(key, members), lines, unranked, verdict)
 
 
 def _order(key: _Key) -> tuple[Any, ...]:
@@ -94,34 +70,27 @@ def _order(key: _Key) -> tuple[Any, ...]:
     return task, split in ("shuffled", "in-session"), is_probe(protocol), key
 
 
-def _grouped(sheet: Sheet) -> dict[_Key, list[int]]:
-    """Group the places of rows by what must not be mixed.
+def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
+    """Group rows by what must not be mixed.
 
     A cell that was not begun knows neither its split, if nobody asked for one, nor whether it would have been
     simulated: it stands with the finished cells of its rig, if these agree.
     """
-    origins = list(zip(*(sheet[key] for key in _ORIGIN), strict=True))
-    alike = dict(zip(origins, sheet.rows, strict=True))  # one row of each origin: the others are asked nothing
     kinds: dict[str, set[str]] = {}
-    splits: dict[tuple[Any, ...], set[str]] = {}
-    for row in alike.values():
+    for row in rows:
         if row["status"] == "done":
             kinds.setdefault(row["rig"], set()).add(hardware_name(row))
-    for row in alike.values():
+    splits: dict[tuple[str, str, str], set[str]] = {}
+    for row in rows:
         if row["split"] is not None:
             splits.setdefault(_without_split(row, kinds), set()).add(row["split"])
-    keys = {origin: _key(row, kinds, splits) for origin, row in alike.items()}
-    groups: dict[_Key, list[int]] = {}
-    for place, origin in enumerate(origins):
-        groups.setdefault(keys[origin], []).append(place)
+    groups: dict[_Key, list[Row]] = {}
+    for row in rows:
+        task, protocol, kind = _without_split(row, kinds)
+        known = splits.get((task, protocol, kind), set())
+        split = row["split"] if row["split"] is not None else next(iter(known)) if len(known) == 1 else ""
+        groups.setdefault((task, protocol, split, kind), []).append(row)
     return groups
-
-
-def _key(row: Row, kinds: Mapping[str, set[str]], splits: Mapping[tuple[Any, ...], set[str]]) -> _Key:
-    task, protocol, kind = _without_split(row, kinds)
-    known = splits.get((task, protocol, kind), set())
-    split = row["split"] if row["split"] is not None else next(iter(known)) if len(known) == 1 else ""
-    return task, protocol, split, kind
 
 
 def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, str]:
@@ -130,33 +99,31 @@ def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, s
     return row["task"], row["protocol"], kind
 
 
-def _arranged(
-    sheet: Sheet, members: Sequence[int], placings: list[Placing | None]
-) -> tuple[tuple[int, ...], str]:  # fmt: skip
-    """Put members of a block in order, and note where its results stand; return why they have no intervals, if so."""
-    status, trivial, scores, sensors = (sheet[key] for key in ("status", "is_baseline", "score", "sensor"))
-    bars = sheet.known("baseline")
-    sign = 1.0 if sheet["metric"][members[0]] in LOWER_IS_BETTER else -1.0
-    done = [place for place in members if status[place] == "done"]
-    error = {place: sign * scores[place] if math.isfinite(scores[place]) else math.inf for place in done}
-    answers: list[int] = []
-    below: list[int] = []
-    for place in done:
-        if not trivial[place]:
-            (below if no_better(error[place], sign, bars[place]) else answers).append(place)
-    order = dict(zip(answers, errors(sheet.taken(answers)), strict=True))
+def _arranged(members: Sequence[Row]) -> tuple[list[tuple[Row, Placing | None]], str]:
+    """Return the rows of a block in order with their places, and why places have no intervals, if so."""
+    sign = 1.0 if members[0]["metric"] in LOWER_IS_BETTER else -1.0
+
+    def error(row: Row) -> float:
+        return sign * row["score"] if math.isfinite(row["score"]) else math.inf
+
+    answers: list[Row] = []
+    below: list[Row] = []
+    for row in members:
+        if row["status"] == "done" and not row["is_baseline"]:
+            (below if no_better(error(row), sign, row.get("baseline")) else answers).append(row)
     # What is equal stays in the order of the names.
-    results = sorted(answers, key=lambda place: (order[place], error[place]))
-    ranked = sheet.taken(results)
-    found, unranked = places(ranked)
-    standing = {place: found[cell] for place, cell in zip(results, ranked["cell"], strict=True)}
-    for place, placing in standing.items():
-        placings[place] = placing
-    results.sort(key=lambda place: standing[place].place)  # of equal place stays the better one first
-    baselines = sorted((place for place in done if trivial[place]), key=lambda place: (sensors[place], error[place]))
-    stopped = sorted((place for place in members if status[place] != "done"), key=status.__getitem__)
-    below.sort(key=error.__getitem__)
-    return (*results, *below, *baselines, *stopped), unranked
+    ordered = sorted(zip(errors(answers), answers, strict=True), key=lambda one: (one[0], error(one[1])))
+    found, unranked = places([row for _, row in ordered])
+    # Of equal place stays the better one first.
+    results = sorted(((row, found[row["cell"]]) for _, row in ordered), key=lambda one: one[1].place)
+    baselines = [row for row in members if row["status"] == "done" and row["is_baseline"]]
+    stopped = [row for row in members if row["status"] != "done"]
+    unplaced = [
+        *sorted(below, key=error),
+        *sorted(baselines, key=lambda row: (row["sensor"], error(row))),
+        *sorted(stopped, key=lambda row: row["status"]),
+    ]
+    return [*results, *((row, None) for row in unplaced)], unranked
 
 
 def no_better(error: float, sign: float, baseline: float | None) -> bool:

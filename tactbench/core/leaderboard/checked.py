@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from operator import itemgetter
 from typing import Any
 
 from tactbench.core.leaderboard.records import JSON_KEYS
@@ -20,42 +19,14 @@ def checked(rows: Iterable[object]) -> tuple[list[Row], list[str]]:
     """Return the rows that a table can be made of, and what is wrong with each of the others, in one sentence each."""
     good: list[Row] = []
     wrong: list[str] = []
-    trouble_of = _Troubles()
     for row in rows:
-        trouble = trouble_of(row)
+        trouble = (_mistyped(row) or _senseless(row)) if isinstance(row, dict) else "it is no row"
         if trouble:
             name = row.get("cell") if isinstance(row, dict) else None
             wrong.append(f"{name if isinstance(name, str) else 'a row without a name'}: {trouble}")
         elif isinstance(row, dict):
             good.append(row)
     return good, wrong
-
-
-class _Troubles:
-    """Says what is wrong with a row, or nothing; remembers which combinations of types it has seen."""
-
-    def __init__(self) -> None:
-        self._alike: dict[tuple[type, ...], tuple[int, ...]] = {}
-        """Where whole numbers stand in the values of `_STORED`, by their types."""
-
-    def __call__(self, row: object) -> str:
-        """Return what is wrong with `row`, or nothing."""
-        if not isinstance(row, dict):
-            return "it is no row"
-        try:
-            values = _VALUES(row)
-        except KeyError:
-            return _mistyped(row)
-        types = tuple(map(type, values))
-        wholes = self._alike.get(types)
-        if wholes is None or any(not -_LARGEST < values[place] < _LARGEST for place in wholes):
-            trouble = _mistyped(row)
-            if trouble:
-                return trouble
-            self._alike[types] = tuple(
-                place for place, one in enumerate(types) if one is int and _STORED[place] != "seed"
-            )
-        return _senseless(row)
 
 
 def _mistyped(row: Row) -> str:
@@ -92,5 +63,4 @@ def _fits(key: str, value: Any) -> bool:
 
 
 _STORED = tuple(key for key in JSON_KEYS if key != "key")
-_VALUES = itemgetter(*_STORED)
 _WHOLE = frozenset({int})

@@ -1,38 +1,50 @@
-"""The one table in the formats that papers, pages and programs read; each shows the same digits."""
+"""The leaderboard in the formats that people, papers, pages and programs read; each shows the same digits."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-from tactbench.core.leaderboard.csv_text import csv_text
+from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.latex import latex
-from tactbench.core.leaderboard.markdown import markdown, markdown_grid, markdown_note, markdown_text
-from tactbench.core.leaderboard.parquet import parquet
-from tactbench.core.leaderboard.records import JSON_KEYS, json_text, records
-from tactbench.core.leaderboard.table import Table, build_table
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, View
+from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, keys, records
+from tactbench.core.leaderboard.table import Table
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, View, document
+from tactbench.core.tables import markdown as markdown_format
+from tactbench.core.tables import terminal
+from tactbench.core.tables.csv_text import csv_text as csv_lines
+from tactbench.core.tables.text import json_text, visible
 
-__all__ = [
-    "FORMATS",
-    "JSON_KEYS",
-    "SUFFIXES",
-    "TEXTS",
-    "VIEWED",
-    "json_array",
-    "markdown_grid",
-    "markdown_note",
-    "markdown_text",
-    "page",
-    "to_csv",
-    "to_json",
-    "to_latex",
-    "to_markdown",
-    "to_page",
-    "to_parquet",
-]
+if TYPE_CHECKING:
+    from rich.console import Console
 
-Row = Mapping[str, Any]
+
+def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
+    """Print a leaderboard on a terminal."""
+    terminal.show(document(table, view), console)
+
+
+def plain_text(table: Table, width: int = 240, view: View = DEFAULT_VIEW) -> str:
+    """Return what a terminal without colours shows."""
+    return terminal.plain_text(document(table, view), width)
+
+
+def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
+    """Return a leaderboard as Markdown, a heading a block."""
+    return markdown_format.markdown(document(table, view))
+
+
+def csv_text(table: Table) -> str:
+    """Return a leaderboard's records as CSV."""
+    names = [*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)]
+    lines = ([*(_stored(*one) for one in values.items()), *shown.values()] for values, shown in records(table))
+    return csv_lines(names, lines)
+
+
+def _stored(key: str, value: Any) -> Any:
+    if key in NESTED:
+        return json_text(value)
+    return visible(value) if isinstance(value, str) else value
 
 
 def json_array(table: Table) -> str:
@@ -65,47 +77,3 @@ SUFFIXES = {
     ".xlsx": "xlsx", ".txt": "table",
 }  # fmt: skip
 """The format that a file is meant to have, by how its name ends."""
-
-
-def to_json(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> str:
-    """Return the rows as a JSON array, in the order of the table."""
-    return json_array(build_table(rows, provenance, times=times))
-
-
-def to_csv(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> str:
-    """Return the rows as CSV, in the order of the table."""
-    return csv_text(build_table(rows, provenance, times=times))
-
-
-def to_markdown(
-    rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True, view: View = DEFAULT_VIEW
-) -> str:
-    """Return the table as Markdown, a heading a block."""
-    return markdown(build_table(rows, provenance, times=times), view)
-
-
-def to_latex(
-    rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True, view: View = DEFAULT_VIEW
-) -> str:
-    """Return the table as LaTeX for the booktabs package, a table a block."""
-    return latex(build_table(rows, provenance, times=times), view)
-
-
-def to_parquet(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> bytes:
-    """Return the rows as a Parquet file; raises UsageError without pyarrow."""
-    return parquet(build_table(rows, provenance, times=times))
-
-
-def to_page(rows: Sequence[Row], provenance: Sequence[Row] = ()) -> str:
-    """Return the leaderboard as one HTML file, every cell behind its numbers."""
-    return page(build_table(rows, provenance))
-
-
-FORMATS: dict[str, Callable[..., str]] = {
-    "json": to_json,
-    "csv": to_csv,
-    "md": to_markdown,
-    "latex": to_latex,
-    "html": to_page,
-}
-"""From rows (and their provenance) to text, by the name of the format on the command line."""

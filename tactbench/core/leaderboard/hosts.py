@@ -3,43 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from itertools import compress
 from string import ascii_uppercase
 from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 
 
-def host_letters(sheet: Sheet) -> dict[str, str]:
+def host_letters(rows: Iterable[Row]) -> dict[str, str]:
     """Return a letter for each host that timed one of the rows, in order of their ids; none if there is but one."""
-    hosts = sorted({host for host, _ in _clocks(sheet)})
+    hosts = sorted({host for host, _ in _clocks(rows)})
     return {host: _letter(place) for place, host in enumerate(hosts)} if len(hosts) > 1 else {}
 
 
-def timing_marks(sheet: Sheet, letters: Mapping[str, str]) -> list[str]:
-    """Return what stands behind every time of each row: ``[A]`` for the host, ``‖4`` for four cells at once.
-
-    Returns
-    -------
-    list
-        One mark a row; empty where no row has any.
-    """
-    if not letters and set(sheet.known("concurrency")) <= {None, 0, 1}:
-        return []
-
-    def mark(row: Row) -> str:
-        letter = letters.get(_host(row.get("host")))
-        at_once = _at_once(row.get("concurrency"))
-        return (f" [{letter}]" if letter else "") + (f" ‖{at_once}" if at_once > 1 else "")
-
-    marks = sheet.told(mark, "host", "concurrency")
-    return marks if any(marks) else []
+def timing_mark(row: Row, letters: Mapping[str, str]) -> str:
+    """Return what stands behind every time of a row: ``[A]`` for the host, ``‖4`` for four cells at once."""
+    letter, at_once = letters.get(_host(row)), _at_once(row)
+    return (f" [{letter}]" if letter else "") + (f" ‖{at_once}" if at_once > 1 else "")
 
 
-def timing_notes(sheet: Sheet, letters: Mapping[str, str], provenance: Iterable[Row]) -> list[str]:
+def timing_notes(rows: Iterable[Row], letters: Mapping[str, str], provenance: Iterable[Row]) -> list[str]:
     """Return what the marks of times mean.
 
     Parameters
@@ -52,7 +36,7 @@ def timing_notes(sheet: Sheet, letters: Mapping[str, str], provenance: Iterable[
     if letters:
         notes.append("Times marked with different letters are of different hosts: compare none of them. Scores do not "
                      "depend on the host and are ranked together.")  # fmt: skip
-    clocks = _clocks(sheet)
+    clocks = _clocks(rows)
     for at_once in sorted({at_once for _, at_once in clocks} - {1}):
         hosts = {host for host, cells in clocks if cells == at_once}
         crowded = sorted({visible(host) for host in hosts if at_once > _cores(machines.get(host), at_once)})
@@ -62,24 +46,22 @@ def timing_notes(sheet: Sheet, letters: Mapping[str, str], provenance: Iterable[
     return notes
 
 
-def _clocks(sheet: Sheet) -> set[tuple[str, int]]:
+def _clocks(rows: Iterable[Row]) -> set[tuple[str, int]]:
     """Return by which hosts rows were timed, and while how many cells ran at once."""
-    keys = ("status", "fit_s", "sim_s", "predict_s", "latency_ms_p50", "latency_ms_p95")
-    # One by one: of nearly every row the first is known.
-    timed = [
-        status == "done" and not (fit is None and sim is None and predict is None and p50 is None and p95 is None)
-        for status, fit, sim, predict, p50, p95 in zip(*(sheet[key] for key in keys), strict=True)
-    ]
-    clocks = set(compress(zip(sheet.known("host"), sheet.known("concurrency"), strict=True), timed))
-    return {(_host(host), _at_once(cells)) for host, cells in clocks}
+    times = ("fit_s", "sim_s", "predict_s", "latency_ms_p50", "latency_ms_p95")
+    return {
+        (_host(row), _at_once(row))
+        for row in rows
+        if row["status"] == "done" and any(row[time] is not None for time in times)
+    }
 
 
-def _host(told: Any) -> str:
-    return str(told or "")
+def _host(row: Row) -> str:
+    return str(row.get("host") or "")
 
 
-def _at_once(told: Any) -> int:
-    return int(told or 1)
+def _at_once(row: Row) -> int:
+    return int(row.get("concurrency") or 1)
 
 
 def _cores(machine: Row | None, otherwise: int) -> int:

@@ -1,147 +1,86 @@
-"""Rows as the texts that stand in a table, column by column."""
+"""A row as the texts that stand in a table, by column."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from operator import add
 from typing import Any, Literal
 
-from tactbench.core.leaderboard.columns import TIMED_COLUMNS, columns
-from tactbench.core.leaderboard.hosts import timing_marks
-from tactbench.core.leaderboard.marks import score_marks
-from tactbench.core.leaderboard.numbers import ABSENT, delay, duration, intervals, scores, tail, whole
+from tactbench.core.leaderboard.columns import NUMERIC, OF_ROWS
+from tactbench.core.leaderboard.hosts import timing_mark
+from tactbench.core.leaderboard.names import answer_name, sensor_name
 from tactbench.core.leaderboard.placing import Placing
-from tactbench.core.leaderboard.sheet import Sheet
-from tactbench.core.leaderboard.values import VALUES
 from tactbench.core.spec.status import STOPPED
+from tactbench.core.tables.numbers import ABSENT
 
 Row = Mapping[str, Any]
 Kind = Literal["result", "baseline", "failed", "skipped"]
+"""Of a line: an answer, a trivial one, a cell that did not end well or was not begun."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """One row as text, one string a column."""
+    """One row as text."""
 
-    cells: tuple[str, ...]
+    row: Row = field(repr=False, compare=False)
+    """Numbers in full."""
+    texts: Mapping[str, str]
+    """By column."""
     kind: Kind
-    cell: str = ""
-    """Name of the cell."""
     placing: Placing | None = None
     """Where it stands in its block; results better than the trivial answer only."""
-    row: Row = field(default_factory=dict, repr=False, compare=False)
-    """The row itself: numbers in full."""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Its texts, one a column."""
+        return tuple(self.texts.values())
+
+    def value(self, column: str) -> float | None:
+        """Return what a line is sorted by in a column of numbers; None: last."""
+        if column not in NUMERIC or self.kind in ("failed", "skipped"):
+            return None  # a stopped cell may know a number that the table does not show
+        if column in OF_ROWS:
+            return OF_ROWS[column].value(self.row)
+        one = self.placing
+        if one is None or column == "#":
+            return one and one.place
+        return (one.low + one.high) / 2 if one.low and one.high else None
 
 
-@dataclass(frozen=True)
-class Shown:
-    """All rows of a table as text."""
-
-    sheet: Sheet = field(repr=False, compare=False)
-    texts: Mapping[str, Sequence[str]]
-    """One text a row, by the name of the column."""
-    kinds: Sequence[Kind]
-    placings: Sequence[Placing | None]
-
-    def line(self, place: int) -> Line:
-        """Return the line of the row at this place of the sheet."""
-        row = self.sheet.rows[place]
-        cells = tuple(column[place] for column in self.texts.values())
-        return Line(cells, self.kinds[place], row["cell"], self.placings[place], row)
-
-
-def shown_of(sheet: Sheet, placings: Sequence[Placing | None], letters: Mapping[str, str], times: bool) -> Shown:
-    """Return what stands in the lines of a table.
+def line_of(row: Row, placing: Placing | None, columns: Sequence[str], letters: Mapping[str, str]) -> Line:
+    """Return the line of a row.
 
     Parameters
     ----------
-    placings
-        Where each row stands in its block; None: a baseline, or a cell that did not end well.
+    placing
+        Where the row stands in its block; None: a baseline, or a cell that did not end well.
     letters
         The mark of each host.
-    times
-        Whether the table has times.
     """
-    units = sheet["unit"]
-    texts = {
-        "#": _places(placings, sheet["is_baseline"]),
-        "sensor": sheet.sensors,
-        "estimator": sheet.answers,
-        "score": list(map(add, scores(sheet["score"], units), score_marks(sheet))),
-        "95 % interval": row_intervals(sheet, units),
-        "beyond floor": scores(sheet.known("score_beyond_floor"), units),
-        "95 % beyond": intervals(sheet.known("beyond_floor_ci_low"), sheet.known("beyond_floor_ci_high"), units),
-        "true error": scores(sheet.known("true_score"), units),
-        "rank 95 %": _ranges(placings),
-        "recordings right": _right(sheet),
-        "published": scores(sheet["published"], units),
-        "baseline": scores(sheet["baseline"], units),
-        "n test": list(map(whole, sheet["n_test"])),
-        "sessions": list(map(whole, sheet["n_sessions"])),
-    }
-    texts = {name: texts[name] for name in columns(sheet, times=False)}
-    if times:
-        marks = timing_marks(sheet, letters)
-        told = {name: list(map(duration, VALUES[name](sheet))) for name in TIMED_COLUMNS}
-        told["delay"] = list(map(delay, sheet.known("answer_delay_ms"), sheet.known("delay_parts_ms")))
-        told["p95"] = list(map(tail, *map(sheet.known, ("latency_ms_p95", "latency_ms_max", "latency_n"))))
-        texts |= {name: _marked(column, marks) for name, column in told.items()}
-    status = sheet["status"]
-    for place in [place for place, ended in enumerate(status) if ended != "done"]:
-        for name, column in texts.items():
-            if name not in ("sensor", "estimator"):
-                column[place] = ABSENT
-        texts["#"][place], texts["score"][place] = "", status[place].upper()
-    return Shown(sheet, texts, list(map(_kind, status, sheet["is_baseline"])), placings)
+    texts = {"sensor": sensor_name(row), "estimator": answer_name(row)}
+    if row["status"] != "done":
+        texts |= {"#": "", "score": row["status"].upper()}
+        kind: Kind = "failed" if row["status"] in STOPPED else "skipped"
+        return Line(row, {name: texts.get(name, ABSENT) for name in columns}, kind)
+    texts |= {"#": _place(placing, row["is_baseline"]), "rank 95 %": _range(placing)}
+    mark = timing_mark(row, letters)
+    for name in columns:
+        if name in OF_ROWS:
+            text = OF_ROWS[name].text(row)
+            texts[name] = text + mark if OF_ROWS[name].timed and text != ABSENT else text
+    texts["score"] += (" †" if row["dagger"] else "") + (" ‡" if row["stamps"] else "")
+    kind = "baseline" if row["is_baseline"] else "result"
+    return Line(row, {name: texts[name] for name in columns}, kind, placing)
 
 
-def _right(sheet: Sheet) -> list[str]:
-    """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
-    told = zip(sheet.known("recordings_right"), sheet.known("recordings_asked"), strict=True)
-    return [ABSENT if right is None or of is None else f"{right:.3g} of {of:.3g}" for right, of in told]
+def _place(one: Placing | None, trivial: bool) -> str:
+    """Return the place; an answer that is no better than the trivial one has none."""
+    if one is None:
+        return "base" if trivial else ABSENT
+    return f"{one.place}=" if one.tied else str(one.place)
 
 
-def row_intervals(sheet: Sheet, units: Sequence[str]) -> list[str]:
-    """Return intervals; where too few replicates carry one, the range of their scores, named so."""
-    told = intervals(sheet["ci_low"], sheet["ci_high"], units)
-    counts = sheet.known("n_replicates")
-    if not any(counts):
-        return told
-    ranges = intervals(sheet.known("score_min"), sheet.known("score_max"), units)
-    return [
-        text if text != ABSENT or not count
-        else "one replicate" if count == 1
-        else text if spread == ABSENT
-        else f"range {spread}"
-        for text, count, spread in zip(told, counts, ranges, strict=True)
-    ]  # fmt: skip
-
-
-def _kind(status: str, trivial: bool) -> Kind:
-    if status == "done":
-        return "baseline" if trivial else "result"
-    return "failed" if status in STOPPED else "skipped"
-
-
-def _places(placings: Sequence[Placing | None], trivial: Sequence[bool]) -> list[str]:
-    """Return places; an answer that is no better than the trivial one has none."""
-    return [
-        ("base" if plain else ABSENT) if one is None
-        else f"{one.place}=" if one.tied
-        else str(one.place)
-        for one, plain in zip(placings, trivial, strict=True)
-    ]  # fmt: skip
-
-
-def _ranges(placings: Sequence[Placing | None]) -> list[str]:
-    return [
-        ABSENT if one is None or one.low is None or one.high is None
-        else str(one.low) if one.low == one.high
-        else f"{one.low}–{one.high}"
-        for one in placings
-    ]  # fmt: skip
-
-
-def _marked(told: list[str], marks: Sequence[str]) -> list[str]:
-    return [text if text == ABSENT else text + mark for text, mark in zip(told, marks, strict=True)] if marks else told
+def _range(one: Placing | None) -> str:
+    if one is None or one.low is None or one.high is None:
+        return ABSENT
+    return str(one.low) if one.low == one.high else f"{one.low}–{one.high}"

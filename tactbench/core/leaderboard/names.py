@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.text import visible
 from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
-
-_name = lru_cache(maxsize=4096)(visible)
-"""A name, made fit to be shown: rows share few of them."""
 
 SIMULATED = "SIM (twin)"
 """What is said of simulated rows in place of a rig."""
@@ -31,7 +27,7 @@ METRIC_NAMES = {
 
 def sensor_name(row: Row) -> str:
     """Return a sensor's name, marked where it was simulated."""
-    return _name(" ".join(filter(None, (str(row["sensor"]), origin_mark(row)))))
+    return visible(" ".join(filter(None, (str(row["sensor"]), origin_mark(row)))))
 
 
 def origin_mark(row: Row) -> str:
@@ -44,9 +40,9 @@ def origin_mark(row: Row) -> str:
 def answer_name(row: Row) -> str:
     """Return the estimator's name, with the parameters that are not its defaults."""
     if not row["params"]:
-        return _name(str(row["estimator"]))
+        return visible(str(row["estimator"]))
     options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
-    return _name(f"{row['estimator']} ({options})" if options else str(row["estimator"]))
+    return visible(f"{row['estimator']} ({options})" if options else str(row["estimator"]))
 
 
 def metric_name(row: Row) -> str:
@@ -64,7 +60,7 @@ def hardware_name(row: Row) -> str:
 
 def question_name(row: Row) -> str:
     """Return sensor and task: what was asked of whom."""
-    return _name(f"{row['sensor']}/{row['task']}")
+    return visible(f"{row['sensor']}/{row['task']}")
 
 
 def asked_of(row: Row) -> str:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from itertools import compress
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
-from tactbench.core.leaderboard.counts import told_counts
-from tactbench.core.leaderboard.marks import mark_notes, simulation_notes
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, question_name
-from tactbench.core.leaderboard.numbers import score, suffix
-from tactbench.core.leaderboard.sheet import Sheet, marks_of
-from tactbench.core.leaderboard.stopped import stopped_notes
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.leaderboard.names import answer_name, asked_of, question_name
+from tactbench.core.leaderboard.verdict import may_be_trivial
 from tactbench.core.spec.status import STATUSES, STOPPED
+from tactbench.core.tables.numbers import score, suffix
+from tactbench.core.tables.text import command_line, cut, visible
 
 Row = Mapping[str, Any]
 
@@ -25,9 +23,21 @@ RANKS = (
     "A place with = is shared: the data do not tell these answers apart. Rank 95 % holds the places that the data do "
     "not exclude (docs/statistics.md)."
 )
+DAGGER = (
+    "† test-set statistics were used: the protocol drops test rows by the test set's own mean and deviation, and "
+    "`karl2016` scales each set, the test set too, by its own. A deployed sensor cannot; protocol `deployable` shows "
+    "what it can."
+)
+_SET = re.compile(r"^(training|validation|test) (rows .*)$")
+_SIGMA = re.compile(r"^rows with (.+) beyond three sigma$")
+MOST_CHANNELS = 4
+MOST_NAMES = 8
+"""Cells that ended alike and are named; the others are counted, and stand in the table."""
+LONGEST_REASON = 600
+"""Characters of a reason in a note; JSON, CSV and Parquet have all of it."""
 
 
-def notes_of(sheet: Sheet, blocks: Sequence[Block]) -> list[str]:
+def notes_of(rows: Sequence[Row], blocks: Sequence[Block]) -> list[str]:
     """Return the notes on the lines of `blocks`, the most important first; those on times stand elsewhere.
 
     First what did not finish, what leaks and what a deployed sensor could not do, then what the scores must be read
@@ -35,34 +45,34 @@ def notes_of(sheet: Sheet, blocks: Sequence[Block]) -> list[str]:
 
     Parameters
     ----------
-    sheet
-        The rows in the order of the lines.
+    rows
+        In the order of the lines.
     """
     return [
-        *stopped_notes(sheet, STOPPED),
-        *mark_notes(sheet),
-        *_floor_notes(sheet),
-        *_no_better_notes(sheet),
-        *_tare_notes(sheet),
+        *_stopped_notes(rows, STOPPED),
+        *_mark_notes(rows),
+        *_floor_notes(rows),
+        *_no_better_notes(rows),
+        *_tare_notes(rows),
         *_rank_notes(blocks),
-        *_true_error_notes(sheet),
-        *_other_knowledge_notes(sheet),
-        *stopped_notes(sheet, frozenset(STATUSES) - STOPPED),
-        *interval_notes(sheet),
-        *_chosen_notes(sheet),
-        *_left_out_notes(sheet),
-        *simulation_notes(sheet),
+        *_true_error_notes(rows),
+        *_other_knowledge_notes(rows),
+        *_stopped_notes(rows, frozenset(STATUSES) - STOPPED),
+        *interval_notes(rows),
+        *_chosen_notes(rows),
+        *_left_out_notes(rows),
+        *_simulation_notes(rows),
     ]
 
 
 def _rank_notes(blocks: Sequence[Block]) -> list[str]:
     """Return what places and their intervals mean, and where there are none."""
     notes = []
-    if any(one and one.low is not None for block in blocks[:1] for one in block.shown.placings):
+    if any(line.placing and line.placing.low is not None for block in blocks for line in block.lines):
         notes.append(RANKS)
     reasons: dict[str, list[str]] = {}
     for block in blocks:
-        if block.unranked and sum(block.shown.kinds[place] == "result" for place in block.places) > 1:
+        if block.unranked and sum(line.kind == "result" for line in block.lines) > 1:
             reasons.setdefault(block.unranked, []).append(block.title)
     everywhere = len(blocks) == sum(len(titles) for titles in reasons.values()) and len(reasons) == 1
     for reason, titles in reasons.items():
@@ -71,68 +81,64 @@ def _rank_notes(blocks: Sequence[Block]) -> list[str]:
     return [note[0].upper() + note[1:] for note in notes]
 
 
-def _tare_notes(sheet: Sheet) -> list[str]:
+def _tare_notes(rows: Sequence[Row]) -> list[str]:
     """Return one sentence on which recordings were tared, where some row's protocol is one that may."""
-    asked = dict.fromkeys(zip(sheet["protocol"], sheet.known("tare_s"), sheet["status"], strict=True))
-    held = sorted({f"{tare:g} s" for _, tare, _ in asked if tare})
-    names = {str(protocol) for protocol, _, status in asked if status == "done"}
-    told = []
+    held = sorted({f"{row['tare_s']:g} s" for row in rows if row.get("tare_s")})
+    sentences = []
     if held:
-        told.append(
+        sentences.append(
             f"`deployable`: each recording is tared on its own unloaded hold before its press ({', '.join(held)})"
         )
-    if "deployable-untared" in names:
-        told.append("`deployable-untared`: readings as they are")
-    return [f"{'; '.join(told)}."] if told else []
+    if any(row["protocol"] == "deployable-untared" and row["status"] == "done" for row in rows):
+        sentences.append("`deployable-untared`: readings as they are")
+    return [f"{'; '.join(sentences)}."] if sentences else []
 
 
-def _floor_notes(sheet: Sheet) -> list[str]:
+def _floor_notes(rows: Sequence[Row]) -> list[str]:
     """Return the floors of the references, once each, and what stands beyond them."""
     floors: dict[tuple[str, str], dict[float, None]] = {}
-    known = zip(sheet.rows, sheet.known("reference_floor"), strict=True)
-    for row, floor in known:
-        if floor is not None:
-            floors.setdefault((question_name(row), str(row["unit"])), {})[floor] = None
-    told = []
+    for row in rows:
+        if row.get("reference_floor") is not None:
+            floors.setdefault((question_name(row), str(row["unit"])), {})[row["reference_floor"]] = None
+    sentences = []
     if floors:
         each = "; ".join(f"{where} {_floor(list(found), unit)}" for (where, unit), found in floors.items())
-        told.append(
+        sentences.append(
             f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond "
             "floor is sqrt(max(0, RMSE² − floor²)) of each replicate; a smaller RMSE is below it by chance. Ranks go "
             "by it where all answers of a block have it."
         )
-    return told
+    return sentences
 
 
-def _true_error_notes(sheet: Sheet) -> list[str]:
-    known = any(one is not None for one in sheet.known("true_score"))
+def _true_error_notes(rows: Sequence[Row]) -> list[str]:
+    known = any(row.get("true_score") is not None for row in rows)
     return ["True error (SIM): against the force that the twin exerted, free of the reference's noise."] * known
 
 
 def _floor(found: Sequence[float], unit: str) -> str:
     """Return a floor; of several campaigns the root of their mean square."""
-    told = f"{score(math.sqrt(sum(one * one for one in found) / len(found)), unit)}{suffix(unit)}"
+    text = f"{score(math.sqrt(sum(one * one for one in found) / len(found)), unit)}{suffix(unit)}"
     return (
-        told if len(found) == 1 else f"{told} (of {len(found)}: {score(min(found), unit)} … {score(max(found), unit)})"
+        text if len(found) == 1 else f"{text} (of {len(found)}: {score(min(found), unit)} … {score(max(found), unit)})"
     )
 
 
-def interval_notes(sheet: Sheet) -> list[str]:
+def interval_notes(rows: Sequence[Row]) -> list[str]:
     """Return one sentence a task and kind of interval; what is in brackets only where it is the same for all."""
     kinds: dict[str, dict[str, None]] = {}
-    answers = [not trivial for trivial in sheet["is_baseline"]]
-    for task, method in dict.fromkeys(compress(zip(sheet["task"], sheet["ci_method"], strict=True), answers)):
+    for task, method in dict.fromkeys((row["task"], row["ci_method"]) for row in rows if not row["is_baseline"]):
         if method:
-            told = visible(f"{task}: interval by {method}.")
-            kinds.setdefault(re.sub(r" \([^)]*\)", "", told), {})[told] = None
-    return [next(iter(told)) if len(told) == 1 else short for short, told in kinds.items()]
+            sentence = visible(f"{task}: interval by {method}.")
+            kinds.setdefault(re.sub(r" \([^)]*\)", "", sentence), {})[sentence] = None
+    return [next(iter(texts)) if len(texts) == 1 else short for short, texts in kinds.items()]
 
 
-def _chosen_notes(sheet: Sheet) -> list[str]:
+def _chosen_notes(rows: Sequence[Row]) -> list[str]:
     """Return one sentence for all answers that chose the same on validation data."""
     names: dict[str, dict[str, None]] = {}
-    for chosen, row in zip(sheet["chosen"], sheet.rows, strict=True):
-        if chosen:
+    for row in rows:
+        if row["chosen"]:
             names.setdefault(visible(picked(row)), {})[f"{question_name(row)}/{answer_name(row)}"] = None
     return [f"{', '.join(who)}: chosen on validation data: {what}." for what, who in names.items()]
 
@@ -155,11 +161,12 @@ def _told(value: object) -> str:
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
-def _no_better_notes(sheet: Sheet) -> list[str]:
+def _no_better_notes(rows: Sequence[Row]) -> list[str]:
     """Return one sentence a sensor and task on the answers that are not clearly better than the trivial one."""
     names: dict[tuple[str, str], dict[str, None]] = {}
-    for row in compress(sheet.rows, _no_better(sheet)):
-        if not is_probe(row["protocol"]):  # no better than trivial is what a probe should be
+    for row in rows:
+        answer = row["status"] == "done" and not row["is_baseline"]
+        if answer and may_be_trivial(row) and not is_probe(row["protocol"]):  # a probe should be no better than trivial
             names.setdefault((question_name(row), _probing(row)), {})[f"{answer_name(row)} ({row['protocol']})"] = None
     return [
         visible(
@@ -177,11 +184,11 @@ def _probing(row: Row) -> str:
     return f"tactbench run --sensor {row['sensor']} --task {row['task']} --rig {row['rig']} --recordings DIR --probe"
 
 
-def _other_knowledge_notes(sheet: Sheet) -> list[str]:
+def _other_knowledge_notes(rows: Sequence[Row]) -> list[str]:
     """Return which trivial answers knew more than readings tell."""
     names: dict[str, dict[str, None]] = {}
-    for row in compress(sheet.rows, (looks == "time" for looks in sheet.known("looks_at"))):
-        if row["is_baseline"] and row["status"] == "done":
+    for row in rows:
+        if row.get("looks_at") == "time" and row["is_baseline"] and row["status"] == "done":
             names.setdefault(answer_name(row), {})[f"{question_name(row)} {score(row['score'], row['unit'])}"] = None
     return [
         f"{who} looks at the time of a sample and at no reading: it knows that every recording is pressed alike, and "
@@ -190,31 +197,80 @@ def _other_knowledge_notes(sheet: Sheet) -> list[str]:
     ]
 
 
-def _no_better(sheet: Sheet) -> list[bool]:
-    keys = ("status", "is_baseline", "baseline", "metric", "ci_low", "ci_high")
+def _left_out_notes(rows: Sequence[Row]) -> list[str]:
+    """Return what was left out of the data, and what their recordings remark; each once."""
+    counted = {(row["sensor"], row["task"], *(row["counts"] or {}).items()): row for row in rows}
+    notes = [
+        visible(f"{question_name(row)}: {count}.")
+        for row in counted.values()
+        for count in count_texts(row["counts"] or {})
+    ]
+    notes += [visible(f"{row['sensor']}: {remark}") for row in rows for remark in row["remarks"] or ()]
+    return list(dict.fromkeys(notes))
+
+
+def count_texts(counts: Mapping[str, int]) -> list[str]:
+    """Return one text a reason, of a cell's counts."""
+    sums: Counter[str] = Counter()
+    beyond: Counter[str] = Counter()
+    for what, count in counts.items():
+        in_a_set = _SET.match(what)
+        reason = in_a_set[2] if in_a_set else what
+        sigma = _SIGMA.match(reason)
+        if sigma:
+            beyond[sigma[1]] += count
+        else:
+            sums[reason] += count
+    texts = [f"{what}: {count}" for what, count in sums.items() if count]
+    if beyond:
+        listed = ", ".join(f"{channel} {count}" for channel, count in beyond.most_common(MOST_CHANNELS))
+        more = len(beyond) - MOST_CHANNELS
+        rest = f" and {more} more channels" if more > 0 else ""
+        texts.append(f"rows beyond three sigma in {listed}{rest}")
+    return texts
+
+
+def _stopped_notes(rows: Sequence[Row], statuses: Collection[str]) -> list[str]:
+    """Return one sentence for all cells that ended alike in one of `statuses`: which, why, how to look into it."""
+    alike: dict[tuple[str, int | None, str], list[Row]] = {}
+    for row in rows:
+        if row["status"] in statuses and row["status"] != "done":
+            alike.setdefault((row["status"], row["signal"], row["reason"]), []).append(row)
+    return [_stopped_note(status, signal, reason, members) for (status, signal, reason), members in alike.items()]
+
+
+def _stopped_note(status: str, signal: int | None, reason: str, members: list[Row]) -> str:
+    names = list(dict.fromkeys(f"{question_name(row)}/{asked_of(row)}" for row in members))
+    more = len(names) - MOST_NAMES
+    listed = ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+    by = f" by signal {signal}" if signal is not None else ""
+    why = cut(visible(reason), LONGEST_REASON)
+    sentence = f"{listed} {visible(status)}{by}: {why}"
+    if status not in STOPPED:
+        return sentence
+    end = "" if sentence.endswith((".", "!", "?", "…")) else "."
+    return f"{sentence}{end} Look into it: {command_line('tactbench', 'why', members[0]['cell'])}"
+
+
+def _mark_notes(rows: Sequence[Row]) -> list[str]:
+    """Return what the marks behind scores mean: ‡ and †, each once."""
+    stamps = dict.fromkeys(chain.from_iterable(row["stamps"] or () for row in rows))
     return [
-        status == "done"
-        and not trivial
-        and baseline is not None
-        and (
-            (high is not None and high >= baseline)
-            if metric in LOWER_IS_BETTER
-            else (low is not None and low <= baseline)
-        )
-        for status, trivial, baseline, metric, low, high in zip(*(sheet[key] for key in keys), strict=True)
+        *(f"‡ {visible(str(stamp))}" for stamp in stamps),
+        *([DAGGER] if any(row["dagger"] for row in rows) else []),
     ]
 
 
-def _left_out_notes(sheet: Sheet) -> list[str]:
-    """Return what was left out of the data, and what their recordings remark; rows share these, each is told once."""
-    counted: dict[str, None] = {}
-    remarked: dict[str, None] = {}
-    asked = zip(sheet["sensor"], sheet["task"], marks_of(sheet["counts"]), strict=True)
-    for (sensor, task, _), counts in dict(zip(asked, sheet["counts"], strict=True)).items():
-        if counts:
-            where = question_name({"sensor": sensor, "task": task})
-            counted |= dict.fromkeys(visible(f"{where}: {count}.") for count in told_counts(counts))
-    for sensor, remarks in zip(sheet["sensor"], sheet["remarks"], strict=True):
-        if remarks:
-            remarked |= dict.fromkeys(visible(f"{sensor}: {remark}") for remark in remarks)
-    return [*counted, *remarked]
+def _simulation_notes(rows: Sequence[Row]) -> list[str]:
+    """Return what SIM and EMULATED mean, and what the simulations assumed."""
+    simulated = [row for row in rows if row["simulated"]]
+    emulated = [row for row in rows if row.get("emulated")]
+    marks = ["SIM: simulated by the twin"] if any(not row.get("emulated") for row in simulated) else []
+    marks += ["EMULATED: read through the drivers from emulated devices that the twin moved"] if emulated else []
+    assumptions = dict.fromkeys(_assumptions(row["assumptions"]) for row in simulated)
+    return [f"{'; '.join(marks)}; never ranked against hardware. Assumed: {one}." for one in assumptions]
+
+
+def _assumptions(assumptions: Mapping[str, Any]) -> str:
+    text = ", ".join(f"{key} {value}" for key, value in sorted(assumptions.items()))
+    return visible(text) or "see docs/twin.md"

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import compress
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard import memo
-from tactbench.core.leaderboard.numbers import interval, score
-from tactbench.core.leaderboard.sections import Section
-from tactbench.core.leaderboard.sheet import Sheet
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.leaderboard.names import answer_name, sensor_name
+from tactbench.core.tables.numbers import interval, score
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 
@@ -25,21 +23,17 @@ NOTE = (
 )
 MOST_ROWS = 2000
 """Rows beyond which resampling all of them takes too long for a table."""
-_DECIDES = (
-    "task", "score", "baseline", "reference_score", "ci_low", "ci_high", "metric", "classes", "replicates",
-)  # fmt: skip
 
 
-def over_tasks(sheet: Sheet) -> Section | None:
+def over_tasks(rows: Sequence[Row]) -> TextTable | None:
     """Return the means of all answers that two tasks or more were given; None if there are none.
 
     A task that was asked under several splits is left out: none of them stands for it.
     """
     groups: dict[tuple[Any, ...], dict[str, list[Row]]] = {}
-    keys = (sheet.sensors, sheet.answers, map(visible, sheet["protocol"]), sheet["rig"])
-    given = zip(zip(*keys, strict=True), sheet["task"], sheet.rows, strict=True)
-    for key, task, row in compress(given, _counts(sheet)):
-        groups.setdefault(key, {}).setdefault(task, []).append(row)
+    for row in filter(_counts, rows):
+        key = sensor_name(row), answer_name(row), visible(row["protocol"]), row["rig"]
+        groups.setdefault(key, {}).setdefault(row["task"], []).append(row)
     alone = {
         key: [members[0] for _, members in sorted(tasks.items()) if len(members) == 1] for key, tasks in groups.items()
     }
@@ -53,48 +47,32 @@ def over_tasks(sheet: Sheet) -> Section | None:
         if found is None:
             continue
         value, low, high, left_out = found
-        absent = {told.partition(":")[0] for told in left_out}
+        absent = {reason.partition(":")[0] for reason in left_out}
         names = ", ".join(visible(row["task"]) for row in members if row["task"] not in absent)
         texts = (score(value, "1"), interval(low, high, "1"), names)
         lines.append((sensor, answer, protocol, *texts))
-        notes |= dict.fromkeys(visible(f"Not in the mean of {sensor}/{answer}: {told}.") for told in left_out)
-    return Section(TITLE, COLUMNS, NUMERIC, tuple(lines), tuple(notes)) if lines else None
+        notes |= dict.fromkeys(visible(f"Not in the mean of {sensor}/{answer}: {reason}.") for reason in left_out)
+    return TextTable(TITLE, COLUMNS, tuple(lines), NUMERIC, notes=tuple(notes)) if lines else None
 
 
-def _counts(sheet: Sheet) -> list[bool]:
-    """Return which rows are answers that are averaged."""
-    ours = {protocol: not is_probe(protocol) for protocol in set(sheet["protocol"])}
-    keys = ("status", "is_baseline", "protocol", "split", "replicates", "score")
-    return [
-        status == "done"
-        and not trivial
-        and ours[protocol]
-        and split not in ("shuffled", "in-session")
-        and bool(replicates)
-        and math.isfinite(score)
-        for status, trivial, protocol, split, replicates, score in zip(*map(sheet.known, keys), strict=True)
-    ]
+def _counts(row: Row) -> bool:
+    """Return whether a row is an answer that is averaged."""
+    return bool(
+        row["status"] == "done"
+        and not row["is_baseline"]
+        and not is_probe(row["protocol"])
+        and row["split"] not in ("shuffled", "in-session")
+        and row.get("replicates")
+        and math.isfinite(row["score"])
+    )
 
 
 def _mean(members: Sequence[Row]) -> tuple[float, float, float, tuple[str, ...]] | None:
     """Return mean, interval and what is left out; None where fewer than two tasks are in it, or nothing can be told."""
-    try:
-        facts = [[memo.ordered(row.get(key)) for key in _DECIDES] for row in members]
-        digest = memo.digest_of("over tasks", *map(memo.source_digest, memo.STATISTICS), facts)
-        told = memo.recall(digest)
-        if not _believable(told):
-            from tactbench.core.statistics.aggregate import aggregate
+    from tactbench.core.statistics.aggregate import aggregate
 
-            one = aggregate(members)
-            told = [0.0, 0.0, 0.0, 0, []] if one is None else [one.value, one.low, one.high, one.tasks, [*one.left_out]]
-            memo.remember(digest, told)
+    try:
+        found = aggregate(members)
     except (ArithmeticError, LookupError, TypeError, ValueError):
         return None  # rows of a stranger's folder: their replicates may be anything
-    value, low, high, tasks, left_out = told
-    return (value, low, high, tuple(left_out)) if tasks > 1 else None
-
-
-def _believable(told: Any) -> bool:
-    if not (isinstance(told, list) and [type(one) for one in told] == [float, float, float, int, list]):
-        return False
-    return told[1] <= told[2] and all(isinstance(one, str) for one in told[4])
+    return (found.value, found.low, found.high, found.left_out) if found and found.tasks > 1 else None

@@ -8,10 +8,10 @@ from typing import Any
 import tactbench
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import SHOWN
-from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, json_text, keys, records
+from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, keys, records
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.text import visible
 from tactbench.core.spec.row import FORMAT
+from tactbench.core.tables.text import json_text, visible
 
 FORMAT_VERSION = "1"
 
@@ -61,9 +61,9 @@ def parquet(table: Table) -> bytes:
 def kind(name: str) -> str:
     """Return what a column holds: whole, float, boolean or text; lists and tables are text."""
     types = FORMAT[name].types if name in FORMAT else frozenset()
-    for told, one in (("boolean", bool), ("float", float), ("whole", int)):
+    for label, one in (("boolean", bool), ("float", float), ("whole", int)):
         if one in types:
-            return told
+            return label
     return _RANKS.get(name, "text")
 
 

@@ -1,26 +1,18 @@
-"""Where each answer of a block stands: its place, whether it shares it, and between which places it may lie.
-
-Ranks take every pair of cells and numpy; what they came to is remembered by a digest of everything that decides them
-(the scores and replicates of the block, and the code that ranks), so that a table that is shown again costs neither.
-"""
+"""Where each answer of a block stands: its place, whether it shares it, and between which places it may lie."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from tactbench.core.leaderboard import memo
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER
-from tactbench.core.leaderboard.sheet import Sheet, alike
 from tactbench.core.statistics.excess import beyond_floor, excess_of
 from tactbench.core.statistics.median import FEWEST
 
-_DECIDES = (
-    "cell", "score", "ci_low", "ci_high", "metric", "equivalence", "classes", "reference_floor",
-    "beyond_floor_ci_low", "beyond_floor_ci_high",
-)  # fmt: skip
+Row = Mapping[str, Any]
+
 MOST_RANKED = 20_000
 """Answers of one block beyond which comparing all pairs takes too long."""
 
@@ -43,7 +35,7 @@ class Placing(NamedTuple):
     """Without how many replicates, each left out alone, it is the best one; 0 for all where replicates differ."""
 
 
-def places(results: Sheet) -> tuple[dict[str, Placing], str]:
+def places(results: Sequence[Row]) -> tuple[dict[str, Placing], str]:
     """Return where each of `results` stands, by the name of its cell, and why there are no rank intervals, if so.
 
     Parameters
@@ -51,89 +43,55 @@ def places(results: Sheet) -> tuple[dict[str, Placing], str]:
     results
         The finished answers of one block, no baselines, the best score first.
     """
-    few = [n for n in results.known("n_replicates") if n is not None and n < FEWEST]
-    if few:
-        shared = Placing(1, None, None, len(results.rows) > 1)
-        return dict.fromkeys(results["cell"], shared), f"fewer than {FEWEST} replicates carry them"
+    counts = [row.get("n_replicates") for row in results]
+    if any(n is not None and n < FEWEST for n in counts):
+        shared = Placing(1, None, None, len(results) > 1)
+        return dict.fromkeys((row["cell"] for row in results), shared), f"fewer than {FEWEST} replicates carry them"
     reason = _unrankable(results)
-    if not results.rows or reason:
+    if not results or reason:
         return _by_score(results), reason
     try:
-        facts = [*map(results.known, _DECIDES), _plain(results["replicates"])]
-        digest = memo.digest_of(*map(memo.source_digest, memo.STATISTICS), facts)
-        found = _believed(memo.recall(digest), results["cell"])
-        if found is None:
-            from tactbench.core.statistics.ranking import ranks
+        from tactbench.core.statistics.ranking import ranks
 
-            ranked = ranks(results.rows)
-            found = {cell: Placing(**vars(rank)) for cell, rank in ranked.items()}
-            memo.remember(digest, [[cell, *placing] for cell, placing in found.items()])
+        return {cell: Placing(**vars(rank)) for cell, rank in ranks(results).items()}, ""
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         # Rows of a stranger's folder: their replicates may be anything.
         return _by_score(results), f"their replicates cannot be used ({type(error).__name__})"
-    return found, ""
 
 
-def errors(results: Sheet) -> list[float]:
+def errors(results: Sequence[Row]) -> list[float]:
     """Return what answers of one metric are ordered by, the lower the better.
 
     The score; of errors of force the mean square beyond the floor of the reference, if all of them have one. It may be
     below zero, where the error beyond the floor is 0: two answers of one sensor differ by more than its floor tells.
     """
-    if beyond_floor(results.rows):
-        return [one if math.isfinite(one) else math.inf for one in map(excess_of, results.rows)]
-    signs = [1.0 if metric in LOWER_IS_BETTER else -1.0 for metric in results["metric"]]
+    if beyond_floor(results):
+        return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]
     return [
-        sign * score if math.isfinite(score) else math.inf
-        for sign, score in zip(signs, results["score"], strict=True)
-    ]  # fmt: skip
+        (row["score"] if row["metric"] in LOWER_IS_BETTER else -row["score"])
+        if math.isfinite(row["score"])
+        else math.inf
+        for row in results
+    ]
 
 
-def _plain(replicates: Sequence[Any]) -> Any:
-    """Return replicates as lists: the same whatever the order of their keys."""
-    by_key = alike(replicates) if set(map(type, replicates)) == {dict} else None
-    return list(map(memo.ordered, replicates)) if by_key is None else memo.ordered(by_key)
-
-
-def _unrankable(results: Sheet) -> str:
+def _unrankable(results: Sequence[Row]) -> str:
     """Return why places have no intervals, if they have none; a row without replicates enters with its own interval."""
-    if not any(results.known("replicates")):
-        return "rows keep no replicates" if results.rows else ""
-    if len(results.rows) > MOST_RANKED:
+    if not any(row.get("replicates") for row in results):
+        return "rows keep no replicates" if results else ""
+    if len(results) > MOST_RANKED:
         return f"there are more than {MOST_RANKED} answers"
-    return "" if all(map(math.isfinite, results["score"])) else "a score is no finite number"
+    return "" if all(math.isfinite(row["score"]) for row in results) else "a score is no finite number"
 
 
-def _by_score(results: Sheet) -> dict[str, Placing]:
+def _by_score(results: Sequence[Row]) -> dict[str, Placing]:
     found: dict[str, Placing] = {}
     ordered = errors(results)
     many = Counter(ordered)
     place, before = 0, None
-    for position, (cell, error) in enumerate(zip(results["cell"], ordered, strict=True)):
+    for position, (row, error) in enumerate(zip(results, ordered, strict=True)):
         if position == 0 or error != before:
             place = position + 1
-        found[cell] = Placing(place, None, None, many[error] > 1)
+        found[row["cell"]] = Placing(place, None, None, many[error] > 1)
         before = error
     return found
-
-
-def _believed(told: Any, cells: Sequence[str]) -> dict[str, Placing] | None:
-    """Return remembered places if they can be those of `cells`, the best first: a file on disk may say anything."""
-    if not isinstance(told, list) or len(told) != len(cells):
-        return None
-    if set(map(type, told)) != {list} or set(map(len, told)) != {len(_ENTRY)}:
-        return None
-    columns = list(zip(*told, strict=True))
-    if any(set(map(type, column)) != {kind} for column, kind in zip(columns, _ENTRY, strict=True)):
-        return None
-    if not all(1 <= low <= place <= high <= len(cells) for _, place, low, high, *_ in told):
-        return None
-    found = {cell: Placing(*placing) for cell, *placing in told}
-    if found.keys() != set(cells):
-        return None
-    places = [found[cell].place for cell in cells]
-    return found if places == sorted(places) else None
-
-
-_ENTRY = (str, int, int, int, bool, bool, bool, int)
-"""What is remembered of an answer: the name of its cell, and its placing."""

@@ -9,9 +9,9 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, sensor_name
-from tactbench.core.leaderboard.numbers import interval, score, suffix
-from tactbench.core.leaderboard.sections import Section
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.text import visible
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 
@@ -30,7 +30,7 @@ COLUMNS = (
 NUMERIC = frozenset({"score", "95 % interval", "shuffled", "first frame alone", "trivial"})
 
 
-def build_probe(rows: Sequence[Row]) -> Section | None:
+def build_probe(rows: Sequence[Row]) -> TextTable | None:
     """Put each finished answer under `deployable` beside its probes; None if nothing was probed."""
     probes = _Probes(rows)
     if not probes:
@@ -52,7 +52,7 @@ def build_probe(rows: Sequence[Row]) -> Section | None:
     if not lines:
         return None
     used = [place for place in range(len(COLUMNS)) if any(line[place] for line in lines)]
-    return Section(
+    return TextTable(
         title="Probe · does the score come from the contact?",
         columns=tuple(COLUMNS[place] for place in used),
         numeric=NUMERIC,
@@ -62,7 +62,7 @@ def build_probe(rows: Sequence[Row]) -> Section | None:
             "Optimistic: shuffled rows score beyond the interval of the split. See docs/real-recordings.md.",
             *dict.fromkeys(skipped),
         ),
-        alarms=frozenset(place for place, line in enumerate(lines) if line[-1].startswith("LEAK")),
+        kinds=tuple("alarm" if line[-1].startswith("LEAK") else "plain" for line in lines),
     )
 
 
@@ -124,9 +124,11 @@ def _about_first(row: Row, first: Row | None) -> list[str]:
     if not beyond:
         return []
     unit = row["unit"]
-    told = f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix(unit)}"
+    sentence = (
+        f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix(unit)}"
+    )
     leak = _skill(first["score"], trivial, row) >= LEAK_SHARE * _skill(row["score"], trivial, row)
-    return [f"LEAK: {told}" if leak else f"{told}: a part of the answer is known before"]
+    return [f"LEAK: {sentence}" if leak else f"{sentence}: a part of the answer is known before"]
 
 
 def _beyond_guessing(first: Row, trivial: float) -> bool | None:
@@ -156,9 +158,9 @@ def _about_shuffled(row: Row, shuffled: Row | None) -> list[str]:
     if _skill(shuffled["score"], best, row) <= 0:
         return []
     by = score(abs(shuffled["score"] - row["score"]), row["unit"])
-    said = f"optimistic by {by}{suffix(row['unit'])} when shuffled"
+    sentence = f"optimistic by {by}{suffix(row['unit'])} when shuffled"
     same = shuffled["n_test"] == row["n_test"] and set(shuffled["recordings"]) == set(row["recordings"])
-    return [said if same else f"{said} (tested on other rows)"]
+    return [sentence if same else f"{sentence} (tested on other rows)"]
 
 
 def _skill(value: float, trivial: float, row: Row) -> float:

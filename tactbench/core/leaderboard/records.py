@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import math
-import re
 from collections.abc import Iterator
 from typing import Any
 
 from tactbench.core.leaderboard.columns import SHOWN
-from tactbench.core.leaderboard.table import Line, Table
+from tactbench.core.leaderboard.lines import Line
+from tactbench.core.leaderboard.table import Table
 from tactbench.core.spec.row import FORMAT
 
 JSON_KEYS = (
@@ -52,9 +50,6 @@ OF_THE_MACHINE = frozenset({
 })  # fmt: skip
 """Keys that machine, place or hour decide, not the seed alone."""
 
-_ACTS = re.compile("[\x7f-\x9f\xad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]")
-"""Controls, marks of direction and lone surrogates."""
-
 
 def keys(table: Table) -> tuple[str, ...]:
     """Return the keys that a table's records have, before their ranks."""
@@ -65,37 +60,13 @@ def keys(table: Table) -> tuple[str, ...]:
 def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
     """Yield each line's row, ranks among it, and its text by column."""
     chosen = keys(table)
-    for block in table.blocks:
-        for line in block.lines:
-            values = {key: line.row.get(key) for key in chosen}
-            yield values | _ranks(line), shown(table, line)
+    for line in table.lines:
+        yield {key: line.row.get(key) for key in chosen} | _ranks(line), shown(line)
 
 
-def shown(table: Table, line: Line) -> dict[str, str]:
+def shown(line: Line) -> dict[str, str]:
     """Return the text of a line, by what its columns are called for programs."""
-    return {SHOWN[name]: text for name, text in zip(table.columns, line.cells, strict=True)}
-
-
-def finite(value: Any) -> Any:
-    """Return `value` with None in place of every number that is not finite."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: finite(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(one) for one in value]
-    return value
-
-
-def json_text(value: Any, **how: Any) -> str:
-    """Return `value` as JSON: what acts on a terminal or is no UTF-8 is escaped; a number that is none is null."""
-    try:
-        text = json.dumps(value, ensure_ascii=False, allow_nan=False, **how)
-    except ValueError:
-        text = json.dumps(finite(value), ensure_ascii=False, allow_nan=False, **how)
-    if text.isascii() and "\x7f" not in text:
-        return text
-    return _ACTS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return {SHOWN[name]: text for name, text in line.texts.items()}
 
 
 def _ranks(line: Line) -> dict[str, Any]:

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name
-from tactbench.core.leaderboard.numbers import interval, score, suffix
 from tactbench.core.leaderboard.placing import Placing
-from tactbench.core.leaderboard.text import visible
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
+from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 
@@ -56,22 +56,22 @@ def verdict_of(
         return (_too_few(rows, names),)
     leaders = [place for place, (_, one) in enumerate(ranked) if not one.behind]
     best = rows[0]
-    if _may_be_trivial(best):
+    if may_be_trivial(best):
         bar = score(best["baseline"], best["unit"]) + suffix(best["unit"])
-        said = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {bar}."
+        sentence = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {bar}."
     elif len(rows) == 1:
-        said = f"{names[0]}: {_measured(best)}, the only answer better than the trivial one."
+        sentence = f"{names[0]}: {_measured(best)}, the only answer better than the trivial one."
     elif len(leaders) == 1:
-        said = f"{names[0]} is best: {_measured(best)}."
+        sentence = f"{names[0]} is best: {_measured(best)}."
     else:
         others = ", ".join(names[place] for place in leaders[1:])
         by = "the smallest error beyond the floor" if beyond_floor([best]) else "the best score"
-        said = f"Tie at the top: {names[0]} has {by}, and {others} cannot be told from it."
+        sentence = f"Tie at the top: {names[0]} has {by}, and {others} cannot be told from it."
         if times:
-            said += _cheapest([rows[place] for place in leaders], [names[place] for place in leaders])
+            sentence += _cheapest([rows[place] for place in leaders], [names[place] for place in leaders])
     how = [_resolution(ranked, len(leaders), names)] if len(rows) > 1 else []
     return (
-        said,
+        sentence,
         " ".join([*how, _single(rows, names)]).strip(),
         *_without_touch(rows, trivial),
         *_published([*rows, *trivial], [*names, *_names(trivial, rows)]),
@@ -89,18 +89,18 @@ def _single(rows: Sequence[Row], names: Sequence[str]) -> str:
 
 def _published(rows: Sequence[Row], names: Sequence[str]) -> list[str]:
     """Return where published figures lie beside the intervals of ours."""
-    told = []
+    figures = []
     for row, name in zip(rows, names, strict=True):
         if row.get("published") is None or row["ci_low"] is None:
             continue
         inside = row["ci_low"] <= row["published"] <= row["ci_high"]
         where = "inside" if inside else "below" if row["published"] < row["ci_low"] else "above"
         ends = interval(row["ci_low"], row["ci_high"], row["unit"])
-        told.append(f"{name} {score(row['published'], row['unit'])} lies {where} our {ends}")
-    if not told:
+        figures.append(f"{name} {score(row['published'], row['unit'])} lies {where} our {ends}")
+    if not figures:
         return []
     tests = " This tests the simulation, not the sensor." if rows[0]["simulated"] else ""
-    return [f"{PUBLISHED}: {'; '.join(told)}.{tests}"]
+    return [f"{PUBLISHED}: {'; '.join(figures)}.{tests}"]
 
 
 def _without_touch(rows: Sequence[Row], trivial: Sequence[Row]) -> list[str]:
@@ -159,12 +159,13 @@ def _replicates(row: Row) -> str:
     return counted(row["n_replicates"], str(row["replicate_unit"])) if row.get("n_replicates") else "replicates"
 
 
-def _may_be_trivial(row: Row) -> bool:
-    """Return whether the interval of a row holds its trivial answer's score."""
-    end = row["ci_high" if row["metric"] in LOWER_IS_BETTER else "ci_low"]
+def may_be_trivial(row: Row) -> bool:
+    """Return whether the interval of a row holds its trivial answer's score, or lies beyond it on the worse side."""
+    lower = row["metric"] in LOWER_IS_BETTER
+    end = row["ci_high" if lower else "ci_low"]
     if row["baseline"] is None or end is None:
         return False
-    return bool(end >= row["baseline"] if row["metric"] in LOWER_IS_BETTER else end <= row["baseline"])
+    return bool(end >= row["baseline"] if lower else end <= row["baseline"])
 
 
 def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:
@@ -185,14 +186,14 @@ def _resolution(ranked: Sequence[tuple[Row, Placing]], leaders: int, names: Sequ
     """Return how many neighbours can be told apart, and whether the first place hangs on one replicate."""
     apart = sum(one.apart for _, one in ranked)
     behind = len(ranked) - leaders
-    said = (
+    sentence = (
         f"{apart} of {len(ranked) - 1} neighbouring rows separable; {leaders - 1} tied with the first, {behind} behind."
     )
     ways = sum(one.first_without for _, one in ranked)
     if not ways:
-        return said
+        return sentence
     others = {names[place]: one.first_without for place, (_, one) in enumerate(ranked) if place and one.first_without}
     if not others:
-        return f"{said} Without any one {ranked[0][0].get('replicate_unit') or 'replicate'} the first stays first."
+        return f"{sentence} Without any one {ranked[0][0].get('replicate_unit') or 'replicate'} the first stays first."
     instead = ", ".join(others)
-    return f"{said} Without one of them ({sum(others.values())} of {ways} ways) the first would be {instead}."
+    return f"{sentence} Without one of them ({sum(others.values())} of {ways} ways) the first would be {instead}."

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from tactbench.core.errors import UnknownNameError
+from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import COLUMNS, INTERVALS, NUMERIC, SHOWN
-from tactbench.core.leaderboard.lines import Kind, Line
 from tactbench.core.leaderboard.names import metric_name
-from tactbench.core.leaderboard.numbers import ABSENT
-from tactbench.core.leaderboard.sections import Section
-from tactbench.core.leaderboard.table import Block, Table
-from tactbench.core.leaderboard.text import command_line, visible
+from tactbench.core.leaderboard.table import Table
 from tactbench.core.statistics.median import counted, percent
+from tactbench.core.tables.numbers import ABSENT
+from tactbench.core.tables.text import command_line, visible
+from tactbench.core.tables.text_table import Entry, TextTable, finite
+
+Row = Mapping[str, Any]
 
 CELL = "cell"
 """The column of cells' names, as `why` and `rerun` take them."""
@@ -22,6 +24,11 @@ DEFAULT = ("#", "sensor", "estimator", "score", "95 % interval", "published", "d
 OF_FLOOR = ("#", "sensor", "estimator", "score", "beyond floor", "95 % beyond", "published", "delay")
 """Where a block has errors beyond the floor of the reference: what its ranks go by, with its interval."""
 MOST_NOTES = 3
+_FIRST_TO_GO = (
+    "cell", "batch/row", "p95", "sessions", "n test", "sim", "baseline", "latency p50", "rank 95 %", "fit",
+    "true error", "95 % interval", "published", "delay", "95 % beyond",
+)  # fmt: skip
+"""Columns that a terminal does without, in this order; those that were asked for by name are never left out."""
 
 
 @dataclass(frozen=True)
@@ -42,22 +49,6 @@ DEFAULT_VIEW = View()
 WHOLE = View(wide=True, notes=True)
 
 
-@dataclass(frozen=True)
-class Grid:
-    """A table of texts under its title."""
-
-    title: str
-    columns: tuple[str, ...]
-    """Names of the columns."""
-    headers: tuple[str, ...]
-    """What stands above them."""
-    lines: tuple[tuple[str, ...], ...]
-    kinds: tuple[Kind, ...]
-    numeric: frozenset[str] = NUMERIC
-    said: tuple[str, ...] = ()
-    """Sentences below the title."""
-
-
 def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
     """Return the names of columns that a person asks for by these or by their names for programs (``rank``).
 
@@ -66,21 +57,33 @@ def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
     UnknownNameError
         If there is no such column.
     """
-    known = {**{name: name for name in (*COLUMNS, CELL)}, **{told: name for name, told in SHOWN.items()}}
+    known = {**{name: name for name in (*COLUMNS, CELL)}, **{shown: name for name, shown in SHOWN.items()}}
     for name in asked:
         if name not in known:
             raise UnknownNameError("column", name, (*COLUMNS, CELL))
     return tuple(dict.fromkeys(known[name] for name in asked))
 
 
-def grids(table: Table, view: View) -> list[Grid]:
+def document(table: Table, view: View) -> list[TextTable | tuple[str, ...]]:
+    """Return the tables and notes that are printed, from above."""
+    sentences = (*notes(table, view), *commands(table, view))
+    parts: tuple[TextTable | tuple[str, ...], ...] = (
+        *grids(table, view),
+        sentences,
+        *sections(table, view),
+        footer(table, view),
+    )
+    return [part for part in parts if part]
+
+
+def grids(table: Table, view: View) -> list[TextTable]:
     """Return what is printed of a table's blocks."""
-    return [grid_of(table, block, view) for block in table.blocks]
+    return [grid_of(block, view) for block in table.blocks]
 
 
-def grid_of(table: Table, block: Block, view: View) -> Grid:
+def grid_of(block: Block, view: View) -> TextTable:
     """Return what is printed of a block."""
-    texts = [_by_column(table, line) for line in block.lines]
+    texts = [{**line.texts, CELL: visible(_cell(line.row))} for line in block.lines]
     if all("†" in text["score"] for text, line in zip(texts, block.lines, strict=True) if line.row["status"] == "done"):
         # The title has it: not repeated behind every score.
         texts = [{**text, "score": text["score"].replace(" †", "")} for text in texts]
@@ -92,22 +95,50 @@ def grid_of(table: Table, block: Block, view: View) -> Grid:
         floor = any(text.get("beyond floor", ABSENT) != ABSENT for text in texts)
         names = [name for name in (OF_FLOOR if floor else DEFAULT) if name in texts[0]]
     rows = [line.row for line in block.lines]
-    return Grid(
+    return TextTable(
         block.title,
         tuple(names),
-        tuple(header(name, rows) for name in names),
         tuple(tuple(text[name] for name in names) for text in texts),
+        NUMERIC,
+        tuple(header(name, rows) for name in names),
         tuple(line.kind for line in block.lines),
-        said=block.verdict,
+        block.verdict,
+        first_to_go=() if view.columns else _FIRST_TO_GO,
+        intervals=frozenset(INTERVALS),
+        unbroken=frozenset({CELL}),
     )
 
 
-def _by_column(table: Table, line: Line) -> dict[str, str]:
-    name = line.cell.removesuffix(f"/{line.row.get('repeat')}") if line.row.get("repeats") == 1 else line.cell
-    return {**dict(zip(table.columns, line.cells, strict=True)), CELL: visible(name)}
+def full_grid(block: Block, anchors: Mapping[str, str] | None = None) -> TextTable:
+    """Return a block with every column, what numbers are sorted by, and why cells did not end well.
+
+    Parameters
+    ----------
+    anchors
+        Where a page tells more about a cell, by its name.
+    """
+    lines = []
+    for line in block.lines:
+        anchor = (anchors or {}).get(line.row["cell"], "")
+        numbers = [name in NUMERIC and text not in ("", ABSENT) for name, text in line.texts.items()]
+        texts = [
+            Entry(text, finite(line.value(name)), anchor) if number else text
+            for (name, text), number in zip(line.texts.items(), numbers, strict=True)
+        ]
+        why = "" if line.row["status"] == "done" else visible(f"{line.row['status']}: {line.row['reason']}")
+        lines.append((*texts, why))
+    columns = (*block.lines[0].texts, "reason")
+    kinds = tuple(line.kind for line in block.lines)
+    return TextTable(block.title, columns, tuple(lines), NUMERIC, kinds=kinds, summary=block.verdict).compact()
 
 
-def header(name: str, rows: Sequence[Any]) -> str:
+def _cell(row: Row) -> str:
+    """Return the name of a cell, without the number of its only replicate."""
+    name = str(row["cell"])
+    return name.removesuffix(f"/{row.get('repeat')}") if row.get("repeats") == 1 else name
+
+
+def header(name: str, rows: Sequence[Row]) -> str:
     """Return what stands above a column of a block: a score by its metric and unit, an interval by what it is over."""
     first = rows[0]
     unit = f" [{visible(str(first['unit']))}]" if first["unit"] != "1" else ""
@@ -126,16 +157,20 @@ def header(name: str, rows: Sequence[Any]) -> str:
     return name
 
 
-def _over(rows: Sequence[Any], key: str) -> str:
+def _over(rows: Sequence[Row], key: str) -> str:
     """Return what all intervals of a block are over: ``over 8 replicates``; empty if it differs or is not known."""
     found = {(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row.get(key) is not None}
     count, unit = next(iter(found)) if len(found) == 1 else (None, None)
     return f"over {counted(count, visible(str(unit or 'replicate')))}" if count else ""
 
 
-def sections(table: Table, view: View) -> tuple[Section, ...]:
+def sections(table: Table, view: View) -> tuple[TextTable, ...]:
     """Return the tables to print below the blocks."""
-    return tuple(section for section in table.sections if view.wide or not section.detail)
+    return tuple(
+        replace(section, first_to_go=section.columns[:0:-1], intervals=frozenset(INTERVALS))
+        for section in table.sections
+        if view.wide or not section.detail
+    )
 
 
 def notes(table: Table, view: View) -> tuple[str, ...]:
@@ -147,7 +182,7 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
     """Return the command that shows what is not printed, and the one that tells what a row rests on."""
     hidden = len(table.notes) - len(notes(table, view))
     more, options = [], []
-    if hidden or len(foot(table, view)) < len(table.foot):
+    if hidden or len(footer(table, view)) < len(table.footer):
         more.append(f"{hidden} more note{'s' if hidden != 1 else ''}" if hidden else "the whole provenance")
         options.append("--notes")
     if not view.wide and not view.columns:
@@ -157,13 +192,13 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
         ]
         options.append("--wide")
     where = (view.folder,) if view.folder else ()
-    told = _listed(more)
-    all_of_it = [f"{told[:1].upper()}{told[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
-    first = next((line for block in table.blocks for line in block.lines if line.kind == "result"), None)
+    listed = _listed(more)
+    all_of_it = [f"{listed[:1].upper()}{listed[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
+    first = next((line for line in table.lines if line.kind == "result"), None)
     if first is None:
         return tuple(all_of_it if more else [])
     out = ("--out", view.folder) if view.folder else ()
-    why = command_line("tactbench", "why", _by_column(table, first)[CELL], *out)
+    why = command_line("tactbench", "why", _cell(first.row), *out)
     return (*(all_of_it if more else []), f"What a row rests on, its delay part by part: `{why}`.")
 
 
@@ -171,9 +206,9 @@ def _listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
 
 
-def foot(table: Table, view: View) -> tuple[str, ...]:
+def footer(table: Table, view: View) -> tuple[str, ...]:
     """Return the provenance to print."""
-    return table.foot if view.notes else table.foot[:1]
+    return table.footer if view.notes else table.footer[:1]
 
 
 def best(table: Table, count: int) -> Table:
@@ -182,13 +217,13 @@ def best(table: Table, count: int) -> Table:
     for block in table.blocks:
         seen: dict[str, int] = {}
         kept = []
-        for place, line in zip(block.places, block.lines, strict=True):
+        for line in block.lines:
             sensor = str(line.row["sensor"])
             if line.kind == "result" and seen.setdefault(sensor, 0) < count:
                 seen[sensor] += 1
-                kept.append(place)
+                kept.append(line)
         if kept:
-            blocks.append(replace(block, places=tuple(kept)))
+            blocks.append(replace(block, lines=tuple(kept)))
     which = "the first answer" if count == 1 else f"the first {count} answers"
     note = f"Of each block only {which} of each sensor; places are those among all answers."
     return replace(table, blocks=tuple(blocks), notes=(note, *table.notes))

@@ -11,7 +11,7 @@ from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.names import metric_name
 from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, keys, records
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.text import visible
+from tactbench.core.tables.text import visible
 
 _FIRST = (*RANK_KEYS, "sensor", "estimator", "score")
 _LONGEST_NAME = 31
@@ -49,7 +49,7 @@ def xlsx(table: Table) -> bytes:
     names = [*_FIRST, *(key for key in keys(table) if key not in NESTED and key not in _FIRST)]
     begin = 0
     for number, block in enumerate(table.blocks, 1):
-        rows = every[begin : begin + len(block.places)]
+        rows = every[begin : begin + len(block.lines)]
         begin += len(rows)
         used = [name for name in names if any(row[name] not in (None, "") for row in rows)]
         sheet = book.create_sheet(_sheet_name(block.title, number))
@@ -59,7 +59,7 @@ def xlsx(table: Table) -> bytes:
         for row in rows:
             put(sheet, [row[name] for name in used])
     sheet = book.create_sheet("notes")
-    for text in (*table.notes, *(f"{section.title}" for section in table.sections), *table.foot):
+    for text in (*table.notes, *(f"{section.title}" for section in table.sections), *table.footer):
         put(sheet, [text])
     out = io.BytesIO()
     book.save(out)

@@ -204,25 +204,26 @@ def answer(
     MemoryError
         It is the engine that knows whether the cell took too much or there was too little.
     """
-    from tactbench.core.evaluation.cell import evaluate
+    from tactbench.core.evaluation.cell import CellContext, evaluate
 
     task = registry.tasks[cell.task].spec
     row = opening(cell, task, simulated=registry.rigs[cell.rig].simulated)
     try:
         material = dataset(task.name, tuple(recordings))
         result = evaluate(
-            task,
-            registry.estimators[cell.estimator],
-            dict(cell.params),
-            cell.protocol,
-            cell.split,
-            recordings,
-            seed=cell.seed,
-            clock=time.perf_counter,
-            threads=1,
-            progress=working,
-            dataset=material,
-            latency=cell.latency,
+            CellContext(
+                task,
+                registry.estimators[cell.estimator],
+                dict(cell.params),
+                cell.protocol,
+                cell.split,
+                seed=cell.seed,
+                clock=time.perf_counter,
+                threads=1,
+                progress=working,
+                latency=cell.latency,
+            ),
+            material,
         )
     except NotApplicable as reason:
         return {**row, "status": "skipped", "reason": str(reason)}, {}

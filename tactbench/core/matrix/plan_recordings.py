@@ -61,9 +61,7 @@ def requests_for(
             continue
         requests[wanted] = []
         for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(wanted[2]), cell.seed):
-            scene = planned.scene
-            if simulation != Simulation():
-                scene = scene.model_copy(update={"simulation": simulation})
+            scene = planned.scene.asked(simulation)
             key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
             path = store.recording_path(cell.sensor, scene.name, key)
             requests[wanted].append(

@@ -27,6 +27,7 @@ API_VERSION = 1
 
 hookspec = pluggy.HookspecMarker(GROUP)
 hookimpl = pluggy.HookimplMarker(GROUP)
+"""Decorator of the functions by which a plugin implements the hooks."""
 
 
 @hookspec

@@ -11,7 +11,7 @@ from tactbench.core.calibration.ranges import LEVEL
 from tactbench.core.calibration.result import CalibrationResult, load_result
 from tactbench.core.calibration.summary import Summary, acceptance, records, summary
 from tactbench.core.calibration.tables import text_tables
-from tactbench.core.report.plain import PlainTable, plain
+from tactbench.core.tables.text_table import TextTable
 
 MOST_NAMED = 2
 """So many nuisances are named beside a number, those it goes with most first."""
@@ -66,7 +66,7 @@ class Calibrated:
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
     """Whose calibration it is, how many draws, which were accepted."""
-    tables: tuple[PlainTable, ...] = ()
+    tables: tuple[TextTable, ...] = ()
     """What else the calibration says, as it says it."""
     sensitivity: Callable[[], Any] | None = None
     """Draws what decides the numbers: a matplotlib figure."""
@@ -88,22 +88,18 @@ def load_calibrated(results: Path) -> Calibrated | None:
     result = load_result(results)
     if result is None:
         return None
-    told = summary(result)
-    notes = (f"Read off {result.shown}.", acceptance(result.spec, told))
-    found = calibrated_from(result.spec.model_dump(mode="json"), records(told), notes, LEVEL)
-    tables = tuple(
-        plain(one.title, one.columns, [[row.get(name, "") for name in one.columns] for row in one.rows],
-              numeric=one.numeric, notes=one.below)
-        for one in text_tables(result, told)
-        if one.columns[0] != "finding"  # those stand in a table of their own, with who states them
-    )  # fmt: skip
-    return replace(found, tables=tables, sensitivity=lambda: _sensitivity(result, told))
+    found_summary = summary(result)
+    notes = (f"Read off {result.shown}.", acceptance(result.spec, found_summary))
+    found = calibrated_from(result.spec.model_dump(mode="json"), records(found_summary), notes, LEVEL)
+    # Findings stand in a table of their own, with who states them.
+    tables = tuple(table for table in text_tables(result, found_summary) if table.columns[0] != "finding")
+    return replace(found, tables=tables, sensitivity=lambda: _sensitivity(result, found_summary))
 
 
-def _sensitivity(result: CalibrationResult, told: Summary) -> Any:
+def _sensitivity(result: CalibrationResult, found_summary: Summary) -> Any:
     from tactbench.core.calibration.figure import sensitivity_figure
 
-    return sensitivity_figure(result.spec, told.sensitivities)
+    return sensitivity_figure(result.spec, found_summary.sensitivities)
 
 
 def calibrated_from(

@@ -5,20 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.particulars import APART, GROUPS, TITLES
-from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
-from tactbench.core.report.section import Details, Section, Subject
+from tactbench.core.leaderboard.row_groups import APART, GROUPS, TITLES
+from tactbench.core.report.section import Details, ReportData, Section
+from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 Row = Mapping[str, Any]
 
 
-def cells_section(subject: Subject) -> Section:
+def cells_section(subject: ReportData) -> Section:
     """Return the section of cells."""
-    said: tuple[str, ...] = ("Everything that is known about each cell. Times are in the unit that ends their name.",)
+    paragraphs: tuple[str, ...] = (
+        "Everything that is known about each cell. Times are in the unit that ends their name.",
+    )
     if any(len(row.get("seeds") or []) > 1 for row in subject.rows):
-        said += ("Of several replicates, key, recordings, candidates and effects are those of the first.",)
+        paragraphs += ("Of several replicates, key, recordings, candidates and effects are those of the first.",)
     return Section(
-        "cells", "Every cell", said=said, details=tuple(_details(row, subject.anchors) for row in subject.rows)
+        "cells",
+        "Every cell",
+        paragraphs=paragraphs,
+        details=tuple(_details(row, subject.anchors) for row in subject.rows),
     )
 
 
@@ -49,23 +54,23 @@ def _details(row: Row, anchors: Mapping[str, str]) -> Details:
     )
 
 
-def _pairs(title: str, pairs: Iterable[tuple[str, Any]]) -> PlainTable:
-    return plain(title, ("name", "value"), [(str(name), _entry(value)) for name, value in pairs])
+def _pairs(title: str, pairs: Iterable[tuple[str, Any]]) -> TextTable:
+    return text_table(title, ("name", "value"), [(str(name), _entry(value)) for name, value in pairs])
 
 
-def _records(title: str, records: Sequence[Mapping[str, Any]]) -> PlainTable:
+def _records(title: str, records: Sequence[Mapping[str, Any]]) -> TextTable:
     columns = list(dict.fromkeys(str(name) for record in records for name in record))
     numeric = [name for name in columns if any(finite(record.get(name)) is not None for record in records)]
-    return plain(
+    return text_table(
         title, columns, [[_entry(record.get(name)) for name in columns] for record in records], numeric=numeric
     )
 
 
-def _confusion(title: str, table: Sequence[Sequence[int]], classes: Sequence[Any]) -> PlainTable:
+def _confusion(title: str, table: Sequence[Sequence[int]], classes: Sequence[Any]) -> TextTable:
     names = [f"{label}" for label in classes]
     columns = ("true", *(f"as {name}" for name in names))
     lines = [[Entry(name), *map(_entry, counts)] for name, counts in zip(names, table, strict=True)]
-    return plain(title, columns, lines, numeric=columns[1:])
+    return text_table(title, columns, lines, numeric=columns[1:])
 
 
 def _entry(value: Any) -> Entry:

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.axes import AXES
-from tactbench.core.leaderboard.comparison import compare
 from tactbench.core.leaderboard.probe import NUMERIC, build_probe
-from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, number, plain
-from tactbench.core.report.section import Section, Subject
+from tactbench.core.leaderboard.side_by_side import compare
+from tactbench.core.report.section import ReportData, Section
+from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, sort_value, text_table
 
 
-def probe_tables(subject: Subject) -> list[PlainTable]:
+def probe_tables(subject: ReportData) -> list[TextTable]:
     """Return what the recordings give away before the contact, each score leading to the cell it is from."""
     table = build_probe(subject.rows)
     if table is None:
@@ -33,34 +33,34 @@ def probe_tables(subject: Subject) -> list[PlainTable]:
             "first frame alone": {**asked, "protocol": FIRST_FRAME.name},
         }
         entries = [
-            Entry(text, number(text), subject.anchor_of(other.get(name, asked))) if name in NUMERIC else Entry(text)
+            Entry(text, sort_value(text), subject.anchor_of(other.get(name, asked))) if name in NUMERIC else Entry(text)
             for name, text in facts.items()
         ]
         lines.append(entries)
-    return [plain(table.title, table.columns, lines, numeric=NUMERIC, notes=table.notes)]
+    return [text_table(table.title, table.columns, lines, numeric=NUMERIC, notes=table.notes)]
 
 
-def comparison_tables(subject: Subject) -> list[PlainTable]:
+def comparison_tables(subject: ReportData) -> list[TextTable]:
     """Return protocols, splits and folds side by side, each score leading to the cell it is from."""
     found = []
     for table in (table for by in AXES for table in compare(subject.rows, by)):
         records = iter(table.records)
         lines = []
-        for names, told in ((line[:2], line[2:]) for line in table.lines):
+        for names, texts in ((line[:2], line[2:]) for line in table.lines):
             entries = [Entry(name) for name in names]
-            for text in told:
+            for text in texts:
                 record = next(records) if text != ABSENT else {}
                 entries.append(Entry(text, finite(record.get("score")), subject.anchor_of(record)))
             lines.append(entries)
-        found.append(plain(table.title, table.columns, lines, numeric=table.columns[2:], notes=table.notes))
+        found.append(text_table(table.title, table.columns, lines, numeric=table.columns[2:], notes=table.notes))
     return found
 
 
-TABLES: tuple[Callable[[Subject], Sequence[PlainTable]], ...] = (comparison_tables, probe_tables)
+TABLES: tuple[Callable[[ReportData], Sequence[TextTable]], ...] = (comparison_tables, probe_tables)
 """Called one after the other; one that has nothing to show returns an empty list."""
 
 
-def compared_section(subject: Subject) -> Section:
+def compared_section(subject: ReportData) -> Section:
     """Return the section of comparisons and probes."""
     tables = tuple(table for provider in TABLES for table in provider(subject))
     lacks = (

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from tactbench.core.cost.ladder_file import VERSION
 from tactbench.core.report.ladder_table import COLUMNS, SORTED_BY, line, title
-from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
-from tactbench.core.report.section import Picture, Section, Subject
+from tactbench.core.report.section import Picture, ReportData, Section
+from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 FOLDER = "cost"
 
 
-def costs_section(subject: Subject) -> Section:
+def costs_section(subject: ReportData) -> Section:
     """Return the section of costs and comparisons."""
-    tables: list[PlainTable] = []
+    tables: list[TextTable] = []
     pictures: list[Picture] = []
     notes: list[str] = []
     for path in sorted((subject.folder / FOLDER).glob("*.json")):
@@ -43,13 +42,13 @@ def costs_section(subject: Subject) -> Section:
     )
 
 
-def _command(subject: Subject) -> str:
+def _command(subject: ReportData) -> str:
     some = next((row for row in subject.rows if row["status"] == "done"), None)
     command = f"tactbench cost --sensor {some['sensor']} --task {some['task']}" if some else "tactbench cost"
     return f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."
 
 
-def read_table(path: Path, subject: Subject) -> PlainTable:
+def read_table(path: Path, subject: ReportData) -> TextTable:
     """Return what a cost file says: an array of flat records, or an object that holds one, whatever their keys.
 
     What is the same in all records stands below the table, as do the object's own words; quartiles (``…_q1``,
@@ -78,20 +77,20 @@ def read_table(path: Path, subject: Subject) -> PlainTable:
     alike = [name for name in names if len(records) > 1 and len({_text(one.get(name)) for one in records}) == 1]
     columns = [name for name in names if name not in alike]
     numeric = [name for name in columns if any(finite(one.get(name)) is not None for one in records)]
-    said = {name: value for name, value in about.items() if not isinstance(value, dict | list)} | {
+    shared = {name: value for name, value in about.items() if not isinstance(value, dict | list)} | {
         name: records[0].get(name) for name in alike
     }
-    facts = ", ".join(f"{name} {_text(value)}" for name, value in said.items() if _text(value) != ABSENT)
+    facts = ", ".join(f"{name} {_text(value)}" for name, value in shared.items() if _text(value) != ABSENT)
     words = [f"{name}: {text}." for name, text in (about.get("definitions") or {}).items()]
     lines = []
     for one in records:
         anchor = subject.anchor_of({**about, **one})
         lines.append([Entry(_text(one.get(name)), finite(one.get(name)), anchor) for name in columns])
     notes = [f"Of all lines: {facts}.", *words] if facts else words
-    return plain(f"Cost: {about.get('title', path.stem)}", columns, lines, numeric=numeric, notes=notes)
+    return text_table(f"Cost: {about.get('title', path.stem)}", columns, lines, numeric=numeric, notes=notes)
 
 
-def _ladder(about: Mapping[str, Any], subject: Subject) -> PlainTable:
+def _ladder(about: Mapping[str, Any], subject: ReportData) -> TextTable:
     """Return a ladder of estimators as the terminal shows it, each number leading to the cell it was timed for."""
     lines = []
     for row in about["rows"]:
@@ -100,14 +99,14 @@ def _ladder(about: Mapping[str, Any], subject: Subject) -> PlainTable:
         entries = []
         for name in COLUMNS:
             key = SORTED_BY.get(name)
-            entry = Entry(texts.get(name) or ABSENT)
-            entries.append(replace(entry, value=finite(row.get(key)), anchor=anchor) if key else entry)
+            text = texts.get(name) or ABSENT
+            entries.append(Entry(text, finite(row.get(key)), anchor) if key else Entry(text))
         lines.append(entries)
     kinds = ["baseline" if row["is_baseline"] else "result" if row["status"] == "done" else "failed"
              for row in about["rows"]]  # fmt: skip
     words = [f"{text}." for text in about["remarks"]]
     words += [f"{name}: {text}." for name, text in about["definitions"].items()]
-    return plain(f"Cost: {title(about)}", COLUMNS, lines, numeric=tuple(SORTED_BY), notes=words, kinds=kinds)
+    return text_table(f"Cost: {title(about)}", COLUMNS, lines, numeric=tuple(SORTED_BY), notes=words, kinds=kinds)
 
 
 def _are_records(value: Any) -> bool:

@@ -17,7 +17,7 @@ from tactbench.core.evaluation.preparation import assigned, prepared
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.selection import features_of
 from tactbench.core.provenance.source import versions
-from tactbench.core.report.material import Material
+from tactbench.core.report.results import Results
 from tactbench.core.report.stored import stored
 from tactbench.core.samples import Answers, FloatArray, IntArray
 
@@ -42,12 +42,12 @@ class Embedding:
     """Kullback-Leibler divergence that is left, nats"""
 
 
-def embed(material: Material, row: Mapping[str, Any], test: Answers) -> Embedding:
+def embed(results: Results, row: Mapping[str, Any], test: Answers) -> Embedding:
     """Return the t-SNE of a cell's test set [1]_, from the result folder if it has been computed before.
 
     Parameters
     ----------
-    material
+    results
         Where the recordings and the stored embeddings are.
     row
         The cell.
@@ -83,11 +83,11 @@ def embed(material: Material, row: Mapping[str, Any], test: Answers) -> Embeddin
     }  # fmt: skip
 
     def compute() -> dict[str, Any]:
-        X = _features(material, row, test)[rows]
+        X = _features(results, row, test)[rows]
         xy, divergence = _tsne(X, perplexity, int(row["seed"]))
         return {"xy": xy.tolist(), "divergence": divergence}
 
-    numbers = stored(material.store.folder, "embeddings", facts, compute)
+    numbers = stored(results.store.folder, "embeddings", facts, compute)
     every = int(rows[1] - rows[0])
     return Embedding(np.array(numbers["xy"], dtype=np.float64), rows, every, perplexity, numbers["divergence"])
 
@@ -97,11 +97,11 @@ def every_nth(n: int) -> IntArray:
     return np.arange(0, n, max(1, math.ceil(n / AT_MOST)), dtype=np.int64)
 
 
-def _features(material: Material, row: Mapping[str, Any], test: Answers) -> FloatArray:
+def _features(results: Results, row: Mapping[str, Any], test: Answers) -> FloatArray:
     """Return (n, features) of the test set as the estimator saw them: kept, scaled and filtered by the protocol."""
-    task = material.registry.tasks[row["task"]].spec
-    estimator = material.registry.estimators[row["estimator"]]
-    data = load_dataset(task, material.recordings(row))
+    task = results.registry.tasks[row["task"]].spec
+    estimator = results.registry.estimators[row["estimator"]]
+    data = load_dataset(task, results.recordings(row))
     rules = protocol_called(row["protocol"])
     (assignment,) = assigned(task, estimator, data, row["split"], row["seed"])
     k = int(row["chosen"].get("k", estimator.window_grid[0]))

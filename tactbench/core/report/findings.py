@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from tactbench.core.report.calibrated import Share
 from tactbench.core.report.linearity import contrasts
-from tactbench.core.report.plain import ABSENT, Entry, PlainTable, plain
-from tactbench.core.report.section import Section, Subject
+from tactbench.core.report.section import ReportData, Section
+from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, text_table
 
 
-def findings_section(subject: Subject) -> Section:
+def findings_section(subject: ReportData) -> Section:
     """Return the section of findings."""
     tables = [table for table in (_frequencies(subject), _linear(subject)) if table is not None]
     lacks = []
@@ -27,20 +27,20 @@ def findings_section(subject: Subject) -> Section:
     return Section("findings", "The paper's findings", missing=tuple(lacks), tables=tuple(tables), notes=notes)
 
 
-def _frequencies(subject: Subject) -> PlainTable | None:
+def _frequencies(subject: ReportData) -> TextTable | None:
     if subject.calibrated is None or not subject.calibrated.findings:
         return None
     lines = [
         (
             Entry(one.statement),
-            _told(one.accepted),
-            _told(one.prior),
+            _share_text(one.accepted),
+            _share_text(one.prior),
             Entry(one.reference),
             Entry(one.reason),
         )
         for one in subject.calibrated.findings
     ]
-    return plain(
+    return text_table(
         "Findings: share of the draws in which they come out, with its 95 % interval",
         ("finding", "accepted draws", "all draws", "stated by", "what is asked of a draw"),
         lines,
@@ -48,29 +48,29 @@ def _frequencies(subject: Subject) -> PlainTable | None:
     )
 
 
-def _told(one: Share | None) -> Entry:
+def _share_text(one: Share | None) -> Entry:
     if one is None:
         return Entry(ABSENT)
     return Entry(f"{one.share:.0%} ({one.low:.0%} … {one.high:.0%}) of {one.draws}", one.share)
 
 
-def _linear(subject: Subject) -> PlainTable | None:
+def _linear(subject: ReportData) -> TextTable | None:
     lines = []
-    for one in contrasts(subject.rows, subject.material.registry):
+    for one in contrasts(subject.rows, subject.results.registry):
         anchors = [subject.anchors[row["cell"]] for row in (one.linear, one.other)]
         lines.append(
             (
                 Entry(one.where),
                 Entry(one.linear["estimator"]),
-                Entry(one.told(one.linear), one.linear["score"], anchors[0]),
+                Entry(one.score_text(one.linear), one.linear["score"], anchors[0]),
                 Entry(one.other["estimator"]),
-                Entry(one.told(one.other), one.other["score"], anchors[1]),
+                Entry(one.score_text(one.other), one.other["score"], anchors[1]),
                 Entry(one.sentence),
             )
         )
     if not lines:
         return None
-    return plain(
+    return text_table(
         "Linear against non-linear",
         ("question", "linear", "score", "non-linear", "score", "comparison"),
         lines,

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tactbench.core.leaderboard.numbers import delay, duration, interval, score, tail
-from tactbench.core.leaderboard.table import METRIC_NAMES
+from tactbench.core.leaderboard.names import METRIC_NAMES
+from tactbench.core.tables.numbers import delay, duration, interval, score, tail
 
 COLUMNS = (
     "estimator", "score", "95 % interval", "fit", "quartiles", "delay", "latency p50", "p95", "batch/row", "data",
@@ -41,8 +41,8 @@ def title(about: Mapping[str, Any]) -> str:
 def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
     """Return one estimator's texts by column; what was not measured is left out."""
     name = f"{row['estimator']} (trivial)" if row["is_baseline"] else row["estimator"]
-    told = "; ".join((*([f"{row['status']}: {row['reason']}"] if row["status"] != "done" else []), *row["notes"]))
-    texts = {"estimator": name, "remark": told}
+    remark = "; ".join((*([f"{row['status']}: {row['reason']}"] if row["status"] != "done" else []), *row["notes"]))
+    texts = {"estimator": name, "remark": remark}
     if row["score"] is not None:
         texts |= {"score": score(row["score"], unit), "95 % interval": interval(row["ci_low"], row["ci_high"], unit)}
     if row["fit_s"] is None:

@@ -2,60 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
-from tactbench.core.leaderboard.sheet import Sheet
-from tactbench.core.leaderboard.table import NUMERIC, Block, Line
-from tactbench.core.leaderboard.values import VALUES
-from tactbench.core.report.plain import ABSENT, Entry, PlainTable, finite, plain
-from tactbench.core.report.section import Section, Subject
-
-Row = Mapping[str, Any]
+from tactbench.core.leaderboard.view import full_grid
+from tactbench.core.report.section import ReportData, Section
 
 
-def leaderboards_section(subject: Subject) -> Section:
+def leaderboards_section(subject: ReportData) -> Section:
     """Return the section of leaderboards, failed and skipped cells with their reasons."""
     table = subject.leaderboard
-    rows = {row["cell"]: row for row in subject.rows}
     tables = tuple(
-        _table(block, table.columns, rows, subject.anchors, block_anchor(place))
+        replace(full_grid(block, subject.anchors), anchor=block_anchor(place))
         for place, block in enumerate(table.blocks)
     )
-    said = ("Click a heading to sort by it; click it again to turn the order round.",)
-    return Section("leaderboards", "Leaderboards", said=said, tables=tables, notes=table.notes)
+    paragraphs = ("Click a heading to sort by it; click it again to turn the order round.",)
+    return Section("leaderboards", "Leaderboards", paragraphs=paragraphs, tables=tables, notes=table.notes)
 
 
 def block_anchor(place: int) -> str:
     """Return where the page shows the block at this place of the table."""
     return f"leaderboard-{place + 1}"
-
-
-def _table(
-    block: Block, columns: tuple[str, ...], rows: Mapping[str, Row], anchors: Mapping[str, str], anchor: str
-) -> PlainTable:  # fmt: skip
-    members = [rows[line.cell] for line in block.lines]
-    sheet = Sheet(members)
-    values = {name: VALUES[name](sheet) for name in columns if name in VALUES}
-    lines = []
-    for place, (line, row) in enumerate(zip(block.lines, members, strict=True)):
-        own = {name: column[place] for name, column in values.items()}
-        reason = "" if row["status"] == "done" else str(row["reason"])
-        lines.append([*_entries(line, columns, own, anchors[line.cell]), Entry(reason)])
-    kinds = [line.kind for line in block.lines]
-    told = plain(block.title, (*columns, "reason"), lines, numeric=NUMERIC, kinds=kinds)
-    return replace(told, said=block.verdict, anchor=anchor)
-
-
-def _entries(
-    line: Line, columns: tuple[str, ...], values: Mapping[str, float | None], anchor: str
-) -> list[Entry]:  # fmt: skip
-    entries = []
-    for name, text in zip(columns, line.cells, strict=True):
-        if name not in NUMERIC or text in ("", ABSENT):
-            entries.append(Entry(text))
-        else:
-            place = line.placing.place if line.placing else None
-            entries.append(Entry(text, finite(values[name]) if name in values else place, anchor))
-    return entries

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tactbench.core.leaderboard.numbers import score, suffix
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER, sensor_name
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, sensor_name
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.reproduction import row_interval
+from tactbench.core.tables.numbers import score, suffix
 
 Row = Mapping[str, Any]
 _SAME = ("sensor", "task", "rig", "protocol", "split", "repeat")
@@ -44,7 +44,7 @@ class Contrast:
         return f"{better} is better by {score(abs(by), unit)}{suffix(unit)}; the intervals {apart}"
 
     @staticmethod
-    def told(row: Row) -> str:
+    def score_text(row: Row) -> str:
         """Return a score and its interval as text."""
         return f"{score(row['score'], row['unit'])} ({row_interval(row)})"
 

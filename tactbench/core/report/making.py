@@ -8,21 +8,21 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import UnwritableError, UsageError
-from tactbench.core.leaderboard.formats import JSON_KEYS
+from tactbench.core.leaderboard.records import JSON_KEYS
 from tactbench.core.matrix.files import replace_file
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.calibrated import Calibrated
-from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures.sensitivity import draw_sensitivity
-from tactbench.core.report.material import Material
 from tactbench.core.report.page import make_page
-from tactbench.core.report.plain import PlainTable
 from tactbench.core.report.published import published_table
 from tactbench.core.report.reproduction import records, reproduce
-from tactbench.core.report.section import Subject
+from tactbench.core.report.results import Results
+from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.report.section import ReportData
+from tactbench.core.tables.text_table import TextTable
 
-Drawer = Callable[[Material, Path, Progress, Callable[[str], None]], Sequence[Drawn]]
-"""Told the material, the folder for figures, where progress goes and what to call with each figure it leaves out."""
+Drawer = Callable[[Results, Path, Progress, Callable[[str], None]], Sequence[SavedFigure]]
+"""Told the results, the folder for figures, where progress goes and what to call with each figure it leaves out."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Report:
     """A report that has been written, and what it lacks."""
 
     page: Path
-    reproduction: PlainTable
+    reproduction: TextTable
     records: Sequence[Mapping[str, Any]]
     """The reproduction table for programs."""
     missing: tuple[str, ...]
@@ -38,7 +38,7 @@ class Report:
 
 
 def make_report(
-    material: Material,
+    results: Results,
     out: Path,
     progress: Progress,
     *,
@@ -61,22 +61,22 @@ def make_report(
     UnwritableError
         If `out` refuses the page or the figures; an earlier page is then still whole.
     """
-    readable = tuple(row for row in material.rows if set(JSON_KEYS) <= set(row))
-    foreign = [str(row.get("cell")) for row in material.rows if row not in readable]
+    readable = tuple(row for row in results.rows if set(JSON_KEYS) <= set(row))
+    foreign = [str(row.get("cell")) for row in results.rows if row not in readable]
     if not any(row["status"] == "done" for row in readable):
         raise UsageError(
-            f"No cell in {material.store.folder} has finished, or all are of another version: there is nothing to "
+            f"No cell in {results.store.folder} has finished, or all are of another version: there is nothing to "
             "report.",
             hint="Finish some with `tactbench run --out DIR`.",
         )
-    material = replace(material, rows=readable)
+    results = replace(results, rows=readable)
     try:
         (out / "figures").mkdir(parents=True, exist_ok=True)
         undrawn: list[str] = []
-        drawn, trouble = _drawn(material, out / "figures", progress, draw, undrawn.append)
+        drawn, trouble = _drawn(results, out / "figures", progress, draw, undrawn.append)
         if draw is not None and calibrated is not None:
             drawn = [*drawn, *draw_sensitivity(calibrated, out / "figures")]
-        subject = Subject(material, drawn, calibrated, (*undrawn, *trouble))
+        subject = ReportData(results, drawn, calibrated, (*undrawn, *trouble))
         page = make_page(subject)
         # A lone surrogate, which JSON may hold, is no UTF-8: a question mark then.
         replace_file(out / "index.html", page.html.encode("utf-8", "replace"))
@@ -85,25 +85,25 @@ def make_report(
             f"The report cannot be written to {out}: {error.strerror or error}.",
             hint="Give another folder with --out.",
         ) from error
-    lacking = tuple(one for one in page.missing if not any(told in one for told in trouble))
+    lacking = tuple(one for one in page.missing if not any(reason in one for reason in trouble))
     rows_left_out = [f"{name}: its row is of another version; run it again" for name in foreign]
     return Report(
         page=out / "index.html",
         reproduction=published_table(subject),
-        records=records(reproduce(material.registry, readable, calibrated)),
+        records=records(reproduce(results.registry, readable, calibrated)),
         missing=(*lacking, *rows_left_out),
         broken=(*page.broken, *trouble),
     )
 
 
 def _drawn(
-    material: Material, folder: Path, progress: Progress, draw: Drawer | None, remark: Callable[[str], None]
-) -> tuple[Sequence[Drawn], tuple[str, ...]]:
+    results: Results, folder: Path, progress: Progress, draw: Drawer | None, remark: Callable[[str], None]
+) -> tuple[Sequence[SavedFigure], tuple[str, ...]]:
     """Return the figures, and why there are none: drawing that fails does not take the tables with it."""
     if draw is None:
         return (), ()
     try:
-        return draw(material, folder, progress, remark), ()
+        return draw(results, folder, progress, remark), ()
     except OSError:
         raise
     except Exception as error:

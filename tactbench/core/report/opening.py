@@ -6,14 +6,14 @@ import json
 from collections import Counter
 from typing import Any
 
-from tactbench.core.leaderboard.numbers import score
 from tactbench.core.provenance.source import RELEVANT
 from tactbench.core.report.figures.published_and_ours import COLUMN
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.leaderboards import block_anchor
-from tactbench.core.report.plain import Entry, PlainTable, plain
 from tactbench.core.report.reproduction import reproduce
-from tactbench.core.report.section import Answer, Picture, Section, Subject
+from tactbench.core.report.section import Highlight, Picture, ReportData, Section
+from tactbench.core.tables.numbers import score
+from tactbench.core.tables.text_table import Entry, TextTable, text_table
 
 _FACTS = ("tactbench", "commit", "python", "platform", "machine", "cpu", "cores", "host", "jobs")
 
@@ -22,7 +22,7 @@ MOST_TASKS = 2
 """So many tasks are named in the first section; the leaderboards have them all."""
 
 
-def answers_section(subject: Subject) -> Section:
+def answers_section(subject: ReportData) -> Section:
     """Return the first section: published scores and ours in one picture, and what came out in three sentences."""
     drawn = {one.name: one for one in subject.drawn}
     pictures: tuple[Picture, ...] = ()
@@ -31,57 +31,57 @@ def answers_section(subject: Subject) -> Section:
         pictures = (Picture(one.title, one.caption, one.png.read_bytes(), narrow=drawn[COLUMN].png.read_bytes()),)
     answers = [*_published(subject), *_tasks(subject)]
     simulated = sum(bool(row["simulated"]) for row in subject.rows if row["status"] == "done")
-    said = ("SIM: simulated by a twin of the sensor; no sensor was pressed.",) if simulated else ()
-    return Section("answers", "What came out", said=said, pictures=pictures, answers=tuple(answers))
+    paragraphs = ("SIM: simulated by a twin of the sensor; no sensor was pressed.",) if simulated else ()
+    return Section("answers", "What came out", paragraphs=paragraphs, pictures=pictures, answers=tuple(answers))
 
 
-def _published(subject: Subject) -> list[Answer]:
+def _published(subject: ReportData) -> list[Highlight]:
     """Return how many published numbers lie in the interval of ours."""
-    lines = [one for one in reproduce(subject.material.registry, subject.rows, subject.calibrated)
+    lines = [one for one in reproduce(subject.results.registry, subject.rows, subject.calibrated)
              if one.row is not None and one.row["status"] == "done"]  # fmt: skip
     if not lines:
         return []
-    told = [one for one in lines if one.verdict != "no interval"]
-    if not told:
+    with_interval = [one for one in lines if one.verdict != "no interval"]
+    if not with_interval:
         few = f"Published numbers beside ours: {len(lines)}; ours are of too few replicates for an interval."
-        return [Answer(few, "reproduction", "published numbers and ours")]
-    inside = sum(one.verdict == "inside" for one in told)
-    said = f"Published numbers in the 95 % interval of ours: {inside} of {len(told)}"
+        return [Highlight(few, "reproduction", "published numbers and ours")]
+    inside = sum(one.verdict == "inside" for one in with_interval)
+    sentence = f"Published numbers in the 95 % interval of ours: {inside} of {len(with_interval)}"
     outside = [
         f"{one.title} (published {score(one.published, one.unit)}, ours {score(one.row['score'], one.unit)})"
-        for one in told
+        for one in with_interval
         if one.row is not None and one.verdict == "outside"
     ]
-    said += f"; outside: {', '.join(outside)}." if outside else "."
-    return [Answer(said, "reproduction", "published numbers and ours")]
+    sentence += f"; outside: {', '.join(outside)}." if outside else "."
+    return [Highlight(sentence, "reproduction", "published numbers and ours")]
 
 
-def _tasks(subject: Subject) -> list[Answer]:
+def _tasks(subject: ReportData) -> list[Highlight]:
     """Return what the first table of each task comes to, without how finely it resolves."""
-    found: dict[str, Answer] = {}
+    found: dict[str, Highlight] = {}
     for place, block in enumerate(subject.leaderboard.blocks):
         row = block.lines[0].row
         if not block.verdict or row["task"] in found:
             continue
-        said = (*block.verdict[:1], *(one for one in block.verdict[2:] if not one.startswith(PUBLISHED)))
+        sentence = (*block.verdict[:1], *(one for one in block.verdict[2:] if not one.startswith(PUBLISHED)))
         asked = f"{row['task']} under {row['protocol']}{' †' if row['dagger'] else ''}"
         asked += ", SIM" if row["simulated"] else ""
-        found[row["task"]] = Answer(f"{asked}: {' '.join(said)}", block_anchor(place), f"table of {row['task']}")
+        found[row["task"]] = Highlight(f"{asked}: {' '.join(sentence)}", block_anchor(place), f"table of {row['task']}")
     return list(found.values())[:MOST_TASKS]
 
 
-def about_section(subject: Subject) -> Section:
+def about_section(subject: ReportData) -> Section:
     """Return the last section."""
     counts = Counter(str(row["status"]) for row in subject.rows)
-    told = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
+    statuses = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
     seeds = ", ".join(map(str, sorted({seed for row in subject.rows for seed in row.get("seeds") or [row["seed"]]})))
-    said = [
+    paragraphs = [
         "Each number on this page links to the cell that it is from, with everything that is known about it.",
-        f"{len(subject.rows)} cells: {told}. Seeds: {seeds}.",
+        f"{len(subject.rows)} cells: {statuses}. Seeds: {seeds}.",
     ]
     facts = _facts(subject)
     if facts:
-        said.append(_made_by(facts))
+        paragraphs.append(_made_by(facts))
     tables = [_table("Made with and on (the last run)", facts, _FACTS)] if facts else []
     versions = facts.get("distributions")
     if isinstance(versions, dict):
@@ -90,13 +90,13 @@ def about_section(subject: Subject) -> Section:
     return Section(
         "about",
         "What this was made of",
-        said=(*said, *_simulated(subject)),
+        paragraphs=(*paragraphs, *_simulated(subject)),
         tables=tuple(tables),
         missing=() if facts else (lacks,),
     )
 
 
-def _facts(subject: Subject) -> dict[str, Any]:
+def _facts(subject: ReportData) -> dict[str, Any]:
     try:
         facts = json.loads((subject.folder / "run.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -118,11 +118,11 @@ def _made_by(facts: dict[str, Any]) -> str:
     )
 
 
-def _table(title: str, facts: dict[str, Any], names: Any) -> PlainTable:
-    return plain(title, ("", "value"), [(name, Entry(str(facts[name]))) for name in names if facts.get(name)])
+def _table(title: str, facts: dict[str, Any], names: Any) -> TextTable:
+    return text_table(title, ("", "value"), [(name, Entry(str(facts[name]))) for name in names if facts.get(name)])
 
 
-def _simulated(subject: Subject) -> list[str]:
+def _simulated(subject: ReportData) -> list[str]:
     """Return what is simulated, and under which assumptions; cells with the same ones share a sentence."""
     by_assumptions: dict[str, list[str]] = {}
     for row in subject.rows:
@@ -131,11 +131,11 @@ def _simulated(subject: Subject) -> list[str]:
             by_assumptions.setdefault(assumed, []).append(f"{row['sensor']}/{row['task']}")
     if not by_assumptions:
         return []
-    said = [
+    paragraphs = [
         "SIM: rows so marked are simulated by a twin of the sensor. No sensor was pressed; they say what the model "
         "behind them implies, and are never ranked against hardware."
     ]
     for assumed, whose in by_assumptions.items():
         named = ", ".join(dict.fromkeys(whose))
-        said.append(f"Assumed for {named}: {assumed or 'nothing that its recordings state'}.")
-    return said
+        paragraphs.append(f"Assumed for {named}: {assumed or 'nothing that its recordings state'}.")
+    return paragraphs

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-import tactbench
-from tactbench.core.leaderboard.one_file import house_style, own, policy_hash, prose
 from tactbench.core.report.cells import cells_section
 from tactbench.core.report.compared import compared_section
 from tactbench.core.report.costs import costs_section
@@ -15,10 +11,10 @@ from tactbench.core.report.findings import findings_section
 from tactbench.core.report.leaderboards import leaderboards_section
 from tactbench.core.report.opening import about_section, answers_section
 from tactbench.core.report.pictures import pictures_section
-from tactbench.core.report.plain import WORDY
 from tactbench.core.report.published import published_section
-from tactbench.core.report.section import Maker, Section, Subject
+from tactbench.core.report.section import Maker, ReportData, Section
 from tactbench.core.report.sensors import sensors_section
+from tactbench.core.tables.html import render
 
 TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 
@@ -48,7 +44,7 @@ class Page:
     """One sentence a section that could not be made although its results are there."""
 
 
-def make_page(subject: Subject) -> Page:
+def make_page(subject: ReportData) -> Page:
     """Return the page: the same results give the same bytes.
 
     A section that cannot be made takes no other with it: it says why.
@@ -59,32 +55,11 @@ def make_page(subject: Subject) -> Page:
         try:
             sections.append(make(subject))
         except Exception as error:
-            told = f"This section cannot be made from these results: {type(error).__name__}: {error}"
-            broken.append(f"{title}: {told}")
-            sections.append(Section(anchor, title, missing=(told,)))
+            reason = f"This section cannot be made from these results: {type(error).__name__}: {error}"
+            broken.append(f"{title}: {reason}")
+            sections.append(Section(anchor, title, missing=(reason,)))
     missing = [f"{section.title}: {lacked}" for section in sections for lacked in section.missing]
-    return Page(_render(sections), tuple(one for one in missing if one not in broken), tuple(broken))
-
-
-def _render(sections: Sequence[Section]) -> str:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-
-    environment = Environment(
-        loader=PackageLoader("tactbench.core.report", "template"), autoescape=True, undefined=StrictUndefined
+    html = render(
+        "tactbench.core.report", "page.html", title=TITLE, styles=["page.css"], scripts=["page.js"], sections=sections
     )
-    environment.filters["prose"] = prose
-    environment.filters["base64"] = lambda content: base64.b64encode(content).decode()
-    style = house_style() + own("tactbench.core.report", "page.css")
-    script = own("tactbench.core.report", "page.js")
-    html = environment.get_template("page.html").render(
-        title=TITLE,
-        version=tactbench.__version__,
-        style=Markup(style),
-        script=Markup(script),
-        style_hash=policy_hash(style),
-        script_hash=policy_hash(script),
-        sections=sections,
-        wordy=WORDY,
-    )
-    return html + "\n"
+    return Page(f"{html}\n", tuple(one for one in missing if one not in broken), tuple(broken))

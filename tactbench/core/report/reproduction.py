@@ -7,14 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from tactbench.core.leaderboard.lines import row_intervals
-from tactbench.core.leaderboard.numbers import interval, score, suffix
-from tactbench.core.leaderboard.sheet import Sheet
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER
+from tactbench.core.leaderboard.columns import row_interval as row_interval
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.calibrated import Calibrated, PredictiveRange
 from tactbench.core.spec.task import Published, TaskSpec
 from tactbench.core.statistics.median import counted, percent
+from tactbench.core.tables.numbers import interval, score, suffix
 
 Row = Mapping[str, Any]
 Verdict = Literal["inside", "outside", "no interval", "no answer"]
@@ -102,10 +101,10 @@ def verdict(row: Row, published: float, predicted: PredictiveRange | None) -> tu
         few = f"{_replicates(row)}: too few for an interval, so whether it is reproduced cannot be said"
         return "no interval", f"{few}; {_difference(row, published)}"
     if row["ci_low"] <= published <= row["ci_high"]:
-        said = f"inside: the published lies in our {_level(row)} interval{_over(row)}"
+        sentence = f"inside: the published lies in our {_level(row)} interval{_over(row)}"
         if predicted is not None and not predicted.low <= published <= predicted.high:
-            said += f"; but {_of_calibration(predicted, published, row['unit'])}"
-        return "inside", said
+            sentence += f"; but {_of_calibration(predicted, published, row['unit'])}"
+        return "inside", sentence
     end = "below" if published < row["ci_low"] else "above"
     parts = [
         f"outside: {_difference(row, published)}, and the published lies {end} our {_level(row)} interval{_over(row)}"
@@ -149,14 +148,14 @@ def _word(better: bool) -> str:
 
 def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> str:
     inside = predicted.low <= published <= predicted.high
-    told = f"the published lies {'inside' if inside else 'outside'} the calibrated range ({predicted.use})"
+    sentence = f"the published lies {'inside' if inside else 'outside'} the calibrated range ({predicted.use})"
     if not inside:
         edge = predicted.low if published < predicted.low else predicted.high
-        told += f" by {score(abs(published - edge), unit)}{suffix(unit)}"
+        sentence += f" by {score(abs(published - edge), unit)}{suffix(unit)}"
     if predicted.goes_with:
         named = " and ".join(f"{name} ({value:+.2f})" for name, value in predicted.goes_with.items())
-        told += f"; of what is not known the number goes most with {named}"
-    return told
+        sentence += f"; of what is not known the number goes most with {named}"
+    return sentence
 
 
 def _without_brackets(text: str) -> str:
@@ -249,17 +248,12 @@ def records(lines: Iterable[Reproduction]) -> list[dict[str, Any]]:
     ]
 
 
-def told_interval(line: Reproduction) -> str:
+def interval_text(line: Reproduction) -> str:
     """Return the interval of our score as text."""
     return row_interval(line.row) if line.row is not None and line.row["status"] == "done" else "–"
 
 
-def row_interval(row: Row) -> str:
-    """Return a row's interval as the tables show it: "one replicate" where there is but one, the range of a few."""
-    return row_intervals(Sheet([row]), [row["unit"]])[0]
-
-
-def told_range(line: Reproduction) -> str:
+def range_text(line: Reproduction) -> str:
     """Return the calibrated range as text: bounds, share of the draws, fitted or held out."""
     one = line.predicted
     if one is None:

@@ -9,22 +9,23 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.leaderboard.table import Table, answer_name, build_table
+from tactbench.core.leaderboard.names import answer_name
+from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.report.calibrated import Calibrated
-from tactbench.core.report.drawn import Drawn
-from tactbench.core.report.material import Material
-from tactbench.core.report.plain import PlainTable
+from tactbench.core.report.results import Results
+from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 _DESCRIBED = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "seed")
 
 
 @dataclass(frozen=True)
-class Subject:
+class ReportData:
     """Everything that a page is about."""
 
-    material: Material
-    drawn: Sequence[Drawn] = ()
+    results: Results
+    drawn: Sequence[SavedFigure] = ()
     calibrated: Calibrated | None = None
     undrawn: tuple[str, ...] = ()
     """Why figures are missing, a sentence each."""
@@ -32,12 +33,12 @@ class Subject:
     @property
     def rows(self) -> tuple[Row, ...]:
         """One a cell."""
-        return self.material.rows
+        return self.results.rows
 
     @property
     def folder(self) -> Path:
         """The result folder."""
-        return self.material.store.folder
+        return self.results.store.folder
 
     @cached_property
     def leaderboard(self) -> Table:
@@ -99,14 +100,14 @@ class Details:
     anchor: str
     title: str
     status: str
-    tables: tuple[PlainTable, ...]
+    tables: tuple[TextTable, ...]
     lists: tuple[tuple[str, tuple[str, ...]], ...] = ()
     """Titled lists of sentences."""
     traceback: str = ""
 
 
 @dataclass(frozen=True)
-class Answer:
+class Highlight:
     """One thing that came out, and where the page shows it."""
 
     text: str
@@ -121,10 +122,10 @@ class Section:
 
     anchor: str
     title: str
-    said: tuple[str, ...] = ()
-    answers: tuple[Answer, ...] = ()
+    paragraphs: tuple[str, ...] = ()
+    answers: tuple[Highlight, ...] = ()
     """Below the pictures: what came out, each with a link."""
-    tables: tuple[PlainTable, ...] = ()
+    tables: tuple[TextTable, ...] = ()
     notes: tuple[str, ...] = ()
     """Below the tables."""
     pictures: tuple[Picture, ...] = ()
@@ -133,4 +134,4 @@ class Section:
     """What the section lacks: one sentence each, with the command that makes it."""
 
 
-Maker = Callable[[Subject], Section]
+Maker = Callable[[ReportData], Section]

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from tactbench.core.errors import TactbenchError
-from tactbench.core.leaderboard.datasheet import details, table_one
 from tactbench.core.recording.reader import read_meta
-from tactbench.core.report.plain import Entry, PlainTable, plain
-from tactbench.core.report.section import Section, Subject
+from tactbench.core.report.datasheet import details, sensor_table, table_one
+from tactbench.core.report.section import ReportData, Section
 from tactbench.core.spec.sensor import SensorSpec
 
 _READINGS = 5
 """So many first lines of `details` are about readings; the parameters behind them are for `tactbench show --all`."""
 
 
-def sensors_section(subject: Subject) -> Section:
+def sensors_section(subject: ReportData) -> Section:
     """Return the comparison of the sensors that the results are about."""
     title = "Sensors (the paper's Table I)"
     names = dict.fromkeys(str(row["sensor"]) for row in subject.rows)
@@ -29,34 +28,25 @@ def sensors_section(subject: Subject) -> Section:
     return Section(
         "sensors",
         title,
-        said=(f"Every parameter of these sensors, and who states it: `tactbench show {' '.join(found)} --all`.",),
-        tables=(_table("Sensor comparison", specs, table=1), _table("Readings", specs, table=2)),
+        paragraphs=(f"Every parameter of these sensors, and who states it: `tactbench show {' '.join(found)} --all`.",),
+        tables=tuple(
+            sensor_table(name, specs, properties, with_source=True).compact()
+            for name, properties in (("Sensor comparison", table_one(specs)), ("Readings", details(specs)[:_READINGS]))
+        ),
         notes=unknown,
     )
 
 
-def _spec(name: str, subject: Subject) -> SensorSpec | None:
+def _spec(name: str, subject: ReportData) -> SensorSpec | None:
     """Return a sensor's spec: the installed one, else the one that a recording carries."""
-    registry = subject.material.registry
+    registry = subject.results.registry
     try:
         if name in registry.sensors:
             return registry.sensors[name].spec
         for row in subject.rows:
             if row["sensor"] == name:
-                for path in subject.material.recordings(row):
+                for path in subject.results.recordings(row):
                     return read_meta(path).sensor
     except TactbenchError:
         pass  # given twice, or a damaged file: the section says that it is not known
     return None
-
-
-def _table(title: str, specs: list[SensorSpec], *, table: int) -> PlainTable:
-    rows = table_one(specs) if table == 1 else details(specs)[:_READINGS]
-    columns = ["", *(column for spec in specs for column in (spec.title, f"{spec.title}: source"))]
-    lines = []
-    for row in rows:
-        line = [Entry(row.title)]
-        for fact in row.facts:
-            line += [Entry(fact.text), Entry(": ".join(part for part in (fact.tag, fact.reference) if part))]
-        lines.append(line)
-    return plain(title, columns, lines)

@@ -4,17 +4,29 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from tactbench.core.errors import nearest
 from tactbench.core.spec.matrix import EstimatorChoice
 from tactbench.core.spec.quantity import Frozen, Source, Tag
-from tactbench.core.spec.scene import Simulation
+from tactbench.core.spec.scene import NUISANCES, Simulation
+from tactbench.core.spec.units import with_unit
 
-_PATH = r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$"
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+
+
+def _known(name: str) -> str:
+    if name not in NUISANCES:
+        close = nearest(name, NUISANCES)
+        meant = f" (did you mean {close[0]!r}?)" if close else ""
+        raise ValueError(f"no nuisance of a scene is called {name!r}{meant}; known: {', '.join(NUISANCES)}")
+    return name
+
+
+SceneNuisance = Annotated[str, AfterValidator(_known)]
+"""The name of a nuisance of a scene."""
 
 
 class Uniform(Frozen):
@@ -59,16 +71,33 @@ class Nuisance(Frozen):
     """One number of the scene that no source states well enough."""
 
     name: Name
-    path: str = Field(pattern=_PATH)
-    """Where it stands in a scene: ``placement.scatter``, ``environment.noise_scale`` …"""
-    unit: str = "1"
-    """Unit of the prior's numbers."""
+    """That of the number it sets, or one of its own where several nuisances set the same one for other sensors."""
+    sets: SceneNuisance = ""
+    """Which nuisance of a scene it sets (:data:`tactbench.core.spec.scene.NUISANCES`); default: the one of its name."""
     sensors: tuple[str, ...] = ()
     """Whose scenes get it; empty: those of all sensors get the same value."""
     prior: Prior
+    """In the unit of what it sets."""
     reason: str
     """Why this range."""
     source: Tag
+
+    @model_validator(mode="before")
+    @classmethod
+    def _sets_what_it_is_called(cls, given: Any) -> Any:
+        if isinstance(given, dict) and "name" in given and not given.get("sets"):
+            return {**given, "sets": given["name"]}
+        return given
+
+    @property
+    def unit(self) -> str:
+        """Unit of the prior's numbers."""
+        return NUISANCES[self.sets][1]
+
+    @property
+    def stream(self) -> str:
+        """What its random numbers are drawn by: the name without a unit, so that another unit draws the same."""
+        return self.name.removesuffix(with_unit("", self.unit))
 
 
 class Score(Frozen):
@@ -154,10 +183,10 @@ class Finding(Frozen):
 class Given(Frozen):
     """One number of the scene, as a setting has it."""
 
-    path: str = Field(pattern=_PATH)
-    """Where it stands in a scene, as for a nuisance."""
+    name: SceneNuisance
+    """Which nuisance of a scene."""
     value: float
-    unit: str = "1"
+    """In the unit of the name."""
     sensors: tuple[str, ...] = ()
     """Whose scenes get it; empty: those of all sensors."""
 

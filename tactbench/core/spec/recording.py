@@ -11,6 +11,7 @@ from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.sensor import SensorSpec, StreamSpec
 
 Scalar = str | float | int
+"""What a recording says of itself under a name."""
 
 
 class PlanEntry(Frozen):

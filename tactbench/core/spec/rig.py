@@ -21,11 +21,12 @@ class SensorDescriptor(Frozen):
 
     spec: SensorSpec
     transducer: str | None = Field(default=None, pattern=_WHERE)
-    """``module:callable`` -> :class:`tactbench.plugin.Transducer`; needed on the twin only."""
+    """``module:callable`` -> :class:`tactbench.plugin.simulation.Transducer`; needed on the twin only."""
     driver: str | None = Field(default=None, pattern=_WHERE)
-    """``module:callable`` -> :class:`tactbench.plugin.Driver`, called with DriverSettings; for real devices."""
+    """``module:callable`` -> :class:`tactbench.plugin.devices.Driver`, called with DriverSettings; for real devices."""
     emulator: str | None = Field(default=None, pattern=_WHERE)
-    """``module:callable`` -> the device as a model at the far end of `emulated_link`, called with EmulatorSettings."""
+    """``module:callable``, called with EmulatorSettings: the device as a model at the far end of `emulated_link`, a
+    :class:`tactbench.plugin.devices.DeviceEmulator`, or a SpiDeviceEmulator on SPI."""
     emulated_link: EmulatedLink | None = None
     """What the driver speaks through; needed where there is an emulator."""
     log_reader: str | None = Field(default=None, pattern=_WHERE)
@@ -48,8 +49,8 @@ class DeviceDescriptor(Frozen):
     kind: Literal["force", "motor"]
     """What a rig uses it for. The streams of a force sensor have channels of kind `force`."""
     driver: str = Field(pattern=_WHERE)
-    """``module:callable`` -> :class:`tactbench.plugin.Driver`, called with DriverSettings; of a motor, what its rig
-    expects."""
+    """``module:callable`` -> :class:`tactbench.plugin.devices.Driver`, called with DriverSettings; of a motor, what its
+    rig expects."""
     emulator: str | None = Field(default=None, pattern=_WHERE)
     """As of a sensor."""
     emulated_link: EmulatedLink | None = None

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, FiniteFloat, ValidationError, field_serializer, model_validator
 
+from tactbench.core.errors import UsageError
+from tactbench.core.spec import units
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.quantity import Frozen, Quantity, assumed, derived, measured, sourced
 from tactbench.core.spec.sensor import ChannelKind
 
+M = TypeVar("M", bound=BaseModel)
+
 Role = Literal["train", "validation", "test"]
+"""What a recording is for, given by its task."""
 
 PAPER = "Karl et al. 2016, ML-based tactile sensor calibration"
 
@@ -169,6 +175,11 @@ class Slide(Frozen):
         return f"{self.speed} from {self.start} on"
 
 
+def _pairs(given: Any) -> Any:
+    """Read a mapping as its sorted pairs."""
+    return tuple(sorted(given.items())) if isinstance(given, Mapping) else given
+
+
 class Simulation(Frozen):
     """How a simulated rig is asked to carry out a scene; a real one ignores it."""
 
@@ -182,6 +193,13 @@ class Simulation(Frozen):
     rung's own."""
     scenario: str | None = None
     """Name of one of the sensor's scenarios, whose nuisances take the place of the usual ones; None: the usual ones."""
+
+    nuisances: Annotated[tuple[tuple[str, FiniteFloat], ...], BeforeValidator(_pairs)] = ()
+    """Nuisances by name with another value than the scene or the sensor states, as ``placement_scatter_mm: 0.3``."""
+
+    @field_serializer("nuisances")
+    def _as_mapping(self, nuisances: tuple[tuple[str, float], ...]) -> dict[str, float]:
+        return dict(nuisances)
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Simulation:
@@ -219,3 +237,92 @@ class Scene(Frozen):
     def first_unit(self) -> bool:
         """Whether the unit is the one whose rest levels and gain the sensor's spec describes."""
         return self.unit == "1"
+
+    def nuisances(self) -> dict[str, float]:
+        """Return what the scene states of nuisances, by name and in the unit of the name."""
+        found = {}
+        for name, (way, unit) in NUISANCES.items():
+            value: Any = self
+            for part in way:
+                value = getattr(value, part, None)
+            if value is not None:
+                found[name] = value.to(unit) if isinstance(value, Quantity) else float(value)
+        return found
+
+    def with_nuisances(self, values: Mapping[str, float]) -> Scene:
+        """Return the scene with other `values` of nuisances, by name; names that are not a scene's are passed over.
+
+        Raises
+        ------
+        UsageError
+            If a nuisance cannot have its value, or the scene lacks the part that it is of.
+        """
+        by_part: dict[tuple[str, ...], dict[str, float]] = {}
+        for name, value in values.items():
+            if name in NUISANCES:
+                if value < 0 and name not in _MAY_BE_NEGATIVE:
+                    raise UsageError(f"{name} = {value:g} is below 0.", hint="Give 0 or more.")
+                by_part.setdefault(NUISANCES[name][0][:-1], {})[name] = value
+        scene = self
+        for way, given in by_part.items():
+            scene = _with(scene, way, given)
+        return scene
+
+    def asked(self, simulation: Simulation) -> Scene:
+        """Return the scene as a simulated rig is asked to carry it out; raises as `with_nuisances`."""
+        if simulation == Simulation():
+            return self
+        return self.with_nuisances(dict(simulation.nuisances)).model_copy(update={"simulation": simulation})
+
+
+def _with(model: M, way: tuple[str, ...], given: Mapping[str, float]) -> M:
+    """Return a copy of `model` with nuisances of the part at `way`, checked as any other numbers."""
+    if way:
+        inside = getattr(model, way[0])
+        if inside is None:
+            raise UsageError(f"{', '.join(given)}: the scene has no {way[0]}.", hint="Leave it out.")
+        return model.model_copy(update={way[0]: _with(inside, way[1:], given)})
+    change: dict[str, Quantity | float] = {}
+    for name, value in given.items():
+        path, unit = NUISANCES[name]
+        is_quantity = "Quantity" in str(type(model).model_fields[path[-1]].annotation)
+        change[path[-1]] = assumed(value, unit, "set for this run") if is_quantity else value
+    try:
+        return type(model).model_validate({**dict(model), **change})
+    except ValidationError as error:
+        told = ", ".join(f"{name} = {value:g}" for name, value in given.items())
+        raise UsageError(f"{told}: {error.errors()[0]['msg']}.", hint="Give another value.") from error
+
+
+_PARTS: tuple[tuple[tuple[str, ...], type[Frozen]], ...] = (
+    (("environment",), Environment), (("placement",), Placement), (("drive",), ForceLoop),
+    (("slide", "surface"), Surface),
+)  # fmt: skip
+_UNITS = {"force_filter": "Hz", "indenter_temperature": "degC", "rate": "Hz"}
+"""Units of the fields that state no number."""
+
+
+def _nuisances() -> Iterator[tuple[str, tuple[tuple[str, ...], str]]]:
+    for way, model in _PARTS:
+        for field, info in model.model_fields.items():
+            if isinstance(info.default, Quantity) or field in _UNITS:
+                unit = _UNITS.get(field) or info.default.unit
+            elif "float" in str(info.annotation):
+                unit = "1"
+            else:
+                continue
+            prefix = "" if way == ("environment",) else f"{way[-1]}_"
+            yield units.with_unit(f"{prefix}{field}", unit), ((*way, field), unit)
+
+
+NUISANCES: Mapping[str, tuple[tuple[str, ...], str]] = dict(_nuisances())
+"""Numbers of a scene that no source states well enough: where each stands, and its unit, by its one name.
+
+The name is field and unit, behind the part of the scene where that is not the environment: ``since_power_on_s``,
+``placement_scatter_mm``, ``drive_delay_ms``, ``surface_roughness_um``. Options, files, recordings and tables use it.
+"""
+
+_MAY_BE_NEGATIVE = frozenset({
+    "ambient_degc", "indenter_temperature_degc", "placement_x_mm", "placement_s_mm", "placement_tilt_x_rad",
+    "placement_tilt_s_rad",
+})  # fmt: skip

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
-from tactbench.core.errors import NotApplicable
+from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.spec import units
 from tactbench.core.spec.figure import RealFigure
-from tactbench.core.spec.quantity import Frozen, Quantity, Source
+from tactbench.core.spec.quantity import Frozen, Quantity, Source, assumed
 from tactbench.core.spec.skin import Skin
 
 ChannelKind = Literal[
@@ -91,30 +92,39 @@ class Creep(Frozen):
     """Its time constant [time]."""
 
 
-class Nuisances(Frozen):
-    """What comes on top of the physics, for all channels of one kind. Counts are the channel's own unit."""
+_NONE_STATED = "the sensor states none"
+_NO_COUNTS = assumed(0.0, "count", _NONE_STATED)
+_NO_SHARE = assumed(0.0, "1", _NONE_STATED)
+_ANY_TIME = assumed(1.0, "s", "without effect")
 
-    white: Quantity
+
+class Nuisances(Frozen):
+    """What comes on top of the physics, for all channels of one kind. Counts are the channel's own unit.
+
+    What is left out is 0; a warm-up or a wander needs its time constant.
+    """
+
+    white: Quantity = _NO_COUNTS
     """Standard deviation of white noise, before rounding."""
-    offset_shared: Quantity
+    offset_shared: Quantity = _NO_COUNTS
     """Standard deviation of an offset that all channels of one recording share."""
-    offset_own: Quantity
+    offset_own: Quantity = _NO_COUNTS
     """Each channel's own offset in a recording: its root mean square over channels and recordings."""
-    offset_session: Quantity
+    offset_session: Quantity = _NO_COUNTS
     """Standard deviation of each channel's own offset between sessions."""
-    gain_scatter: Quantity
+    gain_scatter: Quantity = _NO_SHARE
     """Standard deviation of each channel's gain within one sensor unit [1]."""
-    warm_up: Quantity
+    warm_up: Quantity = _NO_COUNTS
     """How far the shared rest level rises from power-on to equilibrium."""
-    warm_up_tau: Quantity
+    warm_up_tau: Quantity = _ANY_TIME
     """Time constant of that rise [time]."""
-    warm_up_scatter: Quantity
+    warm_up_scatter: Quantity = _NO_SHARE
     """Standard deviation of the factors with which channels follow it [1]."""
-    wander: Quantity
+    wander: Quantity = _NO_COUNTS
     """Standard deviation of free drift (Ornstein–Uhlenbeck)."""
-    wander_tau: Quantity
+    wander_tau: Quantity = _ANY_TIME
     """Its correlation time [time]."""
-    step: Quantity
+    step: Quantity = _NO_COUNTS
     """Step of the converter."""
     creep: tuple[Creep, ...] = ()
     unit_gain: Quantity | None = None
@@ -134,6 +144,52 @@ class Nuisances(Frozen):
         if isinstance(given, dict) and "largest_slope" in given:
             return {name: value for name, value in given.items() if name != "largest_slope"}
         return given
+
+    @model_validator(mode="after")
+    def _has_its_time_constants(self) -> Nuisances:
+        for name in ("warm_up", "wander"):
+            if getattr(self, name).value and f"{name}_tau" not in self.model_fields_set:
+                raise ValueError(f"{name} is not 0, so {name}_tau is needed, the time constant of it")
+        return self
+
+    def by_name(self, kind: str) -> dict[str, tuple[str, Quantity]]:
+        """Return every amount with its field, by the name under which a run sets it: ``taxel_white_count``."""
+        stated = {field: getattr(self, field) for field in type(self).model_fields if field != "creep"}
+        for place, term in enumerate(self.creep, start=1):
+            stated |= {f"creep_{place}_fraction": term.fraction, f"creep_{place}_tau": term.tau}
+        return {
+            units.with_unit(f"{kind}_{field}", one.unit): (field, one)
+            for field, one in stated.items()
+            if one is not None
+        }
+
+    def with_values(self, kind: str, values: Mapping[str, float]) -> Nuisances:
+        """Return these nuisances with other `values`, by name; names that are not theirs are passed over.
+
+        Raises
+        ------
+        UsageError
+            If an amount cannot have its value.
+        """
+        known = self.by_name(kind)
+        given = {field: getattr(self, field) for field in self.model_fields_set}
+        creep = [term.model_dump() for term in self.creep]
+        for name, value in values.items():
+            if name not in known:
+                continue
+            field, old = known[name]
+            if value < 0 and field != "warm_up":
+                raise UsageError(f"{name} = {value:g} is below 0.", hint="Give 0 or more.")
+            new = assumed(value, old.unit, "set for this run")
+            if field.startswith("creep_"):
+                _, place, part = field.split("_")
+                creep[int(place) - 1][part] = new
+            else:
+                given[field] = new
+        try:
+            return Nuisances.model_validate({**given, "creep": creep})
+        except ValidationError as error:
+            raise UsageError(f"{kind}: {error.errors()[0]['msg']}.", hint="Set that as well.") from error
 
     def hidden(self, noise_scale: float = 1.0) -> float:
         """Return the standard deviation that white noise and rounding hide anyway, in the channel's unit."""
@@ -232,6 +288,23 @@ class SensorSpec(Frozen):
         """Return the channels of the given kinds (all of them without arguments), in order of the streams."""
         every = (channel for stream in self.streams for channel in stream.channels)
         return tuple(channel for channel in every if not kinds or channel.kind in kinds)
+
+    def settable(self) -> dict[str, Quantity]:
+        """Return what the sensor declares of nuisances, by the name under which a run sets it."""
+        return {name: amount for kind, own in self.nuisances.items() for name, (_, amount) in own.by_name(kind).items()}
+
+    def with_nuisances(self, values: Mapping[str, float]) -> SensorSpec:
+        """Return the spec with other `values` of its nuisances, by name; names that are not its own are passed over.
+
+        Raises
+        ------
+        UsageError
+            If a nuisance cannot have its value.
+        """
+        if not values.keys() & self.settable().keys():
+            return self
+        nuisances = {kind: own.with_values(kind, values) for kind, own in self.nuisances.items()}
+        return self.model_copy(update={"nuisances": nuisances})
 
     def handled(self, scenario: str | None) -> SensorSpec:
         """Return the spec with the nuisances of one of its scenarios; None: as it is.

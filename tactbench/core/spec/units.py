@@ -90,6 +90,12 @@ def parse(unit: str) -> tuple[float, Dimension]:
     return factor, tuple(exponents)  # type: ignore[return-value]
 
 
+def with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit: ``force_noise_n``, ``drive_integral_mm_per_n_s``; the name of a pure number."""
+    told = unit.lower().replace("*", "_").replace("/", "_per_", 1).replace("/", "_")
+    return name if unit == "1" else f"{name}_{told}"
+
+
 def conversion(given: str, wanted: str) -> float:
     """Return the factor that turns a number in `given` into one in `wanted`.
 

@@ -21,7 +21,7 @@ _Carried = tuple[npt.NDArray[np.bool_], FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
-class Together:
+class PairableRows:
     """Rows that were tested on the same replicates, and so can be paired."""
 
     places: IntArray
@@ -40,7 +40,7 @@ class Together:
     """(n,) how many neighbouring replicates depend on each other"""
 
 
-def together(rows: Sequence[Row]) -> list[Together]:
+def together(rows: Sequence[Row]) -> list[PairableRows]:
     """Return the rows in groups of equal replicates; rows without usable replicates are in none.
 
     Parameters
@@ -66,7 +66,7 @@ def together(rows: Sequence[Row]) -> list[Together]:
             good, influence, freedom, runs = one
             codes = np.array(strata or [0] * len(names), dtype=np.int64)
             where = np.array(places, dtype=np.int64)[good]
-            found.append(Together(where, names, codes, in_time, influence[good], freedom[good], runs[good]))
+            found.append(PairableRows(where, names, codes, in_time, influence[good], freedom[good], runs[good]))
     return found
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from tactbench.core.evaluation.metrics import SUMMED
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray
-from tactbench.core.statistics.influence import Together, scores_of
+from tactbench.core.statistics.influence import PairableRows, scores_of
 
 Row = Mapping[str, Any]
 
 
-def best_without(rows: Sequence[Row], groups: Sequence[Together]) -> list[int] | None:
+def best_without(rows: Sequence[Row], groups: Sequence[PairableRows]) -> list[int] | None:
     """Return the place in `rows` of the best one without each replicate; None if they do not share replicates.
 
     Parameters

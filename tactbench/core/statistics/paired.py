@@ -11,7 +11,7 @@ import numpy as np
 from tactbench.core.evaluation.metrics import METRICS, Metric
 from tactbench.core.evaluation.replicate_sums import tables_of
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.statistics.influence import Together, scores_of, together
+from tactbench.core.statistics.influence import PairableRows, scores_of, together
 from tactbench.core.statistics.median import counted
 from tactbench.core.statistics.student import NORMAL, quantile, two_sided
 
@@ -98,7 +98,7 @@ def _means(first: Row, second: Row) -> tuple[Row, Row]:
     return one, other
 
 
-def _paired(first: Row, second: Row, value: float, sign: float, group: Together, metric: Metric) -> Difference:
+def _paired(first: Row, second: Row, value: float, sign: float, group: PairableRows, metric: Metric) -> Difference:
     carried = group.influence[0] - group.influence[1]
     deviation = float(np.sqrt(carried @ carried))
     freedom = float(group.freedom.min())
@@ -123,7 +123,7 @@ def _paired(first: Row, second: Row, value: float, sign: float, group: Together,
     )  # fmt: skip
 
 
-def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[Together]) -> Difference:
+def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[PairableRows]) -> Difference:
     of = {int(place): (group, line) for group in groups for line, place in enumerate(group.places)}
     errors, freedoms, own = [], [], []
     for place, row in enumerate((first, second)):
@@ -175,7 +175,7 @@ def _region(row: Row) -> float:
     return float(row.get("equivalence") or 0.0)
 
 
-def _to_own(group: Together) -> FloatArray:
+def _to_own(group: PairableRows) -> FloatArray:
     """Return (replicates,) what turns a replicate's influence on the whole into its own difference from the whole.
 
     The jackknife's pseudo-value: of a mean over n replicates, ``sqrt(n (n - 1))``, within each of several strata alike.
@@ -185,7 +185,7 @@ def _to_own(group: Together) -> FloatArray:
     return np.asarray(len(sizes) * np.sqrt(n * (n - 1)))
 
 
-def _in_time(group: Together) -> str:
+def _in_time(group: PairableRows) -> str:
     return ": spread between sessions is not in it" if group.in_time else ""
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from tactbench.core.evaluation.metrics import EXCESS, SUMMED
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.statistics.excess import beyond_floor, excess_of
-from tactbench.core.statistics.influence import Together, scores_of, together
+from tactbench.core.statistics.influence import PairableRows, scores_of, together
 from tactbench.core.statistics.leaving_out import best_without
 from tactbench.core.statistics.student import NORMAL, quantile
 
@@ -109,7 +109,7 @@ def _excess(row: Row) -> Row:
 
 
 def _clearly(
-    rows: Sequence[Row], groups: Sequence[Together], error: FloatArray
+    rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray
 ) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
     """Return (n,) of cells in order of their errors what their ranks are made of.
 
@@ -154,7 +154,7 @@ def _clearly(
     return better, worse, places, apart, behind
 
 
-def _means(rows: Sequence[Row], groups: Sequence[Together], error: FloatArray) -> FloatArray:
+def _means(rows: Sequence[Row], groups: Sequence[PairableRows], error: FloatArray) -> FloatArray:
     """Return (n,) what differences are taken of: `error`, or the mean over replicates with scores of their own."""
     found = error.copy()
     metric = rows[0]["metric"]
@@ -167,7 +167,7 @@ def _means(rows: Sequence[Row], groups: Sequence[Together], error: FloatArray) -
     return found
 
 
-def _less_covariance(bound: FloatArray, group: Together, start: int, stop: int) -> None:
+def _less_covariance(bound: FloatArray, group: PairableRows, start: int, stop: int) -> None:
     """Take twice the covariance of cells `start` … `stop` and those before from a sum of variances, in place."""
     first, last = np.searchsorted(group.places, [start, stop])
     if first == last:
@@ -180,7 +180,7 @@ def _less_covariance(bound: FloatArray, group: Together, start: int, stop: int) 
         bound[np.ix_(group.places[first:last] - start, group.places[:last])] -= product
 
 
-def _own_errors(rows: Sequence[Row], groups: Sequence[Together]) -> tuple[FloatArray, FloatArray]:
+def _own_errors(rows: Sequence[Row], groups: Sequence[PairableRows]) -> tuple[FloatArray, FloatArray]:
     """Return (n,) standard errors and degrees of freedom: of the replicates, or else of the interval in the row."""
     deviation = np.full(len(rows), np.inf)
     freedom = np.full(len(rows), np.inf)

@@ -85,7 +85,10 @@ class EmulatedDevices:
         serial_can = self._virtual is None and can == "slcan"
         self._lines = {
             name: Line(
-                _on_its_line(device, serial_can), faults=device.faults, baud=device.baud, keep_log=keep_log
+                _on_its_line(device, serial_can),
+                faults=device.faults,
+                baud=None if getattr(device.emulator, "keeps_pace", False) else device.baud,
+                keep_log=keep_log,
             )
             for name, device in self._devices.items()
         }  # fmt: skip

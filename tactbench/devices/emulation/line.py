@@ -108,7 +108,7 @@ class Line:
         self._byte_s = BITS_PER_BYTE / baud if baud else 0.0
         self._keep_log = keep_log
         self._gone_s = min((fault.start_s for fault in faults if fault.name == "unplug"), default=math.inf)
-        self._polled_s = -math.inf
+        self._next_s: float | None = None
         self._in: deque[tuple[float, Piece]] = deque()
         self._out: deque[tuple[float, Piece]] = deque()
         self._in_free_s = self._out_free_s = -math.inf
@@ -138,7 +138,6 @@ class Line:
             t_s, piece = self._in.popleft()
             self._send(self._emulator.feed(piece, t_s))
         self._send(self._emulator.poll(until_s))
-        self._polled_s = until_s
         while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._gone_s:
             t_s, piece = self._out.popleft()
             self.bytes_to_host += _size(piece)
@@ -147,18 +146,22 @@ class Line:
             if self.deliver is not None:
                 self.deliver(t_s, piece)
         self.gone = now_s >= self._gone_s
+        self._next_s = math.inf if self.gone else self._due_s(until_s)
 
     def next_s(self) -> float:
         """Return when :meth:`poll` has something to do next; infinite: not before something comes."""
-        if self.gone:
-            return math.inf
+        if self._next_s is None:
+            self._next_s = self._due_s(-math.inf)
+        return self._next_s
+
+    def _due_s(self, polled_s: float) -> float:
         due_s = min(
             self._emulator.next_s(),
             self._in[0][0] if self._in else math.inf,
             self._out[0][0] if self._out else math.inf,
             self._gone_s,
         )
-        return due_s if due_s > self._polled_s else self._polled_s + _AGAIN_S
+        return due_s if due_s > polled_s else polled_s + _AGAIN_S
 
     def _send(self, sent: Sequence[Sent]) -> None:
         for left_s, piece in sent:

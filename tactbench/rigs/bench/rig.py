@@ -16,32 +16,35 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactbench.plugin import (
-    FORCE,
     Acquisition,
     Block,
+    PlanEntry,
+    Rig,
+    RigContext,
+    Scalar,
+    Scene,
+    SensorDescriptor,
+    StreamSpec,
+    UsageError,
+    load_registry,
+)
+from tactbench.plugin.devices import (
+    FORCE,
+    DeviceAcquisition,
     Driver,
     EmulatedDevices,
     Emulation,
     Operator,
-    PlanEntry,
     PressingForce,
     Reading,
-    Rig,
-    RigContext,
     RigFile,
-    Scalar,
-    Scene,
     SceneSamples,
-    SensorDescriptor,
     StreamClock,
     StreamCounts,
-    StreamSpec,
-    UsageError,
     ask_operator,
     drivers_of,
     emulation_of,
     emulators_of,
-    load_registry,
     physics_of,
     with_sensor,
 )
@@ -49,7 +52,8 @@ from tactbench.plugin import (
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from tactbench.plugin import Clock, FloatArray
+    from tactbench.plugin import FloatArray
+    from tactbench.plugin.devices import Clock
 
 
 @dataclass
@@ -114,7 +118,7 @@ class Bench:
         self._physics = physics
 
     @contextmanager
-    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[BenchAcquisition]:
+    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[DeviceAcquisition]:
         """Open the devices and let them sample; the blocks begin when the scene does.
 
         Raises

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tactbench.plugin import DeviceDescriptor, RigDescriptor, hookimpl
+from tactbench.plugin import RigDescriptor, hookimpl
+from tactbench.plugin.devices import DeviceDescriptor
 
 TACTBENCH_API = 1
 

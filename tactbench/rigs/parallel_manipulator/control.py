@@ -11,15 +11,18 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from tactbench.plugin import Block, Driver, StreamSpec, TactbenchError
+from tactbench.plugin import Block, StreamSpec, TactbenchError
+from tactbench.plugin.devices import Driver
 from tactbench.rigs.parallel_manipulator.guard_interface import Beat, Event, Guard, Limits, Report
 from tactbench.rigs.parallel_manipulator.press import Press
 
 if TYPE_CHECKING:
-    from tactbench.plugin import Clock
+    from tactbench.plugin.devices import Clock
 
 STOP_S = 10.0
 """The thread is waited for so long (assumed: a control period, and what a guard in another process takes to answer)."""
+COUNTED_NS = 250_000_000
+"""After which the guard's counts are asked for again."""
 
 
 class WatchedDriver(Driver):
@@ -105,8 +108,10 @@ class Control:
         self._blocks: deque[Block] = deque()
         self._events: deque[Event] = deque()
         self._over = threading.Event()
+        self._stop = ""
         self._thread: threading.Thread | None = None
-        self._counts: Mapping[str, Mapping[str, int]] | None = None
+        self._counts: Mapping[str, Mapping[str, int]] = {}
+        self._counted_ns = 0
 
     @property
     def report(self) -> Report:
@@ -135,6 +140,16 @@ class Control:
         self._thread = threading.Thread(target=self._run, name="force control", daemon=True)
         self._thread.start()
 
+    def retreat(self, why: str, within_s: float) -> None:
+        """Let the motor retreat from the next control period on; return when it has ended, or the time is over."""
+        self._stop = self._stop or why
+        until_ns = self._clock() + round(1e9 * within_s)
+        while not self.press.over and self._clock() < until_ns:
+            if self._thread is None:
+                self.carry(self._next_ns)
+            else:
+                self._over.wait(1e-9 * self._period_ns)
+
     def stop(self) -> None:
         """End the thread, if there is one; the guard may be used by the caller then."""
         self._over.set()
@@ -145,8 +160,9 @@ class Control:
             self._counts = self._guard.counts()
 
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return what guard, motor and force sensor have counted; once stopped, until then."""
-        return self._guard.counts() if self._counts is None else self._counts
+        """Return what guard, motor and force sensor have counted: beside the thread at most 0.25 s old."""
+        alone = self._thread is None and not self._over.is_set()
+        return self._guard.counts() if alone else self._counts
 
     def _run(self) -> None:
         try:
@@ -164,6 +180,9 @@ class Control:
             self._raw += self._pressing(block)
         self._blocks.extend(self._guard.motor_blocks())
         self._events.extend(self._guard.events())
+        # Kept here: one thread alone may use the guard.
+        if self._thread is not None and self._clock() - self._counted_ns >= COUNTED_NS:
+            self._counts, self._counted_ns = self._guard.counts(), self._clock()
 
     def _pressing(self, block: Block) -> list[tuple[float, float]]:
         assert block.t_ns is not None
@@ -174,10 +193,14 @@ class Control:
     def _period(self) -> None:
         now_ns = self._clock()
         self.late += now_ns - self._next_ns > self._period_ns
+        if now_ns - self._next_ns > self._stale_ns:
+            self._began_ns = now_ns  # it was this process that hung, and the sensor's reading with it
         self._next_ns = max(self._next_ns + self._period_ns, now_ns + self._period_ns // 2)
         self._gather()
         raw, self._raw = self._raw, []
         press, last_ns = self.press, max(self._sensor.last_ns, self._began_ns)
+        if self._stop:
+            press.fail(self._stop)
         if now_ns - last_ns > self._stale_ns:
             press.fail(f"the sensor has sent nothing for {1e-6 * (now_ns - last_ns):.0f} ms")
         try:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tactbench.plugin import Block, NotApplicable, Scene, SimulatedPress
+from tactbench.plugin import Block, NotApplicable, Scene
+from tactbench.plugin.simulation import SimulatedPress
 
 if TYPE_CHECKING:
     from tactbench.plugin import FloatArray

@@ -30,7 +30,8 @@ class ForceWatch:
 
     The age of a sample is the time since its receipt and, where the device has a clock of its own, its delay on the way
     beyond the least of the last second or two: a stream that is held up somewhere is old although it keeps coming. A
-    constant delay cannot be seen.
+    constant delay cannot be seen. A sample that comes twice, or after newer ones, may be too large or not known, and is
+    otherwise none: it makes no touch and no age.
 
     Parameters
     ----------
@@ -43,6 +44,8 @@ class ForceWatch:
         Pressing force and norm of the force, less the zero, of the newest sample; NaN: none yet, or no limits.
     sequence, t_ns
         Number and receipt of that sample; -1 and 0: none yet.
+    changed
+        Number of the newest sample that is not in every channel the same as the one before it; -1: none yet.
     received
         Samples so far.
     """
@@ -52,7 +55,7 @@ class ForceWatch:
         self._forces = [n for n, kind in enumerate(kinds) if kind == "force"]
         self._torques = [n for n, kind in enumerate(kinds) if kind == "torque"]
         self.force_n = self.norm_n = np.nan
-        self.sequence, self.t_ns, self.received = -1, 0, 0
+        self.sequence, self.t_ns, self.changed, self.received = -1, 0, -1, 0
         self._delay_ns = 0
         self._offsets: deque[tuple[int, int]] = deque(maxlen=2)
         self._last: FloatArray | None = None
@@ -74,41 +77,48 @@ class ForceWatch:
             return None
         return Trigger.FORCE_OLD, f"the newest force is {1e3 * age_s:.1f} ms old, {1e3 * limits.force_age_s:.1f} may be"
 
-    def take(self, block: Block, limits: Limits | None) -> Problem | None:
-        """Take samples in the order in which they came; return the first thing that is wrong with them.
+    def take(self, block: Block, newer: Block | None, limits: Limits | None) -> Problem | None:
+        """Take samples; return the first thing that is wrong with them.
 
-        Without limits only what needs none is kept up: numbers, times, equal samples.
+        Parameters
+        ----------
+        block
+            All that came.
+        newer
+            Those of them that are newer than each one before, in order; None: there are none.
+        limits
+            None: only what needs none is kept up: numbers, times, equal samples.
         """
-        data = np.asarray(block.data, dtype=np.float64)
-        n = len(data)
-        if not n:
+        lost, same = (0, self._same) if newer is None else self._take_newer(newer)
+        if limits is None or not len(block.data):
             return None
-        first = self.sequence + 1
-        numbers = np.arange(first, first + n) if block.sequence is None else block.sequence
-        before = self.sequence if self.received else int(numbers[0]) - 1
-        ahead = np.maximum.accumulate(np.concatenate(([before], numbers)))
-        lost = numbers - ahead[:-1] - 1
-        same = self._same_in_a_row(data[lost != -1])
-        newest = int(np.argmax(ahead[1:]))
-        self.received += n
-        if ahead[-1] > before:
-            self.sequence = int(ahead[-1])
-            self.t_ns = 0 if block.t_ns is None else int(block.t_ns[newest])
-            if block.device_ns is not None:
-                self._delay_ns = self._delayed(self.t_ns, int(block.device_ns[newest]))
-        if limits is None:
-            return None
-        wrench = data - np.asarray(limits.zero)
-        pressing = limits.sign * wrench[:, limits.channel]
-        self._pressing.extend(pressing[-_LOOKED_AT:].tolist())
+        wrench = np.asarray(block.data, dtype=np.float64) - np.asarray(limits.zero)
         forces = np.linalg.norm(wrench[:, self._forces], axis=1)
-        if ahead[-1] > before:
-            self.force_n, self.norm_n = float(pressing[newest]), float(forces[newest])
+        if newer is not None:
+            own = wrench if newer.data is block.data else newer.data - np.asarray(limits.zero)
+            pressing = limits.sign * own[:, limits.channel]
+            self._pressing.extend(pressing[-_LOOKED_AT:].tolist())
+            self.force_n = float(pressing[-1])
+            self.norm_n = float(np.linalg.norm(own[-1, self._forces]))
         return (
-            self._unknown(data, block.quality)
+            self._unknown(block.data, block.quality)
             or self._too_large(wrench, forces, limits)
-            or self._irregular(int(lost.max()), same, limits)
+            or self._irregular(lost, same, limits)
         )
+
+    def _take_newer(self, block: Block) -> tuple[int, int]:
+        """Keep up numbers and times; return the most samples lost in a row, and the most that were the same."""
+        data, first = np.asarray(block.data, dtype=np.float64), self.sequence + 1
+        numbers = np.arange(first, first + len(data)) if block.sequence is None else block.sequence
+        before = self.sequence if self.received else int(numbers[0]) - 1
+        lost = int(np.diff(numbers, prepend=before).max()) - 1
+        same = self._same_in_a_row(data, numbers)
+        self.received += len(data)
+        self.sequence = int(numbers[-1])
+        self.t_ns = 0 if block.t_ns is None else int(block.t_ns[-1])
+        if block.device_ns is not None:
+            self._delay_ns = self._delayed(self.t_ns, int(block.device_ns[-1]))
+        return lost, same
 
     def _unknown(self, data: FloatArray, quality: np.typing.NDArray[np.uint8] | None) -> Problem | None:
         if not np.isfinite(data).all():
@@ -137,12 +147,12 @@ class ForceWatch:
             return Trigger.FORCE_STUCK, f"{same} force samples in a row are the same in every channel"
         return None
 
-    def _same_in_a_row(self, data: FloatArray) -> int:
+    def _same_in_a_row(self, data: FloatArray, numbers: np.typing.NDArray[np.int64]) -> int:
         """Return the longest run of equal samples that ends in these; 1: each is another one than that before."""
-        if not len(data):
-            return self._same
         before = data[:1] + 1.0 if self._last is None else self._last
         differs = np.flatnonzero((np.concatenate((before, data[:-1])) != data).any(axis=1))
+        if len(differs):
+            self.changed = int(numbers[differs[-1]])
         runs = np.diff(np.concatenate(([-self._same], differs, [len(data)])))
         self._last, self._same = data[-1:].copy(), int(runs[-1])
         return int(runs.max())

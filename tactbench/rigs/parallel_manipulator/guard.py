@@ -4,10 +4,10 @@ It looks at force and motor every millisecond. What makes it retreat, and what i
 docs/hardware.md, Safety. What it promises, of a motor that does as its driver assumes:
 
 - *Steps.* One increment is out at a time, and the next is sent only if a force sample that was taken after the end of
-  the one before is below the ceiling. So the force never exceeds F_c + k (step_m + corridor_m) and the noise of one
-  sample, whatever the line's rate and whoever hangs (derived; k the largest stiffness at the ceiling F_c, step_m
-  rounded to increments of the drive, corridor_m how near to its target the drive calls a move ended). A line that falls
-  silent lets the motor end one increment.
+  the one before is below the ceiling, and is another one in number and value than the sample before it. So the force
+  never exceeds F_c + k (step_m + corridor_m) and the noise of one sample, whatever the line's rate and whoever hangs
+  (derived; k the largest stiffness at the ceiling F_c, step_m rounded to increments of the drive, corridor_m how near
+  to its target the drive calls a move ended). A line that falls silent lets the motor end one increment.
 - *Moves at a speed v* (approach): F_max = F_c + k v t_r + k v^2/(2 acc) of :mod:`worst_case`, with t_r of
   :func:`reaction`: age of the force, one look of the guard and its scheduling, the bytes ahead of the retreat and the
   retreat itself on the line, the motor's lag.
@@ -25,17 +25,15 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple, NoReturn
 
-from tactbench.plugin import (
-    Block,
+from tactbench.plugin import Block, RigError, StreamSpec, TactbenchError
+from tactbench.plugin.devices import (
     Clock,
     Driver,
     LinkClosed,
     LinkError,
     LinkTimeout,
     LinkUnplugged,
-    RigError,
-    StreamSpec,
-    TactbenchError,
+    SequenceCheck,
 )
 from tactbench.rigs.parallel_manipulator.force_watch import ForceWatch, Problem
 from tactbench.rigs.parallel_manipulator.guard_interface import (
@@ -61,8 +59,6 @@ ALIVE_S = 0.2
 """For so long the force is watched before anything moves (assumed: 200 samples at 1 kHz)."""
 AGAIN_S = 0.25
 """After which a retreat that is not under way is sent again (assumed: above the time of an answer at 9600 baud)."""
-RETREAT_S = 1.0
-"""Added to the way's time, after which a retreat has failed (assumed)."""
 REFUSED = 3
 """Refused commands in a row that end the rig's command (assumed)."""
 LONGEST_COMMAND = 9
@@ -156,11 +152,13 @@ class LocalGuard:
         self._motor, self._force, self._clock, self._advance = motor, force, clock, advance
         self._on_event, self._interrupted = on_event, interrupted
         self._watch: ForceWatch | None = None
+        self._order = SequenceCheck()
         self._limits: Limits | None = None
         self._force_blocks: list[Block] = []
         self._motor_blocks: list[Block] = []
         self._events: list[Event] = []
         self._said: list[str] = []
+        self._not_out = ""
         self._counts: Counter[str] = Counter()
         self._force_gone = self._motor_gone = self._home_anew = self._closed = False
         self._beats = self._refused = 0
@@ -256,7 +254,7 @@ class LocalGuard:
             self.look(min(LOOK_S, 1e-9 * left_ns))
 
     def force_blocks(self) -> list[Block]:
-        """Return all force samples since the last call."""
+        """Return all force samples since the last call, but for those that came twice or after newer ones."""
         found, self._force_blocks = self._force_blocks, []
         return found
 
@@ -271,8 +269,14 @@ class LocalGuard:
         return found
 
     def counts(self) -> Mapping[str, Mapping[str, int]]:
-        """Return the drivers' counts, and the guard's ``beats``, ``early``, ``refused``, ``retreats_sent``."""
-        return {"force": dict(self._force.counts), "motor": dict(self._motor.counts), "guard": dict(self._counts)}
+        """Return the drivers' counts, and the guard's ``beats``, ``early``, ``refused``, ``retreats_sent``.
+
+        To the force sensor's the guard adds ``duplicates`` and ``late`` samples, kept out, and ``gaps``, missing.
+        """
+        order = self._order
+        kept_out = {"duplicates": order.duplicates, "late": order.late, "gaps": order.gaps}
+        force = {**self._force.counts, **{name: count for name, count in kept_out.items() if count}}
+        return {"force": force, "motor": dict(self._motor.counts), "guard": dict(self._counts)}
 
     def disarm(self) -> Report:
         """Retreat if the motor is not at its place, and expect no more beats; a fault is cleared."""
@@ -286,7 +290,8 @@ class LocalGuard:
             self.state = GuardState.IDLE
             self._tell(None, "disarmed")
         self._limits, self.trigger = None, None
-        return self._report(0, _Verdict(True))
+        report, self._not_out = self._report(0, _Verdict(True)), ""
+        return report
 
     def abandon(self) -> None:
         """Close the motor's link and send nothing more: for whoever goes on without this guard."""
@@ -361,8 +366,11 @@ class LocalGuard:
             self._force_gone = True
             return Trigger.FORCE_LOST, error.message
         for block in blocks:
-            self._force_blocks.append(block)
-            problem = problem or watch.take(block, limits)
+            newer = self._order(block)
+            if newer is not None:
+                self._force_blocks.append(newer)
+            found = watch.take(block, newer, limits)
+            problem = problem or found
         return problem or (None if limits is None else watch.old(self._clock(), limits))
 
     def _take_motor(self, timeout_s: float, limits: Limits | None) -> Problem | None:
@@ -431,7 +439,7 @@ class LocalGuard:
                 return _Verdict(False, reason)
         if self._motor.moving:
             return _Verdict(False, "the motor is moving", early=True)
-        if beat.force_sequence <= self._end_sequence:
+        if min(beat.force_sequence, watch.changed) <= self._end_sequence:
             return _Verdict(False, "no force sample is known from after the last move", early=True)
         try:
             if is_step:
@@ -464,9 +472,8 @@ class LocalGuard:
         self.state, self.trigger = GuardState.RETREATING, trigger
         self._home_anew |= trigger in _HOME_ANEW
         self._into_skin = False
-        low, high = limits.travel_m
         self._began_ns = self._clock()
-        self._deadline_ns = self._began_ns + round(1e9 * ((high - low) / limits.retreat_speed_m_s + RETREAT_S))
+        self._deadline_ns = self._began_ns + round(1e9 * limits.retreat_s)
         self._send_retreat()
         self._tell(trigger, text)
 
@@ -485,7 +492,7 @@ class LocalGuard:
         now_ns, state = self._clock(), self._motor.state
         took = f"{1e-9 * (now_ns - self._began_ns):.3f} s"
         if self._motor_gone:
-            self._end(Trigger.MOTOR_GONE, "the motor's link is gone: stand clear, it ends its last move and holds")
+            self._end(Trigger.MOTOR_GONE, "stand clear: the motor ends its last move and holds there")
         elif not self._motor.moving and self._at(limits.retreat_m) and state is not None and state.t_ns > self._sent_ns:
             self._end(None, f"out after {took}")
         elif now_ns > self._deadline_ns:
@@ -502,6 +509,7 @@ class LocalGuard:
         ordinary = failed is None and self.trigger in _ORDINARY
         self.state = GuardState.RETREATED if ordinary else GuardState.FAULT
         self._home_anew |= failed is not None
+        self._not_out = "" if failed is None else text
         self._tell(failed, text)
 
     def _at(self, position_m: float) -> bool:
@@ -581,9 +589,7 @@ class LocalGuard:
 
     def _retract(self, careful: Limits) -> None:
         """Go to the place of retreat under watch; raises as `_home`."""
-        deadline_ns = self._clock() + round(
-            1e9 * ((careful.travel_m[1] - careful.travel_m[0]) / careful.retreat_speed_m_s + RETREAT_S)
-        )
+        deadline_ns = self._clock() + round(1e9 * careful.retreat_s)
         self._motor.retreat()
         sent_ns = self._clock()
         while True:
@@ -645,5 +651,6 @@ class LocalGuard:
             force_t_ns=watch.t_ns,
             touched=self._touched,
             trigger=self.trigger,
+            not_out=self._not_out,
             event="; ".join(said),
         )

@@ -20,6 +20,9 @@ from typing import Protocol, Self
 
 from tactbench.plugin import Block, RigError, StreamSpec, UsageError
 
+RETREAT_S = 1.0
+"""Added to the way's time, after which a retreat has failed (assumed)."""
+
 
 class GuardRefusesError(RigError):
     """The guard does not arm: something is not as it must be."""
@@ -168,6 +171,12 @@ class Limits(_Message):
             if wrong:
                 raise UsageError(f"The guard's limits are wrong: {problem}.", hint="See docs/hardware.md, Safety.")
 
+    @property
+    def retreat_s(self) -> float:
+        """Within which a retreat from anywhere has ended."""
+        low, high = self.travel_m
+        return (high - low) / self.retreat_speed_m_s + RETREAT_S
+
 
 @dataclass(frozen=True)
 class Beat(_Message):
@@ -221,6 +230,8 @@ class Report(_Message):
     """Whether the guard has ended the last MOVE_TO because of a touch."""
     trigger: Trigger | None = None
     """Why it retreated."""
+    not_out: str = ""
+    """What is to be done, where the motor did not come out; empty: it did, or has not tried."""
     event: str = ""
     """In words, what has happened since the last report."""
 
@@ -291,7 +302,7 @@ class Guard(Protocol):
         """Let time pass until the rig's clock says so much; the rig's only wait while the guard is armed."""
 
     def force_blocks(self) -> list[Block]:
-        """Return all force samples since the last call: raw, unfiltered, the zero not subtracted."""
+        """Return all force samples since the last call: raw, unfiltered, zero not subtracted, each once, in order."""
 
     def motor_blocks(self) -> list[Block]:
         """Return all samples of the motor since the last call."""

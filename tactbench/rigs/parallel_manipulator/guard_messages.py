@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Self
@@ -14,6 +15,8 @@ from tactbench.plugin import Block
 
 if TYPE_CHECKING:
     import numpy.typing as npt
+
+    from tactbench.plugin.devices import Clock
 
 _HEADER = struct.Struct("<IBBHI")
 """Bytes that follow, device, columns, channels, rows."""
@@ -42,6 +45,10 @@ class ProcessSettings:
     """A file that events are added to, one line of JSON each."""
     clock_zero_ns: int = 0
     """``time.monotonic_ns()`` at zero of the rig's clock."""
+
+    def clock(self) -> Clock:
+        """Return the rig's clock, which every process on this machine can read."""
+        return lambda: time.monotonic_ns() - self.clock_zero_ns
 
     def body(self) -> dict[str, Any]:
         """Return it as plain values."""

@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tactbench.plugin import Driver, RigError, UsageError
+from tactbench.plugin import RigError, UsageError
+from tactbench.plugin.devices import Driver
 from tactbench.rigs.parallel_manipulator.geometry import Delta, LinearDelta
 from tactbench.rigs.parallel_manipulator.kinematics import forward, inverse
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver

@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from tactbench.plugin import DriverSettings, Link, UnknownNameError, UsageError
+from tactbench.plugin import UnknownNameError, UsageError
+from tactbench.plugin.devices import DriverSettings, Link
 
 
 class Options(BaseModel):

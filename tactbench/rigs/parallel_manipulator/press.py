@@ -100,6 +100,8 @@ class Press:
         Where it is.
     ended
         Why it failed; empty: it has not.
+    not_out
+        What is to be done where the motor did not come out; empty: it did.
     remarks
         What happened on the way that did not end it.
     contact_m
@@ -113,6 +115,7 @@ class Press:
     def __init__(self, settings: RigSettings, course: Course, increment_m: float) -> None:
         self.state = PressState.STANDOFF
         self.ended = ""
+        self.not_out = ""
         self.remarks: list[str] = []
         self.contact_m = math.nan
         self.touch_n = 0.0
@@ -227,6 +230,7 @@ class Press:
             self.ended = f"in {self.state}: {report.trigger or report.state}"
             self._enter(PressState.RETREAT, now_s)
         if report.state is not GuardState.RETREATING and not self.over:
+            self.not_out = report.not_out
             self._enter(PressState.FAILED, now_s)
         return Command()
 

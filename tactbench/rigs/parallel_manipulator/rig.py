@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -19,40 +19,43 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactbench.plugin import (
-    FORCE,
     Acquisition,
     Block,
+    NotApplicable,
+    PlanEntry,
+    PluginContractError,
+    Rig,
+    RigContext,
+    RigError,
+    Scalar,
+    Scene,
+    SensorDescriptor,
+    StreamSpec,
+    UsageError,
+    load_registry,
+)
+from tactbench.plugin.devices import (
+    FORCE,
+    DeviceAcquisition,
     Driver,
     EmulatedDevices,
     Emulation,
     ForceEntry,
     NamedDevice,
-    NotApplicable,
     Operator,
-    PlanEntry,
-    PluginContractError,
     PressingForce,
     Reading,
-    Rig,
-    RigContext,
-    RigError,
     RigFile,
-    Scalar,
-    Scene,
-    SensorDescriptor,
     StreamClock,
     StreamCounts,
-    StreamSpec,
-    UsageError,
     ask_operator,
     drivers_of,
     emulation_of,
     emulators_of,
-    load_registry,
     physics_of,
     with_sensor,
 )
-from tactbench.rigs.parallel_manipulator.control import Control, WatchedDriver
+from tactbench.rigs.parallel_manipulator.control import STOP_S, Control, WatchedDriver
 from tactbench.rigs.parallel_manipulator.emulated_press import EmulatedPress, quiet
 from tactbench.rigs.parallel_manipulator.guard import LocalGuard
 from tactbench.rigs.parallel_manipulator.guard_interface import Event, Guard, GuardState, Limits, Report
@@ -68,7 +71,8 @@ from tactbench.rigs.parallel_manipulator.rig_check import refuse
 from tactbench.rigs.parallel_manipulator.settings import JOINTS, MOTOR, settings_of, with_limits
 
 if TYPE_CHECKING:
-    from tactbench.plugin import Clock, EmulatedDevice, FloatArray
+    from tactbench.plugin import FloatArray
+    from tactbench.plugin.devices import Clock, EmulatedDevice
 
 FORCE_AGE_S = 0.010
 """Added to three sampling periods of the force sensor: how old a sample may be."""
@@ -96,6 +100,8 @@ class PressAcquisition:
     clock: Clock = field(repr=False)
     begin_ns: int
     duration_s: float
+    retreat_s: float
+    """A retreat takes at most."""
     gaps: Mapping[str, int]
     """By stream: rows that were missing before the scene."""
     rows: dict[str, int] = field(default_factory=dict)
@@ -126,6 +132,19 @@ class PressAcquisition:
             if last > first:
                 self.rows[block.stream] = self.rows.get(block.stream, 0) + last - first
                 yield self.force.turned(_rows(block, slice(first, last)), self.zero)
+
+    def stop(self, why: str) -> str:
+        """Let the motor retreat at once, and wait for it; return what is to be done where it is not out.
+
+        It retreats already, so a second interrupt changes nothing.
+        """
+        waiting = True
+        while waiting:
+            with suppress(KeyboardInterrupt):
+                self.control.retreat(why, self.retreat_s)
+                waiting = False
+        self.said += self.control.events()
+        return self.control.press.not_out
 
     @property
     def drawn(self) -> Mapping[str, Scalar]:
@@ -171,7 +190,8 @@ class PressAcquisition:
     @property
     def ended(self) -> str:
         """Why it ended before its time; empty: it did not."""
-        return self.control.press.ended or self.reading.ended
+        press = self.control.press
+        return "; ".join(filter(None, (press.ended, press.not_out))) or self.reading.ended
 
 
 class ParallelManipulator:
@@ -199,7 +219,7 @@ class ParallelManipulator:
         self._operator, self._physics = operator, physics
 
     @contextmanager
-    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[PressAcquisition]:
+    def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[DeviceAcquisition]:
         """Open the devices, go to the scene's place, find the surface, and wait just above it.
 
         Raises
@@ -288,6 +308,7 @@ class ParallelManipulator:
                 clock=clock,
                 begin_ns=begin_ns,
                 duration_s=scene.profile.duration.to("s"),
+                retreat_s=limits.retreat_s + STOP_S,
                 gaps=gaps,
                 said=events,
             )
@@ -323,7 +344,7 @@ class ParallelManipulator:
         if not hasattr(simulated, "press_curve"):
             raise PluginContractError(
                 f"The simulated rig {file.emulation.physics!r} has no press curves.",
-                hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.",
+                hint="Its acquisition needs press_curve: see SimulatedPress in tactbench.plugin.simulation.",
             )
         heights, limits = self.settings.heights, self.settings.limits
         rng = np.random.default_rng([file.emulation.seed, seed, *b"skin", *scene.name.encode()])
@@ -341,6 +362,9 @@ class ParallelManipulator:
             if not isinstance(emulator, MotorEmulator):
                 raise UsageError(f"The emulated {MOTOR} is no faulhaber device.", hint="This rig moves one.")
             senses.pressed_by(emulator.drive)
+        for name in JOINTS:
+            if name in found and isinstance(joint := found[name].emulator, MotorEmulator):
+                joint.drive.servo.load = None  # the platform's weight is not modelled
         return found
 
     def _guard(

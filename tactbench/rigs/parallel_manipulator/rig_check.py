@@ -9,7 +9,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
-from tactbench.plugin import (
+from tactbench.plugin import TactbenchError, UsageError, load_registry
+from tactbench.plugin.devices import (
     CanFrame,
     CheckTable,
     DeviceEntry,
@@ -17,11 +18,8 @@ from tactbench.plugin import (
     PressingForce,
     RigCheck,
     RigFile,
-    TactbenchError,
-    UsageError,
     drivers_of,
     emulators_of,
-    load_registry,
 )
 from tactbench.rigs.parallel_manipulator.guard import LONGEST_COMMAND, MANDATORY, reaction
 from tactbench.rigs.parallel_manipulator.joints import check_places, workspace_of
@@ -42,7 +40,7 @@ from tactbench.rigs.parallel_manipulator.worst_case import (
 )
 
 if TYPE_CHECKING:
-    from tactbench.plugin import Link
+    from tactbench.plugin.devices import Link
     from tactbench.rigs.parallel_manipulator.worst_case import Reaction
 
 FIRST = 4
@@ -134,16 +132,17 @@ def _units(found: _Findings, settings: RigSettings, options: FaulhaberOptions) -
     profile, touch = options.profile(), settings.touch
     stated = profile.model_fields_set
 
-    def unit(name: str) -> str:
+    def unit(name: str, shown: str) -> str:
         quantity = getattr(profile, name)
-        return f"{quantity} ({'the rig file' if name in stated else f'ASSUMED: {quantity.source.reference}'})"
+        by = "the rig file" if name in stated else f"ASSUMED: {quantity.source.reference}"
+        return f"{quantity.to(shown):g} {shown} ({by})"
 
     found.table(
         "units of the motor's drive",
-        ("one increment", unit("position_unit")),
-        ("one unit of speed", unit("speed_unit")),
-        ("one unit of acceleration", unit("acceleration_unit")),
-        ("one unit of current", unit("current_unit")),
+        ("one increment", unit("position_unit", "um")),
+        ("one unit of speed", unit("speed_unit", "mm/s")),
+        ("one unit of acceleration", unit("acceleration_unit", "mm/s/s")),
+        ("one unit of current", unit("current_unit", "mA")),
     )
     missing = [name for name in MANDATORY if getattr(options, name) is None]
     if missing:

@@ -11,7 +11,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
 
-from tactbench.plugin import ForceLoop, NamedDevice, Quantity, RigFile, UsageError, sourced
+from tactbench.plugin import ForceLoop, Quantity, UsageError, sourced
+from tactbench.plugin.devices import NamedDevice, RigFile
 from tactbench.rigs.parallel_manipulator.force_law import ForceLaw
 from tactbench.rigs.parallel_manipulator.geometry import Geometry
 from tactbench.rigs.parallel_manipulator.motion_profile import MotionLimits
@@ -19,7 +20,6 @@ from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.options import read_options
 from tactbench.rigs.parallel_manipulator.press_moves import PressHeights
 from tactbench.rigs.parallel_manipulator.singularity import PostureLimits
-from tactbench.rigs.parallel_manipulator.worst_case import Reaction
 
 MOTOR = "motor"
 """Name of the linear motor's entry under `devices:`."""
@@ -339,10 +339,6 @@ class RigSettings(_Part):
     def near_m(self) -> float:
         """Where the motor goes over to the speed of touching [m]: three spreads and a cap's tolerance above it."""
         return self.surface_m - 1e-3 * (3 * self.heights.surface_spread_mm + self.heights.cap_tolerance_mm)
-
-    def reaction(self, baud: int, force_rate_hz: float) -> Reaction:
-        """Return what passes between a force and the motor's braking."""
-        return Reaction(baud=baud, force_age_s=1 / force_rate_hz, motor_lag_s=1e-3 * self.force_loop.motor_lag_ms)
 
 
 class ManipulatorFile(RigFile):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import EffectDescriptor, RigDescriptor, hookimpl
+from tactbench.plugin import RigDescriptor, hookimpl
+from tactbench.plugin.simulation import EffectDescriptor
 
 TACTBENCH_API = 1
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import statistics
 from collections.abc import Sequence
 
-from tactbench.plugin import EffectDescriptor, Explained, Scene, SensorDescriptor, TactbenchError
+from tactbench.plugin import Scene, SensorDescriptor, TactbenchError
+from tactbench.plugin.simulation import EffectDescriptor, Explained
 from tactbench.rigs.twin.contact.stages import forget_tables
 from tactbench.rigs.twin.planner import LENT, Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from tactbench.plugin import RigError, SkinSheet, UsageError
+from tactbench.plugin import RigError, UsageError
+from tactbench.plugin.simulation import SkinSheet
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import Dome, FloatArray, Indenter, RigError, SheetTable, SkinGrid, SkinSheet
+from tactbench.plugin import FloatArray, Indenter, RigError
+from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
 
 STEEPEST = 1.0
 """Largest slope of an indenter, 45 degrees: the gap is taken along the press axis and the deflection along the skin's

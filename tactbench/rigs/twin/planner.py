@@ -12,16 +12,15 @@ from dataclasses import dataclass
 
 from tactbench.plugin import (
     ChannelKind,
-    EffectDescriptor,
     NotApplicable,
     PlanEntry,
     PluginContractError,
-    Reason,
     Scene,
     SensorSpec,
     UsageError,
     load_object,
 )
+from tactbench.plugin.simulation import EffectDescriptor, Reason
 from tactbench.rigs.twin.synthesis import Settled
 
 STORED = "stored"

@@ -7,15 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tactbench.plugin import (
-    ChannelSpec,
-    FloatArray,
-    NotApplicable,
-    RigError,
-    Scene,
-    SensorDescriptor,
-    SensorSpec,
-)
+from tactbench.plugin import ChannelSpec, FloatArray, NotApplicable, RigError, Scene, SensorDescriptor, SensorSpec
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity, rung
 from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan
@@ -57,10 +49,12 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidel
 
 
 def handled(sensor: SensorDescriptor, scene: Scene) -> SensorDescriptor:
-    """Return the sensor with the nuisances of the scenario that the scene asks for, if any; raises NotApplicable."""
-    if scene.simulation.scenario is None:
+    """Return the sensor with the scenario and the nuisances that the scene asks for; raises NotApplicable."""
+    asked = scene.simulation
+    if asked.scenario is None and not asked.nuisances:
         return sensor
-    return sensor.model_copy(update={"spec": sensor.spec.handled(scene.simulation.scenario)})
+    spec = sensor.spec.handled(asked.scenario).with_nuisances(dict(asked.nuisances))
+    return sensor.model_copy(update={"spec": spec})
 
 
 def carried_out(
@@ -124,7 +118,7 @@ def _place(run: Synthesis) -> Contact:
     commanded_x, commanded_s = commanded_place_mm(run.sensor.spec, run.scene)
     off_x, off_s = placement.scatter.to("mm") * run.of_recording("placement").standard_normal(2)
     x, s = commanded_x + off_x, commanded_s + off_s
-    run.drawn.update(placement_x_mm=float(x), placement_s_mm=float(s))
+    run.drawn.update(placed_x_mm=float(x), placed_s_mm=float(s))
     tilt_x, tilt_s = (math.tan(tilt.to("rad")) for tilt in (placement.tilt_x, placement.tilt_s))
     return Contact(run.contact.radius_mm, float(x), float(s), tilt_x, tilt_s)
 

@@ -13,8 +13,6 @@ import numpy.typing as npt
 from tactbench.plugin import (
     Block,
     ChannelSpec,
-    EffectDescriptor,
-    Explained,
     FloatArray,
     NotApplicable,
     PlanEntry,
@@ -23,9 +21,11 @@ from tactbench.plugin import (
     Scalar,
     Scene,
     SensorDescriptor,
+    SensorSpec,
     Source,
     StreamSpec,
 )
+from tactbench.plugin.simulation import EffectDescriptor, Explained
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
@@ -173,7 +173,6 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     )
     measured = np.column_stack([run.reference_n, *(values for _, values in run.reference_more.values())])
     samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), measured, None)
-    environment = run.scene.environment
     contact_x, contact_s = commanded_place_mm(run.sensor.spec, run.scene)
     return TwinAcquisition(
         streams=tuple(streams),
@@ -182,13 +181,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         assumptions={
             "contact_x_mm": contact_x,
             "contact_s_mm": contact_s,
-            "placement_scatter_mm": run.scene.placement.scatter.to("mm"),
-            "drift_scale": environment.drift_scale,
-            "noise_scale": environment.noise_scale,
-            "session_offset_scale": environment.session_offset_scale,
-            "since_power_on_s": environment.since_power_on.to("s"),
-            "force_noise_n": environment.force_noise.to("N"),
-            **_stated(run.scene),
+            **_stated(run.scene, run.sensor.spec),
             **_asked(run.scene),
         },
         drawn=dict(run.drawn),
@@ -197,28 +190,25 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     )
 
 
-def _stated(scene: Scene) -> dict[str, Scalar]:
-    """Return what the scene states of offsets, drive, slide, recorded force and temperatures beyond the default."""
-    environment, drive = scene.environment, scene.drive
-    stated: dict[str, Scalar] = {}
-    if environment.offset_scale is not None:
-        stated["offset_scale"] = environment.offset_scale
-    if environment.indenter_temperature is not None:
-        stated["indenter_degc"] = environment.indenter_temperature.to("degC")
-        stated["ambient_degc"] = environment.ambient.to("degC")
-    if environment.force_filter is not None:
-        stated["force_filter_hz"] = environment.force_filter.to("Hz")
-    if drive is not None:
-        stated["loop_proportional_mm_per_n"] = drive.proportional.to("mm/N")
-        stated["loop_integral_mm_per_n_s"] = drive.integral.to("mm/N/s")
-        stated["loop_cutoff_hz"] = "none" if drive.cutoff is None else drive.cutoff.to("Hz")
-        stated["loop_delay_s"] = drive.delay.to("s")
+_TOLD = frozenset({
+    "placement_scatter_mm", "drift_scale", "noise_scale", "offset_scale", "session_offset_scale", "since_power_on_s",
+    "force_noise_n", "force_filter_hz", "indenter_temperature_degc", "drive_proportional_mm_per_n",
+    "drive_integral_mm_per_n_s", "drive_cutoff_hz", "drive_delay_ms", "surface_static_friction",
+    "surface_kinetic_friction", "surface_roughness_um",
+})  # fmt: skip
+"""Nuisances that a recording states where its scene does; others only where they were set for the run."""
+
+
+def _stated(scene: Scene, sensor: SensorSpec) -> dict[str, Scalar]:
+    """Return the nuisances of the scene that decide most, those that were set, and the slide."""
+    asked = dict(scene.simulation.nuisances)
+    told = _TOLD | asked.keys() | ({"ambient_degc"} if scene.environment.indenter_temperature is not None else set())
+    stated: dict[str, Scalar] = {name: value for name, value in scene.nuisances().items() if name in told}
+    stated |= {name: amount.value for name, amount in sensor.settable().items() if name in asked}
+    if scene.drive is not None and scene.drive.cutoff is None:
+        stated["drive_cutoff_hz"] = "none"
     if scene.slide is not None:
-        surface = scene.slide.surface
         stated["slide_mm_s"] = scene.slide.speed.to("mm/s")
-        stated["static_friction"] = surface.static_friction.to("1")
-        stated["kinetic_friction"] = surface.kinetic_friction.to("1")
-        stated["roughness_um"] = surface.roughness.to("um")
     return stated
 
 

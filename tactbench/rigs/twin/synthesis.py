@@ -10,17 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import (
-    ChannelKind,
-    ChannelSpec,
-    EffectDescriptor,
-    FloatArray,
-    Nuisances,
-    Scalar,
-    Scene,
-    SensorDescriptor,
-    load_object,
-)
+from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Scalar, Scene, SensorDescriptor, load_object
+from tactbench.plugin.simulation import EffectDescriptor, Nuisances
 from tactbench.rigs.twin import draws
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact

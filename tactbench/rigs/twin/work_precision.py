@@ -13,12 +13,7 @@ import numpy as np
 
 from tactbench.plugin import (
     ChannelKind,
-    CostJob,
-    CostPoint,
-    CostStudy,
-    EffectDescriptor,
     FloatArray,
-    FluidBackedShell,
     Indenter,
     Placement,
     RigError,
@@ -28,6 +23,7 @@ from tactbench.plugin import (
     assumed,
     load_registry,
 )
+from tactbench.plugin.simulation import CostJob, CostPoint, CostStudy, EffectDescriptor, FluidBackedShell
 from tactbench.rigs.twin.contact.pressing import pressed
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, forget_tables, skin_under_load
 from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS, Fidelity

@@ -10,7 +10,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import FloatArray, FluidBackedShell, RigError, SensorSpec, SkinGrid
+from tactbench.plugin import FloatArray, RigError, SensorSpec
+from tactbench.plugin.simulation import FluidBackedShell, SkinGrid
 from tactbench.sensors.biotac.film import mid_film_mm
 from tactbench.sensors.biotac.meshes import sheet_x
 from tactbench.sensors.biotac.rims import Disc, RimmedDiscs

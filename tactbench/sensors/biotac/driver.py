@@ -46,19 +46,16 @@ from collections import Counter, deque
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from tactbench.plugin import (
-    Block,
+from tactbench.plugin import Block, RigError, Source, StreamSpec
+from tactbench.plugin.devices import (
     Driver,
     DriverSettings,
     LinkError,
     LinkTimeout,
-    RigError,
-    Source,
     SpiBridge,
     SpiLink,
     SpiReply,
     SpiStep,
-    StreamSpec,
 )
 from tactbench.sensors.biotac.codec import (
     COMMAND_RATE,
@@ -74,7 +71,7 @@ from tactbench.sensors.biotac.frames import FrameBatches, counted, streams_of
 from tactbench.sensors.biotac.options import Options
 
 if TYPE_CHECKING:
-    from tactbench.plugin import Link
+    from tactbench.plugin.devices import Link
 
 PATIENCE_S = 0.5
 """Assumed: a reply that has not come so long after its batch must be over is lost. USB and a busy host take less."""

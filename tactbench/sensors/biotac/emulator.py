@@ -13,7 +13,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from tactbench.plugin import Fault, UsageError, fault_concerns
+from tactbench.plugin import UsageError
+from tactbench.plugin.devices import Fault, SpiDeviceEmulator, fault_concerns
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
 from tactbench.sensors.biotac.codec import (
     CLOCK,
@@ -32,7 +33,7 @@ from tactbench.sensors.biotac.frames import DEFAULT_FRAME
 from tactbench.sensors.biotac.options import Options
 
 if TYPE_CHECKING:
-    from tactbench.plugin import EmulatorSettings, Senses
+    from tactbench.plugin.devices import EmulatorSettings, Senses
 
 _ROUNDING_S = 1e-9
 """Seconds as float64 are 0.1 ns apart after eleven days, and a host's sum of pauses rounds more than once."""
@@ -113,7 +114,7 @@ DEFAULT_PROPERTIES: Mapping[str, bytes] = {
 [assumed]; the default frame as pattern [derived]."""
 
 
-class Emulator:
+class Emulator(SpiDeviceEmulator):
     """One BioTac on an SPI bus.
 
     A sampling command samples at its last bit; the word is read after the pause. Several sensors that are selected

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, SkinGrid
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import SkinGrid
 from tactbench.sensors.biotac.meshes import RAYS_FROM_MM, core_reach_mm
 
 REFINEMENT = 2

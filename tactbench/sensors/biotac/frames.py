@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from tactbench.plugin import Block, Quality, Source, SpiStep, StreamSpec
+from tactbench.plugin import Block, Quality, Source, StreamSpec
+from tactbench.plugin.devices import SpiStep
 from tactbench.sensors.biotac.channels import CONVERTER_TOP, STREAMS
 from tactbench.sensors.biotac.codec import (
     CHANNELS,

@@ -8,7 +8,8 @@ DX is dexrob/BioTac_slide_20_50 (one BioTac sliding).
 
 from __future__ import annotations
 
-from tactbench.plugin import RealFigure, Source
+from tactbench.plugin import Source
+from tactbench.plugin.simulation import RealFigure
 
 RF = "Alexis-Georganopoulos/Robotic-Finger"
 RG = "RuihanGao/BioTacSP_setup"

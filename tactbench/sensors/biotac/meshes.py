@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from tactbench.plugin import SheetTable, Source
+from tactbench.plugin import Source
+from tactbench.plugin.simulation import SheetTable
 from tactbench.sensors.biotac.electrodes import ELECTRODES
 
 MESHES = (

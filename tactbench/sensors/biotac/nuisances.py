@@ -8,10 +8,10 @@ fitted warm-up is taken off, and 15 s or more after a contact. What hard presses
 
 from __future__ import annotations
 
-from tactbench.plugin import ChannelKind, Creep, Nuisances, Quantity, Scenario, assumed, derived, measured
+from tactbench.plugin import ChannelKind, assumed, derived, measured
+from tactbench.plugin.simulation import Creep, Nuisances, Scenario
 
 _STEP = measured(1.0, "count", "raw channels of RF, DX and RG move in steps of one count")
-_NONE_KNOWN = "no recording shows it; left at 0 rather than invented"
 
 _CREEP = (
     Creep(
@@ -25,11 +25,6 @@ _CREEP = (
 )
 
 
-def _zero(unit: str) -> Quantity:
-    return assumed(0.0, unit, _NONE_KNOWN)
-
-
-_WANDER_TAU = assumed(60.0, "s", "not identifiable from twelve minutes of recordings with a trend")
 _WARM_UP_TAU = measured(500.0, "s", "RF: 450-620 s by three ways of fitting the shared drift")
 
 TAXEL = Nuisances(
@@ -70,44 +65,23 @@ TAXEL = Nuisances(
 
 PDC = Nuisances(
     white=measured(0.15, "count", "RF and RG: 0.12 before rounding on the quiet ones, 0.44 on one of RG"),
-    offset_shared=_zero("count"),
     offset_own=measured(17.0, "count", "RF: +17 to +20 after a minute of presses, back only over minutes"),
-    offset_session=_zero("count"),
-    gain_scatter=_zero("1"),
     warm_up=derived(
         20.0, "count", "RF: +5.0 where the electrodes rose by +23.1 without a contact, times their 90 counts"
     ),
     warm_up_tau=_WARM_UP_TAU,
-    warm_up_scatter=_zero("1"),
-    wander=_zero("count"),
-    wander_tau=_WANDER_TAU,
     step=_STEP,
-    creep=(),
 )
-
-
-def _white_only(white: Quantity) -> Nuisances:
-    return Nuisances(
-        white=white,
-        offset_shared=_zero("count"),
-        offset_own=_zero("count"),
-        offset_session=_zero("count"),
-        gain_scatter=_zero("1"),
-        warm_up=_zero("count"),
-        warm_up_tau=_WARM_UP_TAU,
-        warm_up_scatter=_zero("1"),
-        wander=_zero("count"),
-        wander_tau=_WANDER_TAU,
-        step=_STEP,
-    )
 
 
 NUISANCES: dict[ChannelKind, Nuisances] = {
     "taxel": TAXEL,
     "dc_pressure": PDC,
-    "dc_temperature": _white_only(measured(0.4, "count", "RG 0.36-0.41, DX 0.45")),
-    "ac_temperature": _white_only(measured(0.8, "count", "RG 0.7, DX 1.0")),
-    "ac_pressure": _white_only(measured(2.4, "count", "RG, robust; the hum on top is the sensor's parameter `hum`")),
+    "dc_temperature": Nuisances(white=measured(0.4, "count", "RG 0.36-0.41, DX 0.45"), step=_STEP),
+    "ac_temperature": Nuisances(white=measured(0.8, "count", "RG 0.7, DX 1.0"), step=_STEP),
+    "ac_pressure": Nuisances(
+        white=measured(2.4, "count", "RG, robust; the hum on top is the sensor's parameter `hum`"), step=_STEP
+    ),
 }
 
 HARD_HANDLED = Scenario(

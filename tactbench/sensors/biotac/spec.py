@@ -6,12 +6,9 @@ import math
 
 from tactbench.plugin import (
     DataSheet,
-    Dome,
-    FluidBackedShell,
     PhysicalRange,
     Quantity,
     SensorSpec,
-    SkinSheet,
     Source,
     Statement,
     assumed,
@@ -19,6 +16,7 @@ from tactbench.plugin import (
     measured,
     sourced,
 )
+from tactbench.plugin.simulation import Dome, FluidBackedShell, SkinSheet
 from tactbench.sensors.biotac.channels import MANUAL, STREAMS
 from tactbench.sensors.biotac.likeness import LIKENESS
 from tactbench.sensors.biotac.meshes import ELECTRODES_MM, MESHES, film_table, relief_table

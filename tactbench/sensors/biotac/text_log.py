@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from tactbench.plugin import Block, DataError, DeviceLog, Source
+from tactbench.plugin import Block, DataError, Source
+from tactbench.plugin.devices import DeviceLog
 from tactbench.sensors.biotac.codec import CHANNELS, INDEX, Fault, Reply
 from tactbench.sensors.biotac.frames import FrameRows, counted, quality_of, streams_of
 from tactbench.sensors.biotac.options import LogOptions

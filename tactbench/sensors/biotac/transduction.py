@@ -10,7 +10,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, RigError, SensorSpec, SkinGrid, SkinState
+from tactbench.plugin import FloatArray, RigError, SensorSpec
+from tactbench.plugin.simulation import SkinGrid, SkinState
 from tactbench.sensors.biotac.discs import discs_on, dome_mm, outer_radius_mm, shell_of
 from tactbench.sensors.biotac.electrodes import NAMES
 from tactbench.sensors.biotac.film import REFINEMENT, edges, mid_film_mm, refined, spectral_interpolation

@@ -14,7 +14,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from tactbench.plugin import Block, CanFrame, Quality, RigError, UsageError
+from tactbench.plugin import Block, Quality, RigError, UsageError
+from tactbench.plugin.devices import CanFrame
 
 BIT_RATE = 1_000_000
 """Bits a second on the bus [sourced: IM, rate index 0, "1 MB/s" in its comment]."""

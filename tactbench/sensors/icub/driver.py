@@ -6,19 +6,8 @@ from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
 
-from tactbench.plugin import (
-    Block,
-    CanFrame,
-    CanLink,
-    Driver,
-    DriverSettings,
-    LinkError,
-    LinkTimeout,
-    LinkUnplugged,
-    Source,
-    StreamSpec,
-    UsageError,
-)
+from tactbench.plugin import Block, Source, StreamSpec, UsageError
+from tactbench.plugin.devices import CanFrame, CanLink, Driver, DriverSettings, LinkError, LinkTimeout, LinkUnplugged
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     Command,

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import ClassVar, Literal, TypeAlias
 
-from tactbench.plugin import CanFrame, EmulatorSettings, Fault, UsageError, fault_concerns
+from tactbench.plugin import UsageError
+from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, fault_concerns
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BIT_RATE,
@@ -348,7 +349,7 @@ def frame_s(frame: CanFrame) -> float:
     return (44 + bits + (33 + bits) // 4 + 3) / BIT_RATE
 
 
-class Bus:
+class Bus(DeviceEmulator):
     """Boards on one bus: one frame at a time, the lowest identifier first among those that are ready.
 
     Commands take no time on it [assumed: they are rare].

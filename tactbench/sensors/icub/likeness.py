@@ -7,7 +7,8 @@ spread.
 
 from __future__ import annotations
 
-from tactbench.plugin import RealFigure, Source
+from tactbench.plugin import Source
+from tactbench.plugin.simulation import RealFigure
 
 IG = "clear-nus/icub_grasp_dataset"
 _FINGERS = "the range is that of three fingers"

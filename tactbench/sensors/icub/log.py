@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.plugin import CanFrame, CanLog, DataError, DeviceLog, LinkEnded, Source, UsageError
+from tactbench.plugin import DataError, Source, UsageError
+from tactbench.plugin.devices import CanFrame, CanLog, DeviceLog, LinkEnded
 from tactbench.sensors.icub.channels import STREAMS
 from tactbench.sensors.icub.codec import (
     BROADCAST,

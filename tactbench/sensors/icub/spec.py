@@ -4,21 +4,8 @@ from __future__ import annotations
 
 import math
 
-from tactbench.plugin import (
-    Creep,
-    DataSheet,
-    FoamPad,
-    Nuisances,
-    Quantity,
-    SensorSpec,
-    SkinSheet,
-    Source,
-    Statement,
-    assumed,
-    derived,
-    measured,
-    sourced,
-)
+from tactbench.plugin import DataSheet, Quantity, SensorSpec, Source, Statement, assumed, derived, measured, sourced
+from tactbench.plugin.simulation import Creep, FoamPad, Nuisances, SkinSheet
 from tactbench.sensors.icub.channels import OUTER_RADIUS_MM, STREAMS
 from tactbench.sensors.icub.likeness import LIKENESS
 

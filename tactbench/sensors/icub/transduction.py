@@ -7,7 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from tactbench.plugin import ChannelSpec, FloatArray, FoamPad, RigError, SensorSpec, SkinGrid, SkinState
+from tactbench.plugin import ChannelSpec, FloatArray, RigError, SensorSpec
+from tactbench.plugin.simulation import FoamPad, SkinGrid, SkinState
 
 SUBSAMPLES = 4
 """Points per cell and axis that average a taxel's weight."""

@@ -7,19 +7,17 @@ closed form for a point load, for a Gaussian pressure and for a uniform one.
 from __future__ import annotations
 
 from tactbench.plugin import (
-    BondedLayer,
     ChannelSpec,
     DataSheet,
-    Nuisances,
     Quantity,
     SensorDescriptor,
     SensorSpec,
-    SkinSheet,
     Source,
     StreamSpec,
     assumed,
     hookimpl,
 )
+from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 
 TACTBENCH_API = 1
 
@@ -50,21 +48,6 @@ PARAMETERS = {
     "sensitivity": _by_definition(1000.0, "count/N"),
     "influence": _by_definition(1.5, "mm"),
 }
-
-_NONE = Nuisances(
-    white=_by_definition(0.0, "count"),
-    offset_shared=_by_definition(0.0, "count"),
-    offset_own=_by_definition(0.0, "count"),
-    offset_session=_by_definition(0.0, "count"),
-    gain_scatter=_by_definition(0.0, "1"),
-    warm_up=_by_definition(0.0, "count"),
-    warm_up_tau=_by_definition(1.0, "s"),
-    warm_up_scatter=_by_definition(0.0, "1"),
-    wander=_by_definition(0.0, "count"),
-    wander_tau=_by_definition(1.0, "s"),
-    # No converter: readings are stored as float64, unrounded.
-    step=_by_definition(0.0, "count"),
-)
 
 _SOURCE = Source(tag="assumed", reference=_WHY)
 
@@ -97,7 +80,7 @@ SPEC = SensorSpec(
     link_delay=_by_definition(0.0, "ms"),
     skin=SKIN,
     parameters=PARAMETERS,
-    nuisances={"taxel": _NONE},
+    nuisances={"taxel": Nuisances()},
     data_sheet=DataSheet(exists=False),
 )
 

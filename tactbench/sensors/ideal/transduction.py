@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, RigError, SensorSpec, SkinGrid, SkinState
+from tactbench.plugin import FloatArray, RigError, SensorSpec
+from tactbench.plugin.simulation import SkinGrid, SkinState
 
 
 def gaussian_over_cells(centres_mm: FloatArray, at_mm: float, sigma_mm: float) -> FloatArray:

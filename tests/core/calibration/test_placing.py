@@ -1,61 +1,48 @@
-"""Drawn values reach the place in a scene that their path names, and nothing else."""
+"""What a draw asks of the simulation: its values under the names that every run uses, for the sensors they are of."""
 
 import pytest
+from pydantic import ValidationError
 
-from tactbench.core.calibration.placing import with_parameters
-from tactbench.core.errors import UsageError
-from tactbench.core.spec.scene import Environment, Scene
+from tactbench.core.calibration.placing import simulation_of
+from tactbench.core.spec.scene import Simulation
 from tests.core.calibration.toy import procedure
 
-SCENE = Scene(name="a", session="3")
 
-
-def _spec(path, unit="1", sensors=()):
-    nuisance = {"name": "one", "path": path, "unit": unit, "sensors": list(sensors), "reason": "r", "source": "assumed",
-                "prior": {"kind": "fixed", "value": 2.0}}  # fmt: skip
+def _spec(name="one", sensors=(), **more):
+    nuisance = {"name": name, "sensors": list(sensors), "reason": "r", "source": "assumed",
+                "prior": {"kind": "fixed", "value": 2.0}, **more}  # fmt: skip
     return procedure(nuisances=[nuisance])
 
 
-def _placed(path, value, **more):
-    return with_parameters(SCENE, _spec(path, **more), "icub", {"one": value})
+def test_a_drawn_value_is_set_under_the_name_of_its_nuisance():
+    spec = _spec(sets="placement_scatter_mm")
+    assert simulation_of(spec, "icub", {"one": 0.25}) == Simulation(nuisances={"placement_scatter_mm": 0.25})
+    assert spec.nuisances[0].unit == "mm"
 
 
-def test_a_quantity_gets_value_unit_and_tag():
-    placed = _placed("placement.scatter", 250.0, unit="um")
-    assert placed.placement.scatter.to("mm") == pytest.approx(0.25)
-    assert placed.placement.scatter.source.tag == "assumed"
-    assert placed.model_copy(update={"placement": SCENE.placement}) == SCENE
+def test_without_another_word_a_nuisance_sets_what_it_is_called():
+    assert _spec("force_noise_n").nuisances[0].sets == "force_noise_n"
 
 
-@pytest.mark.parametrize("name", ["noise_scale", "drift_scale", "offset_scale", "session_offset_scale"])
-def test_a_factor_gets_a_bare_number(name):
-    placed = _placed(f"environment.{name}", 0.5)
-    assert placed.environment == Environment(**{name: 0.5})
-
-
-def test_an_optional_quantity_can_be_drawn():
-    assert _placed("environment.force_filter", 20.0, unit="Hz").environment.force_filter.to("Hz") == 20.0
+def test_the_unit_in_a_name_does_not_change_the_draw():
+    assert _spec("force_noise_n").nuisances[0].stream == "force_noise"
+    assert _spec("noise_of_mine", sets="noise_scale").nuisances[0].stream == "noise_of_mine"
 
 
 def test_a_nuisance_of_one_sensor_leaves_the_other_as_it_is():
-    spec = _spec("environment.noise_scale", sensors=["biotac"])
-    assert with_parameters(SCENE, spec, "icub", {"one": 9.0}) == SCENE
-    assert with_parameters(SCENE, spec, "biotac", {"one": 9.0}).environment.noise_scale == 9.0
+    spec = _spec(sets="noise_scale", sensors=["biotac"])
+    assert simulation_of(spec, "icub", {"one": 9.0}) == Simulation()
+    assert simulation_of(spec, "biotac", {"one": 9.0}) == Simulation(nuisances={"noise_scale": 9.0})
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "unit", "says"),
-    [
-        ("placement.scater", 0.1, "mm", "Did you mean 'scatter'"),
-        ("environment.noise_scale", -1.0, "1", "noise_scale cannot be -1"),
-        ("placement.scatter", 0.1, "s", "mm"),
-        ("profile.samples", 10.0, "1", "not to a number"),
-        ("session", 1.0, "1", "not to a number"),
-        ("slide.speed", 1.0, "mm/s", "does not have"),
-        ("environment.noise_scale.more", 1.0, "1", "does not have"),
-    ],
-)
-def test_what_cannot_be_placed_is_refused_with_the_next_step(path, value, unit, says):
-    with pytest.raises(UsageError, match=says) as caught:
-        _placed(path, value, unit=unit)
-    assert caught.value.hint
+def test_what_the_procedure_asks_of_the_simulation_stays():
+    spec = _spec(sets="noise_scale")
+    spec = spec.model_copy(update={"simulation": Simulation(rung="fine", nuisances={"drift_scale": 0.5})})
+    asked = simulation_of(spec, "icub", {"one": 9.0})
+    assert asked == Simulation(rung="fine", nuisances={"drift_scale": 0.5, "noise_scale": 9.0})
+
+
+@pytest.mark.parametrize("name", ["placement_scater_mm", "placement.scatter"])
+def test_a_name_that_is_none_comes_with_those_that_are(name):
+    with pytest.raises(ValidationError, match=r"did you mean 'placement_scatter_mm'.*known: .*force_noise_n"):
+        _spec(sets=name)

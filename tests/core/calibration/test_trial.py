@@ -25,9 +25,9 @@ def _spec(outputs, **more):
     )
 
 
-def _fixed(name, path, unit, value):
+def _fixed(name, sets, value):
     return {
-        "name": name, "path": path, "unit": unit, "reason": "r", "source": "assumed",
+        "name": name, "sets": sets, "reason": "r", "source": "assumed",
         "prior": {"kind": "fixed", "value": value},
     }  # fmt: skip
 
@@ -37,7 +37,7 @@ def test_a_band_of_every_force_is_the_score_and_a_narrow_one_is_not(tmp_path):
         _output("whole"), _output("every_force", _band(0, 5.1)), _output("weak", _band(0, 1.0)),
         _output("strong", _band(4.0, 5.1)),
     ]  # fmt: skip
-    still = _fixed("still", "placement.scatter", "mm", 0.0)
+    still = _fixed("still", "placement_scatter_mm", 0.0)
     draw, _ = carry_out(Trial(_spec(outputs, nuisances=[still]), 5, 0, tmp_path))
     assert draw.reason == ""
     assert draw.outputs["every_force"] == draw.outputs["whole"]
@@ -59,7 +59,7 @@ def test_a_draw_has_every_output_it_shall_have(tmp_path):
 def test_drawn_values_reach_the_simulation(tmp_path):
     rmse = {"task": "force", "estimator": {"name": "time-index"}, "every": 1}
     for value in (0.1, 0.9):
-        nuisance = _fixed("force_noise", "environment.force_noise", "N", value)
+        nuisance = _fixed("force_noise", "force_noise_n", value)
         draw, cpu_s = carry_out(Trial(_spec([_output("rmse", **rmse)], nuisances=[nuisance]), 5, 0, tmp_path))
         # 4400 test samples: the standard error of an RMSE is 1/sqrt(2 n) = 1.1 %; four of them.
         assert draw.outputs["rmse"] == pytest.approx(value, rel=0.045)
@@ -89,11 +89,11 @@ def test_what_an_output_asks_is_looked_at_before_anything_is_simulated(change, s
         checked(_spec([_output("one", **change)]))
 
 
-def test_rigs_sensors_and_paths_are_looked_at_too():
+def test_rigs_and_sensors_are_looked_at_too():
     with pytest.raises(UsageError, match="not simulated"):
         checked(_spec([_output("one")], rig="replay"))
     nuisance = procedure().nuisances[0].model_dump()
     with pytest.raises(UsageError, match="which no output asks"):
         checked(_spec([_output("one")], nuisances=[{**nuisance, "sensors": ["biotac"]}]))
-    with pytest.raises(UsageError, match="Did you mean 'scatter'"):
-        checked(_spec([_output("one")], nuisances=[{**nuisance, "path": "placement.scater"}]))
+    with pytest.raises(UsageError, match="drive_delay_ms: the scene has no drive"):
+        checked(_spec([_output("one")], nuisances=[{**nuisance, "sets": "drive_delay_ms"}]))

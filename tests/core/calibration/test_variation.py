@@ -23,7 +23,7 @@ VARIATIONS = [
     {
         "name": "width", "title": "Some widths", "outputs": ["narrow"], "seeds": 5, "reason": "A test.",
         "settings": [
-            {"label": f"width {value}", "given": [{"path": "placement.scatter", "value": value, "unit": "mm"}]}
+            {"label": f"width {value}", "given": [{"name": "placement_scatter_mm", "value": value}]}
             for value in WIDTHS
         ],
     },
@@ -103,12 +103,16 @@ def test_settings_that_are_none_are_refused(tmp_path, line):
         load_result(tmp_path)
 
 
+def _rows(table):
+    return [dict(zip(table.columns, line, strict=True)) for line in table.lines]
+
+
 def test_a_table_has_a_row_for_each_setting(tmp_path):
     result = _result(tmp_path)
     (table,) = [one for one in text_tables(result, summary(result)) if one.title.startswith("Some widths")]
-    assert [row["setting"] for row in table.rows] == ["width 0.1", "width 0.5"]
-    assert [row["seeds"] for row in table.rows] == ["4", "4"]
-    assert [row["narrow"] for row in table.rows] == ["0.1 (0.1 … 0.1)", "0.5 (0.5 … 0.5)"]
+    assert [row["setting"] for row in _rows(table)] == ["width 0.1", "width 0.5"]
+    assert [row["seeds"] for row in _rows(table)] == ["4", "4"]
+    assert [row["narrow"] for row in _rows(table)] == ["0.1 (0.1 … 0.1)", "0.5 (0.5 … 0.5)"]
     without = dataclasses.replace(result, varied={})
     assert not [one for one in text_tables(without, summary(without)) if one.title.startswith("Some widths")]
 
@@ -128,10 +132,10 @@ def test_an_earlier_calibration_stands_beside(tmp_path):
     said = markdown(found, summary(found))
     (table,) = [one for one in text_tables(found, summary(found)) if one.title == "Beside the earlier 30 draws"]
     # Every published number and every finding, each by what its own draws say.
-    assert [row["number or finding"] for row in table.rows] == ["narrow", "tall", "both", "tall exceeds both"]
+    assert [row["number or finding"] for row in _rows(table)] == ["narrow", "tall", "both", "tall exceeds both"]
     narrow = {name: summary(one).predictions[0].before.median for name, one in (("now", result), ("then", earlier))}
-    assert table.rows[0]["prior"].startswith(f"{narrow['now']:.3g} (")
-    assert table.rows[0]["earlier prior"].startswith(f"{narrow['then']:.3g} (")
+    assert _rows(table)[0]["prior"].startswith(f"{narrow['now']:.3g} (")
+    assert _rows(table)[0]["earlier prior"].startswith(f"{narrow['then']:.3g} (")
     assert not math.isclose(narrow["now"], narrow["then"], rel_tol=0.05)
     assert "Priors that differ: width 0 to 2 then, 0 to 1 now." in said
 
@@ -141,8 +145,8 @@ def test_what_comes_along_is_checked_before_anything_is_simulated():
     checked(spec)
     assert {variation.name for variation in spec.variations} == {"contact_place", "warmth"}
     wrong = spec.variations[0].model_dump()
-    wrong["settings"][1]["given"][0]["path"] = "placement.z"
-    with pytest.raises(UsageError, match=r"placement\.z"):
+    wrong["settings"][1]["given"][0]["name"] = "drive_delay_ms"
+    with pytest.raises(UsageError, match="drive_delay_ms: the scene has no drive"):
         checked(type(spec).model_validate({**spec.model_dump(), "variations": [wrong]}))
 
 

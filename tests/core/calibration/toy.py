@@ -30,9 +30,9 @@ def procedure(**more):
     return CalibrationSpec.model_validate({
         "title": "Toy", "seed": 5, "draws": 30, "rig": "twin", "protocol": "karl2016", "outputs": outputs,
         "nuisances": [
-            {"name": "width", "path": "placement.scatter", "unit": "mm", "reason": "a test", "source": "assumed",
+            {"name": "width", "sets": "placement_scatter_mm", "reason": "a test", "source": "assumed",
              "prior": {"kind": "uniform", "low": 0.0, "high": 1.0}},
-            {"name": "height", "path": "environment.noise_scale", "reason": "a test", "source": "assumed",
+            {"name": "height", "sets": "noise_scale", "reason": "a test", "source": "assumed",
              "prior": {"kind": "log-uniform", "low": 0.1, "high": 10.0}},
         ],
         "published": [

@@ -19,9 +19,9 @@ draws: 14
 rig: twin
 protocol: karl2016
 nuisances:
-  - {name: force_noise, path: environment.force_noise, unit: N, reason: r, source: assumed,
+  - {name: force_noise_n, reason: r, source: assumed,
      prior: {kind: uniform, low: 0.2, high: 1.0}}
-  - {name: noise, path: environment.noise_scale, sensors: [icub], reason: r, source: assumed,
+  - {name: noise, sets: noise_scale, sensors: [icub], reason: r, source: assumed,
      prior: {kind: log-uniform, low: 0.1, high: 10}}
 outputs:
   - {name: ramp, title: Time index, sensor: icub, task: force, unit: N, estimator: {name: time-index}}
@@ -51,7 +51,7 @@ def test_tables_on_stdout_progress_on_stderr(calibrated):
     ramp = next(line for line in lines if line.get("output") == "ramp" and line["table"] == "published")
     # Accepted means within two scales of the published .6: what is fitted lies there, and the noise drawn is the RMSE.
     assert 0.3 <= ramp["accepted_low"] <= ramp["accepted_high"] <= 0.9
-    noise = next(line for line in lines if line["name"] == "force_noise")
+    noise = next(line for line in lines if line["name"] == "force_noise_n")
     assert noise["accepted_median"] == pytest.approx(ramp["accepted_median"], rel=0.05)
     assert "drawing" in done.stderr
 

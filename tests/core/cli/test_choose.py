@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tactbench.core.cli.config import shipped_results
-from tactbench.core.leaderboard.datasheet import OF_DEVICES
+from tactbench.core.report.datasheet import OF_DEVICES
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.plugin import DataSheet, PhysicalRange, Source, UsageError, load_registry, sourced
 from tests.conftest import Shell, Verbs
@@ -34,7 +34,10 @@ def on_a_terminal(folder, *arguments, columns=80):
     """Return what a terminal of so many columns is sent."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
-    env = {key: value for key, value in os.environ.items() if key != "COLUMNS"} | {"TERM": "dumb", "PYTHONPATH": ""}
+    env = {key: value for key, value in os.environ.items() if key != "COLUMNS"} | {
+        "TERM": "dumb",
+        "PYTHONPATH": str(ROOT),
+    }
     with subprocess.Popen([sys.executable, "-m", "tactbench", *arguments], cwd=folder, stdin=theirs, stdout=theirs,
                           stderr=theirs, env=env) as process:  # fmt: skip
         os.close(theirs)

@@ -21,7 +21,7 @@ from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, Source, StreamSpec
-from tactbench.plugin import Driver
+from tactbench.plugin.devices import Driver
 from tests.core.cli.terminals import ROOT
 from tests.links.ends import pty
 

@@ -10,7 +10,7 @@ import pytest
 from tactbench.core.cli import VERBS, _exit_code
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.yaml_file import load_yaml
-from tactbench.plugin import RigFile, drivers_of
+from tactbench.plugin.devices import RigFile, drivers_of
 from tests.core.plugins import talking
 
 POINTS = [
@@ -115,7 +115,7 @@ def test_what_cannot_be_is_said_with_the_next_step(emulate, tmp_path, words, sai
 
 
 def test_ctrl_c_ends_it_with_130(emulate, monkeypatch):
-    from tactbench.plugin import EmulatedDevices
+    from tactbench.plugin.devices import EmulatedDevices
 
     def interrupted(self, until_ns):
         raise KeyboardInterrupt

@@ -8,10 +8,13 @@ import sys
 import termios
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
 from tests.core.pool.patience import ending
+
+ROOT = Path(__file__).parents[3]
 
 COMMAND = [
     *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "icub", "--task", "curvature"),
@@ -32,7 +35,7 @@ def started(folder, command=COMMAND):
         os.setsid()
         fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
-    env = {**os.environ, "COLUMNS": "140", "LINES": "40", "TERM": "xterm-256color", "PYTHONPATH": ""}
+    env = {**os.environ, "COLUMNS": "140", "LINES": "40", "TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
     try:
         with ending(command, cwd=folder, env=env, stdin=theirs, stdout=theirs, stderr=theirs,
                     preexec_fn=own_terminal) as process:  # fmt: skip

@@ -8,7 +8,7 @@ from tactbench.core.cost.ladder_rows import by_score, mark_fronts, stopped, time
 from tactbench.core.cost.rounds import Timing
 from tactbench.core.errors import NotApplicable
 from tactbench.core.report.ladder_table import line
-from tests.core.cost.test_rounds import Hours, contestant
+from tests.core.cost.test_rounds import Hours, timed_estimator
 
 
 def row(name, score, fit_s, delay, *, baseline=False, status="done", looks_at="features"):
@@ -19,8 +19,10 @@ def row(name, score, fit_s, delay, *, baseline=False, status="done", looks_at="f
 
 
 def at_once(name, **parts_ms):
-    """A contestant of whose delay all that no machine decides is known."""
-    return replace(contestant(Hours(), name), delay_parts_ms={"sampling": 0.0, "link": 0.0, "window": 0.0, **parts_ms})
+    """An estimator of whose delay all that no machine decides is known."""
+    return replace(
+        timed_estimator(Hours(), name), delay_parts_ms={"sampling": 0.0, "link": 0.0, "window": 0.0, **parts_ms}
+    )
 
 
 def test_a_front_for_each_time_and_baselines_and_failures_on_none():
@@ -95,7 +97,7 @@ def test_a_loop_waits_for_every_part_of_the_delay_and_is_told_of_the_longest():
 
 
 def test_a_delay_that_is_not_known_is_no_verdict_and_on_no_front():
-    found = timed(contestant(Hours(), "a"), Timing([1.0], [1.0], [0.001] * 200, [0.0] * 200), {}, 1, 20.0)
+    found = timed(timed_estimator(Hours(), "a"), Timing([1.0], [1.0], [0.001] * 200, [0.0] * 200), {}, 1, 20.0)
     assert (found["answer_delay_ms"], found["loop_100_hz"], found["loop_1000_hz"]) == (None, None, None)
     rows = [row("a", 0.9, 1.0, None), row("b", 0.5, 2.0, 3.0)]
     mark_fronts(rows, higher_is_better=True)
@@ -103,7 +105,7 @@ def test_a_delay_that_is_not_known_is_no_verdict_and_on_no_front():
 
 
 def test_quartiles_and_rows_are_those_of_the_times():
-    found = timed(contestant(Hours(), "a"), Timing([5.0, 1.0, 3.0, 2.0, 4.0], [2.0], [0.004]), {}, 5, 20.0)
+    found = timed(timed_estimator(Hours(), "a"), Timing([5.0, 1.0, 3.0, 2.0, 4.0], [2.0], [0.004]), {}, 5, 20.0)
     assert (found["fit_s_q1"], found["fit_s"], found["fit_s_q3"]) == (2.0, 3.0, 4.0)
     assert found["batch_s_per_row"] == 2.0 / 1000
     assert found["latency_ms_p50"] == 4.0

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tactbench.core.cost.precision import cheapest_below, diagrams, precise, verdict
 from tactbench.core.cost.precision_figure import draw
-from tactbench.plugin import CostPoint
+from tactbench.plugin.simulation import CostPoint
 
 
 def _point(seconds, error, *, default=False, floor=0.3, label="way", observable="taxel"):

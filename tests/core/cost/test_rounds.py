@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from tactbench.core.cost.contestants import Contestant
 from tactbench.core.cost.ladder_rows import timed
 from tactbench.core.cost.rounds import REPEATS, WARM_UP_ROWS, measure
+from tactbench.core.cost.timed_estimators import TimedEstimator
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.progress import Silence
 
@@ -53,22 +53,22 @@ class Worker:
         return np.zeros(len(X))
 
 
-def contestant(clock, name, *, fit_s=512 * BINARY, batch_s=256 * BINARY, row_s=BINARY, **more):
+def timed_estimator(clock, name, *, fit_s=512 * BINARY, batch_s=256 * BINARY, row_s=BINARY, **more):
     rows = np.zeros((N, 2))
-    return Contestant(
+    return TimedEstimator(
         name=name, build=lambda: Worker(clock, name, fit_s, batch_s, row_s, **more), fold="roles", X_train=rows,
         y_train=np.zeros(N), X_test=rows, y_test=np.ones(N), n_classes=0, metric=metric_called("rmse"), trained_on=(),
     )  # fmt: skip
 
 
-def run(clock, *contestants, rounds=5, budget_s=20.0, threads=1):
-    named = {one.name: one for one in contestants}
+def run(clock, *timed_estimators, rounds=5, budget_s=20.0, threads=1):
+    named = {one.name: one for one in timed_estimators}
     return measure(named, rounds=rounds, budget_s=budget_s, threads=threads, seed=3, clock=clock, progress=Silence())
 
 
 def test_what_took_so_long_is_said_to_have_taken_so_long():
     clock = Hours()
-    found = run(clock, contestant(clock, "a"), contestant(clock, "b", fit_s=2.0, batch_s=0.5, row_s=0.25))
+    found = run(clock, timed_estimator(clock, "a"), timed_estimator(clock, "b", fit_s=2.0, batch_s=0.5, row_s=0.25))
     assert found["a"].fit_s == [512 * BINARY] * 5
     assert found["a"].batch_s == [256 * BINARY] * 5
     assert set(found["a"].latency_s) == {BINARY}
@@ -81,7 +81,7 @@ def test_what_took_so_long_is_said_to_have_taken_so_long():
 def test_everybody_has_one_turn_in_every_round_and_not_always_in_the_same_order():
     clock = Hours()
     names = ["a", "b", "c", "d"]
-    run(clock, *(contestant(clock, name) for name in names))
+    run(clock, *(timed_estimator(clock, name) for name in names))
     turns = [name for name, what, _ in clock.log if what == "fit"]
     rounds = [turns[place : place + 4] for place in range(0, 20, 4)]
     assert all(sorted(one) == names for one in rounds)
@@ -91,15 +91,15 @@ def test_everybody_has_one_turn_in_every_round_and_not_always_in_the_same_order(
 def test_nobody_collects_garbage_while_a_clock_runs_and_everybody_may_afterwards():
     clock = Hours()
     assert gc.isenabled()
-    run(clock, contestant(clock, "a", broken_fit=2), contestant(clock, "b"))
+    run(clock, timed_estimator(clock, "a", broken_fit=2), timed_estimator(clock, "b"))
     assert not any(collecting for _, _, collecting in clock.log)
     assert gc.isenabled()
 
 
 def test_a_fit_beyond_the_budget_is_done_once_and_its_row_says_so():
     clock = Hours()
-    slow = contestant(clock, "slow", fit_s=21.0, batch_s=22.0)
-    found = run(clock, slow, contestant(clock, "a"))
+    slow = timed_estimator(clock, "slow", fit_s=21.0, batch_s=22.0)
+    found = run(clock, slow, timed_estimator(clock, "a"))
     assert found["slow"].fit_s == [21.0]
     assert found["slow"].batch_s == [22.0]
     assert len(found["slow"].latency_s) == 5 * 200
@@ -113,7 +113,7 @@ def test_a_fit_beyond_the_budget_is_done_once_and_its_row_says_so():
 
 def test_an_estimator_that_breaks_ends_its_own_timing_only():
     clock = Hours()
-    found = run(clock, contestant(clock, "weak", broken_fit=3), contestant(clock, "a"))
+    found = run(clock, timed_estimator(clock, "weak", broken_fit=3), timed_estimator(clock, "a"))
     assert str(found["weak"].trouble) == "broken"
     assert len(found["weak"].fit_s) == 2
     assert found["a"].trouble is None
@@ -123,7 +123,7 @@ def test_an_estimator_that_breaks_ends_its_own_timing_only():
 def test_a_short_fit_is_repeated_so_that_one_interruption_is_not_all_that_is_measured():
     clock = Hours()
     interrupted = (1.0 if place % REPEATS == 3 else BINARY for place in range(10**6))
-    found = run(clock, contestant(clock, "a", fit_s=interrupted), rounds=1)
+    found = run(clock, timed_estimator(clock, "a", fit_s=interrupted), rounds=1)
     assert found["a"].fit_s == [BINARY]
     fits = sum(what == "fit" for _, what, _ in clock.log)
     assert fits == 4, "the interruption itself used up the time for repeats"
@@ -138,8 +138,8 @@ def test_what_a_library_does_once_is_no_part_of_a_fit():
             self.clock.now += next(imports, 0.0)
             super().fit(X, y)
 
-    one = contestant(clock, "a")
-    late = Contestant(**{**one.__dict__, "build": lambda: Late(clock, "a", 1.0, 1.0, 1.0)})
+    one = timed_estimator(clock, "a")
+    late = TimedEstimator(**{**one.__dict__, "build": lambda: Late(clock, "a", 1.0, 1.0, 1.0)})
     assert run(clock, late)["a"].fit_s == [1.0] * 5
     assert clock.now > 300.0
 
@@ -153,15 +153,15 @@ def test_numerical_libraries_keep_to_the_threads_that_are_stated(threads):
             super()._work(what)
             seen.append(max(pool["num_threads"] for pool in threadpool_info()))
 
-    one = contestant(clock, "a")
+    one = timed_estimator(clock, "a")
     counting = Counting(clock, "a", 1.0, 1.0, 1.0)
-    run(clock, Contestant(**{**one.__dict__, "build": lambda: counting}), rounds=1, threads=threads)
+    run(clock, TimedEstimator(**{**one.__dict__, "build": lambda: counting}), rounds=1, threads=threads)
     assert set(seen) == {threads}
 
 
 def test_a_model_that_is_not_the_scored_one_is_told_of():
     clock = Hours()
-    one = contestant(clock, "a")
+    one = timed_estimator(clock, "a")
     times = run(clock, one, rounds=1)["a"]
     # Noughts against ones: an rmse of exactly 1.
     assert timed(one, times, {"fold roles": 1.0}, 1, 20.0)["notes"] == []

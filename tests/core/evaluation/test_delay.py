@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.acquisition import acquire
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, reading_delay_ms
 from tactbench.core.evaluation.protocols import PROTOCOLS, protocol_called
@@ -118,9 +118,9 @@ def test_what_is_not_known_is_absent_and_said(tmp_path):
 def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_readings(tmp_path):
     ticks = itertools.count()
     result = evaluate(
-        TASK, estimator(), {}, "deployable-untared", "roles", pressed(tmp_path / "a"), seed=1,
-        clock=lambda: next(ticks) * 2.0**-10,
-    )  # fmt: skip
+        CellContext(TASK, estimator(), {}, "deployable-untared", "roles", seed=1, clock=lambda: next(ticks) * 2.0**-10),
+        pressed(tmp_path / "a"),
+    )
     # One tick passes between the two looks at the clock around each call.
     tick_ms = 1e3 * 2.0**-10
     assert result.delay_parts_ms == pytest.approx(
@@ -134,16 +134,29 @@ def test_the_delay_of_a_cell_is_the_sum_of_its_parts_on_a_clock_that_counts_read
 
 def test_an_answer_that_looks_at_no_reading_waits_for_none(tmp_path):
     mean = load_registry().estimators["mean"]
-    result = evaluate(TASK, mean, {}, "deployable-untared", "roles", pressed(tmp_path / "a"), seed=1,
-                      clock=itertools.count().__next__)  # fmt: skip
+    result = evaluate(
+        CellContext(TASK, mean, {}, "deployable-untared", "roles", seed=1, clock=itertools.count().__next__),
+        pressed(tmp_path / "a"),
+    )
     assert set(result.delay_parts_ms) == {"prediction"}
     assert result.answer_delay_ms == result.latency_ms_p50
     assert NO_LINK not in result.remarks
 
 
 def test_without_the_times_of_a_machine_there_is_no_sum(tmp_path):
-    result = evaluate(TASK, estimator(), {}, "deployable-untared", "roles", pressed(tmp_path / "a"), seed=1,
-                      clock=itertools.count().__next__, latency=False)  # fmt: skip
+    result = evaluate(
+        CellContext(
+            TASK,
+            estimator(),
+            {},
+            "deployable-untared",
+            "roles",
+            seed=1,
+            clock=itertools.count().__next__,
+            latency=False,
+        ),
+        pressed(tmp_path / "a"),
+    )
     assert set(result.delay_parts_ms) == {"sampling", "window"}
     assert result.answer_delay_ms is None
     assert NO_LINK not in result.remarks

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.plugins.registry import load_registry
 from tests.core.evaluation.made import force_task, label_task, record
 
@@ -28,14 +28,10 @@ def grasps(folder, *, offset, each=12, n=20, seed=3):
 
 def run(paths, protocol="first-frame", split=None, task=TASK):
     return evaluate(
-        task,
-        REGISTRY.estimators["forest"],
-        {"n_estimators": 10},
-        protocol,
-        split,
+        CellContext(
+            task, REGISTRY.estimators["forest"], {"n_estimators": 10}, protocol, split, seed=1, clock=time.perf_counter
+        ),
         paths,
-        seed=1,
-        clock=time.perf_counter,
     )
 
 

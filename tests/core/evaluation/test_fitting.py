@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError, UsageError
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.fitting import answers, fit
 from tactbench.core.plugins.registry import load_registry
 
@@ -71,14 +71,16 @@ def test_data_an_estimator_refuses_is_an_error_with_its_name():
 def test_an_estimator_of_the_other_kind_is_refused(tmp_path):
     path = record(tmp_path / "a.h5", *ramp(0, n=100))
     with pytest.raises(UsageError, match="'majority' does classification"):
-        evaluate(force_task(), ESTIMATORS["majority"], {}, "deployable", None, [path], seed=0, clock=ticking())
+        evaluate(
+            CellContext(force_task(), ESTIMATORS["majority"], {}, "deployable", None, seed=0, clock=ticking()), [path]
+        )
 
 
 def test_recordings_without_roles_skip_the_papers_protocol(tmp_path):
     """Foreign recordings have no roles: the cell is skipped with the reason, it does not fail."""
     paths = [record(tmp_path / f"{name}.h5", *ramp(0), session=name) for name in "ab"]
     with pytest.raises(NotApplicable, match="roles"):
-        evaluate(force_task(), ESTIMATORS["mean"], {}, "karl2016", None, paths, seed=0, clock=ticking())
+        evaluate(CellContext(force_task(), ESTIMATORS["mean"], {}, "karl2016", None, seed=0, clock=ticking()), paths)
 
 
 def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
@@ -88,11 +90,16 @@ def test_a_score_that_is_undefined_is_left_out_or_refused_never_nan(tmp_path):
         record(tmp_path / "b.h5", X, np.full(200, 2.0), session="b", role="test"),
     ]
     task = force_task(protocols=("deployable",))
-    result = evaluate(task, ESTIMATORS["mean"], {}, "deployable", "roles", paths, seed=0, clock=ticking())
+    result = evaluate(CellContext(task, ESTIMATORS["mean"], {}, "deployable", "roles", seed=0, clock=ticking()), paths)
     assert "r2" not in result.scores
     assert np.isfinite(list(result.scores.values())).all()
     with pytest.raises(DataError, match="r2 of 200 test rows is undefined"):
-        evaluate(force_task(metric="r2"), ESTIMATORS["mean"], {}, "deployable", "roles", paths, seed=0, clock=ticking())
+        evaluate(
+            CellContext(
+                force_task(metric="r2"), ESTIMATORS["mean"], {}, "deployable", "roles", seed=0, clock=ticking()
+            ),
+            paths,
+        )
 
 
 def test_folds_that_choose_differently_are_reported_each(tmp_path):
@@ -102,7 +109,9 @@ def test_folds_that_choose_differently_are_reported_each(tmp_path):
     for place, noise in enumerate((0.1, 3.0, 0.1, 3.0)):
         X, force = ramp(place, n=300, noise=20.0 * noise)
         paths.append(record(tmp_path / f"{place}.h5", X, force + rng.normal(0, noise, 300), session=str(place)))
-    result = evaluate(force_task(), ESTIMATORS["ridge"], {}, "deployable", None, paths, seed=0, clock=ticking())
+    result = evaluate(
+        CellContext(force_task(), ESTIMATORS["ridge"], {}, "deployable", None, seed=0, clock=ticking()), paths
+    )
     allowed = {"alpha": ESTIMATORS["ridge"].grid["alpha"], "k": ESTIMATORS["ridge"].window_grid}
     assert any(" of fold " in name for name in result.chosen), result.chosen
     for name, value in result.chosen.items():
@@ -114,11 +123,20 @@ def test_the_same_seed_gives_the_same_score_bit_by_bit_with_one_thread_or_two(tm
              for place, name in enumerate("ab")]  # fmt: skip
     results = [
         evaluate(
-            force_task(), ESTIMATORS["forest"], {"n_estimators": 20}, "deployable", None, paths, seed=seed,
-            clock=ticking(), threads=threads,
+            CellContext(
+                force_task(),
+                ESTIMATORS["forest"],
+                {"n_estimators": 20},
+                "deployable",
+                None,
+                seed=seed,
+                clock=ticking(),
+                threads=threads,
+            ),
+            paths,
         )
         for seed, threads in ((0, 1), (0, 2), (0, 2), (1, 1))
-    ]  # fmt: skip
+    ]
     first, second, third, other = results
     assert np.array_equal(first.sets["test"].y_pred, second.sets["test"].y_pred)
     assert np.array_equal(second.sets["test"].y_pred, third.sets["test"].y_pred)
@@ -132,6 +150,8 @@ def test_curvature_rows_of_a_single_class_each_are_answered_by_a_class(tmp_path)
                labels={"kind": float(cap)})
         for seed, (role, cap) in enumerate((r, c) for r in ("train", "validation", "test") for c in (1, 2))
     ]  # fmt: skip
-    result = evaluate(label_task(), ESTIMATORS["chance"], {}, "karl2016", None, paths, seed=3, clock=ticking())
+    result = evaluate(
+        CellContext(label_task(), ESTIMATORS["chance"], {}, "karl2016", None, seed=3, clock=ticking()), paths
+    )
     # Uniform over two classes: 0.5, standard deviation 0.5 / sqrt(2000) = 0.011; five of them.
     assert result.scores["accuracy"] == pytest.approx(0.5, abs=0.056)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.protocols import KARL2016
 from tactbench.core.evaluation.selection import select
-from tactbench.core.evaluation.sets import Scale, keep, part
+from tactbench.core.evaluation.sets import FeatureScale, keep, part
 from tactbench.core.evaluation.splits import make_splits
 from tactbench.core.plugins.registry import load_object, load_registry
 
@@ -45,7 +45,7 @@ def sets(paths, role, k=0):
     (assignment,) = make_splits(data, "roles", 0)
     counts = Counter()
     kept = keep(data, KARL2016, getattr(assignment, role), role, counts)
-    return data, kept, part(kept, Scale.of(kept.X), k), counts
+    return data, kept, part(kept, FeatureScale.of(kept.X), k), counts
 
 
 def test_the_first_600_samples_are_dropped(tmp_path):
@@ -100,16 +100,25 @@ def test_a_channel_that_never_changes_becomes_zero_and_is_reported(tmp_path):
 
 def test_the_window_is_the_mean_over_t_minus_k_to_t_within_one_recording(tmp_path):
     _, kept, one, _ = sets(three(tmp_path, ramp), "train", k=20)
-    z = Scale.of(kept.X)(kept.X)
+    z = FeatureScale.of(kept.X)(kept.X)
     for t in (0, 1, 19, 20, 21, 999):
         np.testing.assert_allclose(one.X[t], z[max(0, t - 20) : t + 1].mean(axis=0), atol=1e-12)
 
 
 def run(paths, estimator="lasso", task=None, **more):
     return evaluate(
-        task or force_task(), ESTIMATORS[estimator], more.pop("params", {}), "karl2016", more.pop("split", None), paths,
-        seed=more.pop("seed", 0), clock=ticking(), **more,
-    )  # fmt: skip
+        CellContext(
+            task or force_task(),
+            ESTIMATORS[estimator],
+            more.pop("params", {}),
+            "karl2016",
+            more.pop("split", None),
+            seed=more.pop("seed", 0),
+            clock=ticking(),
+            **more,
+        ),
+        paths,
+    )
 
 
 def test_lasso_on_one_perfect_feature_is_wrong_by_exactly_lambda(tmp_path):

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.mapping import import_tables
@@ -40,9 +40,17 @@ def grasps(shared_data, tmp_path_factory):
 def run(task, data, split, estimator="forest", protocol="deployable"):
     params = {"n_estimators": 30} if estimator == "forest" else {}
     return evaluate(
-        REGISTRY.tasks[task].spec, REGISTRY.estimators[estimator], params, protocol, split, [],
-        seed=0, clock=time.perf_counter, dataset=data,
-    )  # fmt: skip
+        CellContext(
+            REGISTRY.tasks[task].spec,
+            REGISTRY.estimators[estimator],
+            params,
+            protocol,
+            split,
+            seed=0,
+            clock=time.perf_counter,
+        ),
+        data,
+    )
 
 
 def folds(result):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.evaluation.reference_floor import (
@@ -16,7 +16,7 @@ from tactbench.core.evaluation.reference_floor import (
     true_force,
 )
 from tactbench.core.evaluation.replicate_sums import summed
-from tactbench.core.evaluation.replication import Units
+from tactbench.core.evaluation.replication import ReplicateUnits
 from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Answers
 from tactbench.core.spec.drive import ForceLoop
@@ -83,7 +83,7 @@ def asked(error, *, rows=4400, hold=600, recordings=1, seed=0, sigma=SIGMA):
     row = np.tile(np.arange(hold, hold + rows), recordings)
     answers = Answers(y, predicted, recording, row, np.zeros(n, dtype=np.int64), row / 83.3, y)
     holds = {place: hold_of(sigma * rng.standard_normal(hold)) for place in range(recordings)}
-    unit = Units("session", recording, tuple(f"s{place}" for place in range(recordings)))
+    unit = ReplicateUnits("session", recording, tuple(f"s{place}" for place in range(recordings)))
     return answers, unit, Floor(holds)
 
 
@@ -176,7 +176,9 @@ TASK = force_task(protocols=("deployable",), splits=("roles",))
 
 def result_of(paths, task=TASK):
     estimator = installed().estimators["ols" if task.kind == "regression" else "logistic"]
-    return evaluate(task, estimator, {}, "deployable", "roles", paths, seed=1, clock=lambda: 0.0, latency=False)
+    return evaluate(
+        CellContext(task, estimator, {}, "deployable", "roles", seed=1, clock=lambda: 0.0, latency=False), paths
+    )
 
 
 def test_a_cell_tells_its_floor_and_the_error_against_the_true_force(tmp_path):
@@ -240,4 +242,6 @@ def test_other_metrics_and_labels_have_no_floor(tmp_path):
     tested = Answers(table.y, table.y, np.full(n, 2), table.row, np.zeros(n, dtype=np.int64), table.time_s, table.y)
     assert reference_floor(TASK, METRICS["mae"], data, tested) == (None, "")
     assert reference_floor(label_task(), METRICS["macro_f1"], data, tested) == (None, "")
-    assert "floor" not in summed(METRICS["mae"], tested, Units("session", np.zeros(n, dtype=np.int64), ("a",)), data)
+    assert "floor" not in summed(
+        METRICS["mae"], tested, ReplicateUnits("session", np.zeros(n, dtype=np.int64), ("a",)), data
+    )

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import DataError, NotApplicable, UsageError
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.protocols import DEPLOYABLE
-from tactbench.core.evaluation.sets import Scale, keep, part
+from tactbench.core.evaluation.sets import FeatureScale, keep, part
 from tactbench.core.evaluation.splits import choose_split, make_splits
 from tactbench.core.evaluation.windows import causal_mean
 
@@ -34,8 +34,19 @@ def grasps(folder, role=None, objects=12, each=20, seed=0):
 
 
 def run(paths, split=None, task=None, estimator="forest", **more):
-    return evaluate(task or force_task(), ESTIMATORS[estimator], more.pop("params", {"n_estimators": 10}), "deployable",
-                    split, paths, seed=0, clock=ticking(), **more)  # fmt: skip
+    return evaluate(
+        CellContext(
+            task or force_task(),
+            ESTIMATORS[estimator],
+            more.pop("params", {"n_estimators": 10}),
+            "deployable",
+            split,
+            seed=0,
+            clock=ticking(),
+            **more,
+        ),
+        paths,
+    )
 
 
 @pytest.mark.parametrize("split", ["session", "in-session", "shuffled", "object"])
@@ -90,10 +101,10 @@ def test_a_window_never_reaches_across_a_split(tmp_path_factory, k, seed):
     from collections import Counter
 
     for fold in make_splits(data, split, 0):
-        before = part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), Scale(np.zeros(3), np.ones(3)), k)
+        before = part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), FeatureScale(np.zeros(3), np.ones(3)), k)
         for table, test in zip(data.tables, fold.test, strict=True):
             table.X[test] += rng.normal(size=(int(test.sum()), 3)) * 1e6
-        after = part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), Scale(np.zeros(3), np.ones(3)), k)
+        after = part(keep(data, DEPLOYABLE, fold.train, "t", Counter()), FeatureScale(np.zeros(3), np.ones(3)), k)
         assert np.array_equal(before.X, after.X)
 
 
@@ -143,7 +154,7 @@ def test_deployable_scales_by_training_data_only(tmp_path):
     result = run(paths, estimator="ridge", params={})
     for table in data.tables:
         table.X[:] = table.X  # same data: the same score
-    assert run(paths, estimator="ridge", params={}, dataset=data).score == result.score
+    assert run(data, estimator="ridge", params={}).score == result.score
     from collections import Counter
 
     from tactbench.core.evaluation.selection import scales
@@ -232,6 +243,6 @@ def test_a_dropped_out_row_is_skipped_by_the_window_which_does_not_start_anew(tm
     paths = [record(tmp_path / f"{name}.h5", X, force, session=name) for name in "ab"]
     data = load_dataset(force_task(), paths)
     one = part(keep(data, DEPLOYABLE, make_splits(data, "session", 0)[0].train, "t", Counter()),
-               Scale(np.zeros(3), np.ones(3)), 5)  # fmt: skip
+               FeatureScale(np.zeros(3), np.ones(3)), 5)  # fmt: skip
     after = int(np.flatnonzero(one.row == 52)[0])
     np.testing.assert_allclose(one.X[after], X[[46, 47, 48, 49, 51, 52]].mean(axis=0), rtol=1e-12)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.evaluation.cell import NOT_TARED, evaluate
+from tactbench.core.evaluation.cell import NOT_TARED, CellContext, evaluate
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.preparation import prepared
 from tactbench.core.evaluation.protocols import DEPLOYABLE, DEPLOYABLE_UNTARED
@@ -43,7 +43,9 @@ def three(folder, offsets=(0.0, 0.0, 0.0), **how):
 
 
 def answered(paths, protocol, estimator="ols"):
-    return evaluate(TASK, installed().estimators[estimator], {}, protocol, "roles", paths, seed=1, clock=lambda: 0.0)
+    return evaluate(
+        CellContext(TASK, installed().estimators[estimator], {}, protocol, "roles", seed=1, clock=lambda: 0.0), paths
+    )
 
 
 def test_constant_offsets_of_recordings_change_nothing_where_they_are_tared(tmp_path):

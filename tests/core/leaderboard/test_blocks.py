@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.formats import to_csv, to_json, to_latex, to_markdown
+from tactbench.core.leaderboard.formats import plain_text
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
 from tactbench.core.leaderboard.view import WHOLE
+from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown
 
 from .rows import row
 from .strategies import some_rows
@@ -34,7 +34,7 @@ def test_equal_scores_stand_in_the_order_of_their_cells_however_they_come():
 @given(some_rows(most=8))
 def test_every_row_is_one_line_and_no_block_mixes_what_is_not_comparable(rows):
     blocks = build_table(rows).blocks
-    assert sorted(line.cell for block in blocks for line in block.lines) == sorted(one["cell"] for one in rows)
+    assert sorted(line.row["cell"] for block in blocks for line in block.lines) == sorted(one["cell"] for one in rows)
     for block in blocks:
         done = [line.row for line in block.lines if line.row["status"] == "done"]
         assert len({(one["task"], one["protocol"], one["split"], one["simulated"]) for one in done}) <= 1

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.leaderboard.checked import checked
-from tactbench.core.leaderboard.formats import to_csv, to_json, to_latex, to_markdown, to_parquet
+from tactbench.core.leaderboard.formats import plain_text
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
+from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown, to_parquet
 
 from .rows import row
 from .strategies import some_rows

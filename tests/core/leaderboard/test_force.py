@@ -3,9 +3,9 @@
 import pytest
 
 from tactbench.core.leaderboard.columns import COLUMNS, IF_KNOWN
-from tactbench.core.leaderboard.formats import to_markdown
 from tactbench.core.leaderboard.records import records
 from tactbench.core.leaderboard.table import build_table
+from tests.core.leaderboard.rendering import to_markdown
 
 from .rows import row
 

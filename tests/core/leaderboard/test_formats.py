@@ -14,18 +14,17 @@ from rich.cells import cell_len
 
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
-from tactbench.core.leaderboard.csv_text import csv_text, guarded, unguarded
-from tactbench.core.leaderboard.fitting import pieces
-from tactbench.core.leaderboard.formats import to_csv, to_json, to_latex, to_markdown, to_page, to_parquet
-from tactbench.core.leaderboard.latex import COLUMN_PT, latex, points
-from tactbench.core.leaderboard.markdown import markdown
+from tactbench.core.leaderboard.formats import csv_text, markdown, plain_text
+from tactbench.core.leaderboard.latex import COLUMN_PT, latex
 from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, OF_THE_MACHINE, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids, notes, sections
+from tactbench.core.tables.csv_text import guarded, unguarded
+from tactbench.core.tables.fitting import pieces
+from tactbench.core.tables.latex import points
+from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown, to_page, to_parquet
 
-from .board.reading import planes, read_page
-from .board.reading import texts as texts_of
+from .board.reading import read_page, values
 from .rows import row
 from .strategies import HOSTILE, some_rows, texts
 from .tex import as_set, untex
@@ -188,14 +187,11 @@ def test_nothing_is_cut_off_or_broken_within_a_word(rows, width, view):
 @settings(max_examples=30)
 @given(some_rows())
 def test_the_page_shows_the_cells_of_the_table(rows):
-    head, blobs = read_page(to_page(rows))
+    head, columns, _ = read_page(to_page(rows))
     table = build_table(rows)
-    shown = [texts_of(blobs, column["column"]) or [""] * len(rows) for column in head["columns"]]
-    assert tuple(column["name"] for column in head["columns"]) == table.columns
-    cells = list(zip(*shown, strict=True))
-    assert [one_spaced(cells[place]) for place in planes(blobs, head["order"])] == [
-        one_spaced(line) for line in lines_of(table)
-    ]
+    assert tuple(columns) == table.columns
+    cells = list(zip(*map(values, columns.values()), strict=True))
+    assert [one_spaced(cells[place]) for place in head["order"]] == [one_spaced(line) for line in lines_of(table)]
 
 
 @given(texts)

@@ -1,7 +1,6 @@
 """Times of different hosts are never mistaken for comparable; scores do not depend on the host."""
 
 from tactbench.core.leaderboard.hosts import host_letters
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import build_table
 
 from .rows import row
@@ -32,8 +31,8 @@ def test_hosts_share_a_ranking_and_every_time_says_whose_it_is():
 
 def test_letters_depend_on_the_hosts_alone_and_go_on_after_z():
     rows = [row(host=f"h{n:02d}") for n in range(28)]
-    letters = host_letters(Sheet(rows))
-    assert letters == host_letters(Sheet(rows[::-1]))
+    letters = host_letters(rows)
+    assert letters == host_letters(rows[::-1])
     assert (letters["h00"], letters["h25"], letters["h26"], letters["h27"]) == ("A", "Z", "AA", "AB")
 
 
@@ -45,7 +44,7 @@ def test_a_host_without_a_name_or_provenance_is_told_apart_too():
 
 def test_a_cell_that_failed_elsewhere_has_no_times_to_mark():
     rows = [row(host="h1"), row("b", host="h2", status="failed", score=None, reason="no")]
-    assert host_letters(Sheet(rows)) == {}
+    assert host_letters(rows) == {}
 
 
 def test_cells_timed_beside_others_say_so():
@@ -63,4 +62,4 @@ def test_without_times_there_are_no_hosts():
     rows = [row(host="h1", concurrency=4), row("b", host="h2")]
     table = build_table(rows, KNOWN, times=False)
     assert not {"sim", "fit", "latency p50", "p95", "batch/row"} & set(table.columns)
-    assert not [note for note in (*table.notes, *table.foot) if "h1" in note or "timed" in note]
+    assert not [note for note in (*table.notes, *table.footer) if "h1" in note or "timed" in note]

@@ -1,25 +1,15 @@
-"""Means over tasks: of what, of what not, and computed once."""
-
-import json
+"""Means over tasks: of what, and of what not."""
 
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard import memo
-from tactbench.core.leaderboard.formats import to_latex, to_markdown
+from tactbench.core.leaderboard.formats import plain_text
 from tactbench.core.leaderboard.over_tasks import over_tasks
-from tactbench.core.leaderboard.sheet import Sheet
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
 from tactbench.core.statistics.aggregate import aggregate
+from tests.core.leaderboard.rendering import to_latex, to_markdown
 
 from .rows import resampled, row
-
-
-@pytest.fixture(autouse=True)
-def _forgetful(monkeypatch):
-    monkeypatch.setattr(memo, "_known", {})
-    monkeypatch.setattr(memo, "_added", set())
 
 
 @pytest.fixture
@@ -33,7 +23,7 @@ def rows():
 
 
 def test_each_answer_to_several_tasks_has_its_mean(rows):
-    section = over_tasks(Sheet(rows))
+    section = over_tasks(rows)
     assert [line[0] for line in section.lines] == ["a SIM", "b SIM"]
     for line, members in zip(section.lines, (rows[:2], rows[2:]), strict=True):
         mean = aggregate(members)
@@ -44,34 +34,14 @@ def test_each_answer_to_several_tasks_has_its_mean(rows):
 
 
 def test_what_does_not_stand_for_a_task_is_not_in_it(rows):
-    assert over_tasks(Sheet(rows[::2])) is None
-    assert over_tasks(Sheet([row(task="force"), row(task="shear")])) is None
+    assert over_tasks(rows[::2]) is None
+    assert over_tasks([row(task="force"), row(task="shear")]) is None
     for change in ({"is_baseline": True}, {"split": "shuffled"}, {"protocol": "first-frame"}, {"status": "failed"}):
-        assert over_tasks(Sheet([rows[0] | change, rows[1]])) is None
-    assert over_tasks(Sheet([rows[0], rows[0] | {"split": "unit", "cell": "other"}, rows[1]])) is None
-    assert over_tasks(Sheet([rows[0] | {"baseline": None}, rows[1]])) is None
-
-
-def test_a_mean_is_found_again_and_a_forged_one_is_not_taken(rows, tmp_path):
-    (tmp_path / "cache").mkdir()
-    first = over_tasks(Sheet(rows))
-    memo.save(tmp_path)
-    path = tmp_path / memo.FILE
-    kept = json.loads(path.read_text())
-    assert len(kept) == 2
-    for forged in ("x", [1.0, 2.0, 0.0, 2, []], [1.0, 0.0, 2.0, 2, [3]], [None, 0.0, 1.0, 2, []]):
-        path.write_text(json.dumps(dict.fromkeys(kept, forged)))
-        memo._known.clear()
-        memo.load(tmp_path)
-        assert over_tasks(Sheet(rows)) == first
-    path.write_text(json.dumps(kept))
-    memo._known.clear()
-    memo.load(tmp_path)
-    memo._added.clear()
-    assert over_tasks(Sheet(rows)) == first
-    assert memo._added == set()
+        assert over_tasks([rows[0] | change, rows[1]]) is None
+    assert over_tasks([rows[0], rows[0] | {"split": "unit", "cell": "other"}, rows[1]]) is None
+    assert over_tasks([rows[0] | {"baseline": None}, rows[1]]) is None
 
 
 def test_replicates_of_strangers_are_no_traceback(rows):
     for nonsense in ({"sums": "x"}, {"unit": 3, "names": None, "strata": "a", "sums": [[1], "b"]}, {"sums": [[]]}):
-        assert over_tasks(Sheet([row | {"replicates": nonsense} for row in rows])) is None
+        assert over_tasks([row | {"replicates": nonsense} for row in rows]) is None

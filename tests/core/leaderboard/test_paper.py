@@ -6,9 +6,10 @@ import subprocess
 
 import pytest
 
-from tactbench.core.leaderboard.latex import COLUMN_PT, latex, points
+from tactbench.core.leaderboard.latex import COLUMN_PT, latex
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import WHOLE
+from tactbench.core.tables.latex import points
 
 from .rows import row
 from .test_force import KNOWN
@@ -78,7 +79,7 @@ def test_it_compiles_and_no_box_is_overfull(tmp_path, view):
     "text", ["0.6928 †", "0.0000 … 0.2208", "lasso (lambda_=0.2)", "biotac SIM", "RMSE [N]", "WMmw", "Ünïcode µ 中"]
 )
 def test_widths_are_those_that_latex_sets(tmp_path, text):
-    from tactbench.core.leaderboard.latex import tex
+    from tactbench.core.tables.latex import tex
 
     if shutil.which("pdflatex") is None:
         pytest.skip("there is no pdflatex")
@@ -92,3 +93,7 @@ def test_widths_are_those_that_latex_sets(tmp_path, text):
     # Letters are set closer in pairs than alone, by less than half a point each; never wider apart.
     assert found <= points(text) + 0.05
     assert points(text) <= found + 0.5 * len(text)
+
+
+def test_a_letter_that_is_set_by_its_number_is_as_wide_as_that():
+    assert points("Å") == points("U+00C5")

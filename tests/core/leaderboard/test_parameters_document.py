@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tactbench.core.leaderboard.datasheet import parameters_markdown
+from tactbench.core.report.datasheet import parameters_markdown
 from tactbench.plugin import load_registry
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "parameters.md"

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from tactbench.core.leaderboard.formats import to_latex, to_markdown
+from tactbench.core.leaderboard.formats import show
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import show
+from tests.core.leaderboard.rendering import to_latex, to_markdown
 from tests.core.leaderboard.rows import row
 
 

@@ -5,13 +5,13 @@ import json
 import pytest
 from rich.console import Console
 
-from tactbench.core.leaderboard.counts import told_counts
-from tactbench.core.leaderboard.formats import JSON_KEYS, to_csv, to_json, to_latex, to_markdown
-from tactbench.core.leaderboard.numbers import duration, score
-from tactbench.core.leaderboard.records import OF_REPLICATES, RANK_KEYS
+from tactbench.core.leaderboard.formats import show
+from tactbench.core.leaderboard.notes import count_texts
+from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import show
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE
+from tactbench.core.tables.numbers import duration, score
+from tests.core.leaderboard.rendering import to_csv, to_json, to_latex, to_markdown
 
 from .rows import row
 
@@ -119,7 +119,7 @@ def test_counts_are_summed_over_sets_and_the_busiest_channels_come_first():
         f"{one} rows with T{place} beyond three sigma": place for one in ("training", "test") for place in range(7)
     }
     counts |= {f"{one} rows before the press begins": 600 for one in ("training", "test")}
-    assert told_counts(counts) == [
+    assert count_texts(counts) == [
         "rows before the press begins: 1200",
         "rows beyond three sigma in T6 12, T5 10, T4 8, T3 6 and 3 more channels",
     ]
@@ -132,12 +132,12 @@ def test_latex_keeps_ordinary_spaces_and_sets_thin_ones_in_numbers():
 
 
 def test_notes_that_say_the_same_of_several_answers_are_one():
+
     from tactbench.core.leaderboard.notes import interval_notes
-    from tactbench.core.leaderboard.sheet import Sheet
 
     method = "block bootstrap in time within 5 recordings (blocks of {} rows): spread between sessions is not in it"
     rows = [{"task": "curvature", "is_baseline": False, "ci_method": method.format(blocks)} for blocks in (17, 198)]
-    (told,) = interval_notes(Sheet(rows))
+    (told,) = interval_notes(rows)
     assert told.endswith("within 5 recordings: spread between sessions is not in it.")
-    (alone,) = interval_notes(Sheet(rows[:1]))
+    (alone,) = interval_notes(rows[:1])
     assert "(blocks of 17 rows)" in alone

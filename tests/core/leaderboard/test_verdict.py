@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.formats import to_markdown
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.replicates import over_replicates
+from tests.core.leaderboard.rendering import to_markdown
 from tests.core.statistics.test_replicates import replicates
 
 RNG = np.random.default_rng(7)

@@ -7,12 +7,22 @@ import pytest
 
 from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.leaderboard.columns import COLUMNS
-from tactbench.core.leaderboard.fitting import fit, pieces, wrapped
-from tactbench.core.leaderboard.formats import to_markdown
+from tactbench.core.leaderboard.formats import plain_text
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.leaderboard.terminal import plain_text
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, best, commands, foot, grids, known_columns, notes
+from tactbench.core.leaderboard.view import (
+    DEFAULT_VIEW,
+    WHOLE,
+    View,
+    best,
+    commands,
+    footer,
+    grids,
+    known_columns,
+    notes,
+)
 from tactbench.core.leaderboard.xlsx import xlsx
+from tactbench.core.tables.fitting import fit, pieces, wrapped
+from tests.core.leaderboard.rendering import to_markdown
 
 from .rows import row
 from .test_force import KNOWN
@@ -96,9 +106,9 @@ def test_three_notes_are_shown_the_most_important_first_and_a_command_for_the_ot
 
 def test_the_provenance_is_one_line_unless_asked_for():
     table = build_table([row(made_by="x")], [{"tactbench": "1", "host": "h"}])
-    assert len(table.foot) == 3
-    assert foot(table, DEFAULT_VIEW) == table.foot[:1]
-    assert foot(table, WHOLE) == table.foot
+    assert len(table.footer) == 3
+    assert footer(table, DEFAULT_VIEW) == table.footer[:1]
+    assert footer(table, WHOLE) == table.footer
 
 
 def test_the_commands_name_folder_and_cell():
@@ -135,7 +145,7 @@ def test_the_best_of_each_sensor_keep_the_places_they_have_among_all():
 
 
 def to_markdown_of(table):
-    from tactbench.core.leaderboard.markdown import markdown
+    from tactbench.core.leaderboard.formats import markdown
 
     return markdown(table)
 

@@ -7,18 +7,8 @@ import math
 
 import numpy as np
 
-from tactbench.plugin import (
-    Block,
-    ChannelSpec,
-    DatagramLink,
-    DeviceDescriptor,
-    Driver,
-    LinkTimeout,
-    SensorDescriptor,
-    StreamSpec,
-    UsageError,
-    hookimpl,
-)
+from tactbench.plugin import Block, ChannelSpec, SensorDescriptor, StreamSpec, UsageError, hookimpl
+from tactbench.plugin.devices import DatagramLink, DeviceDescriptor, Driver, LinkTimeout
 from tactbench.sensors.ideal import SPEC
 
 TACTBENCH_API = 1

@@ -13,11 +13,14 @@ import pytest
 from tactbench.core.errors import DuplicateNameError, PluginError, UnknownNameError
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.registry import Registry, installed, load_object, load_registry
-from tactbench.plugin import DeviceDescriptor, SensorDescriptor
+from tactbench.plugin import SensorDescriptor
+from tactbench.plugin.devices import DeviceDescriptor
 from tactbench.sensors.ideal import SPEC as IDEAL
 
 HEAD = """
 from tactbench.plugin import *
+from tactbench.plugin.devices import DeviceDescriptor
+from tactbench.plugin.simulation import EffectDescriptor
 from tactbench.plugin import hookimpl
 from tactbench.tasks.force import SPEC as FORCE
 from tactbench.sensors.ideal import SPEC as IDEAL

@@ -10,7 +10,7 @@ import pytest
 
 from tactbench.core.errors import LinkError, TactbenchError, UnknownNameError, UsageError
 from tactbench.core.plugins.registry import load_registry
-from tactbench.plugin import (
+from tactbench.plugin.devices import (
     DatagramLink,
     DeviceEntry,
     EmulatedDevices,

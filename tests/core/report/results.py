@@ -1,6 +1,6 @@
 """A small result folder, made by the real command line, and a small real figure of it."""
 
-from tactbench.core.report.drawn import Drawn
+from tactbench.core.report.saved_figure import SavedFigure
 
 MATRIX = """\
 repeats: 1
@@ -30,7 +30,7 @@ def draw_one(material, folder, progress=None, remark=print):
     row, answers = next((row, found["test"]) for row in material.rows if (found := material.answers(row)))
     figure = Figure(figsize=(4, 3))
     figure.subplots().plot(answers.y_true, answers.y_pred, ".")
-    drawn = Drawn(
+    drawn = SavedFigure(
         "predicted-against-true", "Predicted against true", "Force: truth across, prediction upwards, newtons.",
         folder / "one.png", folder / "one.pdf", (row["key"],),
     )  # fmt: skip

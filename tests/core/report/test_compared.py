@@ -2,13 +2,13 @@ from tactbench.core.evaluation.protocols import FIRST_FRAME
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.compared import compared_section
-from tactbench.core.report.material import Material
-from tactbench.core.report.section import Subject
+from tactbench.core.report.results import Results
+from tactbench.core.report.section import ReportData
 from tests.core.leaderboard.rows import row
 
 
 def subject(folder, *rows):
-    return Subject(Material(Store(folder), load_registry(), rows))
+    return ReportData(Results(Store(folder), load_registry(), rows))
 
 
 def test_a_probe_s_numbers_lead_each_to_the_cell_they_are_from(tmp_path):
@@ -33,7 +33,7 @@ def test_protocols_side_by_side_lead_each_to_their_cell(tmp_path):
     rows += [row("c", cell="c-karl2016", protocol="karl2016")]  # asked in one way only: its other field is empty
     (table,) = compared_section(subject(tmp_path, *rows)).tables
     assert table.columns[2:] == ("karl2016", "deployable")
-    found = [(line[0].text, *(entry.anchor for entry in line[2:])) for line in table.lines]
+    found = [(line[0], *(entry.anchor for entry in line[2:])) for line in table.lines]
     assert sorted(found) == [
         ("a SIM", "cell-a-karl2016", "cell-a-deployable"),
         ("b SIM", "cell-b-karl2016", "cell-b-deployable"),

@@ -8,16 +8,15 @@ import time
 
 import pytest
 
-from tactbench.core.leaderboard.table import NUMERIC
+from tactbench.core.leaderboard.columns import NUMERIC, OF_ROWS
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.calibrated import Calibrated, Finding, Share
 from tactbench.core.report.costs import read_table
-from tactbench.core.report.drawn import Drawn
-from tactbench.core.report.leaderboards import VALUES
-from tactbench.core.report.material import Material, open_material
 from tactbench.core.report.page import make_page
-from tactbench.core.report.section import Subject
+from tactbench.core.report.results import Results, open_results
+from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.report.section import ReportData
 
 from .html import Reader
 from .results import draw_one
@@ -28,16 +27,16 @@ HOSTILE = "<script>alert('`x`')</script><img src=x onerror=alert(1)> & \"quoted\
 
 @pytest.fixture(scope="module")
 def material(results):
-    return open_material(Store(results), load_registry())
+    return open_results(Store(results), load_registry())
 
 
 @pytest.fixture
 def subject(material, tmp_path):
-    return Subject(material, draw_one(material, tmp_path))
+    return ReportData(material, draw_one(material, tmp_path))
 
 
 def test_the_same_results_give_the_same_bytes(subject, results, tmp_path):
-    again = Subject(open_material(Store(results), load_registry()), draw_one(subject.material, tmp_path))
+    again = ReportData(open_results(Store(results), load_registry()), draw_one(subject.results, tmp_path))
     assert make_page(subject).html.encode() == make_page(again).html.encode()
 
 
@@ -92,7 +91,7 @@ def test_everything_that_a_row_knows_is_on_the_page(subject):
 
 def test_a_key_that_nobody_has_thought_of_is_shown_too(material, tmp_path):
     row = {**material.rows[0], "novelty": "seen", "novel_table": {"depth": 3.25}, "novel_list": ["first", "second"]}
-    text = Reader(make_page(Subject(Material(material.store, material.registry, (row,)))).html).text
+    text = Reader(make_page(ReportData(Results(material.store, material.registry, (row,)))).html).text
     for told in ("novelty", "seen", "novel_table", "3.25", "novel_list", "second"):
         assert told in text
 
@@ -110,7 +109,7 @@ def test_text_from_plugins_is_text(material):
         "reason": HOSTILE, "remarks": [HOSTILE], "assumptions": {HOSTILE: HOSTILE}, "traceback": HOSTILE,
         "plan": [{HOSTILE: HOSTILE}], "counts": {HOSTILE: 1}, "split": HOSTILE, "simulated": True,
     }  # fmt: skip
-    page = make_page(Subject(Material(material.store, material.registry, (*material.rows, row))))
+    page = make_page(ReportData(Results(material.store, material.registry, (*material.rows, row))))
     read = Reader(page.html)
     assert page.broken == ()
     assert read.wrong == []
@@ -121,23 +120,23 @@ def test_text_from_plugins_is_text(material):
 
 def test_two_names_that_look_alike_have_two_anchors(material):
     rows = [{**material.rows[0], "cell": name} for name in ("A/b", "a-b", "a b", "")]
-    anchors = Subject(Material(material.store, material.registry, tuple(rows))).anchors
+    anchors = ReportData(Results(material.store, material.registry, tuple(rows))).anchors
     assert len(set(anchors.values())) == 4
 
 
 def test_every_column_of_numbers_has_something_to_be_sorted_by():
-    assert NUMERIC - set(VALUES) == {"#", "rank 95 %"}  # both are sorted by the place itself
+    assert NUMERIC - set(OF_ROWS) == {"#", "rank 95 %"}  # both are sorted by the place itself
 
 
 def test_what_is_missing_is_said_with_the_command_that_makes_it(material):
-    missing = "\n".join(make_page(Subject(material)).missing)
+    missing = "\n".join(make_page(ReportData(material)).missing)
     for command in ("tactbench calibrate", "tactbench cost --sensor icub --task force", "tactbench run"):
         assert f"`{command}`" in missing
 
 
 def test_a_section_that_cannot_be_made_takes_no_other_with_it(material, tmp_path):
-    gone = Drawn("gone", "Gone", "It was deleted.", tmp_path / "gone.png", tmp_path / "gone.pdf", ())
-    page = make_page(Subject(material, [gone]))
+    gone = SavedFigure("gone", "Gone", "It was deleted.", tmp_path / "gone.png", tmp_path / "gone.pdf", ())
+    page = make_page(ReportData(material, [gone]))
     assert len(page.broken) == 1
     assert page.broken[0].startswith("Figures: This section cannot be made from these results: FileNotFoundError")
     (lasso,) = (row for row in material.rows if row["estimator"] == "lasso" and row["status"] == "done")
@@ -147,13 +146,13 @@ def test_a_section_that_cannot_be_made_takes_no_other_with_it(material, tmp_path
 def test_findings_of_a_calibration_and_linear_against_non_linear(material):
     often = Share(0.84, 0.78, 0.89, 200)
     finding = Finding("The iCub is better at curvature.", Share(0.5, 0.4, 0.6, 400), often, "section IV", "by .05")
-    text = Reader(make_page(Subject(material, calibrated=Calibrated(findings=(finding,)))).html).text
+    text = Reader(make_page(ReportData(material, calibrated=Calibrated(findings=(finding,)))).html).text
     assert "The iCub is better at curvature. 84% (78% … 89%) of 200 50% (40% … 60%) of 400 section IV by .05" in text
     assert re.search(r"icub SIM, force, karl2016, roles lasso 0\.\d{4} \(.*?\) forest 0\.\d{4}", text)
 
 
 def test_cost_files_are_shown_whatever_their_keys(material, tmp_path):
-    subject, path = Subject(material), tmp_path / "icub-force.json"
+    subject, path = ReportData(material), tmp_path / "icub-force.json"
     lasso, forest = (row for row in material.rows if row["task"] == "force" and not row["is_baseline"])
     asked = {name: lasso[name] for name in ("sensor", "task", "rig", "protocol", "split", "seed")}
     rows = [
@@ -172,7 +171,7 @@ def test_cost_files_are_shown_whatever_their_keys(material, tmp_path):
     table = read_table(path, subject)
     assert (table.title, table.columns) == ("Cost: force", ("estimator", "fit_s", "front", "loop"))
     assert [line[1].value for line in table.lines] == [0.25, 1.5]
-    assert [line[2].text for line in table.lines] == ["yes", "no"]
+    assert [line[2] for line in table.lines] == ["yes", "no"]
     assert [line[1].anchor for line in table.lines] == [subject.anchors[row["cell"]] for row in (lasso, forest)]
     assert table.notes[0].startswith("Of all lines: title force, sensor icub, task force")
     assert table.notes[0].endswith("status done.")
@@ -192,7 +191,7 @@ def ladder_row(estimator, **more):
 
 
 def test_a_ladder_is_shown_as_the_terminal_shows_it_and_sorts_by_the_numbers_behind(material, tmp_path):
-    subject, path = Subject(material), tmp_path / "icub-force.json"
+    subject, path = ReportData(material), tmp_path / "icub-force.json"
     lasso = next(row for row in material.rows if row["task"] == "force" and row["estimator"] == "lasso")
     about = {name: lasso[name] for name in ("sensor", "task", "rig", "protocol", "split", "metric", "unit")}
     about |= {"version": 2, "remarks": [], "higher_is_better": False, "simulated": True, "dagger": True,
@@ -204,11 +203,11 @@ def test_a_ladder_is_shown_as_the_terminal_shows_it_and_sorts_by_the_numbers_beh
     table = read_table(path, subject)
     assert table.title.startswith("Cost: icub, force: RMSE, lower is better · karl2016 † · split roles · SIM")
     first, second = (dict(zip(table.columns, line, strict=True)) for line in table.lines)
-    assert (first["fit"].text, first["fit"].value) == ("250 ms", 0.25)
-    assert (first["100 Hz loop"].text, first["1 kHz loop"].text, first["front"].text) == ("yes", "no (sampling)", "fit")
-    assert (first["delay"].text, first["delay"].value) == ("8.50 ms", 8.5)
+    assert (first["fit"], first["fit"].value) == ("250 ms", 0.25)
+    assert (first["100 Hz loop"], first["1 kHz loop"], first["front"]) == ("yes", "no (sampling)", "fit")
+    assert (first["delay"], first["delay"].value) == ("8.50 ms", 8.5)
     assert first["score"].anchor == subject.anchors[lasso["cell"]]
-    assert second["remark"].text == "skipped: needs <it>"
+    assert second["remark"] == "skipped: needs <it>"
     assert table.kinds == ("result", "failed")
     path.write_text(json.dumps({**about, "rows": [{"estimator": "lasso"}]}))
     with pytest.raises(ValueError, match="make it again"):
@@ -220,13 +219,13 @@ def test_a_damaged_cost_file_is_named_and_takes_nothing_with_it(results, tmp_pat
     shutil.copytree(results, tmp_path / "copy", ignore=shutil.ignore_patterns("recordings"))
     (tmp_path / "copy" / "cost").mkdir()
     (tmp_path / "copy" / "cost" / "broken.json").write_text(text)
-    page = make_page(Subject(open_material(Store(tmp_path / "copy"), load_registry())))
+    page = make_page(ReportData(open_results(Store(tmp_path / "copy"), load_registry())))
     assert page.broken == ()
     assert "cost/broken.json cannot be shown" in page.html
 
 
 def test_a_number_leads_to_the_one_cell_that_it_can_be_from_or_to_none(material):
-    subject = Subject(material)
+    subject = ReportData(material)
     forest = next(row for row in material.rows if row["params"] and row["task"] == "force")
     told = {"sensor": "icub", "task": "force", "estimator": "forest"}
     assert subject.anchor_of({"cell": forest["cell"]}) == subject.anchors[forest["cell"]]
@@ -236,7 +235,7 @@ def test_a_number_leads_to_the_one_cell_that_it_can_be_from_or_to_none(material)
     assert subject.anchor_of({**told, "protocol": "deployable"}) == ""
     assert subject.anchor_of({"sensor": "icub"}) == ""
     assert subject.anchor_of({"key": None}) == ""
-    twice = Subject(Material(material.store, material.registry, (forest, {**forest, "cell": "another"})))
+    twice = ReportData(Results(material.store, material.registry, (forest, {**forest, "cell": "another"})))
     assert twice.anchor_of(told) == ""
 
 
@@ -244,7 +243,7 @@ def test_a_hundred_cells_take_less_than_a_second(material):
     copies = itertools.product(range(1, 13), material.rows)
     rows = [{**row, "cell": f"{row['cell']}-{copy}", "repeat": copy} for copy, row in copies]
     assert len(rows) >= 100
-    subject = Subject(Material(material.store, material.registry, tuple(rows[:100])))
+    subject = ReportData(Results(material.store, material.registry, tuple(rows[:100])))
     seconds = []
     for _ in range(3):
         began = time.process_time()  # of this process alone: what else runs on the machine is not asked
@@ -266,24 +265,24 @@ def replicated(material, scores):
             if one["status"] == "done":
                 own |= {"score": one["score"] * factor, "key": f"{one['key']}{place}"}
             rows.append({**one, **own})
-    return Material(material.store, material.registry, tuple(over_replicates(rows)))
+    return Results(material.store, material.registry, tuple(over_replicates(rows)))
 
 
 def test_the_page_opens_with_what_came_out_each_with_a_link(material):
-    few = make_page(Subject(material)).html
+    few = make_page(ReportData(material)).html
     opening = few[few.index('<section id="answers"') : few.index('<section id="reproduction"')]
     assert "Published numbers beside ours: 2; ours are of too few replicates for an interval." in opening
     assert "force under karl2016 †, SIM: Not enough to tell: one replicate" in opening
     assert re.findall(r'href="#([^"]+)"', opening) == ["reproduction", "leaderboard-1", "leaderboard-2"]
     eight = replicated(material, [0.97, 0.98, 0.99, 1.0, 1.0, 1.01, 1.02, 1.03])
-    many = make_page(Subject(eight)).html
+    many = make_page(ReportData(eight)).html
     opening = many[many.index('<section id="answers"') : many.index('<section id="reproduction"')]
     assert re.search(r"Published numbers in the 95 % interval of ours: \d of 2", opening)
     assert "(95 % over 8 replicates:" in opening
 
 
 def test_every_sentence_of_a_verdict_stands_above_its_table(material):
-    subject = Subject(replicated(material, [0.97, 0.98, 0.99, 1.0, 1.0, 1.01, 1.02, 1.03]))
+    subject = ReportData(replicated(material, [0.97, 0.98, 0.99, 1.0, 1.0, 1.01, 1.02, 1.03]))
     text = Reader(make_page(subject).html).text
     told = [sentence for block in subject.leaderboard.blocks for sentence in block.verdict]
     assert len(told) > len(subject.leaderboard.blocks) - 1
@@ -291,7 +290,7 @@ def test_every_sentence_of_a_verdict_stands_above_its_table(material):
 
 
 def test_several_notes_are_folded_and_none_is_lost(material):
-    subject = Subject(material)
+    subject = ReportData(material)
     html = make_page(subject).html
     assert len(subject.leaderboard.notes) > 1
     folded = re.findall(r'<details class="folded">.*?</details>', html, flags=re.S)

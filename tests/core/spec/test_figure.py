@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from tactbench.plugin import RealFigure, SensorSpec, Source, UsageError, load_registry
+from tactbench.plugin import SensorSpec, Source, UsageError, load_registry
+from tactbench.plugin.simulation import RealFigure
 
 SOURCE = Source(tag="measured", reference="a test")
 

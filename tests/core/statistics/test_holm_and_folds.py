@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from tactbench.core.statistics.holm import holm
-from tactbench.core.statistics.overlap import corrected_t, over_folds
+from tactbench.core.statistics.over_folds import corrected_t, over_folds
 
 from .made import mae_row
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from tactbench.plugin import CanFrame, Senses
+from tactbench.plugin.devices import CanFrame, Senses
 
 
 class Recorder:

@@ -16,7 +16,7 @@ from tactbench.devices.emulation.emulated_devices import EmulatedDevice, Emulate
 from tactbench.devices.emulation.lawicel_adapter import LawicelAdapter
 from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer, UdpEnd
-from tactbench.plugin import CanFrame, open_link
+from tactbench.plugin.devices import CanFrame, open_link
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 
 needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")

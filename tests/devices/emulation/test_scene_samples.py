@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from tactbench.plugin import Block, ChannelSpec, SceneSamples, StreamSpec
+from tactbench.plugin import Block, ChannelSpec, StreamSpec
+from tactbench.plugin.devices import SceneSamples
 
 MS = 1_000_000
 """Nanoseconds."""

@@ -12,7 +12,7 @@ import pytest
 from tactbench.core.errors import LinkClosed, LinkError, LinkTimeout, LinkUnplugged, UnknownNameError
 from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
 from tactbench.devices.emulation.line import LinkFault
-from tactbench.plugin import ByteLink, CanFrame, CanLink, DatagramLink, SpiLink, SpiStep
+from tactbench.plugin.devices import ByteLink, CanFrame, CanLink, DatagramLink, SpiLink, SpiStep
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 
 MS = 1_000_000

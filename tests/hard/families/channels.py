@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
+from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import (
-    Environment,
     ForceRamp,
     Indenter,
     Placement,
@@ -17,10 +17,10 @@ from tactbench.plugin import (
     RigContext,
     Scene,
     SensorDescriptor,
-    Simulation,
     assumed,
     load_registry,
 )
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.rig import REFERENCE_STREAM, Twin, TwinAcquisition, build
 from tests.hard.cases import Case, Family
 

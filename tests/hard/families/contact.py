@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tactbench.plugin import FluidBackedShell, SkinState, load_registry
-from tactbench.plugin import Skin as AnySkin
+from tactbench.plugin import load_registry
+from tactbench.plugin.simulation import FluidBackedShell, SkinState
+from tactbench.plugin.simulation import Skin as AnySkin
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press

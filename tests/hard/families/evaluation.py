@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.evaluation.cell import evaluate
+from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.spec.recording import RecordingMeta
@@ -103,9 +103,11 @@ def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
         split = splits[case.rng.integers(len(splits))]
         case.says(split=str(split))
         result = evaluate(
-            _task(kind), estimator, QUICK.get(name, {}), protocol, split, paths, seed=1,
-            clock=lambda: next(ticks) * 1e-3,
-        )  # fmt: skip
+            CellContext(
+                _task(kind), estimator, QUICK.get(name, {}), protocol, split, seed=1, clock=lambda: next(ticks) * 1e-3
+            ),
+            paths,
+        )
     for what, value in (("score", result.score), ("low end", result.ci_low), ("high end", result.ci_high)):
         case.holds(np.isfinite(value), f"the {what} is {value}")
     case.holds(result.ci_low <= result.ci_high, f"the interval runs from {result.ci_low} to {result.ci_high}")

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from tactbench.plugin import FluidBackedShell, FoamPad, Quantity
-from tactbench.plugin import Skin as AnySkin
+from tactbench.plugin import Quantity
+from tactbench.plugin.simulation import FluidBackedShell, FoamPad
+from tactbench.plugin.simulation import Skin as AnySkin
 from tactbench.rigs.twin.contact.foam import CUT_OVER, Foam
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.skins import medium_of

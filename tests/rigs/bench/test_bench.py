@@ -10,18 +10,9 @@ from tactbench.core.errors import RigError, UsageError
 from tactbench.core.recording.health import examine
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.quantity import assumed
-from tactbench.plugin import (
-    DeviceEntry,
-    EmulationSettings,
-    ForceEntry,
-    ForceRamp,
-    Quality,
-    RigContext,
-    RigFile,
-    Scene,
-    load_object,
-    load_registry,
-)
+from tactbench.core.spec.rig_file import EmulationSettings
+from tactbench.plugin import ForceRamp, Quality, RigContext, Scene, load_object, load_registry
+from tactbench.plugin.devices import DeviceEntry, ForceEntry, RigFile
 
 REGISTRY = load_registry()
 SECONDS = 2.0

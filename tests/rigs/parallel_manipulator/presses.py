@@ -6,6 +6,7 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+from tactbench.plugin import load_object
 from tactbench.rigs.parallel_manipulator.guard_messages import DeviceSettings, ProcessSettings
 from tactbench.rigs.parallel_manipulator.guard_process import GuardProcess
 
@@ -21,6 +22,7 @@ def load(name):
 
 FAULTS = load("guard_faults")
 PACKAGE = "tactbench.rigs.parallel_manipulator"
+NET_FT = f"{PACKAGE}.force_torque.net_ft.driver:build"
 # In real time, emulators and rig share a process and perhaps a busy machine: a force may be old, a beat late, and an
 # answer of the motor, too, whose driver is told of a slow line.
 PATIENT = {"time": "real", "force_age_s": 1.0, "heartbeat_s": 1.0, "period_s": 0.05, "wanted_n": 2.0}
@@ -30,12 +32,12 @@ SLOW_LINE = {"baud": 600}
 class Rig:
     """A guard, emulated devices and what presses."""
 
-    def __init__(self, kind, tmp_path, setting, address, **faults):
+    def __init__(self, kind, tmp_path, setting, address, force_driver, **faults):
         self.setting = setting
         self.world = FAULTS.Pressed(setting, **faults)
         self.clock = self.world.clock
         if kind == "local":
-            self.guard = self.world.guard()
+            self.guard = self.world.guard(load_object(force_driver))
         else:
             addresses, options = self.world.devices.addresses, self.world.settings()
             self.log = tmp_path / "guard.log"
@@ -46,7 +48,7 @@ class Rig:
                         address or addresses["motor"],
                         options["motor"] | SLOW_LINE,
                     ),
-                    DeviceSettings(f"{PACKAGE}.force_torque.net_ft.driver:build", addresses["force"], options["force"]),
+                    DeviceSettings(force_driver, addresses["force"], options["force"]),
                     str(self.log),
                     time.monotonic_ns() - self.clock(),
                 )
@@ -76,12 +78,12 @@ class Rig:
 
 
 @contextmanager
-def rig(kind, tmp_path, setting=None, address=None, **faults):
+def rig(kind, tmp_path, setting=None, address=None, force_driver=NET_FT, **faults):
     """Yield a rig whose guard is started; `setting` of a guard in a process is made patient."""
     setting = setting or FAULTS.Setting()
     if kind == "process":
         setting = FAULTS.replace(setting, **PATIENT)
-    made = Rig(kind, tmp_path, setting, address, **faults)
+    made = Rig(kind, tmp_path, setting, address, force_driver, **faults)
     try:
         made.guard.start()
         yield made

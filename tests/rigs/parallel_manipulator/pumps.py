@@ -12,7 +12,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from tactbench.plugin import Block, ByteLink, DatagramLink, Link, LinkUnplugged, Received
+from tactbench.plugin import Block
+from tactbench.plugin.devices import ByteLink, DatagramLink, Link, LinkUnplugged, Received
 from tests.links.ends import pty
 
 

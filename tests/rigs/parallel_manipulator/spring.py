@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from tactbench.plugin import Block, ChannelSpec, ForceRamp, RigFile, Scene, StreamSpec, assumed, load_registry
+from tactbench.plugin import Block, ChannelSpec, ForceRamp, Scene, StreamSpec, assumed, load_registry
+from tactbench.plugin.devices import RigFile
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.settings import JOINTS
 

@@ -7,7 +7,8 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
-from tactbench.plugin import DriverSettings, EmulatorSettings, load_object, load_registry
+from tactbench.plugin import load_object, load_registry
+from tactbench.plugin.devices import DriverSettings, EmulatorSettings
 from tests.rigs.parallel_manipulator.pumps import VirtualLink, joined, read_for
 
 POINT = EntryPoint("parallel-manipulator", "tactbench.rigs.parallel_manipulator", "tactbench")

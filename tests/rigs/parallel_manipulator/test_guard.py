@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.worst_case import first_touch_n
 from tests.rigs.parallel_manipulator.presses import FAULTS, rig
 
+ROOT = Path(__file__).parents[3]
 BOTH = pytest.mark.parametrize("kind", ["local", "process"])
 
 
@@ -94,23 +96,70 @@ def test_a_rig_that_goes_wrong(kind, name, trigger, tmp_path):
         assert made.world.largest_n < made.setting.allowed_n
 
 
+def saturate(world):
+    world.force.faults.append(FAULTS.DatagramFault("saturated"))
+
+
+def lose_samples(world):
+    world.force.faults.append(FAULTS.DatagramFault("dropped", end_s=1e-9 * world.clock() + 4.5 / world.rate_hz))
+
+
+def sense(name):
+    def begin(world):
+        world.sensed = FAULTS.sensed({name: 0.0})
+
+    return begin
+
+
 @BOTH
 @pytest.mark.parametrize(
-    ("name", "trigger"),
-    [("one sample above the ceiling", Trigger.FORCE_CEILING), ("force stuck", Trigger.FORCE_STUCK)],
+    ("begin", "trigger"),
+    [
+        (sense("one sample above the ceiling"), Trigger.FORCE_CEILING),
+        (sense("one torque above the ceiling"), Trigger.TORQUE_CEILING),
+        (sense("force stuck"), Trigger.FORCE_STUCK),
+        (saturate, Trigger.FORCE_SATURATED),
+        (lose_samples, Trigger.FORCE_GAP),
+    ],
+    ids=["ceiling of another axis", "torque", "stuck", "saturated", "lost"],
 )
-def test_a_force_that_is_wrong(kind, name, trigger, tmp_path):
+def test_a_force_that_is_wrong(kind, begin, trigger, tmp_path):
     with rig(kind, tmp_path) as made:
+        once = []
 
-        def begin(beat):
-            made.world.sensed = FAULTS.sensed({name: 0.0})
+        def change(beat):
+            if not once:
+                once.append(1)
+                begin(made.world)
             return beat
 
-        once = []
-        made.press(in_phase("ramp", lambda beat: beat if once else once.append(1) or begin(beat)))
+        made.press(in_phase("ramp", change))
         report = made.ended()
         assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
         assert made.out
+
+
+@BOTH
+def test_a_force_that_is_not_a_number(kind, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    with rig(kind, tmp_path, force_driver="tests.rigs.parallel_manipulator.broken_force:build") as made:
+        made.press()
+        report = made.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
+        assert made.out
+        assert made.world.largest_n < 2.0
+
+
+@BOTH
+def test_samples_that_come_twice_or_late_are_kept_out_and_counted(kind, tmp_path):
+    texts = ("doubled:every=2", "out-of-order:every=5")
+    with rig(kind, tmp_path, force=[FAULTS.DatagramFault.parse(text) for text in texts]) as made:
+        assert made.press().phase == "over"
+        numbers = np.concatenate([block.sequence for block in made.guard.force_blocks()])
+        assert (np.diff(numbers) > 0).all()
+        counts = made.guard.counts()["force"]
+        assert counts["duplicates"] == pytest.approx(numbers.size / 2, rel=0.3)
+        assert counts["late"] > numbers.size / 10
 
 
 @BOTH
@@ -251,10 +300,26 @@ def test_what_goes_wrong_in_devices_leads_to_a_fault(where, text, trigger, tmp_p
         assert math.isfinite(first.position_m)
 
 
-@pytest.mark.parametrize("text", ["out-of-order:every=3", "doubled:every=2"])
-def test_samples_that_come_late_alone_or_twice_are_no_fault(text, tmp_path):
-    with rig("local", tmp_path, force=[FAULTS.DatagramFault.parse(text)]) as made:
-        assert made.press().phase == "over"
+def test_a_force_that_does_not_change_lets_no_step_pass(tmp_path):
+    # For half a second numbers go on and the value does not; each beat asks for a step, and ten would have their time.
+    setting = FAULTS.Setting(period_s=5e-3, same_samples=500)
+    with rig("local", tmp_path, setting) as made:
+        begun = []
+
+        def push(beat, since_s):
+            if beat.state == "ramp" and not begun:
+                begun.append(len(press.reports))
+                sense("force stuck")(made.world)
+            return replace(beat, command=CommandKind.STEP, distance_m=setting.limits.step_m) if begun else beat
+
+        press = FAULTS.Press(made.guard, setting, made.clock, push)
+        last = press.run()
+        assert last.trigger is Trigger.FORCE_STUCK
+        asked = press.reports[begun[0] :]
+        assert len(asked) >= 90
+        assert asked[-1].force_sequence >= asked[0].force_sequence + 450
+        # One that rested on a sample from before, at most.
+        assert sum(report.accepted for report in asked) <= 1
 
 
 def test_one_late_sample_alone_is_no_fault(tmp_path):
@@ -263,42 +328,6 @@ def test_one_late_sample_alone_is_no_fault(tmp_path):
     # Held up by 5 ms, and those behind it with it: late, and not too old.
     with rig("local", tmp_path, force_link=[LinkFault.parse("late:start_s=1.5,every=400,delay_s=0.005")]) as made:
         assert made.press().phase == "over"
-
-
-def test_a_force_that_is_not_a_number(tmp_path):
-    from tactbench.rigs.parallel_manipulator.force_torque.net_ft.driver import NetFtDriver
-
-    class Broken(NetFtDriver):
-        """A driver of somebody else's."""
-
-        broken = False
-
-        def read(self, timeout_s):
-            blocks = super().read(timeout_s)
-            return [replace(block, data=block.data * np.nan) for block in blocks] if self.broken else blocks
-
-    world = FAULTS.Pressed(FAULTS.Setting())
-    drivers = []
-
-    def build(settings):
-        drivers.append(Broken(settings))
-        return drivers[0]
-
-    guard = world.guard(build)
-    guard.start()
-    once = []
-
-    def change(beat, since_s):
-        if beat.state == "ramp" and not once:
-            once.append(1)
-            drivers[0].broken = True
-        return beat
-
-    last = FAULTS.Press(guard, world.setting, world.clock, change).run()
-    guard.advance(world.clock() + 10**9)
-    assert (guard.state, guard.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
-    assert last.trigger is Trigger.FORCE_NOT_A_NUMBER
-    guard.close()
 
 
 def test_a_drive_that_has_forgotten_its_limits_is_not_armed(made):

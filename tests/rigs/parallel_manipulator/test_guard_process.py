@@ -3,11 +3,14 @@
 import json
 import re
 import signal
+import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tactbench.plugin import Block, LinkError, LinkTimeout, Quality
+from tactbench.plugin import Block, Quality
+from tactbench.plugin.devices import LinkError, LinkTimeout
 from tactbench.rigs.parallel_manipulator.guard_interface import Beat, GuardLostError
 from tactbench.rigs.parallel_manipulator.guard_messages import (
     FORCE,
@@ -18,10 +21,11 @@ from tactbench.rigs.parallel_manipulator.guard_messages import (
     encode_message,
 )
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
-from tactbench.rigs.parallel_manipulator.motor.retreat import retreat_blind, retreat_command
+from tactbench.rigs.parallel_manipulator.motor.retreat import retreat_blind, retreat_command, stand_blind
 from tests.rigs.parallel_manipulator.presses import FAULTS, PATIENT, load, rig
 
 KILLS = load("guard_kills")
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.parametrize(
@@ -78,6 +82,102 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
         assert made.out
 
 
+def test_a_wake_up_without_data_is_not_a_lost_guard(tmp_path, monkeypatch):
+    with rig("process", tmp_path) as made:
+        made.guard.arm(made.setting.limits)
+        keys = [(key, 1) for key in made.guard._selector.get_map().values()]
+        made.guard.advance(made.clock() + 10_000_000)
+        with monkeypatch.context() as patch:
+            # As select() says it now and then: somebody else has read, or nothing came after all.
+            patch.setattr(made.guard._selector, "select", lambda timeout_s: keys)
+            for _ in range(20):
+                made.guard._take(0.0)
+        assert made.guard.beat(Beat(1, made.clock())).accepted
+
+
+RAISING = "tests.rigs.parallel_manipulator.broken_force:build_raising"
+TO_A_SWITCH = {"homing": "switch", "homing_speed_m_s": 5e-3, "home_m": 3e-3}
+
+
+def entries(log):
+    return [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines() if line.startswith("{")]
+
+
+def told(made, since_s):
+    """Return what the motor was told since a second."""
+    log = made.world.devices.log_of("motor")
+    return b"".join(passed.piece for passed in log if passed.sender == "host" and passed.t_s >= since_s)
+
+
+def test_an_error_within_the_guard_lets_the_motor_retreat(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    with rig("process", tmp_path, force_driver=RAISING) as made:
+
+        def change(beat, since_s):
+            if beat.state == "ramp":
+                # The rig looks on until the guard's process has ended by itself.
+                made.guard._process.wait(30.0)
+            return beat
+
+        with pytest.raises(GuardLostError, match="has retreated"):
+            made.press(change)
+        assert made.out
+        found = entries(made.log)
+        (error,) = [entry["internal_error"] for entry in found if "internal_error" in entry]
+        assert "a driver's own error" in error
+        (where,) = [entry["retreated_to_m"] for entry in found if "retreated_to_m" in entry]
+        assert where == pytest.approx(FAULTS.RETREAT_M, abs=1.01 * FAULTS.STATED["corridor_m"])
+
+
+def homed_to_a_switch_behind_the_skin(made):
+    made.world.motor.drive._reference_switch_m = 8e-3
+
+
+def test_an_error_within_the_guard_while_homing_lets_the_motor_stand(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | TO_A_SWITCH)
+    with rig("process", tmp_path, force_driver=RAISING) as made:
+        homed_to_a_switch_behind_the_skin(made)
+        with pytest.raises(GuardLostError, match="told to stand"):
+            made.guard.arm(made.setting.limits)
+        assert [entry for entry in entries(made.log) if "stands" in entry]
+        assert stands(made)
+        assert 0.1 < made.world.force_n < 3.0
+
+
+def test_a_guard_that_is_killed_while_homing_leaves_a_motor_that_stands(tmp_path, monkeypatch):
+    monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | TO_A_SWITCH)
+    with rig("process", tmp_path) as made:
+        homed_to_a_switch_behind_the_skin(made)
+        killed = []
+
+        def kill(wrench, at_s):
+            if made.world.position_m > FAULTS.RETREAT_M + 1e-3 and not killed:
+                killed.append(at_s)
+                made.guard._process.kill()
+            return wrench
+
+        made.world.sensed = kill
+        with pytest.raises(GuardLostError, match="told to stand"):
+            made.guard.arm(made.setting.limits)
+        assert stands(made)
+        assert told(made, killed[0]).endswith(b"\rV0\r")
+        # 5 mm/s for the second that a busy machine may take at most.
+        assert made.world.position_m < FAULTS.RETREAT_M + 6e-3
+        assert made.world.force_n == 0.0
+
+
+def stands(made):
+    """Return whether the motor has come to rest: two moments a fifth of a second apart, within three seconds."""
+    waits = threading.Event()
+    for _ in range(15):
+        before_m = made.world.position_m
+        waits.wait(0.2)
+        if abs(made.world.position_m - before_m) < 1e-6:
+            return True
+    return False
+
+
 def test_a_rig_that_takes_no_samples_still_gets_its_reports(tmp_path):
     with rig("process", tmp_path) as made:
         made.guard._selector.unregister(made.guard._data)
@@ -127,6 +227,24 @@ def test_a_blind_retreat_whatever_stands_on_the_line(half):
     position_m = retreat_blind(world.devices.opener("motor"), options, world.clock, 2.0)
     assert position_m == pytest.approx(FAULTS.RETREAT_M, abs=5e-6)
     assert world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=20e-6)
+
+
+@pytest.mark.parametrize("half", [b"", b"LA12", b"POS\rGRC\rOST\r"])
+def test_a_motor_that_is_let_stand_blind(half):
+    world = FAULTS.Pressed(FAULTS.Setting(baud=9600))
+    options = FaulhaberOptions(**world.settings()["motor"])
+    link = world.devices.open_link("motor")
+    link.write(b"ANSW2\rEN\rV5\r")
+    world.devices.advance(world.clock() + 10**9)
+    link.write(half)
+    link.close()
+    assert world.motor.drive.servo.speed_m_s == pytest.approx(5e-3, rel=0.01)
+    stand_blind(world.devices.opener("motor"), options, world.clock)
+    world.devices.advance(world.clock() + 10**8)
+    where_m = world.position_m
+    world.devices.advance(world.clock() + 10**9)
+    assert world.position_m == pytest.approx(where_m, abs=1e-6)
+    assert world.motor.drive._enabled
 
 
 def test_a_blind_retreat_that_ends_elsewhere_says_where():

@@ -7,16 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import (
-    DriverSettings,
-    EmulatorSettings,
-    LinkTimeout,
-    LinkUnplugged,
-    Quality,
-    RigError,
-    UsageError,
-    open_link,
-)
+from tactbench.plugin import Quality, RigError, UsageError
+from tactbench.plugin.devices import DriverSettings, EmulatorSettings, LinkTimeout, LinkUnplugged, open_link
 from tactbench.rigs.parallel_manipulator.motor.codec import OperationStatus
 from tactbench.rigs.parallel_manipulator.motor.driver import build
 from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator, MotorFault

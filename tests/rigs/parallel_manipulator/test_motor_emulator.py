@@ -135,20 +135,44 @@ def test_silence_and_changed_rate():
     host.emulator.feed(b"POS\r", sent_s)
     # 4 bytes, the drive's time of 1 ms, 3 bytes; half a bit of room on either side.
     due_s = sent_s + line_time_s(4, 19200) + 1e-3 + line_time_s(3, 19200)
-    assert joined_bytes(host.emulator.poll(due_s - 25e-6)) == b"0\r"
-    assert host.emulator.poll(due_s + 25e-6) == [(pytest.approx(due_s), b"\n")]
+    assert joined_bytes(host.emulator.poll(due_s - 25e-6)) == b"0"
+    assert host.emulator.poll(due_s + 25e-6) == [(pytest.approx(due_s), b"\r\n")]
 
 
-def test_bytes_leave_at_the_pace_of_the_line():
+def test_lines_leave_at_the_pace_of_the_line():
     host = Host()
     host.do("HO98956")
     start_s = host.now_s
     assert host.emulator.feed(b"POS\r", start_s) == []
-    first_s = start_s + line_time_s(4, 9600) + 1e-3
-    sent = host.emulator.poll(first_s + line_time_s(7, 9600) + 1e-9)
-    assert sent == [
-        (pytest.approx(first_s + line_time_s(n + 1, 9600)), bytes([byte])) for n, byte in enumerate(b"98956\r\n")
+    began_s = start_s + line_time_s(4, 9600) + 1e-3
+    left_s = began_s + line_time_s(7, 9600)
+    assert host.emulator.poll(left_s + 1e-9) == [
+        (pytest.approx(began_s + line_time_s(1, 9600)), b"9"),
+        (pytest.approx(left_s), b"8956\r\n"),
     ]
+
+
+@pytest.mark.parametrize("ticks", [1, 7, 1000])
+def test_a_drive_that_stands_without_load_answers_as_if_each_tick_were_made(ticks):
+    """Ticks are left out where nothing moves: whether it is looked at between them changes nothing."""
+    made = {}
+    for skipped in (False, True):
+        host = Host(load=None if skipped else lambda _position_m, _at_s: 0.0)
+        for text in ("EN", "LA500", "M"):
+            host.do(text)
+        host.wait(1.0)
+        assert host.emulator.drive.standing == skipped
+        host.wait(ticks * 1e-3)
+        host.do("LR-20")
+        host.do("M")
+        host.wait(0.013)
+        servo = host.emulator.drive.servo
+        made[skipped] = (host.ask("POS"), host.ask("OST"), servo.position_m, servo.mean_square_a2, host.emulator._ticks)
+    assert made[True][:2] == made[False][:2]
+    # Positions to what a tick resolves, 1 nm/s for 1 ms and its decay over a second.
+    assert made[True][2] == pytest.approx(made[False][2], abs=2e-9)
+    assert made[True][3] == pytest.approx(made[False][3], rel=1e-6)
+    assert made[True][4] == made[False][4]
 
 
 def test_polls_cannot_be_quicker_than_the_line():

@@ -14,16 +14,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import (
+from tactbench.plugin import Quality, RigError, UsageError
+from tactbench.plugin.devices import (
     DriverSettings,
     EmulatorSettings,
     Frame,
     LinkTimeout,
     LinkUnplugged,
-    Quality,
     Received,
-    RigError,
-    UsageError,
     encode_frame,
     open_link,
 )

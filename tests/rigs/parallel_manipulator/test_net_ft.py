@@ -13,17 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import (
-    DriverSettings,
-    EmulatorSettings,
-    LinkTimeout,
-    LinkUnplugged,
-    Quality,
-    RigError,
-    Unwrap,
-    UsageError,
-    open_link,
-)
+from tactbench.plugin import Quality, RigError, UsageError
+from tactbench.plugin.devices import DriverSettings, EmulatorSettings, LinkTimeout, LinkUnplugged, Unwrap, open_link
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import AtiFileError
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     CONFIGURATION_PATH,

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from tactbench.plugin import NotApplicable, RigError, RigFile, Slide, assumed
+from tactbench.plugin import NotApplicable, RigError, assumed, load_registry
+from tactbench.plugin.devices import RigFile
+from tactbench.plugin.simulation import Slide
+from tactbench.rigs.parallel_manipulator.guard_interface import GuardState, Trigger
 from tactbench.rigs.parallel_manipulator.loop_stability import ramp_error_n
 from tactbench.rigs.parallel_manipulator.press import PressState
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
@@ -102,6 +105,27 @@ def test_a_first_touch_stays_within_its_bound(stiffness):
     assert 0.1 < found.press.touch_n <= bound
     if stiffness == 20.0:
         assert bound <= 0.31
+
+
+def test_a_motor_that_does_not_come_out_is_said():
+    found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=9"], **QUICK)
+    assert "in ramp: motor's link is gone" in found.acquisition.ended
+    assert "stand clear" in found.acquisition.ended
+    assert found.acquisition.stop("stopped by hand") == found.press.not_out != ""
+
+
+def test_a_press_that_is_stopped_retreats_within_a_control_period():
+    rig = ParallelManipulator(file_of(**QUICK), None, SpringRig(5.0))
+    with rig.open(load_registry().sensors["icub"], ramp(5.0, 0.5, 20.0), seed=1) as acquisition:
+        next(block for block in acquisition if block.t_ns[-1] > acquisition.begin_ns + 3e9)
+        assert acquisition.control.press.state is PressState.RAMP
+        stopped_ns = acquisition.clock()
+        assert acquisition.stop("stopped by hand") == ""
+        assert acquisition.ended == "stopped by hand"
+        retreating, out = acquisition.said[-2:]
+        assert (retreating.trigger, out.state) == (Trigger.COMMANDED, GuardState.RETREATED)
+        # The next period of 10 ms, and the one in which it was stopped.
+        assert 0 < retreating.t_ns - stopped_ns <= 20_000_000
 
 
 def test_no_contact_ends_with_a_retreat():

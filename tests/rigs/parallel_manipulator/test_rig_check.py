@@ -4,7 +4,8 @@ import pytest
 import yaml
 
 from tactbench.core.cli import main
-from tactbench.plugin import RigContext, RigFile, UsageError
+from tactbench.plugin import RigContext, UsageError
+from tactbench.plugin.devices import RigFile
 from tactbench.rigs.parallel_manipulator.rig import build
 from tactbench.rigs.parallel_manipulator.rig_check import check
 from tactbench.rigs.parallel_manipulator.settings import settings_of, with_limits

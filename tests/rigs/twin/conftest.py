@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tactbench.plugin import BondedLayer, SensorDescriptor, SensorSpec, SheetTable, SkinSheet, assumed
+from tactbench.plugin import SensorDescriptor, SensorSpec, assumed
+from tactbench.plugin.simulation import BondedLayer, SheetTable, SkinSheet
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.newton import NewtonSolver

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import Dome, RigError, SheetTable, SkinGrid, SkinSheet, assumed
+from tactbench.plugin import RigError, assumed
+from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
 from tactbench.rigs.twin.geometry import Contact, check_contact, finger_surface_mm, gap_mm, skin_grid
 
 SHEET = SkinSheet(

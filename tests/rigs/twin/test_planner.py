@@ -3,17 +3,9 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from tactbench.plugin import (
-    EffectDescriptor,
-    ForceRamp,
-    NotApplicable,
-    PluginContractError,
-    Scene,
-    Simulation,
-    Slide,
-    UsageError,
-    assumed,
-)
+from tactbench.core.spec.scene import Simulation
+from tactbench.plugin import ForceRamp, NotApplicable, PluginContractError, Scene, UsageError, assumed
+from tactbench.plugin.simulation import EffectDescriptor, Slide
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.planner import plan_scene
 

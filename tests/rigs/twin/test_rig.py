@@ -9,21 +9,20 @@ import sys
 import numpy as np
 import pytest
 
+from tactbench.core.spec.scene import NUISANCES, Simulation
 from tactbench.plugin import (
-    EffectDescriptor,
-    Environment,
+    ForceLoop,
     ForceRamp,
     Indenter,
     NotApplicable,
     Placement,
     Quality,
-    Reason,
     RigContext,
     RigError,
     Scene,
-    Simulation,
     assumed,
 )
+from tactbench.plugin.simulation import EffectDescriptor, Environment, Reason, Slide
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.preparation import prepare
 from tactbench.rigs.twin.rig import Twin, build
@@ -121,8 +120,34 @@ def test_the_place_of_contact_is_stated_with_the_commanded_offset(rig, sensors):
     assumed_x, assumed_s = (acquisition.assumptions[f"contact_{axis}_mm"] for axis in "xs")
     assert (assumed_x, assumed_s) == (-3.5, -0.5)
     # Where this recording met the skin is drawn about it.
-    drawn_x, drawn_s = (acquisition.drawn[f"placement_{axis}_mm"] for axis in "xs")
+    drawn_x, drawn_s = (acquisition.drawn[f"placed_{axis}_mm"] for axis in "xs")
     assert 0 < np.hypot(drawn_x - assumed_x, drawn_s - assumed_s) < 5 * 0.2
+
+
+def test_nuisances_that_are_set_change_the_recording_and_are_stated(rig, sensors):
+    held = _scene(profile=ForceRamp(end=_q(0.0, "N"), samples=2000), environment=QUIET)
+    values = {"noise_scale": 1.0, "taxel_white_count": 9.0, "taxel_step_count": 0.0, "placement_tilt_x_rad": 0.0}
+    acquisition, streams = _record(rig, sensors["biotac"], held.asked(Simulation(nuisances=values)))
+    assert values.items() <= acquisition.assumptions.items()
+    assert "placement_tilt_x_rad" not in _record(rig, sensors["biotac"], held)[0].assumptions
+    noise = streams["electrodes"][1].std(axis=0)
+    # 2000 samples of 19 electrodes, stored in whole counts: the standard error of the mean deviation is 0.36 %; five.
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(np.hypot(9.0, 12**-0.5), rel=0.02)
+
+
+def test_what_a_recording_assumes_has_the_names_under_which_it_is_set(rig, sensors):
+    slide = Slide(speed=_q(5.0, "mm/s"), start=_q(0.0, "s"))
+    warm = Environment(indenter_temperature=_q(30.0, "degC"), force_filter=_q(5.0, "Hz"), offset_scale=2.0)
+    parts = {"drive": ForceLoop(), "slide": slide, "environment": warm}
+    acquisition, _ = _record(rig, sensors["icub"], _scene(profile=ForceRamp(samples=200), **parts))
+    commanded = {"contact_x_mm", "contact_s_mm", "slide_mm_s"}
+    assert acquisition.assumptions.keys() - commanded <= NUISANCES.keys()
+
+
+def test_a_nuisance_that_the_sensor_does_not_declare_is_not_stated(rig, sensors):
+    asked = _scene(profile=ForceRamp(samples=20)).asked(Simulation(nuisances={"dc_pressure_white_count": 9.0}))
+    acquisition, _ = _record(rig, sensors["icub"], asked)
+    assert "dc_pressure_white_count" not in acquisition.assumptions
 
 
 def test_a_scenario_changes_the_recording_and_is_stated(rig, sensors):
@@ -233,7 +258,7 @@ def test_a_cap_below_a_cell_is_refused(rig, sensors):
 
 def test_a_strangers_effect_takes_part(sensors, tmp_path, monkeypatch):
     (tmp_path / "dew.py").write_text(
-        "from tactbench.plugin import Reason\n"
+        "from tactbench.plugin.simulation import Reason\n"
         "def called_for(scene, sensor):\n    return Reason(True, 'it is raining')\n"
         "def apply(run):\n    for track in run.tracks:\n        track.readings -= 7\n"
     )
@@ -255,6 +280,7 @@ def test_what_a_plan_leaves_out_is_never_imported(sensors):
     code = """
 import sys
 from tactbench.plugin import *
+from tactbench.plugin.simulation import *
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.rig import build
 from tactbench.sensors.icub import tactbench_sensors

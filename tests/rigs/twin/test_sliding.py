@@ -13,7 +13,6 @@ from tactbench.core.evaluation.channels import channels_for
 from tactbench.core.recording.reader import open_recording
 from tactbench.plugin import (
     ChannelTarget,
-    Environment,
     ForceRamp,
     Indenter,
     NotApplicable,
@@ -21,10 +20,9 @@ from tactbench.plugin import (
     RigContext,
     RigDescriptor,
     Scene,
-    Slide,
-    Surface,
     assumed,
 )
+from tactbench.plugin.simulation import Environment, Slide, Surface
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.rig import build
 
@@ -214,7 +212,7 @@ def test_without_the_effects_dynamic_pressure_is_refused(sensors):
 
 @pytest.mark.parametrize("effects", [("+all",), ("-friction",), ("-skin-vibration",), ("-hum", "-ac-pressure", "+all")])
 def test_effects_asked_for_or_left_out_do_no_harm(record, effects):
-    from tactbench.plugin import Simulation
+    from tactbench.core.spec.scene import Simulation
 
     for slide in (None, _slide(20.0)):
         _, streams, _ = record(profile=_held(seconds=2.0), slide=slide, simulation=Simulation(effects=effects))

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from tactbench.plugin import Environment, ForceRamp, Indenter, Placement, RigContext, RigError, Scene, assumed
+from tactbench.plugin import ForceRamp, Indenter, Placement, RigContext, RigError, Scene, assumed
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.rig import build
 from tactbench.rigs.twin.stated_numbers import MOST_SAMPLES, check_numbers

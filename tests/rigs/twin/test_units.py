@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tactbench.plugin import Environment, ForceRamp, Indenter, RigContext, Scene, assumed
+from tactbench.plugin import ForceRamp, Indenter, RigContext, Scene, assumed
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import draws, tactbench_effects
 from tactbench.rigs.twin.effects import gain, rest_spread, unit_rest
 from tactbench.rigs.twin.planner import plan_scene

@@ -9,17 +9,9 @@ import pytest
 
 from tactbench.core.cost.precision import measured
 from tactbench.core.matrix.progress import Silence
-from tactbench.plugin import (
-    FluidBackedShell,
-    Indenter,
-    Placement,
-    RigContext,
-    Scene,
-    SensorDescriptor,
-    Simulation,
-    assumed,
-    load_registry,
-)
+from tactbench.core.spec.scene import Simulation
+from tactbench.plugin import Indenter, Placement, RigContext, Scene, SensorDescriptor, assumed, load_registry
+from tactbench.plugin.simulation import FluidBackedShell
 from tactbench.rigs.twin import tactbench_effects, work_precision
 from tactbench.rigs.twin.contact.stages import skin_under_load
 from tactbench.rigs.twin.fidelity import RUNGS

@@ -10,19 +10,16 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from tactbench.plugin import (
-    BridgeEmulator,
+from tactbench.links.bridge_emulator import BridgeEmulator
+from tactbench.plugin import Quality, RigError, UsageError, load_object
+from tactbench.plugin.devices import (
     DriverSettings,
     EmulatorSettings,
     LinkError,
     LinkTimeout,
     LinkUnplugged,
-    Quality,
-    RigError,
     SpiLink,
     SpiReply,
-    UsageError,
-    load_object,
     open_link,
 )
 from tactbench.sensors.biotac import driver as module

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import EmulatorSettings, UsageError
+from tactbench.plugin import UsageError
+from tactbench.plugin.devices import EmulatorSettings
 from tactbench.sensors.biotac.codec import (
     INDEX,
     PROPERTIES,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import SkinGrid
+from tactbench.plugin.simulation import SkinGrid
 from tactbench.sensors.biotac.electrodes import ELECTRODES
 from tactbench.sensors.biotac.film import core_mm, mid_film_mm, refined, spectral_interpolation
 from tactbench.sensors.biotac.meshes import CORE_MM, ELECTRODES_MM, ray_on_sheet, sheet_x

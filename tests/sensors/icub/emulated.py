@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tactbench.plugin import (
+from tactbench.plugin.devices import (
     CanFrame,
     CanLink,
     DeviceEmulator,

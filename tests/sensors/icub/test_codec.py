@@ -10,7 +10,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import CanFrame, Quality, RigError, UsageError
+from tactbench.plugin import Quality, RigError, UsageError
+from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
     NO_ACK,
     NOT_CONNECTED,

@@ -14,17 +14,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import (
-    Block,
+from tactbench.plugin import Block, Quality, UsageError, load_object
+from tactbench.plugin.devices import (
     CanFrame,
     CanLink,
     DriverSettings,
     EmulatorSettings,
     LinkError,
     LinkUnplugged,
-    Quality,
-    UsageError,
-    load_object,
     open_link,
 )
 from tactbench.sensors.icub import tactbench_sensors

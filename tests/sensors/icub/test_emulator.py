@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import CanFrame, Quality, UsageError
+from tactbench.plugin import Quality, UsageError
+from tactbench.plugin.devices import CanFrame
 from tactbench.sensors.icub.codec import (
     BROADCAST,
     BoardSetup,

@@ -8,7 +8,8 @@ import can
 import numpy as np
 import pytest
 
-from tactbench.plugin import CanFrame, DataError, LinkError, Quality, UsageError
+from tactbench.plugin import DataError, Quality, UsageError
+from tactbench.plugin.devices import CanFrame, LinkError
 from tactbench.sensors.icub.codec import skin_frames
 from tactbench.sensors.icub.log import read_log
 from tests.sensors.icub.emulated import in_virtual_time

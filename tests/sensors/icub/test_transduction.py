@@ -111,7 +111,7 @@ def test_a_state_of_another_grid_is_refused(make_grid, make_state):
 
 
 def _uniform(strain):
-    from tactbench.plugin import SkinGrid, SkinState
+    from tactbench.plugin.simulation import SkinGrid, SkinState
 
     grid = SkinGrid(-9.25 + (np.arange(44) + 0.5) * 18.5 / 44, -10.21 + (np.arange(48) + 0.5) * 20.42 / 48)
     field = np.full((44, 48), strain * FOAM_MM)

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tactbench.plugin import RigError, SkinGrid
+from tactbench.plugin import RigError
+from tactbench.plugin.simulation import SkinGrid
 from tactbench.sensors.ideal import SPEC
 from tactbench.sensors.ideal.transduction import build
 
@@ -94,6 +95,6 @@ def _fine() -> SkinGrid:
 
 
 def _bare(grid, pressure):
-    from tactbench.plugin import SkinState
+    from tactbench.plugin.simulation import SkinState
 
     return SkinState(grid, 1.0, 0 * pressure, pressure, 0 * pressure + 2.0, 0.0, 0.0, 0.0, 0.0)

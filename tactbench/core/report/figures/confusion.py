@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tactbench.core.errors import NotApplicable
-from tactbench.core.leaderboard.numbers import score
 from tactbench.core.report.figures.group import Group, Panel, Remark
 from tactbench.core.report.figures.sketch import Sketch, heading, marks, metric_name, quantity, sensors, with_unit
 from tactbench.core.report.figures.style import COLUMN_IN, PAGE_IN, panels
 from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.spec.task import LabelTarget
+from tactbench.core.tables.numbers import score
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,6 @@ from pathlib import Path
 from tactbench.core.errors import TactbenchError, UsageError
 from tactbench.core.evaluation.splits import shots
 from tactbench.core.matrix.progress import Progress, Silence
-from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures import (
     confusion,
     embedding_map,
@@ -23,7 +22,8 @@ from tactbench.core.report.figures.published_and_ours import draw_published
 from tactbench.core.report.figures.saving import save
 from tactbench.core.report.figures.sketch import Sketch
 from tactbench.core.report.figures.style import styled
-from tactbench.core.report.material import Material
+from tactbench.core.report.results import Results
+from tactbench.core.report.saved_figure import SavedFigure
 
 Draw = Callable[[Group, Remark], Sketch]
 """A group of cells to a figure; raises NotApplicable where it does not apply, and tells of panels it leaves out."""
@@ -36,13 +36,13 @@ FIGURES: dict[str, tuple[Draw, ...]] = {
 
 
 def draw_figures(
-    material: Material, folder: Path, progress: Progress | None = None, remark: Remark | None = None
-) -> list[Drawn]:
+    results: Results, folder: Path, progress: Progress | None = None, remark: Remark | None = None
+) -> list[SavedFigure]:
     """Draw and save every figure that the results can serve, as PDF and PNG.
 
     Parameters
     ----------
-    material
+    results
         The results.
     folder
         Where the files go; made if it is not there. Nothing else is written into it.
@@ -53,7 +53,7 @@ def draw_figures(
 
     Returns
     -------
-    list of Drawn
+    list of SavedFigure
         In the order of a report: published scores and ours, then by group of comparable cells, as the cells come.
 
     Raises
@@ -61,44 +61,44 @@ def draw_figures(
     UsageError
         If `folder` cannot be made.
     """
-    told = progress or Silence()
+    reporter = progress or Silence()
     say: Remark = remark or (lambda _: None)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"The folder {folder} cannot be made: {error.strerror}.", hint="Give another one.") from error
-    work = [(group, draw) for group in _worth_drawing(material, say) for draw in FIGURES[group.task.kind]]
+    work = [(group, draw) for group in _worth_drawing(results, say) for draw in FIGURES[group.task.kind]]
     refused: dict[tuple[str, str], list[str]] = {}
     if not work:
         return []
-    drawn: list[Drawn] = []
+    drawn: list[SavedFigure] = []
     try:
-        drawn += draw_published(material, folder)
+        drawn += draw_published(results, folder)
     except Exception as error:
         say(f"No picture of published scores and ours: {type(error).__name__}: {error}")
-    told.begin("drawing", len(work))
+    reporter.begin("drawing", len(work))
     with styled():
         for group, draw in work:
             what = f"{draw.__module__.rpartition('.')[2].replace('_', ' ')} of {group.task.name}"
-            told.working(what)
+            reporter.working(what)
             try:
                 sketch = draw(group, say)
                 drawn.append(save(sketch, folder))
             except Exception as error:
                 why = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
                 refused.setdefault((what, why), []).append(f"{group.row['protocol']}, split {group.row['split']}")
-            told.advance(what)
+            reporter.advance(what)
     for (what, why), where in refused.items():
         say(f"No {what} under {'; '.join(where)}: {why}")
     try:
-        drawn += draw_few_shot(material, folder)
+        drawn += draw_few_shot(results, folder)
     except Exception as error:
         say(f"No figure of few sessions: {type(error).__name__}: {error}")
     return drawn
 
 
-def _worth_drawing(material: Material, say: Remark) -> list[Group]:
+def _worth_drawing(results: Results, say: Remark) -> list[Group]:
     """Return the groups of cells, few-shot splits left to the one figure that shows them all."""
-    found = groups(material, say)
+    found = groups(results, say)
     few = [group for group in found if shots(group.row["split"])]
     return [group for group in found if len(few) < 2 or group not in few]

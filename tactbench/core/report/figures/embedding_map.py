@@ -34,7 +34,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
     found: list[tuple[Panel, Embedding]] = []
     for panel in group.panels:
         try:
-            found.append((panel, embed(group.material, panel.row, panel.answers["test"])))
+            found.append((panel, embed(group.results, panel.row, panel.answers["test"])))
         except TactbenchError as error:
             remark(f"No embedding of {panel.row['cell']}: {error}")
     if not found:

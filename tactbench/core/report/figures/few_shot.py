@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tactbench.core.evaluation.splits import shots
-from tactbench.core.leaderboard.comparison import Curve, few_shot_curves
-from tactbench.core.leaderboard.table import METRIC_NAMES
-from tactbench.core.report.drawn import Drawn
+from tactbench.core.evaluation.few_shot import shots
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, hardware_name
 from tactbench.core.report.figures.saving import write
 from tactbench.core.report.figures.sketch import with_unit
 from tactbench.core.report.figures.style import (
@@ -27,14 +26,60 @@ from tactbench.core.report.figures.style import (
     sensor_colours,
     styled,
 )
-from tactbench.core.report.material import Material
+from tactbench.core.report.results import Results
+from tactbench.core.report.saved_figure import SavedFigure
+
+Row = Mapping[str, Any]
 
 _NAME = "few-shot"
 ACROSS = 3
 """Panels beside each other."""
 
 
-def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
+@dataclass(frozen=True)
+class Curve:
+    """A score against the number of training sessions."""
+
+    sensor: str
+    task: str
+    estimator: str
+    metric: str
+    unit: str
+    simulated: bool
+    baseline: float | None
+    points: tuple[tuple[int, float, float, float], ...]
+    """(training sessions, score, low, high), in order of the sessions"""
+
+
+def few_shot_curves(rows: Iterable[Row]) -> list[Curve]:
+    """Return a curve for each sensor, task, estimator and protocol that has answered several few-shot splits."""
+    groups: dict[tuple[Any, ...], list[tuple[int, Row]]] = {}
+    for row in rows:
+        number = shots(str(row["split"]))
+        if number and row["status"] == "done":
+            key = (row["task"], hardware_name(row), row["repeat"], row["protocol"], row["sensor"], answer_name(row))
+            groups.setdefault(key, []).append((number, row))
+    curves = []
+    for members in groups.values():
+        points = sorted((n, row["score"], row["ci_low"], row["ci_high"]) for n, row in members)
+        first = members[0][1]
+        if len(points) > 1:
+            curves.append(
+                Curve(
+                    sensor=first["sensor"],
+                    task=first["task"],
+                    estimator=answer_name(first),
+                    metric=first["metric"],
+                    unit=first["unit"],
+                    simulated=first["simulated"],
+                    baseline=max(members, key=lambda member: member[0])[1]["baseline"],
+                    points=tuple(points),
+                )
+            )
+    return curves
+
+
+def draw_few_shot(results: Results, folder: Path) -> list[SavedFigure]:
     """Draw one panel a task, a line for each sensor and estimator; nothing where fewer than two numbers were tried.
 
     Raises
@@ -42,7 +87,7 @@ def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
     OSError
         If `folder` cannot be written.
     """
-    answers = [row for row in material.rows if not row["is_baseline"]]
+    answers = [row for row in results.rows if not row["is_baseline"]]
     curves = few_shot_curves(answers)
     if not curves:
         return []
@@ -56,14 +101,14 @@ def draw_few_shot(material: Material, folder: Path) -> list[Drawn]:
         for here in axes.flat[len(tasks) :]:
             here.set_visible(False)
         lines = list(dict.fromkeys(_name(curve) for curve in curves))
-        colours = sensor_colours(material.rows)
+        colours = sensor_colours(results.rows)
         for here, (task, own) in zip(axes.flat, tasks.items(), strict=False):
             _panel(here, own, lines, colours)
             here.set_title(task)
         legend(figure, axes.flat)
         png, pdf = write(figure, _NAME, folder)
     keys = tuple(row["key"] for row in answers if shots(str(row["split"])) and row["key"])
-    return [Drawn(_NAME, "What few sessions are worth", _caption(curves, colours), png, pdf, keys)]
+    return [SavedFigure(_NAME, "What few sessions are worth", _caption(curves, colours), png, pdf, keys)]
 
 
 def _panel(here: Any, own: Sequence[Curve], lines: Sequence[str], colours: Mapping[str, str]) -> None:

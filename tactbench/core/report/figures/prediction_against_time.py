@@ -6,13 +6,13 @@ import numpy as np
 
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.report.figures.group import Group, Panel, Remark
 from tactbench.core.report.figures.sketch import Sketch, coloured, heading, marks, metric_name, quantity, with_unit
 from tactbench.core.report.figures.style import GREY, corner, legend, panels
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
+from tactbench.core.tables.numbers import score, suffix
 
 SHOWN: tuple[Role, ...] = ("train", "test")
 WORDS = {"train": "training", "test": "test"}

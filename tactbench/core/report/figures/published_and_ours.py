@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.leaderboard.table import LOWER_IS_BETTER, METRIC_NAMES, answer_name
-from tactbench.core.report.drawn import Drawn
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name
 from tactbench.core.report.figures.saving import write
 from tactbench.core.report.figures.sketch import with_unit
 from tactbench.core.report.figures.style import (
@@ -20,8 +19,9 @@ from tactbench.core.report.figures.style import (
     sensor_colours,
     styled,
 )
-from tactbench.core.report.material import Material
 from tactbench.core.report.reproduction import Reproduction, reproduce
+from tactbench.core.report.results import Results
+from tactbench.core.report.saved_figure import SavedFigure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +36,7 @@ _LINE_IN = 0.24
 """Height of a row of the picture."""
 
 
-def draw_published(material: Material, folder: Path) -> list[Drawn]:
+def draw_published(results: Results, folder: Path) -> list[SavedFigure]:
     """Draw each published score beside our row, and what its replicates scored; nothing where no row stands beside one.
 
     Raises
@@ -45,20 +45,20 @@ def draw_published(material: Material, folder: Path) -> list[Drawn]:
         If `folder` cannot be written.
     """
     tasks: dict[str, list[Reproduction]] = {}
-    for line in reproduce(material.registry, material.rows):
+    for line in reproduce(results.registry, results.rows):
         if line.row is not None and line.row["status"] == "done":
             tasks.setdefault(line.task, []).append(line)
     if not tasks:
         return []
     every = [line for lines in tasks.values() for line in lines]
-    colours = sensor_colours(material.rows)
+    colours = sensor_colours(results.rows)
     keys = tuple(dict.fromkeys(str(line.row["key"]) for line in every if line.row and line.row["key"]))
     drawn = []
     with styled():
         for name, across in ((NAME, min(len(tasks), ACROSS)), (COLUMN, 1)):
             figure = _figure(list(tasks.values()), across, colours)
             png, pdf = write(figure, name, folder)
-            drawn.append(Drawn(name, "Published scores and ours", _caption(every, colours), png, pdf, keys))
+            drawn.append(SavedFigure(name, "Published scores and ours", _caption(every, colours), png, pdf, keys))
     return drawn
 
 

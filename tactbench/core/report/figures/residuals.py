@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.core.leaderboard.numbers import score, suffix
 from tactbench.core.report.figures.group import Group, Remark
 from tactbench.core.report.figures.sketch import Sketch, coloured, heading, marks, metric_name, quantity, with_unit
 from tactbench.core.report.figures.style import BLACK, corner, legend, panels
+from tactbench.core.tables.numbers import score, suffix
 
 ACROSS = 2
 """Panels beside each other."""

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.matrix.files import replace_file
-from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures.sketch import Sketch
+from tactbench.core.report.saved_figure import SavedFigure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,10 +23,10 @@ _WITHOUT_DATES: dict[str, dict[str, Any]] = {
 """Nor with the version of what drew them: files differ only where figures do."""
 
 
-def save(sketch: Sketch, folder: Path) -> Drawn:
+def save(sketch: Sketch, folder: Path) -> SavedFigure:
     """Write both files, each whole, and return what was drawn; raises OSError."""
     png, pdf = write(sketch.figure, sketch.name, folder)
-    return Drawn(sketch.name, sketch.title, sketch.caption, png, pdf, sketch.group.keys)
+    return SavedFigure(sketch.name, sketch.title, sketch.caption, png, pdf, sketch.group.keys)
 
 
 def write(figure: Figure, name: str, folder: Path) -> tuple[Path, Path]:

@@ -12,12 +12,12 @@ import numpy.typing as npt
 from tactbench.core.errors import NotApplicable
 from tactbench.core.evaluation.interval import score_interval
 from tactbench.core.evaluation.metrics import Metric, metric_called
-from tactbench.core.leaderboard.numbers import interval, score, whole
 from tactbench.core.report.figures.group import Group, Panel, Remark
 from tactbench.core.report.figures.sketch import Sketch, coloured, heading, marks, metric_name
 from tactbench.core.report.figures.style import DASHES, GREY, MARKERS, cycled, panels
 from tactbench.core.report.smoothing import WINDOW_S, smoothed_force
 from tactbench.core.samples import Answers, FloatArray
+from tactbench.core.tables.numbers import interval, score, whole
 
 EDGES_N = (1.5, 3.0)
 """A band is from one edge up to the next; the outer ones are open."""
@@ -47,7 +47,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
         raise NotApplicable("no test row has a reference force")
     figure, axes = panels(1, 1, 1.9)
     here = axes[0, 0]
-    counted, told = [], []
+    counted, listed = [], []
     for place, panel in enumerate(shown):
         found = banded(group, panel)
         at = np.flatnonzero([band.rows > 0 for band in found])
@@ -60,7 +60,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
             markersize=4, linestyle=cycled(DASHES, place), capsize=2, label=panel.sensor,
         )  # fmt: skip
         counted.append(f"{panel.sensor} {', '.join(whole(band.rows) for band in found)}")
-        told.append(f"{panel.sensor} {', '.join(_told(band, group.task.unit) for band in found)}")
+        listed.append(f"{panel.sensor} {', '.join(_band_text(band, group.task.unit) for band in found)}")
     _baseline(here, group, shown)
     here.set_xticks(range(len(BANDS)), BANDS)
     here.set_xlim(-0.3, len(BANDS) - 0.7)
@@ -70,7 +70,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
     figure.suptitle(heading(group))
     figure.legend(loc="outside lower center", ncols=3)
     return Sketch(
-        "score-by-force", f"{metric_name(group.task)} by force", _caption(group, shown, counted, told), group, figure
+        "score-by-force", f"{metric_name(group.task)} by force", _caption(group, shown, counted, listed), group, figure
     )
 
 
@@ -96,8 +96,8 @@ def _band(metric: Metric, test: Answers, inside: npt.NDArray[np.bool_], n_classe
     if not inside.any():
         return Band(0.0, 0.0, 0.0, 0)
     alone = replace(metric, rows=lambda y, predicted, n: metric.rows(y, predicted, n) * inside[:, None])
-    nobody = np.zeros(len(test), dtype=np.int64)  # sessions are not resampled: the test set is one
-    found = score_interval(alone, test.y_true, test.y_pred, test.recording, nobody, "session", n_classes, seed)
+    no_groups = np.zeros(len(test), dtype=np.int64)  # sessions are not resampled: the test set is one
+    found = score_interval(alone, test.y_true, test.y_pred, test.recording, no_groups, "session", n_classes, seed)
     value = metric.of(test.y_true[inside], test.y_pred[inside], n_classes)
     return Band(value, found.low, found.high, int(inside.sum()))
 
@@ -120,18 +120,18 @@ def _baseline(here: Any, group: Group, shown: list[Panel]) -> None:
         label = False
 
 
-def _told(band: Band, unit: str) -> str:
+def _band_text(band: Band, unit: str) -> str:
     return f"{score(band.score, unit)} ({interval(band.low, band.high, unit)})" if band.rows else "–"
 
 
-def _caption(group: Group, shown: list[Panel], counted: list[str], told: list[str]) -> str:
+def _caption(group: Group, shown: list[Panel], counted: list[str], listed: list[str]) -> str:
     trivial = next((panel.row["estimator"] for panel in group.baselines.values()), None)
     line = f" Dotted: {trivial}, the trivial baseline, in the same bands, a line a sensor." if trivial else ""
     return (
         f"{metric_name(group.task)} of the test set by force, one line a sensor ({coloured(group, shown)}): "
-        f"{'; '.join(told)}. Bands are below 1.5 N, from 1.5 N to below 3 N, and 3 N and above, by the reference force "
-        f"smoothed within a recording by a centred mean over {WINDOW_S:g} s, since a single reading of the reference "
-        f"is noisy; test rows in them: {'; '.join(counted)}. A class that is missing in a band counts as 0. Bars: 95 % "
-        f"intervals, bootstrap over blocks of time within recordings; spread between sessions is not in "
+        f"{'; '.join(listed)}. Bands are below 1.5 N, from 1.5 N to below 3 N, and 3 N and above, by the "
+        f"reference force smoothed within a recording by a centred mean over {WINDOW_S:g} s, since a single reading of "
+        f"the reference is noisy; test rows in them: {'; '.join(counted)}. A class that is missing in a band counts as "
+        f"0. Bars: 95 % intervals, bootstrap over blocks of time within recordings; spread between sessions is not in "
         f"them.{line}{marks(group)}"
     )

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from tactbench.core.report.calibrated import Calibrated
-from tactbench.core.report.drawn import Drawn
 from tactbench.core.report.figures.saving import write
+from tactbench.core.report.saved_figure import SavedFigure
 
 _NAME = "calibration-sensitivity"
 
 
-def draw_sensitivity(calibrated: Calibrated, folder: Path) -> list[Drawn]:
+def draw_sensitivity(calibrated: Calibrated, folder: Path) -> list[SavedFigure]:
     """Save the figure as PDF and PNG; none if the calibration has none.
 
     Raises
@@ -27,4 +27,6 @@ def draw_sensitivity(calibrated: Calibrated, folder: Path) -> list[Drawn]:
         "cannot know; a panel a number. Bars: 95 %, bootstrap over draws; filled circles: the interval leaves "
         "out 0. SIM. "
     )
-    return [Drawn(_NAME, "What decides the published numbers", caption + " ".join(calibrated.notes), png, pdf, ())]
+    return [
+        SavedFigure(_NAME, "What decides the published numbers", caption + " ".join(calibrated.notes), png, pdf, ())
+    ]

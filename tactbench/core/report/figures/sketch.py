@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.leaderboard.table import METRIC_NAMES, answer_name
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name
 from tactbench.core.report.figures.group import Group, Panel
 from tactbench.core.report.figures.style import colour_name
 from tactbench.core.spec.task import LabelTarget, TaskSpec
@@ -59,14 +59,14 @@ def heading(group: Group, *more: str) -> str:
 def marks(group: Group) -> str:
     """Return what the marks in the heading mean, and which replicate is shown."""
     row = group.row
-    said = [""]
+    sentences = [""]
     if row["simulated"]:
-        said.append("SIM: simulated, no hardware was touched.")
+        sentences.append("SIM: simulated, no hardware was touched.")
     if row["dagger"]:
-        said.append("†: each set, the test set too, is scaled by its own mean and deviation.")
-    said += [f"‡: {stamp}" for stamp in row["stamps"]]
-    said += [f"Shown: {one}; the tables are over all of them." for one in _shown(row)]
-    return " ".join(said)
+        sentences.append("†: each set, the test set too, is scaled by its own mean and deviation.")
+    sentences += [f"‡: {stamp}" for stamp in row["stamps"]]
+    sentences += [f"Shown: {one}; the tables are over all of them." for one in _shown(row)]
+    return " ".join(sentences)
 
 
 def _shown(row: Mapping[str, Any]) -> list[str]:

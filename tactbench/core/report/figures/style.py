@@ -105,13 +105,13 @@ def colour_name(colour: str) -> str:
 
 def legend(figure: Figure, shown: Iterable[Axes], **more: Any) -> None:
     """Put below a figure what its panels name, each name once."""
-    told: dict[str, Any] = {}
+    entries: dict[str, Any] = {}
     for here in shown:
         handles, labels = here.get_legend_handles_labels()
-        told.update(zip(labels, handles, strict=True))
+        entries.update(zip(labels, handles, strict=True))
     wide = figure.get_figwidth() > COLUMN_IN
-    ncols = 2 if sum(map(len, told)) > LEGEND_LETTERS and not wide else 3
-    figure.legend(told.values(), told.keys(), loc="outside lower center", ncols=min(len(told), ncols), **more)
+    ncols = 2 if sum(map(len, entries)) > LEGEND_LETTERS and not wide else 3
+    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=min(len(entries), ncols), **more)
 
 
 def corner(axes: Axes, text: str, *, right: bool = False) -> None:

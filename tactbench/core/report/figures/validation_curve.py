@@ -135,11 +135,11 @@ def _of_fold(chosen: Mapping[str, float], name: str, fold: str) -> float | None:
 
 
 def _caption(group: Group, shown: Sequence[Panel], names: Sequence[str]) -> str:
-    told = []
+    picks = []
     for panel in shown:
         chosen = panel.row["chosen"]
         picked = (f"{_called(name)} = {value:g}" for name, value in sorted(chosen.items()))
-        told.append(f"{panel.sensor}: {', '.join(picked)}")
+        picks.append(f"{panel.sensor}: {', '.join(picked)}")
     folds = any(" of fold " in name for panel in shown for name in panel.row["chosen"])
     means = " Scores are means over folds, which did not all choose alike: a ring each." if folds else ""
     others = " At each value the best over the other parameters is shown." if len(names) > 1 else ""
@@ -147,7 +147,7 @@ def _caption(group: Group, shown: Sequence[Panel], names: Sequence[str]) -> str:
     return (
         f"{metric_name(group.task)} on validation data ({low} is better) against what was searched, "
         f"{', '.join(_called(name) for name in names)}; one panel a sensor ({sensors(group)}), one line a length k of "
-        f"the mean filter over samples t−k … t. Ringed: the candidate chosen ({'; '.join(told)}).{means}{others}"
+        f"the mean filter over samples t−k … t. Ringed: the candidate chosen ({'; '.join(picks)}).{means}{others}"
         f"{marks(group)}"
     )
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import ChannelSpec, RigError, StreamSpec, Unwrap
+from tactbench.plugin import ChannelSpec, RigError, StreamSpec
+from tactbench.plugin.devices import Unwrap
 
 IntArray = npt.NDArray[np.int64]
 

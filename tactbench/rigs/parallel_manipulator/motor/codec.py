@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from enum import Enum, IntFlag
 from typing import NamedTuple
 
-from tactbench.plugin import Received
+from tactbench.plugin.devices import Received
 
 BITS_PER_BYTE = 10
 """Start bit, 8 data bits, stop bit: 8N1 (sourced: the manual, page 13)."""

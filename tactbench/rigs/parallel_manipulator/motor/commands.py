@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tactbench.plugin import Clock
+from tactbench.plugin.devices import Clock
 from tactbench.rigs.parallel_manipulator.motor.codec import QUERIES, Configuration, Line, OperationStatus
 from tactbench.rigs.parallel_manipulator.motor.errors import (
     MotorError,

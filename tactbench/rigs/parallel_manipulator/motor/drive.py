@@ -65,16 +65,20 @@ class Drive:
     Parameters
     ----------
     load
-        Force on the motor [N] at a position [m] and a time [s], positive against positive motion.
+        Force on the motor [N] at a position [m] and a time [s], positive against positive motion; None: none, ever.
     profile, model
         Units of the drive; mechanics of the motor.
     reference_switch_m
         Where GOHOSEQ finds its switch [m]; None: there is none, and GOHOSEQ is refused.
     """
 
-    def __init__(self, load: Load, profile: MotorProfile, model: MotorModel, reference_switch_m: float | None) -> None:
+    def __init__(
+        self, load: Load | None, profile: MotorProfile, model: MotorModel, reference_switch_m: float | None
+    ) -> None:
         self.profile = profile
         self.servo = Servo(model, load)
+        self.standing = False
+        """Whether further ticks change nothing but the motor's heat, to the servo's resolution, before a command."""
         self.hot = False
         """Too hot: without power, and without any until it is switched on again."""
         self.flash_defect = False
@@ -113,11 +117,13 @@ class Drive:
     def overheat(self) -> None:
         """Take the power off until `hot` is set back and the drive is enabled again."""
         self.hot, self._enabled, self._homing = True, False, False
+        self.standing = False
 
     def tick(self, at_s: float) -> list[str]:
         """Go one tick, to `at_s`; return the notices it causes."""
         profile, settings, reference = self.profile, self.settings, self._reference
         before = self.servo.position_m, self.servo.speed_m_s
+        reference_before_m = reference.position_m
         if not self._enabled:
             self.servo.step(at_s, None, 0.0)
             reference.stop_at(self.servo.position_m)
@@ -133,7 +139,17 @@ class Drive:
                     speed = profile.speed_m_s(settings.homing_speed)
                 reference.to_position(self._target_m, self.servo.tick_s, speed, acceleration, braking)
             self.servo.step(at_s, reference, self._limit_a())
-        return self._notify(*before)
+        notices = self._notify(*before)
+        # A load may change with time.
+        self.standing = (
+            self.servo.load is None
+            and not notices
+            and not self.servo.limited
+            and reference.position_m == reference_before_m
+            and reference.speed_m_s == 0.0
+            and self.servo.settled(reference)
+        )
+        return notices
 
     def _at_limits(self, wanted: float, braking: float) -> float:
         if not self.settings.limits_on:
@@ -194,6 +210,7 @@ class Drive:
         Refused
             If the drive does not carry it out; its text is the answer.
         """
+        self.standing = False
         name, argument = command.name, command.argument
         query = self._query(name)
         if query is not None:

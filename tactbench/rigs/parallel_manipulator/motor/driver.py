@@ -15,15 +15,8 @@ from typing import Literal
 
 import numpy as np
 
-from tactbench.plugin import (
-    Block,
-    ByteLink,
-    ChannelSpec,
-    Driver,
-    DriverSettings,
-    Quality,
-    StreamSpec,
-)
+from tactbench.plugin import Block, ChannelSpec, Quality, StreamSpec
+from tactbench.plugin.devices import ByteLink, Driver, DriverSettings
 from tactbench.rigs.parallel_manipulator.motor.codec import Configuration, Kind, OperationStatus, fault_status
 from tactbench.rigs.parallel_manipulator.motor.commands import FAULTS, Commands
 from tactbench.rigs.parallel_manipulator.motor.errors import (

@@ -1,6 +1,6 @@
 """The motor's drive at the end of its line: bytes in, bytes out, on a clock that is passed in; no input or output.
 
-A :class:`tactbench.plugin.DeviceEmulator`.
+A :class:`tactbench.plugin.devices.DeviceEmulator`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from tactbench.plugin import CanFrame, EmulatorSettings, Fault, Sent, fault_concerns, sourced
+from tactbench.plugin import sourced
+from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
 from tactbench.rigs.parallel_manipulator.motor.codec import OK, Command, CommandReader, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.drive import Drive, Refused
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions, MotorProfile
@@ -41,13 +42,13 @@ SWITCH_M = -8e-3
 """Where an emulated drive of a rig file has its reference switch, 2 mm from its end stop (assumed)."""
 
 
-class MotorEmulator:
+class MotorEmulator(DeviceEmulator):
     """A drive with its motor, and its line's pace. The first call is power-on.
 
     Parameters
     ----------
     load
-        Force on the motor [N] at a position [m] and a time [s], positive against positive motion.
+        Force on the motor [N] at a position [m] and a time [s], positive against positive motion; None: none, ever.
     rng
         Draws the bytes of garbled lines.
     profile, model
@@ -62,7 +63,7 @@ class MotorEmulator:
 
     def __init__(
         self,
-        load: Load,
+        load: Load | None,
         rng: np.random.Generator,
         *,
         profile: MotorProfile | None = None,
@@ -82,9 +83,12 @@ class MotorEmulator:
         self._start_s: float | None = None
         self._now_s = self._in_free_s = self._out_free_s = -math.inf
         self._ticks = 0
-        self._in: deque[tuple[float, int]] = deque()
+        self._in: deque[tuple[float, bytes]] = deque()
         self._answers: deque[tuple[float, str]] = deque()
-        self._out: deque[tuple[float, int]] = deque()
+        self._out: deque[tuple[float, bytes]] = deque()
+
+    keeps_pace = True
+    """Bytes take their time here, at the rate that the drive is set to."""
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.
@@ -95,34 +99,41 @@ class MotorEmulator:
         now_s = max(now_s, self._now_s)
         byte_s = line_time_s(1, self.drive.settings.baud)
         self._in_free_s = max(self._in_free_s, now_s)
-        for byte in piece:
-            self._in_free_s += byte_s
-            self._in.append((self._in_free_s, byte))
+        for part in piece.splitlines(keepends=True):
+            self._in_free_s += len(part) * byte_s
+            self._in.append((self._in_free_s, part))
         return self.poll(now_s)
 
     def poll(self, now_s: float) -> list[Sent]:
-        """Go on to `now_s`; return each byte whose last bit has left the drive by then, with that time."""
+        """Go on to `now_s`; return what has left the drive by then, of each line the first byte and the rest."""
         if self._start_s is None:
             self._start_s = now_s
         now_s = max(now_s, self._now_s)
         while self._in and self._in[0][0] <= now_s:
-            at_s, byte = self._in.popleft()
+            at_s, part = self._in.popleft()
             self._go_to(at_s)
-            for command in self._reader.feed(bytes([byte])):
+            for command in self._reader.feed(part):
                 self._carry_out(command, at_s)
         self._go_to(now_s)
         found: list[Sent] = []
         while self._out and self._out[0][0] <= now_s:
-            sent_s, byte = self._out.popleft()
-            found.append((sent_s, bytes([byte])))
+            found.append(self._out.popleft())
         return found
 
     def next_s(self) -> float:
-        """Return when something may happen next: a byte in, an answer, a byte out, or a tick; 0 before power-on."""
+        """Return when something may happen next: a command in, an answer, a line out, a tick; 0 before power-on."""
         if self._start_s is None:
             return 0.0
-        queued = [due[0] for queue in (self._in, self._answers, self._out) for due in list(queue)[:1]]
-        return min([self._tick_s(), *queued])
+        next_s = math.inf if self._standing else self._tick_s()
+        for queue in (self._in, self._answers, self._out):
+            if queue:
+                next_s = min(next_s, queue[0][0])
+        return next_s
+
+    @property
+    def _standing(self) -> bool:
+        """Whether a tick changes nothing but the motor's heat until a command comes."""
+        return self.drive.standing and not any(fault.name == "motor-fault" for fault in self.faults)
 
     def _tick_s(self) -> float:
         """Return the time of the next tick."""
@@ -133,6 +144,13 @@ class MotorEmulator:
         # Ticks stand on a grid of their own, and answers have their times: when it is asked for changes nothing.
         while True:
             tick_s = self._tick_s()
+            if tick_s <= now_s and self._standing:
+                assert self._start_s is not None
+                # One tick is left to be made: rounding then decides nothing.
+                ticks = max(0, math.floor((now_s - self._start_s) / self.drive.servo.tick_s) - 1 - self._ticks)
+                self.drive.servo.cool(ticks)
+                self._ticks += ticks
+                tick_s = self._tick_s()
             if self._answers and self._answers[0][0] <= min(tick_s, now_s):
                 due_s, text = self._answers.popleft()
                 self._send(text, due_s)
@@ -182,10 +200,10 @@ class MotorEmulator:
             # Any other byte than the right one: also a digit for a digit, which no host can notice.
             line[int(self._rng.integers(len(line)))] ^= int(self._rng.integers(1, 256))
         byte_s = line_time_s(1, self.drive.settings.baud)
-        self._out_free_s = max(self._out_free_s, at_s)
-        for byte in line:
-            self._out_free_s += byte_s
-            self._out.append((self._out_free_s, byte))
+        first_s = max(self._out_free_s, at_s) + byte_s
+        self._out_free_s = first_s + (len(line) - 1) * byte_s
+        # A host stamps a line at its first byte, and has it at its last.
+        self._out += [(first_s, bytes(line[:1])), (self._out_free_s, bytes(line[1:]))]
 
 
 def build(settings: EmulatorSettings) -> MotorEmulator:

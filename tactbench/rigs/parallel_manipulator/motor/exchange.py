@@ -11,7 +11,7 @@ from collections import Counter, deque
 from contextlib import suppress
 from typing import NamedTuple
 
-from tactbench.plugin import ByteLink, Clock, LinkTimeout, Received
+from tactbench.plugin.devices import ByteLink, Clock, LinkTimeout, Received
 from tactbench.rigs.parallel_manipulator.motor.codec import (
     LONGEST_ANSWER,
     LONGEST_LINE,

@@ -7,6 +7,7 @@ motor: these are assumed, and a rig states its own.
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -44,6 +45,22 @@ class MotorProfile(BaseModel):
     largest_current: int = 12_000
     """Largest argument of LPC and LCC (assumed)."""
 
+    @cached_property
+    def _position_m(self) -> float:
+        return self.position_unit.to("m")
+
+    @cached_property
+    def _speed_m_s(self) -> float:
+        return self.speed_unit.to("m/s")
+
+    @cached_property
+    def _acceleration_m_s2(self) -> float:
+        return self.acceleration_unit.to("m/s/s")
+
+    @cached_property
+    def _current_a(self) -> float:
+        return self.current_unit.to("A")
+
     def increments(self, position_m: float) -> int:
         """Return the nearest position argument.
 
@@ -52,12 +69,12 @@ class MotorProfile(BaseModel):
         RigError
             If the drive has no such position.
         """
-        found = self._finite(position_m / self.position_unit.to("m"), "position", position_m, "m")
+        found = self._finite(position_m / self._position_m, "position", position_m, "m")
         return self._within(round(found), self.largest_position, "position", position_m, "m")
 
     def position_m(self, increments: float) -> float:
         """Return a position in metres."""
-        return increments * self.position_unit.to("m")
+        return increments * self._position_m
 
     def speed(self, speed_m_s: float) -> int:
         """Return the argument of SP or V: the largest that is not faster than asked for; its sign is that of V.
@@ -67,28 +84,28 @@ class MotorProfile(BaseModel):
         RigError
             If the drive cannot be so fast, or not so slow.
         """
-        return self._limit(speed_m_s, self.speed_unit.to("m/s"), self.largest_speed, "speed", "m/s")
+        return self._limit(speed_m_s, self._speed_m_s, self.largest_speed, "speed", "m/s")
 
     def speed_m_s(self, argument: float) -> float:
         """Return a speed in metres per second."""
-        return argument * self.speed_unit.to("m/s")
+        return argument * self._speed_m_s
 
     def acceleration(self, acceleration_m_s2: float) -> int:
         """Return the argument of AC or DEC, rounded down; raises RigError as `speed` does."""
-        unit = self.acceleration_unit.to("m/s/s")
+        unit = self._acceleration_m_s2
         return self._limit(acceleration_m_s2, unit, self.largest_acceleration, "acceleration", "m/s^2")
 
     def acceleration_m_s2(self, argument: float) -> float:
         """Return an acceleration in m/s^2."""
-        return argument * self.acceleration_unit.to("m/s/s")
+        return argument * self._acceleration_m_s2
 
     def current(self, current_a: float) -> int:
         """Return the argument of LPC or LCC, rounded down; raises RigError as `speed` does."""
-        return self._limit(current_a, self.current_unit.to("A"), self.largest_current, "current", "A")
+        return self._limit(current_a, self._current_a, self.largest_current, "current", "A")
 
     def current_a(self, argument: float) -> float:
         """Return a current in amperes."""
-        return argument * self.current_unit.to("A")
+        return argument * self._current_a
 
     def _limit(self, value: float, unit: float, largest: int, what: str, si: str) -> int:
         found = self._finite(value / unit, what, value, si)

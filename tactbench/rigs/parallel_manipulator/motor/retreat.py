@@ -6,7 +6,8 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
-from tactbench.plugin import ByteLink, Clock, Link, LinkClosed, LinkError, LinkTimeout, UsageError
+from tactbench.plugin import UsageError
+from tactbench.plugin.devices import ByteLink, Clock, Link, LinkClosed, LinkError, LinkTimeout
 from tactbench.rigs.parallel_manipulator.motor.codec import LONGEST_ANSWER, Kind, LineReader, encode, line_time_s
 from tactbench.rigs.parallel_manipulator.motor.exchange import HOST_S
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions

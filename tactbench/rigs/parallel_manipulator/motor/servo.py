@@ -52,6 +52,10 @@ class MotorModel(BaseModel):
     answer_time: Quantity = assumed(1.0, "ms", "from the end of a command to the start of its answer; not documented")
 
 
+REST_M, REST_M_S = 1e-9, 1e-8
+"""A thousandth of an increment of 1 um, and ten times the resolution of the speed."""
+
+
 class Profile:
     """The reference: a trapezoid of speed, recomputed every tick, that ends on its target."""
 
@@ -108,10 +112,10 @@ class Servo:
     model
         The motor.
     load
-        What it presses against.
+        What it presses against; None: nothing, ever.
     """
 
-    def __init__(self, model: MotorModel, load: Load) -> None:
+    def __init__(self, model: MotorModel, load: Load | None) -> None:
         self.load = load
         self.tick_s = model.tick.to("s")
         self.mass = model.mass.to("kg")
@@ -134,6 +138,15 @@ class Servo:
         """Return the current that is allowed now: the peak, or the continuous one while the motor is warm."""
         return peak_a if self.mean_square_a2 < continuous_a**2 else min(peak_a, continuous_a)
 
+    def settled(self, reference: Profile) -> bool:
+        """Whether the motor is at rest where the reference is, within what :meth:`step` resolves."""
+        return abs(self.position_m - reference.position_m) <= REST_M and abs(self.speed_m_s) <= REST_M_S
+
+    def cool(self, ticks: int) -> None:
+        """Let the mean square of a constant current go on by some ticks."""
+        keep = math.exp(-ticks * self.tick_s / self.heating_s)
+        self.mean_square_a2 = keep * self.mean_square_a2 + (1.0 - keep) * self.current_a**2
+
     def step(self, time_s: float, reference: Profile | None, limit_a: float) -> None:
         """Go one tick, to `time_s`; `reference` None: the power stage is off."""
         h, (kp, kd, ki) = self.tick_s, self.gains
@@ -147,7 +160,7 @@ class Servo:
             return min(max(wanted, -largest), largest)
 
         def residual(v: float) -> float:
-            load = self.load(self.position_m + h * v, time_s)
+            load = 0.0 if self.load is None else self.load(self.position_m + h * v, time_s)
             return self.mass * (v - self.speed_m_s) / h - force(v) + self.damping * v + load
 
         v = _root(residual, self.speed_m_s, self.mass / h)
@@ -167,8 +180,7 @@ class Servo:
         at_stop = moved in self.stops
         self.position_m, self.speed_m_s = moved, 0.0 if at_stop else v
         self.current_a = applied / self.force_constant
-        keep = math.exp(-h / self.heating_s)
-        self.mean_square_a2 = keep * self.mean_square_a2 + (1.0 - keep) * self.current_a**2
+        self.cool(1)
 
 
 def _root(residual: Callable[[float], float], guess: float, slope: float) -> float:

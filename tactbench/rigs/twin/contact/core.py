@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, FluidBackedShell
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import FluidBackedShell
 from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_positive
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import BondedLayer, FloatArray, SkinState
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import BondedLayer, SkinState
 from tactbench.rigs.twin.boundary_elements.contact import press
 from tactbench.rigs.twin.boundary_elements.kernels import Layer
 from tactbench.rigs.twin.contact.media import Medium

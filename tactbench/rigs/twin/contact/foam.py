@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, FoamPad, SkinGrid
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import FoamPad, SkinGrid
 from tactbench.rigs.twin.contact.media import Medium, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.geometry import skin_grid

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import BondedLayer, SkinGrid
+from tactbench.plugin.simulation import BondedLayer, SkinGrid
 from tactbench.rigs.twin.contact.media import Medium, no_local_law, require_poisson, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.layer_kernel import compliance_shape

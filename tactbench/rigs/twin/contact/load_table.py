@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, SkinState
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import SkinState
 from tactbench.rigs.twin.contact.interpolant import Interpolant
 from tactbench.rigs.twin.contact.press import AnyPress, scalars
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import BondedLayer, FloatArray, FluidBackedShell, FoamPad, RigError, SkinState
+from tactbench.plugin import FloatArray, RigError
+from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad, SkinState
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Coreless, at_rest, contact_radius_mm
 from tactbench.rigs.twin.geometry import Contact

@@ -7,7 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, RigError, SkinGrid
+from tactbench.plugin import FloatArray, RigError
+from tactbench.plugin.simulation import SkinGrid
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 
 

@@ -8,7 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, RigError, SkinGrid, SkinState
+from tactbench.plugin import FloatArray, RigError
+from tactbench.plugin.simulation import SkinGrid, SkinState
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.newton import TOLERANCE, NewtonSolver, Solution
 from tactbench.rigs.twin.geometry import Contact

@@ -6,18 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tactbench.plugin import (
+from tactbench.plugin import FloatArray, NotApplicable, PluginContractError, RigError, SensorDescriptor, load_object
+from tactbench.plugin.simulation import (
     BondedLayer,
-    FloatArray,
     FluidBackedShell,
-    NotApplicable,
-    PluginContractError,
-    RigError,
-    SensorDescriptor,
     Skin,
     SkinGrid,
     SkinState,
-    load_object,
+    Transducer,
+    TransducerFactory,
 )
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress, Press
@@ -94,8 +91,8 @@ def _reader(
 ) -> Callable[[SkinState], FloatArray]:
     """Return the sensor's transducer, each of its answers looked at before it is used."""
     try:
-        factory = load_object(sensor.transducer or "")
-        transducer = factory(sensor.spec, grid, names, **fidelity.options(factory))
+        factory: TransducerFactory = load_object(sensor.transducer or "")
+        transducer: Transducer = factory(sensor.spec, grid, names, **fidelity.options(factory))
     except RigError as error:
         raise NotApplicable(f"The transducer of {sensor.name} cannot answer: {error}", hint=error.hint) from error
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, FluidBackedShell, SkinGrid
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import FluidBackedShell, SkinGrid
 from tactbench.rigs.twin.contact.media import LocalLaw, Medium, require_poisson, require_positive
 from tactbench.rigs.twin.contact.spectrum import Spectrum
 from tactbench.rigs.twin.geometry import outer_radius_mm

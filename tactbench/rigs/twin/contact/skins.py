@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from tactbench.plugin import BondedLayer, FluidBackedShell, FoamPad, Quantity, RigError, SkinGrid
+from tactbench.plugin import Quantity, RigError
+from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad, SkinGrid
 from tactbench.rigs.twin.contact.media import Medium
 
 

@@ -11,7 +11,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import FloatArray, SkinGrid
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import SkinGrid
 
 
 class Spectrum:

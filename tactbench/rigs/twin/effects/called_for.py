@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from tactbench.plugin import FluidBackedShell, Nuisances, Quantity, Reason, Scene, SensorSpec
+from tactbench.plugin import Quantity, Scene, SensorSpec
+from tactbench.plugin.simulation import FluidBackedShell, Nuisances, Reason
 
 
 def _observed(scene: Scene, sensor: SensorSpec) -> list[Nuisances]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import FluidBackedShell, Reason, Scene, SensorSpec
+from tactbench.plugin import Scene, SensorSpec
+from tactbench.plugin.simulation import FluidBackedShell, Reason
 
 STILL = "no tangential motion: the scene does not slide"
 UNSEEN = "no channel of dynamic pressure is observed"

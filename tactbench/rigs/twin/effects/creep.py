@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import ChannelKind, Creep, FloatArray, Nuisances
+from tactbench.plugin import ChannelKind, FloatArray
+from tactbench.plugin.simulation import Creep, Nuisances
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, read_names, skin_under_load
 from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.synthesis import Load, Settled, Synthesis, Track

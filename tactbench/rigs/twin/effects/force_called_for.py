@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import Reason, Scene, SensorSpec
+from tactbench.plugin import Scene, SensorSpec
+from tactbench.plugin.simulation import Reason
 
 
 def force_loop(scene: Scene, sensor: SensorSpec) -> Reason:

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from tactbench.plugin import ChannelKind, FloatArray, Nuisances, SensorSpec
+from tactbench.plugin import ChannelKind, FloatArray, SensorSpec
+from tactbench.plugin.simulation import Nuisances
 from tactbench.rigs.twin.synthesis import Synthesis, Track
 
 _INDEPENDENT = 1e-9

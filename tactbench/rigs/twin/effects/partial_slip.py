@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import BondedLayer, FloatArray, FluidBackedShell, FoamPad, Skin
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, FoamPad, Skin
 
 
 def shear_modulus_mpa(skin: Skin) -> float:

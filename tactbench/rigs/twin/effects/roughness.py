@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, Surface
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import Surface
 
 COMPONENTS = 48
 """Cosines the profile is made of: enough to be close to Gaussian; they set the effect's cost."""

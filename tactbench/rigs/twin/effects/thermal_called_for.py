@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from tactbench.plugin import ChannelKind, Reason, Scene, SensorSpec, SkinSheet
+from tactbench.plugin import ChannelKind, Scene, SensorSpec
+from tactbench.plugin.simulation import Reason, SkinSheet
 from tactbench.rigs.twin.effects import thermistor
 from tactbench.rigs.twin.effects.heated_core import NEEDED, HeatedCore
 

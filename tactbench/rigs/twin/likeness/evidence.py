@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import FloatArray, NotApplicable, RealFigure
+from tactbench.plugin import FloatArray, NotApplicable
+from tactbench.plugin.simulation import RealFigure
 
 IntArray = npt.NDArray[np.int64]
 LOADED_FROM = 10.0

@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, NotApplicable, RealFigure
+from tactbench.plugin import FloatArray, NotApplicable
+from tactbench.plugin.simulation import RealFigure
 from tactbench.rigs.twin.likeness import statistics
 from tactbench.rigs.twin.likeness.evidence import MOVED_FROM, Evidence
 

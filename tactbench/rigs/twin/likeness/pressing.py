@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, FluidBackedShell, NotApplicable, SensorDescriptor, load_object
+from tactbench.plugin import FloatArray, NotApplicable, SensorDescriptor, load_object
+from tactbench.plugin.simulation import FluidBackedShell
 from tactbench.rigs.twin.contact.core import with_core
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Press

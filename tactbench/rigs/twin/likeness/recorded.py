@@ -8,15 +8,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import (
-    FloatArray,
-    MissingRecordingError,
-    NotApplicable,
-    Recording,
-    SensorSpec,
-    UsageError,
-    open_recording,
-)
+from tactbench.plugin import FloatArray, MissingRecordingError, NotApplicable, SensorSpec, UsageError
+from tactbench.plugin.simulation import Recording, open_recording
 from tactbench.rigs.twin.likeness.evidence import LOADED_FROM, Evidence
 
 UNTOUCHED_WITHIN = 4.0

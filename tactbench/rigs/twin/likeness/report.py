@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from tactbench.plugin import ChannelKind, Check, NotApplicable, RealFigure, SensorDescriptor, UsageError, Verdict
+from tactbench.plugin import ChannelKind, NotApplicable, SensorDescriptor, UsageError
+from tactbench.plugin.simulation import Check, RealFigure, Verdict
 from tactbench.rigs.twin.likeness import recorded, scenes
 from tactbench.rigs.twin.likeness.evidence import Evidence
 from tactbench.rigs.twin.likeness.named import take

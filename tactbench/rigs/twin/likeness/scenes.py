@@ -9,9 +9,7 @@ import numpy as np
 
 from tactbench.plugin import (
     ChannelKind,
-    Environment,
     FloatArray,
-    FluidBackedShell,
     ForceRamp,
     Indenter,
     NotApplicable,
@@ -19,10 +17,10 @@ from tactbench.plugin import (
     Scene,
     SensorDescriptor,
     SensorSpec,
-    Slide,
     assumed,
     load_registry,
 )
+from tactbench.plugin.simulation import Environment, FluidBackedShell, Slide
 from tactbench.rigs.twin.geometry import finger_surface_mm
 from tactbench.rigs.twin.likeness.evidence import LOADED_FROM, Evidence
 from tactbench.rigs.twin.likeness.plate import plate_gap_mm, plate_normal

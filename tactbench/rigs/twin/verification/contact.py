@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tactbench.plugin import Check
+from tactbench.plugin.simulation import Check
 from tactbench.rigs.twin.verification import friction_and_adhesion, half_space, kernels, layers
 
 GROUP = "contact"

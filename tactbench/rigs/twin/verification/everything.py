@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tactbench.plugin import Check
+from tactbench.plugin.simulation import Check
 
 
 def checks() -> Sequence[Check]:

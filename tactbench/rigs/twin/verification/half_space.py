@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactbench.plugin import Verdict
+from tactbench.plugin.simulation import Verdict
 from tactbench.rigs.twin.boundary_elements.kernels import HalfSpace
 from tactbench.rigs.twin.closed_forms.half_space import FlatPunch, Hertz, point_load_mm
 from tactbench.rigs.twin.verification.pressing import (

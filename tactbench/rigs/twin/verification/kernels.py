@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, Verdict
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import Verdict
 from tactbench.rigs.twin.boundary_elements.kernels import HalfSpace, Kernel, Layer
 from tactbench.rigs.twin.boundary_elements.operator import operator
 from tactbench.rigs.twin.verification.pressing import paraboloid_mm, pressed, within

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactbench.plugin import BondedLayer, SkinSheet, Verdict, assumed
+from tactbench.plugin import assumed
+from tactbench.plugin.simulation import BondedLayer, SkinSheet, Verdict
 from tactbench.rigs.twin.boundary_elements.kernels import Layer
 from tactbench.rigs.twin.closed_forms.layers import IncompressibleLayer, Winkler
 from tactbench.rigs.twin.contact.newton import NewtonSolver, Solution

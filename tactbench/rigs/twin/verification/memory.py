@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactbench.plugin import Check, FloatArray, ForceLoop, Verdict, assumed
+from tactbench.plugin import FloatArray, ForceLoop, assumed
+from tactbench.plugin.simulation import Check, Verdict
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
 from tactbench.rigs.twin.effects.loop_dynamics import Dynamics
 from tactbench.rigs.twin.effects.memory import lag, time_constant_s, wandering

@@ -9,17 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tactbench.plugin import (
-    Check,
-    FloatArray,
-    PlanEntry,
-    RigContext,
-    Scene,
-    SensorDescriptor,
-    TactbenchError,
-    Verdict,
-    load_registry,
-)
+from tactbench.plugin import FloatArray, PlanEntry, RigContext, Scene, SensorDescriptor, TactbenchError, load_registry
+from tactbench.plugin.simulation import Check, Verdict
 from tactbench.rigs.twin.preparation import carried_out
 from tactbench.rigs.twin.rig import Twin, build
 

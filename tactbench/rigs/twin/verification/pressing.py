@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, Verdict
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import Verdict
 from tactbench.rigs.twin.boundary_elements.contact import ElasticContact, press
 from tactbench.rigs.twin.boundary_elements.kernels import Kernel
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tactbench.plugin import Check, FloatArray, Verdict
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import Check, Verdict
 from tactbench.rigs.twin.effects.bristle import bristle, coefficient
 from tactbench.rigs.twin.effects.partial_slip import share_of_force, sliding_stiffness, stick_ratio
 from tactbench.rigs.twin.effects.skin_mode import shaken

@@ -7,7 +7,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.report.figures.group import groups
-from tactbench.core.report.material import open_material
+from tactbench.core.report.results import open_results
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.plugin import Block, ChannelSpec, SensorSpec, Source, StreamSpec
@@ -69,7 +69,7 @@ def results(folder, *, sensors=("alpha", "beta"), kept=KEPT, simulated=True, pro
 
 
 def opened(folder):
-    return open_material(Store(folder), REGISTRY)
+    return open_results(Store(folder), REGISTRY)
 
 
 def group_of(folder, task):

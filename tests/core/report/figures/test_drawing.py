@@ -93,8 +93,8 @@ def test_the_same_bytes_in_another_process_whatever_the_user_s_style(all_of_it, 
         "from tactbench.core.matrix.store import Store\n"
         "from tactbench.core.plugins.registry import load_registry\n"
         "from tactbench.core.report.figures import draw_figures\n"
-        "from tactbench.core.report.material import open_material\n"
-        "draw_figures(open_material(Store(Path(sys.argv[1])), load_registry()), Path(sys.argv[2]))\n"
+        "from tactbench.core.report.results import open_results\n"
+        "draw_figures(open_results(Store(Path(sys.argv[1])), load_registry()), Path(sys.argv[2]))\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
         "assert 'sklearn' not in sys.modules, 'embeddings are stored'\n"
     )

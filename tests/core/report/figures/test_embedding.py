@@ -20,7 +20,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.report import embedding
 from tactbench.core.report.embedding import AT_MOST, embed, every_nth
-from tactbench.core.report.material import open_material
+from tactbench.core.report.results import open_results
 
 from .made import REGISTRY, group_of, opened, record, results
 
@@ -96,7 +96,7 @@ def test_other_recordings_than_were_answered_are_refused(tmp_path):
     record(tmp_path / "recordings", "alpha", 2.0, 0, 50)
     with pytest.raises(DataError, match="not the one that"):
         embed(material, row, test)
-    allowed = open_material(Store(folder, recordings=(tmp_path / "recordings",)), REGISTRY)
+    allowed = open_results(Store(folder, recordings=(tmp_path / "recordings",)), REGISTRY)
     with pytest.raises(DataError, match="other test rows than were answered"):
         embed(allowed, row, test)
 

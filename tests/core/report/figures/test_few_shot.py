@@ -3,7 +3,7 @@
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.figures.few_shot import draw_few_shot
-from tactbench.core.report.material import Material
+from tactbench.core.report.results import Results
 
 
 def row(sensor, shots, score, task="force"):
@@ -16,7 +16,7 @@ def row(sensor, shots, score, task="force"):
 
 
 def drawn(folder, rows):
-    return draw_few_shot(Material(Store(folder / "results"), load_registry(), tuple(rows)), folder)
+    return draw_few_shot(Results(Store(folder / "results"), load_registry(), tuple(rows)), folder)
 
 
 def test_every_few_shot_cell_is_in_the_one_figure(tmp_path):

@@ -5,8 +5,8 @@ import pytest
 
 from tactbench.core.report.figures import published_and_ours
 from tactbench.core.report.figures.style import BLACK, sensor_colours, styled
-from tactbench.core.report.material import Material
 from tactbench.core.report.reproduction import reproduce
+from tactbench.core.report.results import Results
 
 from .made import REGISTRY, opened
 
@@ -52,7 +52,7 @@ def test_the_caption_says_over_what_the_interval_is_and_which_colour_is_whose(fi
     material = opened(finished)
     few = {"n_replicates": 1, "replicate_scores": [1.0], "ci_low": None, "ci_high": None}
     rows = tuple(over_eight(row) if eight else {**row, **few} for row in material.rows if row["status"] == "done")
-    wide, column = published_and_ours.draw_published(Material(material.store, REGISTRY, rows), tmp_path)
+    wide, column = published_and_ours.draw_published(Results(material.store, REGISTRY, rows), tmp_path)
     assert wide.caption == column.caption
     assert "alpha blue, beta orange-red" in wide.caption
     assert ("the median over 8 replicates, with their 95 % intervals" in wide.caption) == eight
@@ -63,4 +63,4 @@ def test_the_caption_says_over_what_the_interval_is_and_which_colour_is_whose(fi
 def test_nothing_is_drawn_where_no_row_stands_beside_a_published_number(finished, tmp_path):
     material = opened(finished)
     rows = tuple(row for row in material.rows if row["task"] == "curvature")
-    assert published_and_ours.draw_published(Material(material.store, REGISTRY, rows), tmp_path) == []
+    assert published_and_ours.draw_published(Results(material.store, REGISTRY, rows), tmp_path) == []

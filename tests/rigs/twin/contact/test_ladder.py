@@ -7,18 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from tactbench.plugin import (
-    Environment,
-    ForceRamp,
-    Indenter,
-    RigContext,
-    RigError,
-    Scene,
-    SensorDescriptor,
-    Simulation,
-    UsageError,
-    assumed,
-)
+from tactbench.core.spec.scene import Simulation
+from tactbench.plugin import ForceRamp, Indenter, RigContext, RigError, Scene, SensorDescriptor, UsageError, assumed
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects, tactbench_rigs
 from tactbench.rigs.twin.contact.elements import ElementsPress
 from tactbench.rigs.twin.contact.local import LocalPress

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import Environment, Scene
+from tactbench.plugin import Scene
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.effects import creep, gain, offset
 from tactbench.rigs.twin.effects.memory import lag
 from tactbench.rigs.twin.geometry import Contact

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import Environment, ForceLoop, ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.plugin import ForceLoop, ForceRamp, Indenter, RigContext, RigError, Scene, assumed
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.effects.force_loop import BEYOND, depth_of, force_at_depth
@@ -127,9 +128,9 @@ def test_what_the_drive_is_made_of_is_printed_with_the_recording(sensors):
     scene = _scene(_unfiltered(), samples=50)
     with build(RigContext(effects=tuple(EFFECTS))).open(sensors["icub"], scene, seed=1) as recording:
         said = recording.assumptions
-    assert said["loop_cutoff_hz"] == "none"
-    assert said["loop_proportional_mm_per_n"] == 0.15
-    assert said["loop_delay_s"] == pytest.approx(0.01)
+    assert said["drive_cutoff_hz"] == "none"
+    assert said["drive_proportional_mm_per_n"] == 0.15
+    assert said["drive_delay_ms"] == pytest.approx(10.0)
 
 
 def test_creep_is_never_left_out_behind_a_loop(sensors):

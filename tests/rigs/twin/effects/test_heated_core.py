@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import Environment, Scene, assumed
+from tactbench.plugin import Scene, assumed
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin.effects.heated_core import HeatedCore, disc_conductance_w_per_k, relative_conductivity
 
 CORE = HeatedCore(room_c=23.0, power_w=0.25, resistance_k_per_w=136.0, capacity_j_per_k=3.7)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import Environment, NotApplicable, Scene, Simulation, load_registry
+from tactbench.core.spec.scene import Simulation
+from tactbench.plugin import NotApplicable, Scene, load_registry
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import draws
 from tactbench.rigs.twin.effects import offset
 from tactbench.rigs.twin.geometry import Contact

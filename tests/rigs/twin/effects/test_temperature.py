@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactbench.plugin import Environment, ForceRamp, Indenter, NotApplicable, RigContext, Scene, Simulation, assumed
+from tactbench.core.spec.scene import Simulation
+from tactbench.plugin import ForceRamp, Indenter, NotApplicable, RigContext, Scene, assumed
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.effects.heated_core import HeatedCore
 from tactbench.rigs.twin.effects.memory import time_constant_s

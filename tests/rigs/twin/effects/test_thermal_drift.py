@@ -5,7 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import Environment, ForceRamp, Indenter, RigContext, Scene, Simulation, assumed
+from tactbench.core.spec.scene import Simulation
+from tactbench.plugin import ForceRamp, Indenter, RigContext, Scene, assumed
+from tactbench.plugin.simulation import Environment
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.effects.heated_core import HeatedCore, relative_conductivity
 from tactbench.rigs.twin.effects.thermal_drift import largest_stretch, through_divider

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import RigError, Surface, assumed
+from tactbench.plugin import RigError, assumed
+from tactbench.plugin.simulation import Surface
 from tactbench.rigs.twin.effects.ac_pressure import within_band
 from tactbench.rigs.twin.effects.hum import band_noise
 from tactbench.rigs.twin.effects.roughness import Profile, patch_mean

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.plugin import Dome, SkinGrid, assumed
+from tactbench.plugin import assumed
+from tactbench.plugin.simulation import Dome, SkinGrid
 from tactbench.rigs.twin.geometry import Contact, finger_surface_mm, gap_mm
 from tactbench.rigs.twin.likeness.plate import plate_gap_mm, plate_normal
 

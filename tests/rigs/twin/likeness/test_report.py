@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tactbench.plugin import MissingRecordingError, RealFigure, SensorDescriptor, Source, UsageError, load_registry
+from tactbench.plugin import MissingRecordingError, SensorDescriptor, Source, UsageError, load_registry
+from tactbench.plugin.simulation import RealFigure
 from tactbench.rigs.twin.likeness.report import checks
 
 SENSORS = load_registry().sensors

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tactbench.plugin import ForceRamp, Indenter, Placement, RigContext, Scene, Simulation, assumed, load_registry
+from tactbench.core.spec.scene import Simulation
+from tactbench.plugin import ForceRamp, Indenter, Placement, RigContext, Scene, assumed, load_registry
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.contact.stages import skin_under_load
 from tactbench.rigs.twin.effects.thermal_called_for import widest_contact_mm

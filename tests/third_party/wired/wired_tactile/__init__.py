@@ -1,15 +1,7 @@
 """A pad and a scale that send lines of text over a serial port."""
 
-from tactbench.plugin import (
-    ChannelSpec,
-    DeviceDescriptor,
-    RigDescriptor,
-    SensorDescriptor,
-    SensorSpec,
-    Source,
-    StreamSpec,
-    hookimpl,
-)
+from tactbench.plugin import ChannelSpec, RigDescriptor, SensorDescriptor, SensorSpec, Source, StreamSpec, hookimpl
+from tactbench.plugin.devices import DeviceDescriptor
 
 TACTBENCH_API = 1
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from tactbench.plugin import Block, Driver, LinkTimeout, RigError
+from tactbench.plugin import Block, RigError
+from tactbench.plugin.devices import Driver, LinkTimeout
 from wired_tactile import PAD, SCALE
 
 

@@ -5,7 +5,7 @@ import time
 from contextlib import contextmanager
 from functools import partial
 
-from tactbench.plugin import DriverSettings, open_link
+from tactbench.plugin.devices import DriverSettings, open_link
 from wired_tactile.driver import build
 
 

@@ -78,7 +78,7 @@ const cellBody = (row) => {
   };
   const grouped = new Set(Object.values(head.groups).flat());
   const apart = new Set(["traceback", "log", "classes", ...Object.keys(head.titles)]);
-  const others = Object.keys(head.fields).filter((name) => !grouped.has(name) && !apart.has(name));
+  const others = head.fields.filter((name) => !grouped.has(name) && !apart.has(name));
   const parts = [...pairs("As the table shows it", line)];
   for (const [title, names] of Object.entries(head.groups)) parts.push(...pairs(title, names.flatMap(single)));
   parts.push(...pairs("Also", others.flatMap(single)));

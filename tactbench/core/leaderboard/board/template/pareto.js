@@ -8,7 +8,7 @@ const timeText = (seconds) => {
 const UNKNOWN = "a host that is not known";
 const pointsOf = (place, axis) => {
   const { order, starts, shown } = board;
-  const score = board.role("score"), rank = board.role("rank"), times = axis.column.values(), scores = score.column.values();
+  const score = board.role("score"), rank = board.role("rank"), times = axis.column.sort, scores = score.column.sort;
   const points = [];
   let untimed = 0;
   for (let at = starts[place]; at < starts[place + 1]; at += 1) {
@@ -73,7 +73,7 @@ const drawTime = () => {
   const { head } = board;
   const figure = byId("pareto");
   const axes = head.roles.times.map((name) => board.columns.find((one) => one.name === name))
-    .filter((one) => !board.silent(one));
+    .filter((one) => !board.isSilent(one));
   const blocks = head.blocks.map((block, place) => [String(place), block.title])
     .filter(([place]) => board.anyShown(Number(place)));
   fillPicker(byId("time-block"), blocks, byId("time-block").value);
@@ -129,7 +129,7 @@ const drawFigure = (width, points, front, block, axis) => {
   const height = Math.max(300, Math.min(520, width * 0.6));
   const left = 64, right = 16, top = 12, bottom = 44;
   const interval = board.role("interval");
-  const ends = new Map(front.map((one) => [one, interval?.column.ends ? interval.column.ends(one.row) : []]));
+  const ends = new Map(front.map((one) => [one, interval ? intervalEnds(interval.column.text(one.row)) : []]));
   const all = points.map((one) => one.score).concat(...ends.values());
   let low = Math.min(...all), high = Math.max(...all);
   const spare = (high - low || Math.abs(high) || 1) * 0.06;

@@ -8,11 +8,10 @@ const say = (text) => {
 };
 
 const readBoard = async () => {
-  const blobs = await inflateAll();
-  const head = json(blobs[packed.head]);
-  const columns = head.columns.map((one, place) => ({ ...one, place, column: readColumn(blobs, one.column) }));
-  const fields = new Map(Object.entries(head.fields).map(([name, told]) => [name, readColumn(blobs, told)]));
-  const order = planes(blobs, head.order);
+  const [head, ...read] = await Promise.all(packed().map(inflated));
+  const columns = head.columns.map((one, place) => ({ ...one, place, column: readColumn(read[place]) }));
+  const fields = new Map(head.fields.map((name, place) => [name, readColumn(read[columns.length + place])]));
+  const { order } = head;
   const starts = [0];
   for (const { size } of head.blocks) starts.push(starts.at(-1) + size);
   const blockOf = new Int32Array(head.rows).fill(-1);
@@ -20,12 +19,11 @@ const readBoard = async () => {
     for (let at = starts[place]; at < starts[place + 1]; at += 1) blockOf[order[at]] = place;
   });
   const byName = new Map(columns.map((one) => [one.name, one]));
-  const silent = ({ column }) => (column.patterns ? column.patterns.every(([text]) => !text || text === ABSENT)
-    : column.words ? column.words.every((one) => !asText(one) || asText(one) === ABSENT) : true);
+  const isSilent = ({ column }) => column.dictionary.every((one) => !asText(one) || asText(one) === ABSENT);
   return {
-    head, columns, fields, order, starts, blockOf, silent, rows: head.rows,
-    visibleColumns: columns.filter((one) => !silent(one)),
-    kinds: readColumn(blobs, head.kinds),
+    head, columns, fields, order, starts, blockOf, isSilent, rows: head.rows,
+    visibleColumns: columns.filter((one) => !isSilent(one)),
+    kinds: readColumn(head.kinds),
     shown: new Uint8Array(head.rows).fill(1),
     role: (name) => byName.get(head.roles[name]),
     field: (name, row) => fields.get(name)?.text(row) ?? "",
@@ -45,8 +43,8 @@ const fillFilters = () => {
   for (const [name, field] of Object.entries(pickers)) {
     const column = board.fields.get(field);
     const counts = new Map();
-    if (column?.at) for (const place of column.at) counts.set(place, (counts.get(place) ?? 0) + 1);
-    const entries = [...counts].map(([place, count]) => [String(place), asText(column.words[place]), count])
+    for (const place of column?.index ?? []) counts.set(place, (counts.get(place) ?? 0) + 1);
+    const entries = [...counts].map(([place, count]) => [String(place), asText(column.dictionary[place]), count])
       .sort((one, other) => words.compare(one[1], other[1]));
     fillPicker(byId(`pick-${name}`), [[ANY, `all (${whole(entries.length)})`],
       ...entries.map(([place, text, count]) => [place, name === "status" ? `${text} (${whole(count)})` : text])], ANY);
@@ -61,9 +59,9 @@ const searched = (term) => {
   const hit = new Uint8Array(board.rows);
   const columns = [...SEARCHED.map((name) => board.fields.get(name)), board.role("estimator").column, board.role("sensor").column];
   for (const column of columns) {
-    if (!column?.words) continue;
-    const matches = column.words.map((one) => visible(asText(one)).toLowerCase().includes(term));
-    if (matches.includes(true)) for (let row = 0; row < hit.length; row += 1) if (matches[column.at[row]]) hit[row] = 1;
+    if (!column) continue;
+    const matches = column.dictionary.map((one) => visible(asText(one)).toLowerCase().includes(term));
+    if (matches.includes(true)) for (let row = 0; row < hit.length; row += 1) if (matches[column.index[row]]) hit[row] = 1;
   }
   return hit;
 };
@@ -78,7 +76,7 @@ const filter = () => {
   if (hardware !== ANY) keep((row) => head.blocks[blockOf[row]].simulated === (hardware === "SIM"));
   for (const [name, field] of Object.entries(pickers)) {
     const value = byId(`pick-${name}`).value;
-    if (value !== ANY) { const { at } = board.fields.get(field); keep((row) => at[row] === Number(value)); }
+    if (value !== ANY) { const { index } = board.fields.get(field); keep((row) => index[row] === Number(value)); }
   }
   for (const term of byId("find").value.toLowerCase().split(/\s+/).filter((one) => one)) {
     const hit = searched(term);
@@ -115,21 +113,8 @@ const drawNotes = (most) => {
   if (!notes.length) byId("notes").append(make("li", {}, "Nothing to note."));
 };
 
-const drawSections = () => {
-  byId("sections").replaceChildren(...board.head.sections.flatMap(({ title, columns, lines, notes, alarms }) => [
-    make("h2", {}, title),
-    make("div", { class: "box" }, make("table", { "aria-label": title },
-      make("thead", {}, make("tr", {}, ...columns.map(([name, numeric]) =>
-        make("th", { scope: "col", class: numeric ? "number" : "" }, name)))),
-      make("tbody", {}, ...lines.map((line, at) => make("tr", { class: alarms.includes(at) ? "failed" : "" }, ...line.map((text, place) =>
-        make("td", { class: columns[place][1] ? "number" : "" }, text))))))),
-    make("ul", { class: "notes" }, ...notes.map((note) => make("li", {}, ...prose(note)))),
-  ]));
-};
-
 const drawProvenance = () => {
   const all = board.head.provenance;
-  byId("foot").replaceChildren(...board.head.foot.map((text) => make("p", { class: "note" }, ...prose(text))));
   byId("provenance").replaceChildren(...(all.length ? all.map(([, entry]) => make("details", {},
     make("summary", {}, Object.entries(entry).filter(([, value]) => !isEmpty(value) && !isRecord(value)).slice(0, 6)
       .map(([name, value]) => `${name} ${asText(value)}`).join(" · ")), ...provenanceTables(entry)))
@@ -175,10 +160,9 @@ const start = async () => {
     board = await readBoard();
     fillFilters();
     drawNotes(NOTES_AT_FIRST);
-    drawSections();
     drawProvenance();
     byId("app").hidden = false;
-    byId("still").remove();
+    byId("static").remove();
     listen();
     filter();
     show(state.view);

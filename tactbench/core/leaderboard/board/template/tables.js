@@ -6,28 +6,12 @@ const state = { sort: null, page: 0, matrixSort: null, matrixPage: 0, size: PAGE
 
 // What rows are compared by in a column: numbers by value, texts by their place among all texts.
 const keysOf = (entry) => {
-  if (entry.column.values) return entry.column.values();
+  if (entry.column.sort) return entry.column.sort;
   if (entry.keys) return entry.keys;
-  const { words: list, at } = entry.column;
-  if (!list) return (entry.keys = new Float64Array(board.rows).fill(NaN));
-  const place = new Float64Array(list.length).fill(NaN);
-  const texts = list.map(asText);
-  [...list.keys()].filter((one) => texts[one] && texts[one] !== ABSENT)
-    .sort((one, other) => words.compare(texts[one], texts[other]))
-    .forEach((one, order, all) => {
-      const before = order ? all[order - 1] : -1;
-      place[one] = order && !words.compare(texts[one], texts[before]) ? place[before] : order;
-    });
-  entry.keys = Float64Array.from(at, (one) => place[one]);
+  const { dictionary, index } = entry.column;
+  const place = textKeys(dictionary.map(asText));
+  entry.keys = Float64Array.from(index, (one) => place[one]);
   return entry.keys;
-};
-
-// Sorting is stable, and what has no value comes last either way round.
-const sorted = (rows, keys, descending) => {
-  const there = [], missing = [];
-  for (const row of rows) (Number.isNaN(keys[row]) ? missing : there).push(row);
-  there.sort(descending ? (one, other) => keys[other] - keys[one] : (one, other) => keys[one] - keys[other]);
-  return there.concat(missing);
 };
 
 const turn = (sort, place, first = false) =>

@@ -38,7 +38,6 @@ const prose = (text) => {
 };
 
 const whole = (count) => count.toLocaleString("en");
-const words = new Intl.Collator("en", { numeric: true, sensitivity: "base" });
 
 // A stable address of a cell: its name in plain letters, and a digest of the name as it is (FNV-1a, 32 bits).
 const address = (name) => {

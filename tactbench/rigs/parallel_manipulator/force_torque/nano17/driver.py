@@ -9,18 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import (
-    Block,
-    ByteLink,
-    Driver,
-    DriverSettings,
-    LinkTimeout,
-    LinkUnplugged,
-    Quality,
-    RigError,
-    StreamSpec,
-    Unwrap,
-)
+from tactbench.plugin import Block, Quality, RigError, StreamSpec
+from tactbench.plugin.devices import ByteLink, Driver, DriverSettings, LinkTimeout, LinkUnplugged, Unwrap
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import GAUGES, read_calibration
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
     STEP_V,

@@ -1,6 +1,6 @@
 """A Nano17 and the microcontroller that digitises its gauges, as a model: nothing in, frames out.
 
-A :class:`tactbench.plugin.DeviceEmulator`. It listens to nothing, as the format has it.
+A :class:`tactbench.plugin.devices.DeviceEmulator`. It listens to nothing, as the format has it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from tactbench.plugin import CanFrame, EmulatorSettings, Fault, Sent, UsageError, fault_concerns
+from tactbench.plugin import UsageError
+from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.codec import GaugeCalibration, read_calibration
 from tactbench.rigs.parallel_manipulator.force_torque.nano17.gauges import (
     STEP_V,
@@ -46,7 +47,7 @@ class GaugeFault(Fault):
     }
 
 
-class GaugeEmulator:
+class GaugeEmulator(DeviceEmulator):
     """A sensor, its six gauges and their converter.
 
     Parameters

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from tactbench.plugin import Frame, FrameDecoder, Received, RigError, encode_frame
+from tactbench.plugin import RigError
+from tactbench.plugin.devices import Frame, FrameDecoder, Received, encode_frame
 from tactbench.rigs.parallel_manipulator.options import Options
 
 VERSION = 1

@@ -11,20 +11,16 @@ from urllib.request import ProxyHandler, build_opener
 
 import numpy as np
 
-from tactbench.plugin import (
-    Block,
+from tactbench.plugin import Block, Quality, RigError, StreamSpec, UsageError
+from tactbench.plugin.devices import (
     DatagramLink,
     Driver,
     DriverSettings,
     LinkError,
     LinkTimeout,
     LinkUnplugged,
-    Quality,
     Received,
-    RigError,
-    StreamSpec,
     Unwrap,
-    UsageError,
 )
 from tactbench.rigs.parallel_manipulator.force_torque.ati_xml import LARGEST_BYTES
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (

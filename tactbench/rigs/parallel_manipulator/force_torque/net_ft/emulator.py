@@ -1,6 +1,6 @@
 """A Net F/T box as a model without input or output: requests in, datagrams out, on a clock that is passed in.
 
-A :class:`tactbench.plugin.DeviceEmulator`.
+A :class:`tactbench.plugin.devices.DeviceEmulator`.
 """
 
 from __future__ import annotations
@@ -15,14 +15,8 @@ from xml.sax.saxutils import escape
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.plugin import (
-    CanFrame,
-    EmulatorSettings,
-    Fault,
-    Sent,
-    UsageError,
-    fault_concerns,
-)
+from tactbench.plugin import UsageError
+from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     MOST_BUFFERED,
     SENSOR_RATE_HZ,
@@ -53,7 +47,7 @@ class DatagramFault(Fault):
     }
 
 
-class RdtEmulator:
+class RdtEmulator(DeviceEmulator):
     """A box and its sensor.
 
     Parameters

@@ -1,0 +1,221 @@
+"""Sensors side by side: the rows of the paper's Table I, then what else is known, and who says so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from tactbench.core.spec.quantity import Quantity, Source
+from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, PhysicalRange, SensorSpec, Statement
+from tactbench.core.spec.skin import SheetTable
+from tactbench.core.tables.text_table import TextTable
+
+ABSENT = "-"
+UNKNOWN = "unknown"
+"""What stands where no source states a fact that every device has."""
+OF_DEVICES = ("force_range", "length", "width", "height", "mass", "interface", "power", "availability")
+"""Fields of a data sheet, in the order in which they are shown."""
+
+# Rows of Table I of Karl et al. 2016: title, kind of channel, and whether its range or its band is meant.
+_TABLE_ONE: tuple[tuple[str, ChannelKind, str], ...] = (
+    ("DC Pressure Range", "dc_pressure", "measures"),
+    ("DC Temp. Range", "dc_temperature", "measures"),
+    ("AC Pressure spectrum", "ac_pressure", "band"),
+    ("AC Temp. spectrum", "ac_temperature", "band"),
+)
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One cell of the comparison."""
+
+    text: str
+    tag: str = ""
+    reference: str = ""
+
+
+@dataclass(frozen=True)
+class Property:
+    """A titled row: one fact a sensor."""
+
+    title: str
+    facts: tuple[Fact, ...]
+
+
+def table_one(sensors: Sequence[SensorSpec]) -> list[Property]:
+    """Return the paper's Table I for any sensors."""
+    rows = [
+        _row("# taxels", sensors, lambda sensor: _text(str(len(sensor.channels("taxel"))))),
+        _row("measurement principle", sensors, lambda s: Fact(s.principle, s.principle_source.tag,
+                                                              s.principle_source.reference)),
+    ]  # fmt: skip
+    rows += [
+        Property(title, tuple(_range(sensor, kind, which) for sensor in sensors)) for title, kind, which in _TABLE_ONE
+    ]
+    return rows
+
+
+def data_sheets(sensors: Sequence[SensorSpec]) -> list[Property]:
+    """Return the sensors as devices: range, size, mass, interface, power, availability."""
+    return [
+        Property(name.replace("_", " "), tuple(_of_device(sensor, name) for sensor in sensors)) for name in OF_DEVICES
+    ]
+
+
+def details(sensors: Sequence[SensorSpec]) -> list[Property]:
+    """Return what else the specs say: clocks, converters, rest levels, skin, parameters, noise."""
+    rows = [
+        _row("streams", sensors, _streams),
+        _row("delay of a reading", sensors, _delay),
+        _row("taxel reading", sensors, _reading),
+        _row("taxel at rest", sensors, _rest),
+        _row("under load", sensors, _sign),
+        _row("positions", sensors, _positions),
+    ]
+    tables = [_quantities(sensor) for sensor in sensors]
+    titles = dict.fromkeys(title for table in tables for title in table)
+    rows += [
+        Property(title, tuple(_quantity(table[title]) if title in table else Fact(ABSENT) for table in tables))
+        for title in titles
+    ]
+    return rows
+
+
+def sensor_table(
+    title: str, sensors: Sequence[SensorSpec], properties: Iterable[Property], *, with_source: bool
+) -> TextTable:
+    """Return properties as a table, a column a sensor; with sources, a column more behind each."""
+    columns = [name for one in sensors for name in (one.title, *([f"{one.title}: source"] if with_source else []))]
+    lines = []
+    for row in properties:
+        line = [row.title]
+        for fact in row.facts:
+            source = ": ".join(filter(None, (fact.tag, fact.reference)))
+            line += [fact.text, source] if with_source else [fact.text]
+        lines.append(tuple(line))
+    return TextTable(title, ("", *columns), tuple(lines))
+
+
+def parameters_markdown(sensors: Sequence[SensorSpec]) -> str:
+    """Return every quantity the specs state, one table a sensor: value, tag, who says so."""
+    parts = []
+    for sensor in sensors:
+        lines = [f"## {sensor.title}", "", "| parameter | value | tag | source |", "|---|---|---|---|"]
+        for title, quantity in _quantities(sensor).items():
+            cells = (title, str(quantity), quantity.source.tag, quantity.source.reference)
+            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+        parts.append("\n".join(lines) + "\n")
+    return "\n".join(parts)
+
+
+def _row(title: str, sensors: Sequence[SensorSpec], look: Callable[[SensorSpec], Fact]) -> Property:
+    return Property(title, tuple(look(sensor) for sensor in sensors))
+
+
+def _text(text: str) -> Fact:
+    return Fact(text)
+
+
+def _sourced(text: str, source: Source | None) -> Fact:
+    return Fact(text, source.tag, source.reference) if source else Fact(text)
+
+
+def _range(sensor: SensorSpec, kind: ChannelKind, which: str) -> Fact:
+    for channel in sensor.channels(kind):
+        found = getattr(channel, which)
+        if found is not None:
+            return _sourced(str(found), found.source)
+    return Fact(ABSENT)
+
+
+def _of_device(sensor: SensorSpec, name: str) -> Fact:
+    stated: PhysicalRange | Quantity | Statement | None = getattr(sensor.data_sheet, name)
+    if stated is None:
+        return Fact(UNKNOWN if sensor.data_sheet.exists else ABSENT)
+    return _sourced(stated.text if isinstance(stated, Statement) else str(stated), stated.source)
+
+
+def _streams(sensor: SensorSpec) -> Fact:
+    parts = []
+    for stream in sensor.streams:
+        rate = f"{stream.rate_hz:g} Hz" if stream.rate_hz else "rate not stated"
+        parts.append(f"{stream.name}: {len(stream.channels)} ch., {rate}")
+    return _sourced("; ".join(parts), sensor.streams[0].rate_source)
+
+
+def _delay(sensor: SensorSpec) -> Fact:
+    """Return the parts of an answer's delay that are the sensor's own: an interval of each stream, and the link."""
+    parts = [f"{stream.name} {1e3 / stream.rate_hz:.3g} ms" for stream in sensor.streams if stream.rate_hz]
+    sampling = f"sampling interval {', '.join(parts) or 'not stated'}"
+    if sensor.link_delay is None:
+        return Fact(f"{sampling}; link not stated")
+    return _sourced(f"{sampling}; link {sensor.link_delay}", sensor.link_delay.source)
+
+
+def _reading(sensor: SensorSpec) -> Fact:
+    taxels = sensor.channels("taxel")
+    if not taxels:
+        return Fact(ABSENT)
+    first = taxels[0]
+    if first.lower is None or first.upper is None:
+        return Fact(first.unit)
+    return Fact(f"{first.lower:g}–{first.upper:g} {first.unit}")
+
+
+def _rest(sensor: SensorSpec) -> Fact:
+    rests = [channel.rest for channel in sensor.channels("taxel") if channel.rest is not None]
+    if not rests:
+        return Fact(ABSENT)
+    values = [rest.value for rest in rests]
+    low, high = min(values), max(values)
+    text = f"{low:g} {rests[0].unit}" if low == high else f"{low:.4g}–{high:.4g} {rests[0].unit}"
+    return _sourced(text, rests[0].source)
+
+
+def _sign(sensor: SensorSpec) -> Fact:
+    words = {1: "rises", -1: "falls", 0: "rises or falls"}
+    return Fact(", ".join(dict.fromkeys(words[channel.sign] for channel in sensor.channels("taxel"))) or ABSENT)
+
+
+def _positions(sensor: SensorSpec) -> Fact:
+    placed: list[ChannelSpec] = [channel for channel in sensor.channels("taxel") if channel.position_m]
+    if not placed:
+        return Fact(ABSENT)
+    return _sourced(f"{len(placed)} of {len(sensor.channels('taxel'))} known", placed[0].position_source)
+
+
+def _quantities(sensor: SensorSpec) -> dict[str, Quantity]:
+    found: dict[str, Quantity] = {}
+    if sensor.link_delay is not None:
+        found["link delay"] = sensor.link_delay
+    if sensor.skin is not None:
+        found.update(_named("skin", sensor.skin))
+    found.update({f"{name.replace('_', ' ')}": quantity for name, quantity in sensor.parameters.items()})
+    usual = sensor.settable()
+    found.update(usual)
+    for scenario in sensor.scenarios:
+        other = sensor.handled(scenario).settable()
+        found.update((f"{name}, {scenario}", amount) for name, amount in other.items() if usual.get(name) != amount)
+    return found
+
+
+def _named(prefix: str, model: object) -> Iterable[tuple[str, Quantity]]:
+    for name in getattr(type(model), "model_fields", {}):
+        value = getattr(model, name)
+        if isinstance(value, Quantity):
+            yield f"{prefix}: {name.replace('_', ' ')}", value
+        elif isinstance(value, SheetTable):
+            for end, length in (("least", value.least_mm), ("most", value.most_mm)):
+                yield (
+                    f"{prefix}: {name.replace('_', ' ')}, {end}",
+                    Quantity(value=length, unit="mm", source=value.source),
+                )
+        elif hasattr(type(value), "model_fields"):
+            yield from _named(f"{prefix} {name.replace('_', ' ')}", value)
+        elif isinstance(value, tuple):
+            for place, item in enumerate(value, start=1):
+                yield from _named(f"{prefix} {name.replace('_', ' ')} {place}", item)
+
+
+def _quantity(quantity: Quantity) -> Fact:
+    return Fact(str(quantity), quantity.source.tag, quantity.source.reference)

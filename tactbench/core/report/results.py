@@ -1,0 +1,75 @@
+"""What a report is made of: finished cells, what they answered, and the recordings behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactbench.core.errors import DataError
+from tactbench.core.leaderboard.checked import checked
+from tactbench.core.matrix.store import Row, Store
+from tactbench.core.samples import Answers
+from tactbench.core.statistics.replicates import over_replicates
+
+if TYPE_CHECKING:
+    from tactbench.core.plugins.registry import Registry
+
+
+@dataclass(frozen=True)
+class Results:
+    """A result folder, opened for reading.
+
+    Parameters
+    ----------
+    store
+        The folder.
+    registry
+        Where specs of sensors and tasks are looked up.
+    rows
+        One a cell, the latest of each name.
+    replicates
+        The rows as they are stored, one a cell and replicate, by key.
+    """
+
+    store: Store
+    registry: Registry
+    rows: tuple[Row, ...]
+    replicates: Mapping[str, Row] = field(default_factory=dict)
+
+    def answers(self, row: Mapping[str, Any]) -> dict[str, Answers]:
+        """Return what a cell answered, by role; empty if it did not finish."""
+        return self.store.answers(str(row["key"]))
+
+    def replicate(self, row: Row) -> Row:
+        """Return the row of the one replicate whose answers and recordings a cell's row leads to."""
+        return self.replicates.get(str(row["key"]), row)
+
+    def recordings(self, row: Mapping[str, Any]) -> list[Path]:
+        """Return the files of a cell's recordings, in the order that ``Answers.recording`` counts.
+
+        Raises
+        ------
+        DataError
+            If one lies outside the folder, was not allowed and does not hold what the row tells of.
+        """
+        found = []
+        for path, recording in self.store.recordings(row):
+            if recording is None:
+                raise DataError(
+                    f"The recording {path} lies outside {self.store.folder}, and is not there any more, or not the one "
+                    f"that {row['cell']} was answered from: it is not opened.",
+                    hint="If you trust these results, allow its folder with `tactbench report --recordings DIR`.",
+                )
+            found.append(recording)
+        return found
+
+
+def open_results(store: Store, registry: Registry) -> Results:
+    """Return what `store` holds: a row a cell, baselines beside it, and rows of other versions as they are."""
+    rows = store.rows()
+    good = checked(rows)[0]
+    known = {id(row) for row in good}
+    shown = (*over_replicates(good), *(row for row in rows if id(row) not in known))
+    return Results(store, registry, shown, {str(row["key"]): row for row in good})

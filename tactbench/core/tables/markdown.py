@@ -1,0 +1,55 @@
+"""Tables as Markdown; names stay text, whatever they are made of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from tactbench.core.tables.text_table import TextTable
+
+_ACTS = re.compile(r"[\\|*\[\]~]|(?<![^\W_])_|_(?![^\W_])")
+"""Begins something wherever it stands; an underscore does so only at the edge of a word."""
+_BEGINS_A_LINE = re.compile(r"[#>+=-]|[0-9]+[.)]")
+
+
+def markdown(parts: Iterable[TextTable | Sequence[str]]) -> str:
+    """Return tables, each under a heading, and notes as Markdown."""
+    return "\n\n".join("\n".join(_table(one) if isinstance(one, TextTable) else _notes(one)) for one in parts) + "\n"
+
+
+def _table(table: TextTable) -> list[str]:
+    """Return a table as lines of Markdown: a heading, sentences, columns of numbers to the right, notes."""
+    return [
+        f"### {_heading(table.title)}\n",
+        *(f"{markdown_note(text)}\n" for text in table.summary),
+        "| " + " | ".join(markdown_text(name) for name in table.headers) + " |",
+        "|" + "|".join("---:" if right else "---" for right in table.right) + "|",
+        *("| " + " | ".join(map(markdown_text, line)) + " |" for line in table.lines),
+        *(["", *_notes(table.notes)] if table.notes else []),
+    ]
+
+
+def _notes(notes: Sequence[str]) -> list[str]:
+    return [f"- {markdown_note(note)}" for note in notes]
+
+
+def _heading(title: str) -> str:
+    text = markdown_text(title).rstrip()
+    return f"{text[:-1]}\\#" if text.endswith("#") else text
+
+
+def markdown_text(text: str) -> str:
+    """Return text that Markdown shows as it is, in a table or a heading; its lines are one of the table."""
+    return "<br>".join(_escaped(line).replace("`", "\\`") for line in text.split("\n"))
+
+
+def markdown_note(text: str) -> str:
+    """Return a sentence that Markdown shows as it is, but for words between backticks, which are code."""
+    escaped = _escaped(text.strip())
+    begins = _BEGINS_A_LINE.match(escaped)
+    return f"{escaped[: begins.end() - 1]}\\{escaped[begins.end() - 1 :]}" if begins else escaped
+
+
+def _escaped(text: str) -> str:
+    escaped = _ACTS.sub(r"\\\g<0>", text.replace("\n", " "))
+    return escaped.replace("&", "&amp;").replace("<", "&lt;")

@@ -1,0 +1,61 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+ABSENT = "–"
+
+
+def score(value: float | None, unit: str) -> str:
+    """Return a score: three decimals for a share; four for a number with a unit, two from ten on."""
+    if value is None:
+        return ABSENT
+    return f"{value:.3f}" if unit == "1" else f"{value:.4f}" if -10 < value < 10 else f"{value:.2f}"
+
+
+def interval(low: float | None, high: float | None, unit: str) -> str:
+    """Return an interval in the digits of its score."""
+    return ABSENT if low is None or high is None else f"{score(low, unit)} … {score(high, unit)}"
+
+
+def suffix(unit: str) -> str:
+    """Return what follows a number: its unit, and nothing where it has none."""
+    return "" if unit == "1" else f" {unit}"
+
+
+def duration(seconds: float | None) -> str:
+    """Return a duration with three significant digits and a unit that fits."""
+    if seconds is None:
+        return ABSENT
+    if seconds >= 0.9995:
+        value, unit = seconds, "s"
+    elif (value := seconds * 1e3) >= 0.9995:
+        unit = "ms"
+    elif seconds > 0:
+        value, unit = seconds * 1e6, "µs"
+    else:
+        return "0 s"
+    if value >= 99.95:
+        return f"{value:.0f} {unit}"
+    return f"{value:.1f} {unit}" if value >= 9.995 else f"{value:.2f} {unit}"
+
+
+def delay(known_ms: float | None, parts_ms: Mapping[str, float] | None) -> str:
+    """Return an answer delay; of readings whose link is not known, as the least that it can be."""
+    if known_ms is None:
+        return ABSENT
+    least = "≥ " if parts_ms and "window" in parts_ms and "link" not in parts_ms else ""
+    return f"{least}{duration(known_ms / 1e3)}"
+
+
+def tail(p95_ms: float | None, largest_ms: float | None, calls: int | None) -> str:
+    """Return the 95th percentile of times; where there are too few calls for one, the largest of them, and says so."""
+    if p95_ms is not None:
+        return duration(p95_ms / 1e3)
+    return ABSENT if largest_ms is None else f"{duration(largest_ms / 1e3)} (largest of {calls})"
+
+
+def whole(value: int | None) -> str:
+    """Return a count with thin groups of three."""
+    return ABSENT if value is None else f"{value:,}".replace(",", "\u202f")

@@ -1,0 +1,64 @@
+"""Text from plugins, recordings and strangers' folders, made fit to be read: nothing in it acts on what shows it."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shlex
+import unicodedata
+from typing import Any
+
+_ACTS = re.compile("[\x7f-\x9f\xad\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]")
+"""Controls, marks of direction and lone surrogates."""
+
+
+def visible(text: str) -> str:
+    r"""Return `text` on one line, every character that acts instead of showing written out as an escape.
+
+    Control characters (the ESC that begins a terminal's commands), marks that turn the direction of reading, lone
+    surrogates, private and unassigned characters become ``\x1b``, ``\u202e`` or ``\U000e0001``; line breaks, tabs and
+    spaces of any width become one space each.
+    """
+    return text if text.isprintable() else "".join(map(_shown, text))
+
+
+def _shown(character: str) -> str:
+    if character.isprintable():
+        return character
+    if character in "\t\n\r\v\f\u2028\u2029" or unicodedata.category(character) == "Zs":
+        return " "
+    code = ord(character)
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def command_line(*words: str) -> str:
+    """Return a command as it is typed into a shell; a name that acts instead of showing is shown and not typed."""
+    return visible(shlex.join(words))
+
+
+def cut(text: str, most: int) -> str:
+    """Return the first `most` characters of `text`, and an ellipsis where there are more."""
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def json_text(value: Any, **how: Any) -> str:
+    """Return `value` as JSON: what acts on a terminal or is no UTF-8 is escaped; a number that is none is null."""
+    try:
+        text = json.dumps(value, ensure_ascii=False, allow_nan=False, **how)
+    except ValueError:
+        text = json.dumps(_finite(value), ensure_ascii=False, allow_nan=False, **how)
+    if text.isascii() and "\x7f" not in text:
+        return text
+    return _ACTS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def _finite(value: Any) -> Any:
+    """Return `value` with None in place of every number that is not finite."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return value

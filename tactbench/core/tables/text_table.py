@@ -1,0 +1,125 @@
+"""The one table of text: what every format for people renders."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from tactbench.core.tables.numbers import ABSENT as ABSENT
+
+WORDY = 60
+"""Letters from which a field wraps as prose."""
+_DIGITS = r"[-+−]?[\d\u202f]+(?:\.\d+)?(?:[eE][-+]?\d+)?"
+_NUMBER = re.compile(rf"({_DIGITS})(?: … {_DIGITS})?(?: %)?(?: ?[†‡*])*")
+
+
+class Entry(str):
+    """A text of a table with the number behind it and a link."""
+
+    __slots__ = ("anchor", "value")
+    value: float | None
+    """What a column of numbers is sorted by, in one unit for the whole column; None sorts last."""
+    anchor: str
+    """Where a page tells more; empty: nowhere."""
+
+    def __new__(cls, text: str, value: float | None = None, anchor: str = "") -> Entry:
+        """Return the text with what is known besides."""
+        entry = super().__new__(cls, text)
+        entry.value, entry.anchor = value, anchor
+        return entry
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A title, columns, lines and notes."""
+
+    title: str
+    columns: tuple[str, ...]
+    """Names of the columns."""
+    lines: tuple[tuple[str, ...], ...]
+    """One text a column; some may be `Entry`."""
+    numeric: frozenset[str] = frozenset()
+    """Columns aligned to the right and sorted by value."""
+    headings: tuple[str, ...] = ()
+    """What stands above the columns, if not their names."""
+    kinds: tuple[str, ...] = ()
+    """One word a line, by which it looks other than plain: ``result``, ``baseline``, ``failed``, ``alarm`` …"""
+    summary: tuple[str, ...] = ()
+    """Sentences below the title."""
+    notes: tuple[str, ...] = ()
+    """Sentences below the lines."""
+    detail: bool = False
+    """Whether it only gives details of what stands in other tables, and is printed with them all."""
+    records: tuple[Mapping[str, Any], ...] = ()
+    """The same as numbers; all have the same keys."""
+    anchor: str = ""
+    """Where links to the whole table lead; empty: nowhere."""
+    first_to_go: tuple[str, ...] = ()
+    """Columns that a terminal leaves out, in this order, where it is too narrow even with broken texts."""
+    intervals: frozenset[str] = frozenset()
+    """Columns of numbers that may be broken into two lines."""
+    unbroken: frozenset[str] = frozenset()
+    """Columns of texts that may not: they are typed elsewhere."""
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """What stands above the columns."""
+        return self.headings or self.columns
+
+    @property
+    def right(self) -> tuple[bool, ...]:
+        """Whether each column is aligned to the right."""
+        return tuple(name in self.numeric for name in self.columns)
+
+    @property
+    def wordy(self) -> bool:
+        """Whether it has sentences in its fields: on a narrow screen its lines are stacked, field below field."""
+        return any(len(text) > WORDY for line in self.lines for text in line)
+
+    def compact(self) -> TextTable:
+        """Return the table without the columns in which no line says anything."""
+        if not self.lines:
+            return self
+        kept = [place for place in range(len(self.columns)) if any(line[place].strip(ABSENT) for line in self.lines)]
+        return replace(
+            self,
+            columns=tuple(self.columns[place] for place in kept),
+            lines=tuple(tuple(line[place] for place in kept) for line in self.lines),
+            headings=tuple(self.headings[place] for place in kept) if self.headings else (),
+        )
+
+
+def sort_value(text: str) -> float | None:
+    """Return what a text is sorted by in a column of numbers.
+
+    That of an `Entry`; else the number that the text is, thin spaces and marks aside, of an interval its lower end.
+    Text with a unit has none, since two lines may have two units.
+    """
+    if isinstance(text, Entry):
+        return text.value
+    found = _NUMBER.fullmatch(text.strip())
+    return float(found[1].replace("\u202f", "").replace("−", "-")) if found and any(map(str.isdigit, text)) else None
+
+
+def finite(value: object) -> float | None:
+    """Return `value` if it is a finite number: nothing else can be sorted."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(value)
+
+
+def text_table(
+    title: str,
+    columns: Sequence[str],
+    lines: Iterable[Sequence[str]],
+    *,
+    numeric: Collection[str] = (),
+    notes: Sequence[str] = (),
+    kinds: Sequence[str] = (),
+) -> TextTable:
+    """Return a table without the columns in which no line says anything."""
+    given = tuple(map(tuple, lines))
+    return TextTable(title, tuple(columns), given, frozenset(numeric), kinds=tuple(kinds), notes=tuple(notes)).compact()

@@ -1,0 +1,101 @@
+"""The door: what an author of a sensor, a task, an estimator or a rig imports.
+
+A plugin is a module, named by an entry point of group ``tactbench``, that states ``TACTBENCH_API = 1`` and implements
+one or more of the hooks; ``docs/plugins.md`` shows how. What being simulated takes is in
+:mod:`tactbench.plugin.simulation`; drivers, emulators and links are in :mod:`tactbench.plugin.devices`.
+"""
+
+from typing import TYPE_CHECKING
+
+from tactbench.core.errors import (
+    DataError,
+    MissingRecordingError,
+    NotApplicable,
+    PluginContractError,
+    RigError,
+    TactbenchError,
+    UnknownNameError,
+    UsageError,
+)
+from tactbench.core.plugins.hookspecs import hookimpl
+from tactbench.core.plugins.interfaces import Acquisition, Estimator, Rig, RigContext, Shelf
+from tactbench.core.plugins.registry import load_object, load_registry
+from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
+from tactbench.core.spec.recording import PlanEntry, Scalar
+from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor, SensorDescriptor, TaskDescriptor
+from tactbench.core.spec.scene import ForceRamp, Indenter, Placement, Role, Scene
+from tactbench.core.spec.sensor import (
+    ChannelKind,
+    ChannelSpec,
+    DataSheet,
+    PhysicalRange,
+    SensorSpec,
+    Statement,
+    StreamSpec,
+)
+from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
+from tactbench.plugin.on_demand import on_demand
+
+if TYPE_CHECKING:
+    from tactbench.core.samples import FloatArray
+
+__all__ = [
+    "Acquisition",
+    "Block",
+    "ChannelKind",
+    "ChannelSpec",
+    "ChannelTarget",
+    "DataError",
+    "DataSheet",
+    "Estimator",
+    "EstimatorDescriptor",
+    "FloatArray",
+    "ForceLoop",
+    "ForceRamp",
+    "Indenter",
+    "LabelTarget",
+    "MissingRecordingError",
+    "NotApplicable",
+    "PhysicalRange",
+    "Placement",
+    "PlanEntry",
+    "PlannedScene",
+    "PluginContractError",
+    "Published",
+    "Quality",
+    "Quantity",
+    "Rig",
+    "RigContext",
+    "RigDescriptor",
+    "RigError",
+    "Role",
+    "Scalar",
+    "Scene",
+    "SensorDescriptor",
+    "SensorSpec",
+    "Shelf",
+    "Source",
+    "Statement",
+    "StreamSpec",
+    "TactbenchError",
+    "TaskDescriptor",
+    "TaskSpec",
+    "UnknownNameError",
+    "UsageError",
+    "assumed",
+    "derived",
+    "hookimpl",
+    "load_object",
+    "load_registry",
+    "measured",
+    "sourced",
+]
+
+__getattr__ = on_demand(
+    __name__,
+    {
+        "tactbench.core.samples": ("FloatArray",),
+    },
+)

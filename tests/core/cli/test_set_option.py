@@ -1,0 +1,101 @@
+"""``--set``: a nuisance under one name, from the option or the matrix file to the recording, the row and the tables."""
+
+import json
+
+import pytest
+
+from tests.conftest import Shell
+from tests.core.cli.test_screens import assert_one_clear_screen
+
+RUN = ("run", "--sensor", "icub", "--task", "force", "--estimator", "ols", "--repeats", "1", "--no-latency")
+SET = ("--set", "placement_scatter_mm=0.3", "--set", "taxel_white_count=2")
+CELL = "icub/force/twin/karl2016/ols/1"
+
+
+def rows_of(done):
+    return {row["estimator"]: row for row in json.loads(done.stdout)}
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory):
+    """A folder with the same cells as they are, and with two nuisances set."""
+    shell = Shell(tmp_path_factory.mktemp("set"))
+    shell.usual = rows_of(shell(*RUN, "--format", "json"))
+    shell.set = rows_of(shell(*RUN, *SET, "--format", "json"))
+    return shell
+
+
+def test_what_was_set_is_in_the_row_and_nothing_else_is_otherwise(here):
+    usual, row = here.usual["ols"], here.set["ols"]
+    assert usual["assumptions"]["placement_scatter_mm"] == 0.1
+    assert row["assumptions"] == {**usual["assumptions"], "placement_scatter_mm": 0.3, "taxel_white_count": 2.0}
+
+
+def test_it_is_another_recording_with_another_score(here):
+    recorded = {tuple(here.usual["ols"]["recordings"]), tuple(here.set["ols"]["recordings"])}
+    assert len(recorded) == 2
+    assert here.usual["ols"]["score"] != here.set["ols"]["score"]
+
+
+def test_what_was_asked_again_is_found_again(here):
+    for more in ((), SET):
+        assert "0 computed now; 0 recordings made now" in here(*RUN, *more).stderr
+
+
+def test_the_notes_say_it(here):
+    assert "placement_scatter_mm 0.3" in here("leaderboard", "--notes").stdout
+    assert "taxel_white_count 2.0" in here("leaderboard", "--notes").stdout
+
+
+def test_why_says_it(here):
+    assert "placement_scatter_mm 0.3" in here("why", CELL).stdout
+    facts = json.loads(here("why", CELL, "--format", "json").stdout)
+    assert facts["simulation"] == {"nuisances": {"placement_scatter_mm": 0.3, "taxel_white_count": 2.0}}
+    found = json.loads(here("why", CELL, *RUN[1:], "--set", "placement_scatter_mm=0.5", "--format", "json").stdout)
+    assert found["answer"] == "miss"
+    assert any("placement_scatter_mm 0.3 -> 0.5" in reason for reason in found["reasons"])
+
+
+def test_the_same_cell_is_computed_again_with_what_was_set(here):
+    assert "bit for bit" in here("rerun", CELL).stdout
+
+
+def test_a_matrix_file_says_the_same(here):
+    matrix = {
+        "sensors": ["icub"], "tasks": [{"name": "force", "estimators": ["ols"]}], "latency": False, "repeats": 1,
+        "simulation": {"nuisances": {"placement_scatter_mm": 0.2, "taxel_white_count": 2}},
+    }  # fmt: skip
+    (here.folder / "set.yaml").write_text(json.dumps(matrix))
+    done = here("run", "--config", "set.yaml", *SET[:2], "--format", "json")
+    assert "0 recordings made now" in done.stderr  # the option goes over the file, whose other values stay
+    assert rows_of(done)["ols"]["score"] == here.set["ols"]["score"]
+
+
+def test_a_recording_says_it(here):
+    here("record", "--sensor", "icub", "--out", "a.h5", "--seconds", "1", *SET)
+    assert "placement_scatter_mm = 0.3" in here("inspect", "a.h5").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--set", "placement_scater_mm=0.3"), "Did you mean 'placement_scatter_mm'"),
+        (("--set", "placement_scatter_mm=0.3mm"), "'placement_scatter_mm=0.3mm' is not a name and a number"),
+        (("--set", "placement_scatter_mm"), "is not a name and a number"),
+        (("--set", "noise_scale=inf"), "is not a name and a number"),
+        (("--set", "noise_scale=1", "--set", "noise_scale=2"), "gives noise_scale twice: 1 and 2"),
+        (("--set", "noise_scale=-1"), "noise_scale = -1 is below 0"),
+        (("--set", "taxel_white_count=-1"), "taxel_white_count = -1 is below 0"),
+        (("--set", "drive_delay_ms=1"), "drive_delay_ms: the scene has no drive"),
+        (("--sensor", "icub", "--set", "dc_pressure_white_count=1"), "no nuisance called 'dc_pressure_white_count'"),
+        (("--rig", "replay", "--recordings", ".", "--set", "noise_scale=2"), "for simulated rigs"),
+    ],
+)
+def test_what_cannot_be_set_is_answered_with_the_next_step(verbs, arguments, says):
+    assert_one_clear_screen(verbs("run", *arguments, code=2), says)
+
+
+def test_a_matrix_file_is_held_to_the_same_names(verbs):
+    matrix = "tasks: [force]\nsensors: [icub]\nsimulation:\n  nuisances: {placement_scater_mm: 0.3}\n"
+    (verbs.folder / "wrong.yaml").write_text(matrix)
+    assert_one_clear_screen(verbs("run", "--config", "wrong.yaml", code=2), "Did you mean 'placement_scatter_mm'")

@@ -1,0 +1,31 @@
+"""Rows in each format, as the command writes their table."""
+
+from tactbench.core.leaderboard.formats import csv_text, json_array, markdown, page
+from tactbench.core.leaderboard.latex import latex
+from tactbench.core.leaderboard.parquet import parquet
+from tactbench.core.leaderboard.table import build_table
+from tactbench.core.leaderboard.view import DEFAULT_VIEW
+
+
+def to_json(rows, provenance=(), *, times=True):
+    return json_array(build_table(rows, provenance, times=times))
+
+
+def to_csv(rows, provenance=(), *, times=True):
+    return csv_text(build_table(rows, provenance, times=times))
+
+
+def to_markdown(rows, provenance=(), *, times=True, view=DEFAULT_VIEW):
+    return markdown(build_table(rows, provenance, times=times), view)
+
+
+def to_latex(rows, provenance=(), *, times=True, view=DEFAULT_VIEW):
+    return latex(build_table(rows, provenance, times=times), view)
+
+
+def to_parquet(rows, provenance=(), *, times=True):
+    return parquet(build_table(rows, provenance, times=times))
+
+
+def to_page(rows, provenance=()):
+    return page(build_table(rows, provenance))

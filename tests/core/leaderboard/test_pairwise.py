@@ -1,0 +1,110 @@
+"""What may be compared, what is refused and why, and what is declared."""
+
+import pytest
+
+from tactbench.core.errors import UnknownNameError
+from tactbench.core.leaderboard.pairwise import comparisons, folder_comparisons, with_declared
+from tactbench.core.leaderboard.pairwise_table import notes_of, record_of, tables_of
+from tactbench.core.spec.matrix import ComparisonChoice
+
+from .rows import row
+
+SESSIONS = [f"s{place}" for place in range(6)]
+
+
+def answered(sensor="a", means=(1.0, 1.1, 1.2, 1.3, 1.4, 1.5), estimator="lasso", **more):
+    sums = [[100 * mean**2, 100] for mean in means]
+    kept = {"unit": "session", "names": SESSIONS, "strata": None, "run": 1, "sums": sums}
+    score = (sum(mean**2 for mean in means) / len(means)) ** 0.5
+    made = row(sensor, estimator, score, replicates=kept, baseline=3.0)
+    made |= more
+    return made | {"cell": "/".join(str(made[k]) for k in ("sensor", "task", "rig", "protocol", "split", "estimator"))}
+
+
+WORSE = (1.3, 1.4, 1.5, 1.65, 1.7, 1.8)
+
+
+def test_two_sensors_are_compared_estimator_by_estimator():
+    rows = [answered(), answered("b", WORSE), answered(estimator="ols"), answered("b", WORSE, "ols"),
+            answered("a", estimator="mean", is_baseline=True), answered("c")]  # fmt: skip
+    found = comparisons(rows, "a", "b")
+    assert [(one.kind, one.of) for one in found] == [("sensors", "lasso"), ("sensors", "ols")]
+    assert all(one.difference.verdict == "better" and one.difference.paired for one in found)
+    (table,) = tables_of(found)
+    assert table.title.startswith("A = a, B = b · question · RMSE [N] · deployable · split session · SIM")
+    assert table.lines[0][-1] == "a better"
+    (record, _) = map(record_of, found)
+    assert record["difference"] == pytest.approx(record["score_a"] - record["score_b"])
+    assert any("exploratory" in note for note in notes_of(found))
+
+
+def test_two_estimators_are_compared_sensor_by_sensor_and_a_baseline_may_be_one():
+    rows = [
+        answered(),
+        answered(estimator="ols", means=WORSE),
+        answered(estimator="mean", means=WORSE, is_baseline=True),
+    ]
+    assert [one.of for one in comparisons(rows, "ols", "lasso")] == ["a"]
+    assert comparisons(rows, "lasso", "mean")[0].difference.verdict == "better"
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ({"simulated": False, "rig": "replay"}, "SIM is never compared with hardware"),
+        ({"protocol": "karl2016"}, "b was asked under another protocol"),
+        ({"split": "roles"}, "b was asked with another split"),
+        ({"task": "other"}, "b has no such cell"),
+        ({"status": "failed", "reason": "No sample.", "score": None}, "b failed: No sample."),
+        ({"metric": "mae"}, "they were scored by other metrics or classes"),
+    ],
+)
+def test_what_must_not_be_compared_is_refused_with_its_reason(more, why):
+    found = comparisons([answered(), answered("b", **more)], "a", "b")
+    assert found[0].refused == why
+    assert all(one.difference is None for one in found)
+    assert all("not compared" in line[-1] for table in tables_of(found) for line in table.lines)
+    assert all(record_of(one)["difference"] is None for one in found)
+
+
+def test_a_name_that_is_neither_names_the_nearest():
+    rows = [answered("biotac"), answered("icub")]
+    with pytest.raises(UnknownNameError, match="biotac"):
+        comparisons(rows, "biotack", "icub")
+    with pytest.raises(UnknownNameError, match="icub"):
+        comparisons(rows, "biotac", "icup")
+    with pytest.raises(UnknownNameError):
+        comparisons(rows, "biotac", "lasso")
+
+
+def test_declared_comparisons_are_corrected_for_all_that_were_declared():
+    rows = [answered(), answered("b", WORSE), answered(estimator="ols"), answered("b", WORSE, "ols")]
+    declared = [ComparisonChoice(sensors=("a", "b")), ComparisonChoice(estimators=("lasso", "ols")),
+                ComparisonChoice(sensors=("a", "nobody"))]  # fmt: skip
+    found = with_declared(comparisons(rows, "b", "a"), rows, declared)
+    p = found[0].difference.p
+    assert p == 2 / 64
+    # Four were tested: two pairs of sensors at p, two pairs of estimators with none to tell.
+    assert [one.p_corrected for one in found] == [4 * p, 4 * p]
+    other = with_declared(comparisons(rows, "a", "b"), rows, [ComparisonChoice(sensors=("a", "b"), task="elsewhere")])
+    assert not any(one.declared for one in other)
+    assert [one.p_corrected for one in other] == [None, None]
+
+
+def test_two_folders_are_compared_cell_by_cell():
+    before, after = [answered(), answered("b")], [answered(means=WORSE), answered("c")]
+    found = folder_comparisons(before, after, "old", "new")
+    assert [(one.of, one.refused) for one in found] == [
+        ("a, lasso", ""), ("b, lasso", "new has no such cell"), ("c, lasso", "old has no such cell"),
+    ]  # fmt: skip
+    assert tables_of(found)[0].lines[0][-1] == "old better"
+
+
+def test_several_tasks_are_averaged():
+    rows = [
+        answered(sensor, means, task=task) for task in ("x", "y") for sensor, means in (("a", (1.0,) * 6), ("b", WORSE))
+    ]
+    (note,) = [note for note in notes_of(comparisons(rows, "a", "b")) if note.startswith("Interquartile")]
+    assert "over 2 tasks" in note
+    assert "a 0.667" in note
+    assert not any(note.startswith("Interquartile") for note in notes_of(comparisons(rows, "a", "b", "x")))

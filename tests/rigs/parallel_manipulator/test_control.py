@@ -1,0 +1,80 @@
+"""The loop that beats the guard, in a thread of its own: nobody else uses the guard meanwhile."""
+
+import threading
+
+from tactbench.rigs.parallel_manipulator.control import Control
+from tactbench.rigs.parallel_manipulator.press import Press
+from tests.rigs.parallel_manipulator.presses import FAULTS
+from tests.rigs.parallel_manipulator.test_press_states import COURSE, SETTINGS
+
+
+class Asked:
+    """A guard that notes which threads use it."""
+
+    def __init__(self, guard):
+        self.guard, self.threads = guard, set()
+
+    def __getattr__(self, name):
+        self.threads.add(threading.current_thread().name)
+        return getattr(self.guard, name)
+
+
+class Sensor:
+    last_ns = 0
+
+
+def test_while_it_runs_counts_are_those_of_its_own_thread():
+    setting = FAULTS.Setting()
+    world = FAULTS.Pressed(setting)
+    guard = world.guard()
+    guard.start()
+    asked = Asked(guard)
+    armed = guard.arm(setting.limits)
+    press = Press(SETTINGS, COURSE, 1e-6)
+    control = Control(asked, setting.limits, armed, press, Sensor(), world.clock, period_s=0.02, stale_s=1e9)
+    control.start()
+    seen, waits = {}, threading.Event()
+    for _ in range(1000):
+        seen = control.counts()
+        if seen.get("guard", {}).get("beats", 0) > 20:
+            break
+        waits.wait(0.01)
+    assert seen["guard"]["beats"] > 20
+    assert asked.threads == {"force control"}
+    control.stop()
+    # Of the end, not of a quarter of a second before.
+    assert control.counts()["guard"]["beats"] == guard.counts()["guard"]["beats"]
+    guard.close()
+
+
+def test_a_rig_that_has_hung_does_not_blame_the_sensor():
+    setting = FAULTS.Setting()
+    world = FAULTS.Pressed(setting)
+    guard = world.guard()
+    guard.start()
+    armed = guard.arm(setting.limits)
+    press, sensor = Press(SETTINGS, COURSE, 1e-6), Sensor()
+    control = Control(guard, setting.limits, armed, press, sensor, world.clock, period_s=0.02, stale_s=0.1)
+    for _ in range(10):
+        sensor.last_ns = world.clock()
+        control.carry(world.clock() + 20_000_000)
+    assert not press.over
+    guard.advance(world.clock() + 4_000_000_000)
+    control.carry(world.clock() + 100_000_000)
+    assert press.ended == "in standoff: no beat in time"
+    guard.close()
+
+
+def test_a_sensor_that_sends_nothing_ends_the_press():
+    setting = FAULTS.Setting()
+    world = FAULTS.Pressed(setting)
+    guard = world.guard()
+    guard.start()
+    armed = guard.arm(setting.limits)
+    press = Press(SETTINGS, COURSE, 1e-6)
+    control = Control(guard, setting.limits, armed, press, Sensor(), world.clock, period_s=0.02, stale_s=0.1)
+    control.carry(world.clock() + 90_000_000)
+    assert press.ended == ""
+    control.carry(world.clock() + 60_000_000)
+    assert "the sensor has sent nothing for 1" in press.ended
+    guard.close()

@@ -1,0 +1,40 @@
+"""Ctrl-C at a terminal in the recorded part of a press: the motor is out, the recording says so, exit code 130."""
+
+import os
+import re
+
+import pytest
+
+from tactbench.core.recording.reader import open_recording
+from tests.core.cli.terminals import on_terminal, plain
+from tests.rigs.parallel_manipulator.spring import EXAMPLE
+
+RECORD = ("-m", "tactbench", "record", "--rig-file", "rig.yaml", "--sensor", "icub", "--seconds", "30", "--live")
+SHOWN = re.compile(r"([\d.]+) of 30\.0 s")
+
+
+@pytest.mark.parametrize("times", [1, 3])
+def test_ctrl_c_in_the_recorded_part(tmp_path, times):
+    (tmp_path / "rig.yaml").write_text(EXAMPLE.read_text(encoding="utf-8"), encoding="utf-8")
+    with on_terminal([*RECORD, "--out", "press.h5"], columns=120, cwd=tmp_path) as terminal:
+        for _ in range(200):
+            shown = SHOWN.findall(plain(terminal.seen))
+            if shown and float(shown[-1]) > 12.0:
+                break
+            terminal.read_until(" s", 1)
+        for _ in range(times):
+            os.write(terminal.ours, b"\x03")
+        said = terminal.last_words()
+        assert terminal.process.wait(60) == 130
+    assert "What was recorded until then is in press.h5" in said
+    assert said.endswith("Interrupted.\n")
+    assert "Traceback" not in terminal.seen
+    with open_recording(tmp_path / "press.h5") as recording:
+        recording.verify()
+        meta, force_n = recording.meta, recording.read("force_torque").data[:, 2]
+    assert meta.excluded == "interrupted: stopped by hand"
+    # It was pressed when it was interrupted.
+    assert force_n[-20:].mean() > 0.5
+    events = [text for name, text in meta.drawn.items() if name.startswith("event")]
+    assert "retreating: the rig has commanded it" in events[-2]
+    assert re.search(r"retreated: out after 0\.\d+ s$", events[-1])
