@@ -95,9 +95,9 @@ class EngineChoice:
             return InProcess(self.limits)
         return Pool(self.concurrency(cells), self.limits, preload=preload())
 
-    def pool(self, jobs: int, *, grace_s: float = 0.0) -> Pool:
-        """Return reused processes for `jobs` items at once, for what is no cell."""
-        return Pool(jobs, replace(self.limits, grace_s=grace_s), reuse=True, preload=preload())
+    def pool(self, jobs: int, *, grace_s: float = 0.0, reuse: bool = True) -> Pool:
+        """Return processes for `jobs` items at once, for what is no cell."""
+        return Pool(jobs, replace(self.limits, grace_s=grace_s), reuse=reuse, preload=preload())
 
 
 def preload() -> tuple[str, ...] | None:

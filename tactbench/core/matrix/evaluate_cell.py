@@ -164,11 +164,6 @@ def _unseen(recordings: tuple[Path, ...], digests: tuple[str, ...]) -> BaseExcep
     return None
 
 
-def our_own(estimator: str) -> bool:
-    """Return whether an estimator comes with this package: tested with it, and trusted not to end whoever builds it."""
-    return installed().estimators.owned(estimator).module.partition(".")[0] == __name__.partition(".")[0]
-
-
 def unanswered(cell: Cell, trouble: BaseException) -> dict[str, object]:
     """Return the row of a cell that could not be carried out, or not to its end."""
     registry = installed()
@@ -448,7 +443,7 @@ def _import(several: Set[tuple[str, str]]) -> None:
     import_libraries()
     for estimator, kind in sorted(several - _tried):
         _tried.add((estimator, kind))
-        if our_own(estimator):
+        if installed().estimators.owned(estimator).ours:
             with suppress(Exception):
                 prepare(estimator, kind)
     find_libraries()

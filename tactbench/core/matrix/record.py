@@ -64,7 +64,11 @@ def acquire_missing(
         if operator is not None and not simulated:
             outcomes = _one_by_one(missing, operator)
         else:
-            outcomes = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S).each(record, missing)
+            registry = installed()
+            ours = all(registry.sensors.owned(one.sensor).ours and registry.rigs.owned(one.rig).ours for one in missing)
+            # What an import of somebody else's changes in its process, it changes for one recording.
+            pool = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S, reuse=ours)
+            outcomes = pool.each(record, missing)
         with closing(outcomes):
             for request, outcome in outcomes:
                 if isinstance(outcome, UnwritableError):

@@ -55,6 +55,11 @@ class Owned(Generic[D]):
     distribution: str
     version: str
 
+    @property
+    def ours(self) -> bool:
+        """Whether it comes with this package: tested with it, and trusted not to change or end whoever imports it."""
+        return _is_ours(self.module)
+
 
 @dataclass
 class Shelfful(Generic[D]):
@@ -181,7 +186,7 @@ def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: floa
         owner = owners[id(point.dist)]
         unique[point.name, point.value, owner[0]] = point, owner
     several = [unique[key] for key in sorted(unique)]
-    answers = _asked_apart([point for point, _ in several if not _is_ours(point)], timeout_s)
+    answers = _asked_apart([point for point, _ in several if not _is_ours(point.module)], timeout_s)
     for point, owner in several:
         _add(registry, point, owner, answers.get((point.name, point.value)))
     return registry
@@ -193,8 +198,8 @@ def installed() -> Registry:
     return load_registry()
 
 
-def _is_ours(point: EntryPoint) -> bool:
-    return point.module.partition(".")[0] == __name__.partition(".")[0]
+def _is_ours(module: str) -> bool:
+    return module.partition(".")[0] == __name__.partition(".")[0]
 
 
 def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], answer: Any) -> None:
