@@ -130,12 +130,15 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     trouble = trouble or _unseen(recordings, digests)
     if trouble is not None:
         return unanswered(cell, trouble), {}
+    folder = Path.cwd()
     try:
         prepare(cell.estimator, registry.tasks[cell.task].spec.kind)
     except MemoryError:
         raise
     except Exception:
         pass  # the cell will tell
+    finally:
+        os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
     began = time.perf_counter()
     _seed_everything(cell.seed)
     row, sets = answer(cell, registry, recordings, DATASETS, working)

@@ -49,7 +49,7 @@ ENDS = {
     "evil-promise": ("crashed", None, "do not begin with the length of a result"),
     "evil-built-elsewhere": ("done", None, ""),
     "evil-built-deaf": ("done", None, ""),
-    "evil-built-limited": ("done", None, ""),
+    "evil-built-limited": ("failed", None, "Too many open files"),
     "evil-built-kill": ("crashed", 9, "SIGKILL"),
 }
 """Status, signal and a part of the reason of every evil cell."""

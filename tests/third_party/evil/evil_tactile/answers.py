@@ -107,7 +107,8 @@ def _built(first):
 
 
 def _lower_limits():
-    resource.setrlimit(resource.RLIMIT_NOFILE, (8, 8))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
+    Path(os.devnull).read_bytes()
 
 
 def _lie():
