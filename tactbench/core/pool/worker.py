@@ -21,6 +21,9 @@ from tactbench.core.pool.processes import kill_below, kill_tree
 
 STACK_S = 0.1
 """Seconds that a process which is about to be ended has to write where it is."""
+CLOSED_S = 2.0
+"""Seconds that a process may still be there once its pipe is closed: one that dies closes it first, and a busy machine
+tells of its end some tenths of a second later."""
 START_S = 60.0
 """Seconds that a process may take to begin with its item: a fork server imports libraries first."""
 
@@ -87,14 +90,16 @@ class Worker:
         self._kills = memory.oom_kills()
 
     @property
-    def waits_on(self) -> tuple[Any, Any]:
+    def waits_on(self) -> tuple[Any, ...]:
         """What becomes readable when there is something to look at."""
-        return self.connection, self._process.sentinel
+        return (self._process.sentinel,) if self._closed_s else (self.connection, self._process.sentinel)
 
     def begin(self, index: int, second: bool) -> None:
         """Have it carry out an item; `second`: another process has ended before it had begun with that."""
         self.index, self.second, self.begun = index, second, False
         self._began_s = time.monotonic()
+        self._closed_s: float | None = None
+        """When the pipe of its result was found closed."""
         self._ends_s: float | None = self._began_s + START_S
         self._shared_mb = max(self._shared_mb, memory.resident_mb(self._process.pid))
         with suppress(OSError):  # it has ended: `outcome` says so
@@ -127,8 +132,9 @@ class Worker:
         if over:
             return self._ended()
         if not open_:
-            wait([self._process.sentinel], STACK_S)
-            return self._ended() if self._process.exitcode is not None else self._stop(endings.silenced())
+            self._closed_s = self._closed_s or time.monotonic()
+            if time.monotonic() - self._closed_s > CLOSED_S:
+                return self._stop(endings.silenced())
         return self._limited()
 
     def _note_beginning(self) -> None:
