@@ -77,37 +77,31 @@ def processes(rounds: int) -> None:
 def parts(rounds: int) -> None:
     """Time the parts of a cached run in this process."""
     gc.set_threshold(100_000, 50, 100)  # as the command line does
-    from tactbench.core.matrix.keys import cell_key
+    from tactbench.core.matrix.keys import Keys
     from tactbench.core.matrix.plan import Cell
-    from tactbench.core.matrix.provenance import gather
-    from tactbench.core.matrix.source import SourceDigests
     from tactbench.core.plugins.registry import installed, load_registry
+    from tactbench.core.provenance.gather import gather
 
     print(f"registry, loaded once more  {1e3 * median_s(load_registry, rounds):.1f} ms")
     cell = Cell("ideal", "force", "twin", "deployable", None, "lasso", (("lambda_", 0.2),), False, 1, 1, 1)
     data = [f"{number:064x}" for number in range(60)]
-    with tempfile.TemporaryDirectory() as place:
-        memory = Path(place) / "sources.json"
 
-        def first() -> SourceDigests:
-            sources = SourceDigests(memory)
-            cell_key(cell, data, installed(), sources)
-            return sources
+    def first() -> Keys:
+        keys = Keys(installed())
+        keys.of_cell(cell, data)
+        return keys
 
-        cold = median_s(lambda: (memory.unlink(missing_ok=True), first()), rounds)
-        first().save()
-        warm = median_s(first, rounds)
-        sources = first()
+    cold = median_s(first, rounds)
+    keys = first()
 
     def thousand() -> None:
         for _ in range(1000):
-            cell_key(cell, list(data), installed(), sources)
+            keys.of_cell(cell, list(data))
 
     each = median_s(thousand, rounds) / 1000
-    print(f"first key, nothing known    {1e3 * cold:.1f} ms")
-    print(f"first key, source known     {1e3 * warm:.1f} ms")
+    print(f"first key                   {1e3 * cold:.1f} ms")
     print(f"every further key           {1e6 * each:.1f} us (goal {1e6 * GOAL_KEY_S:.0f} us, 60 recordings)")
-    spent = median_s(lambda: gather(sources), rounds)
+    spent = median_s(lambda: gather(keys.sources), rounds)
     print(f"provenance                  {1e3 * spent:.1f} ms (goal {1e3 * GOAL_PROVENANCE_S:.0f} ms)")
 
 

@@ -2,15 +2,14 @@
 
 Trivial cells (a function that returns its argument) through both engines, turn and turn about, two at once: the time of
 many cells less that of a few, by the number between, so that starting up does not count. Prints medians over rounds,
-their ratio, what starting a local cluster of two workers costs, and the memory of workers and cell servers after the
-first and after the last round.
+their ratio, what starting a local cluster of two workers costs, and the memory of workers and their fork servers after
+the first and after the last round.
 
 Usage: python benchmarks/dask_cells.py [CELLS] [ROUNDS]
 """
 
 from __future__ import annotations
 
-import operator
 import os
 import statistics
 import subprocess
@@ -22,20 +21,23 @@ from typing import Any
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
-from tactbench.core.matrix.engines.dask import open_dask  # noqa: E402
-from tactbench.core.matrix.engines.isolated import Isolated  # noqa: E402
-from tactbench.core.matrix.engines.limits import Limits  # noqa: E402
+from tactbench.core.matrix.dask import Dask, client_of  # noqa: E402
+from tactbench.core.pool.limits import Limits  # noqa: E402
+from tactbench.core.pool.pool import Pool  # noqa: E402
 
 JOBS, FEW = 2, 10
 LIMITS = Limits(timeout_s=60.0)
-WORK = operator.index
-"""Says the number it is given."""
+
+
+def work(number: int, concurrency: int = 1) -> int:
+    """Return the number it is given."""
+    return number
 
 
 def seconds(engine: Any, cells: int) -> float:
     """Return the seconds that an engine needs for so many cells; every answer is checked."""
     began = time.perf_counter()
-    outcomes = list(engine.each(WORK, range(cells)))
+    outcomes = list(engine.each(work, range(cells)))
     spent = time.perf_counter() - began
     assert sorted(outcomes) == [(number, number) for number in range(cells)]
     return spent
@@ -57,11 +59,11 @@ def below(pid: int) -> list[int]:
 
 
 def resident_mb() -> dict[str, float]:
-    """Return the largest resident memory among workers and among cell servers, MB."""
-    most = {"worker": 0.0, "cell server": 0.0}
+    """Return the largest resident memory among workers and among fork servers, MB."""
+    most = {"worker": 0.0, "fork server": 0.0}
     for pid in below(os.getpid()):
         said = Path(f"/proc/{pid}/cmdline").read_text()
-        kind = "cell server" if "engines.server" in said else "worker" if "spawn_main" in said else ""
+        kind = "fork server" if "forkserver" in said else "worker" if "spawn_main" in said else ""
         if kind:
             pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
             most[kind] = max(most[kind], pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
@@ -80,7 +82,8 @@ def main(cells: int, rounds: int) -> None:
     """Measure and print."""
     isolated, dask, memory = [], [], []
     began = time.perf_counter()
-    with open_dask(None, JOBS, LIMITS) as engine:
+    with client_of(None, JOBS) as client:
+        engine = Dask(JOBS, LIMITS, client.scheduler.address)
         seconds(engine, JOBS)
         start_s = time.perf_counter() - began
         for _ in range(rounds):
@@ -99,6 +102,6 @@ def main(cells: int, rounds: int) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["isolated"]:
-        print(per_cell_ms(Isolated(JOBS, LIMITS), int(sys.argv[2])))
+        print(per_cell_ms(Pool(JOBS, LIMITS), int(sys.argv[2])))
     else:
         main(*(int(word) for word in (*sys.argv[1:], *("300", "5")[len(sys.argv) - 1 :])))

@@ -214,10 +214,6 @@ def ways(folder: Path, benchopt: str | None) -> dict[str, tuple[list[str], Calla
         "plain script": ([sys.executable, "plain.py", "arrays.npz"], nothing),
         "tactbench, cold": ([*tactbench, "latency-false.yaml", "--out", "out"], forget("out")),
         "tactbench, cached": ([*tactbench, "latency-false.yaml", "--out", "out"], nothing),
-        "tactbench, cold, sources anew": (
-            ["env", "TACTBENCH_CACHE=", *tactbench, "latency-false.yaml", "--out", "anew"],
-            forget("anew"),
-        ),
         "plain script, with latency": ([sys.executable, "plain.py", "arrays.npz", "latency"], nothing),
         "tactbench, cold, with latency": ([*tactbench, "latency-true.yaml", "--out", "timed"], forget("timed")),
     }

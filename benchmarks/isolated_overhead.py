@@ -1,8 +1,8 @@
-"""What isolation costs a cell: engine `isolated` against a bare fork and pipe, and against the engine's reused process.
+"""What isolation costs a cell: the process pool against a bare fork and pipe, and against a reused process.
 
 The process first imports what cells share (scikit-learn), as a run does. Then trivial cells, turn and turn about: bare
-``os.fork`` with a pipe, written in ten lines; `Isolated`, with and without limits; `Processes`, which forks once.
-Prints medians over rounds, and the ratio to the bare fork. Bound: 20 ms per trivial cell after preload.
+``os.fork`` with a pipe, written in ten lines; a pool with a process for each cell, with and without limits; a pool that
+reuses one. Prints medians over rounds, and the ratio to the bare fork. Bound: 40 ms per trivial cell after preload.
 
 Usage: OMP_NUM_THREADS=1 python benchmarks/isolated_overhead.py [ROUNDS [CELLS]]
 """
@@ -17,12 +17,11 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from tactbench.core.matrix.engines.family import can_fork
-from tactbench.core.matrix.engines.isolated import Isolated
-from tactbench.core.matrix.engines.limits import Limits
-from tactbench.core.matrix.engines.processes import Processes
+from tactbench.core.pool.limits import Limits
+from tactbench.core.pool.pool import Pool
+from tactbench.core.pool.processes import can_fork
 
-BOUND_MS = 20.0
+BOUND_MS = 40.0
 
 
 def cell(number: int) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -47,7 +46,7 @@ def bare(items: Iterable[int]) -> int:
     return heard
 
 
-def by(engine: Isolated | Processes) -> Callable[[Iterable[int]], int]:
+def by(engine: Pool) -> Callable[[Iterable[int]], int]:
     """Return a timed_estimator that has an engine carry out the cells."""
     return lambda items: sum(not isinstance(outcome, BaseException) for _, outcome in engine.each(cell, items))
 
@@ -65,9 +64,9 @@ def main() -> None:
     limits = Limits(timeout_s=60.0, memory_mb=4096)
     timed_estimators = {
         "bare fork and pipe": bare,
-        "isolated": by(Isolated(1)),
-        "isolated, limited": by(Isolated(1, limits)),
-        "reused process": by(Processes(1, limits)),
+        "isolated": by(Pool(1)),
+        "isolated, limited": by(Pool(1, limits)),
+        "reused process": by(Pool(1, limits, reuse=True)),
     }
     spent: dict[str, list[float]] = {name: [] for name in timed_estimators}
     for _ in range(rounds):

@@ -30,7 +30,7 @@ one_thread()  # as the command line does, before numpy is imported: a process wi
 
 import trivial  # noqa: E402
 
-COLD_MS, CACHED_MS, RATIO = 1.5, 0.2, 1.3
+COLD_MS, CACHED_MS, RATIO = 5.0, 0.2, 1.3
 
 
 def one(cells: int, on: str | None) -> dict[str, float]:
@@ -42,7 +42,7 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         trivial.use(folder / "plugin")
         from tactbench.core.evaluation.cell import CellContext, evaluate
         from tactbench.core.evaluation.dataset import load_dataset
-        from tactbench.core.matrix.engines.choice import EngineChoice
+        from tactbench.core.matrix.engine import EngineChoice
         from tactbench.core.matrix.run import run_matrix
         from tactbench.core.matrix.store import Store
         from tactbench.core.plugins.registry import installed

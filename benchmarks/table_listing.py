@@ -23,7 +23,7 @@ import numpy as np
 from tactbench.core.leaderboard.formats import TEXTS, plain_text
 from tactbench.core.leaderboard.parquet import parquet
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.matrix.answer import opening
+from tactbench.core.matrix.evaluate_cell import opening
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.spec.task import LabelTarget, TaskSpec

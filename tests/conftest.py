@@ -32,14 +32,6 @@ ROOT = Path(__file__).resolve().parents[1]
 THIRD_PARTY = ROOT / "tests" / "third_party"
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _memory_of_tests(tmp_path_factory):
-    """What this user's runs remember is left alone: tests have a memory of their own, which all of them share."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("TACTBENCH_CACHE", str(tmp_path_factory.mktemp("cache") / "tactbench"))
-        yield
-
-
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The folder of real recordings; tests that need it are skipped where it is not."""

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tactbench.core.evaluation.fitting import fit
-from tactbench.core.matrix.keys import versions
+from tactbench.core.matrix.evaluate_cell import solve
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.solving import solve
+from tactbench.core.provenance.source import versions
 from tactbench.plugin import NotApplicable, load_object, load_registry
 from tests.core.evaluation.made import record
 

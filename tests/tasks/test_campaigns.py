@@ -7,9 +7,9 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from tactbench.core.evaluation.splits import shots
-from tactbench.core.matrix.material import orders_for
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import plan_cells
-from tactbench.core.matrix.source import SourceDigests
+from tactbench.core.matrix.plan_recordings import requests_for
 from tactbench.core.matrix.store import Store
 from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
 from tactbench.core.spec.scene import Simulation
@@ -45,7 +45,7 @@ def test_campaigns_of_other_tasks_share_their_recordings(tmp_path):
         for name in ("force", "curvature", "inverse-radius")
     ))  # fmt: skip
     cells = plan_cells(matrix, ["icub"], REGISTRY)
-    orders = orders_for(cells, REGISTRY, SourceDigests(tmp_path / "s.json"), Store(tmp_path), Simulation())
+    orders = requests_for(cells, REGISTRY, Keys(REGISTRY), Store(tmp_path), Simulation())
     paths = {key: {order.path for order in some} for key, some in orders.items()}
     every = set().union(*paths.values())
     for split in ("placement", "unit", "few-shot-1", "few-shot-2", "few-shot-5", "few-shot-10"):
@@ -143,8 +143,8 @@ def test_tasks_that_share_the_caps_share_their_order(tmp_path):
     cells = plan_cells(
         MatrixSpec(seed=5, repeats=1, tasks=(TaskChoice(name="curvature", protocol="karl2016"),)), ["icub"], REGISTRY
     )
-    (orders,) = orders_for(
-        cells, REGISTRY, SourceDigests(tmp_path / "s.json"), Store(tmp_path), Simulation()
+    (orders,) = requests_for(
+        cells, REGISTRY, Keys(REGISTRY), Store(tmp_path), Simulation()
     ).values()  # fmt: skip
     # What is to be recorded holds the drawn order: a recording keeps its scene.
     assert [order.scene.name for order in orders] == in_time("curvature", 5)

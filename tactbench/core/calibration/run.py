@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from tactbench.core.calibration.draw import Draw, Varied
 from tactbench.core.calibration.journal import Journal
 from tactbench.core.calibration.placing import as_procedure
 from tactbench.core.calibration.trial import Trial, carry_out
 from tactbench.core.errors import TactbenchError
-from tactbench.core.matrix.engines.choice import EngineChoice
-from tactbench.core.matrix.keys import versions
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.provenance import gather
+from tactbench.core.provenance.gather import gather
+from tactbench.core.provenance.source import versions
 from tactbench.core.spec.calibration import CalibrationSpec
 
 Work = Callable[[Trial], tuple[Draw, float]]
@@ -44,17 +47,24 @@ def carry_out_missing(
         # One folder for all: workers that are ended in the middle cannot tidy up behind themselves, and one may still
         # be writing when it is emptied; that must not hide the interruption.
         with tempfile.TemporaryDirectory(prefix="tactbench-draws-", ignore_cleanup_errors=True) as scratch:
-            crew = EngineChoice().pool(min(jobs, len(numbers)))
+            pool = EngineChoice().pool(min(jobs, len(numbers)))
             missing = [Trial(spec, seed, number, Path(scratch)) for number in numbers]
-            for trial, outcome in crew.each(work, missing):
+            for trial, outcome in pool.each(partial(_as_json, work), missing):
                 if isinstance(outcome, BaseException):
                     raise TactbenchError(
                         f"The process of draw {trial.number} was ended: {outcome}",
                         hint="What was finished is kept; give the same command again, with fewer --jobs.",
                     ) from outcome
-                journal.append(*outcome)
-                told.advance(f"draw {trial.number}: {outcome[0].status}, {outcome[1]:.1f} s")
+                draw, cpu_s = Draw(**outcome["draw"]), outcome["cpu_s"]
+                journal.append(draw, cpu_s)
+                told.advance(f"draw {trial.number}: {draw.status}, {cpu_s:.1f} s")
     return [journal.draws[number] for number in range(draws)]
+
+
+def _as_json(work: Work, trial: Trial) -> dict[str, Any]:
+    """Return what a child process can send of a draw."""
+    draw, cpu_s = work(trial)
+    return {"draw": asdict(draw), "cpu_s": cpu_s}
 
 
 def carry_out_variations(

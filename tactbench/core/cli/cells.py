@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.errors import UsageError
 
 if TYPE_CHECKING:
-    from tactbench.core.matrix.explanation import Explanation
     from tactbench.core.matrix.keys import Keys
-    from tactbench.core.matrix.material import Order
     from tactbench.core.matrix.plan import Cell
+    from tactbench.core.matrix.plan_recordings import RecordingRequest
     from tactbench.core.matrix.recorded import Recorded
-    from tactbench.core.matrix.source import SourceDigests
     from tactbench.core.matrix.store import Row, Store
+    from tactbench.core.matrix.why import Explanation
     from tactbench.core.plugins.registry import Registry
 
 
@@ -26,23 +25,22 @@ class Subject:
 
     store: Store
     keys: Keys
-    sources: SourceDigests
     recorded: Recorded
     cell: Cell
     row: Row | None
     """What the folder says of it."""
     paths: tuple[Path, ...]
-    orders: tuple[Order, ...]
+    requests: tuple[RecordingRequest, ...]
     """How the recordings are made; none if they were made elsewhere, or cannot be made anew."""
 
     def explain(self) -> Explanation:
         """Return whether its result would be reused, and what differs."""
-        from tactbench.core.matrix.explanation import explain
         from tactbench.core.matrix.key_book import KeyBook
+        from tactbench.core.matrix.why import explain
 
         known = str(self.row["key"]) if self.row is not None and self.row["status"] == "done" else ""
         book = KeyBook(self.store.folder / "cache" / "keys")
-        return explain(self.cell, self.paths, self.orders, self.keys, self.recorded, book, self.store, known)
+        return explain(self.cell, self.paths, self.requests, self.keys, self.recorded, book, self.store, known)
 
 
 def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> Subject:
@@ -64,11 +62,9 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
         If there is no such folder or cell, or more than one cell is meant.
     """
     from tactbench.core.cli.selection import matrix_asked
-    from tactbench.core.matrix.keys import keys_of
-    from tactbench.core.matrix.material import need_of
+    from tactbench.core.matrix.keys import Keys
     from tactbench.core.matrix.naming import cell_of, meant
-    from tactbench.core.matrix.personal import sources_of_this_user
-    from tactbench.core.matrix.planning import plan
+    from tactbench.core.matrix.plan_recordings import plan, request_key
     from tactbench.core.matrix.recorded import Recorded
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
@@ -76,9 +72,8 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
     if not out.is_dir():
         raise UsageError(f"There is no folder {out}.", hint="Name one that `tactbench run --out DIR` wrote.")
     registry, store = installed(), Store(out)
-    sources = sources_of_this_user()
     recorded = Recorded(out / "cache" / "recordings.json")
-    keys = keys_of(registry, sources)
+    keys = Keys(registry)
     rows = {row["cell"]: row for row in store.rows()}
     known = {name: str(row.get("key", "")) for name, row in rows.items()}
     if options is None or not any(_given(name, value) for name, value in options.items()):
@@ -89,8 +84,8 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
                 raise
         else:
             cell = cell_of(row)
-            paths, orders = _material(cell, row, registry, sources, store)
-            return Subject(store, keys, sources, recorded, cell, row, paths, orders)
+            paths, requests = _material(cell, row, registry, keys, store)
+            return Subject(store, keys, recorded, cell, row, paths, requests)
     asked = dict(options or {})
     if not asked["config"] and any(given in name for name in rows):
         given = meant(given, list(rows), known)
@@ -98,10 +93,10 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
         was = {"sensors": (rows[given]["sensor"],), "tasks": (rows[given]["task"],), "rig": rows[given]["rig"]}
         asked |= {name: value for name, value in was.items() if not asked[name]}
     matrix, folder = matrix_asked(registry, **asked)
-    cells, needed = plan(matrix, registry, sources, store, folder, recorded)
+    cells, needed = plan(matrix, registry, keys, store, folder, recorded)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
-    made = tuple(needed.orders.get(need_of(cell), ()))
-    return Subject(store, keys, sources, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)
+    made = tuple(needed.requests.get(request_key(cell), ()))
+    return Subject(store, keys, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)
 
 
 def _given(option: str, value: Any) -> bool:
@@ -109,14 +104,14 @@ def _given(option: str, value: Any) -> bool:
 
 
 def _material(
-    cell: Cell, row: Row, registry: Registry, sources: SourceDigests, store: Store
-) -> tuple[tuple[Path, ...], tuple[Order, ...]]:
+    cell: Cell, row: Row, registry: Registry, keys: Keys, store: Store
+) -> tuple[tuple[Path, ...], tuple[RecordingRequest, ...]]:
     """Return the recordings a row was answered from, and how to make them where a simulation did."""
-    from tactbench.core.matrix.material import need_of, orders_for
+    from tactbench.core.matrix.plan_recordings import request_key, requests_for
 
     if registry.rigs[cell.rig].simulated:
-        made = orders_for([cell], registry, sources, store, cell.simulation)[need_of(cell)]
-        return tuple(order.path for order in made), tuple(made)
+        made = requests_for([cell], registry, keys, store, cell.simulation)[request_key(cell)]
+        return tuple(request.path for request in made), tuple(made)
     return recordings_of(row, store), ()
 
 

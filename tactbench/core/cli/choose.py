@@ -114,7 +114,7 @@ def _shipped() -> tuple[list[Row], str]:
     """Return the rows that came with tactbench, and how they were made."""
     from tactbench.core.cli.config import shipped_results
     from tactbench.core.errors import ConfigError
-    from tactbench.core.matrix.leaving import fill_baselines
+    from tactbench.core.matrix.summary import fill_baselines
 
     path = shipped_results()
     try:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from tactbench.core.matrix.engines.choice import EngineChoice, EngineName
+    from tactbench.core.matrix.engine import EngineChoice, EngineName
     from tactbench.core.spec.matrix import MatrixSpec
 
 _OPTIONS = (
     click.option(
         "--engine",
         type=click.Choice(("in-process", "isolated", "dask")),
-        help="Where cells are carried out: all in one process, each in a process of its own, or on a Dask cluster. "
-        "Default: in-process for a single cell without limits, isolated otherwise.",
+        help="Where cells are carried out: each in a process of its own (the default), on a Dask cluster, or, a single "
+        "cell, in the process of the run.",
     ),
     click.option(
         "--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Cells at once."
@@ -62,11 +62,11 @@ def choice_of(
     UsageError
         If options do not go together.
     """
-    from tactbench.core.matrix.engines.choice import EngineChoice
-    from tactbench.core.matrix.engines.limits import Limits
+    from tactbench.core.matrix.engine import EngineChoice
+    from tactbench.core.pool.limits import Limits
 
     limits = Limits(
         timeout_s=matrix.timeout_s if timeout is None else timeout,
         memory_mb=matrix.memory_mb if memory is None else memory,
     )
-    return EngineChoice(engine, jobs, limits, scheduler).checked()
+    return EngineChoice(engine or "isolated", jobs, limits, scheduler).checked()

@@ -25,7 +25,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     the same scores, one host's row is kept whole: times of different hosts are never mixed.
     """
     from tactbench.core.cli.screen import remark
-    from tactbench.core.matrix.merging import merge
+    from tactbench.core.matrix.merge import merge
 
     merged = merge(folders, out, also=_tables)
     done = sum(row["status"] == "done" for row in merged.rows)
@@ -43,8 +43,8 @@ def _tables(folder: Path, rows: Sequence[Row]) -> None:
     """Write what `tactbench leaderboard` shows."""
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.files import write_tables
-    from tactbench.core.matrix.leaving import fill_baselines
     from tactbench.core.matrix.store import Store
+    from tactbench.core.matrix.summary import fill_baselines
 
     fill_baselines(list(rows))
     write_tables(rows, folder, provenance_of(Store(folder), rows))

@@ -64,9 +64,9 @@ def command(
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import TactbenchError, UsageError
-    from tactbench.core.matrix.provenance import gather
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.plugins.rig_files import load_rig_file
+    from tactbench.core.provenance.gather import gather
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]

@@ -15,7 +15,7 @@ from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import Subject
-    from tactbench.core.matrix.again import Again
+    from tactbench.core.matrix.rerun import Again
 
 
 @click.command(name="rerun")
@@ -61,8 +61,8 @@ def _compute(found: Subject) -> Again:
     from tactbench.core.cli.cells import recordings_of
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import TactbenchError
-    from tactbench.core.matrix.again import compute_again
-    from tactbench.core.matrix.material import need_of, orders_for
+    from tactbench.core.matrix.plan_recordings import request_key, requests_for
+    from tactbench.core.matrix.rerun import compute_again
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
 
@@ -70,17 +70,17 @@ def _compute(found: Subject) -> Again:
     try:
         before = recordings_of(row, found.store)
     except TactbenchError:
-        if not found.orders:
+        if not found.requests:
             raise
         before = ()
     with tempfile.TemporaryDirectory(prefix="tactbench-rerun-") as place:
-        orders = []
-        if found.orders:
+        requests = []
+        if found.requests:
             elsewhere = Store(Path(place))
-            made = orders_for([found.cell], installed(), found.sources, elsewhere, found.cell.simulation)
-            orders = made[need_of(found.cell)]
+            made = requests_for([found.cell], installed(), found.keys, elsewhere, found.cell.simulation)
+            requests = made[request_key(found.cell)]
         with redirect_stdout(sys.stderr):  # what a plugin prints is no result
-            return compute_again(found.cell, row, found.store, before or found.paths, orders, remark)
+            return compute_again(found.cell, row, found.store, before or found.paths, requests, remark)
 
 
 def _text(facts: dict[str, Any]) -> str:

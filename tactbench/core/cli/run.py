@@ -21,7 +21,7 @@ from tactbench.core.cli.tables import (
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
-    from tactbench.core.matrix.engines.choice import EngineName
+    from tactbench.core.matrix.engine import EngineName
     from tactbench.core.matrix.run import Outcome
 
 

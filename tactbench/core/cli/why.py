@@ -14,8 +14,8 @@ from tactbench.core.tables.text import visible
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import Subject
-    from tactbench.core.matrix.explanation import Explanation
     from tactbench.core.matrix.store import Row
+    from tactbench.core.matrix.why import Explanation
 
 _TAIL = 15
 """Lines of a traceback or log that are shown; the whole of it stands in ``--format json``."""
@@ -133,7 +133,7 @@ def _rests_on(row: Row) -> list[str]:
 
 def _provenance(found: Subject) -> list[str]:
     from tactbench.core.cli.results import provenance_of
-    from tactbench.core.matrix.provenance import foot
+    from tactbench.core.provenance.gather import foot
 
     return list(foot(provenance_of(found.store, [found.row or {}])))
 

@@ -45,7 +45,7 @@ def footer_of(rows: Sequence[Row], provenance: Sequence[Row], times: bool) -> tu
 def _made_by(provenance: Sequence[Row]) -> tuple[str, ...]:
     if not provenance:
         return ()
-    from tactbench.core.matrix.provenance import foot
+    from tactbench.core.provenance.gather import foot
 
     try:
         return foot(provenance)

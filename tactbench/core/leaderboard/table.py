@@ -60,7 +60,7 @@ def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: b
     rows
         Rows of one folder or of several, in any order.
     provenance
-        What is known of the runs they are from: see `tactbench.core.matrix.provenance`.
+        What is known of the runs they are from: see `tactbench.core.provenance.gather`.
     times
         False: the table of what a seed decides, the same on every machine; no times, no hosts, no provenance.
     """

@@ -6,12 +6,13 @@ Whether its row is plain data, the store finds out when it writes it (`NotPlainE
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
+from tactbench.core.matrix.evaluate_cell import ASKED
 from tactbench.core.matrix.store import Row
 from tactbench.core.samples import Answers
 from tactbench.core.spec.status import STATUSES
@@ -19,25 +20,29 @@ from tactbench.core.spec.status import STATUSES
 _COLUMNS = tuple(column.name for column in fields(Answers))
 
 
-def fault_in(given: Any, cell: str, keys: Set[str]) -> str:
+SAME_SCORE = 1e-9
+"""Relative difference of two scores of the same answers: sums of a million terms in another order, as on another kind
+of processor, differ by less."""
+
+
+def fault_in(given: Any, asked: Row) -> str:
     """Return what is wrong with what a cell gave, as a clause; "" if nothing is.
 
     Parameters
     ----------
     given
-        What came; a row and its answers by role are wanted.
-    cell
-        Name of the cell.
-    keys
-        What every row has.
+        What came; a row and the columns of its answers by role are wanted.
+    asked
+        The row as it was before anything was computed: it has every key, and says what was asked.
     """
     if not (isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], dict)):
         return f"it gave a {type(given).__name__} and not a row with its answers"
     row, sets = given
-    if row.keys() != keys:
-        return f"its row has other keys: {', '.join(sorted(map(str, row.keys() ^ keys)))}"
-    if row["cell"] != cell:
-        return f"its row is that of another cell, {row['cell']!r}"
+    if row.keys() != asked.keys():
+        return f"its row has other keys: {', '.join(sorted(map(str, row.keys() ^ asked.keys())))}"
+    for name in ASKED:
+        if row[name] != asked[name]:
+            return f"its row is that of another cell: its {name} is {row[name]!r}, not {asked[name]!r}"
     if row["status"] not in STATUSES:
         return f"its status is {row['status']!r}"
     recordings = row["recordings"]
@@ -56,18 +61,31 @@ def fault_in(given: Any, cell: str, keys: Set[str]) -> str:
 def _fault_in_answers(sets: Any, row: Row) -> str:
     if not (isinstance(sets, Mapping) and "test" in sets):
         return "it has no answers to the test set"
-    for role, answers in sets.items():
-        if not isinstance(answers, Answers):
-            return f"its {role} answers are a {type(answers).__name__}"
-        columns = {name: getattr(answers, name) for name in _COLUMNS}
+    for role, columns in sets.items():
+        if not (isinstance(columns, Mapping) and columns.keys() == set(_COLUMNS)):
+            return f"its {role} answers are a {type(columns).__name__} without the columns of answers"
         for name, column in columns.items():
             if not (isinstance(column, np.ndarray) and column.ndim == 1 and column.dtype.kind in "biufSU"):
                 return f"its {role} answers have no plain column {name}"
         lengths = {name: len(column) for name, column in columns.items()}
         if len(set(lengths.values())) != 1:
             return f"the columns of its {role} answers differ in length: {lengths}"
-        if answers.y_pred.dtype.kind == "f" and not np.isfinite(answers.y_pred).all():
+        if columns["y_pred"].dtype.kind == "f" and not np.isfinite(columns["y_pred"]).all():
             return f"some of its {role} answers are NaN or infinite"
-    if len(sets["test"]) != row["n_test"]:
-        return f"it gave {len(sets['test'])} test answers and says {row['n_test']}"
+    given = len(sets["test"]["y_true"])
+    if given != row["n_test"]:
+        return f"it gave {given} test answers and says {row['n_test']}"
+    return _fault_in_score(sets["test"], row)
+
+
+def _fault_in_score(test: Mapping[str, Any], row: Row) -> str:
+    """Compute the score anew from the answers that are kept, in this process, where no plugin has run."""
+    from tactbench.core.evaluation.metrics import metric_called
+
+    try:
+        found = metric_called(row["metric"]).of(test["y_true"], test["y_pred"], len(row["classes"]))
+    except (TypeError, ValueError, IndexError) as error:
+        return f"its answers have no {row['metric']}: {error}"
+    if not math.isclose(found, row["score"], rel_tol=SAME_SCORE, abs_tol=SAME_SCORE):
+        return f"its score is {row['score']!r}, and its answers give {found!r}"
     return ""

@@ -8,21 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sys
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
-from tactbench.core.matrix.distributions import installed_distributions, normal
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.source import Source, SourceDigests
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.provenance.source import Source, SourceDigests, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
-
-RELEVANT = ("numpy", "scipy", "scikit-learn")
-"""Distributions whose version may change a number."""
 
 _TOLD_OTHERWISE = {"published", "equivalence", "reference_score", "title", "question", "scenes", "campaigns"}
 """Of a task: what changes no number, and what its recordings say themselves, by their content."""
@@ -47,13 +40,12 @@ class Keys:
     ----------
     registry
         Where descriptors and their owners are looked up.
-    sources
-        Digests of the owners' packages.
     """
 
-    def __init__(self, registry: Registry, sources: SourceDigests) -> None:
+    def __init__(self, registry: Registry) -> None:
         self._registry = registry
-        self._sources = sources
+        self.sources = SourceDigests()
+        """Digests of the owners' packages."""
         self._answers: dict[tuple[str, str], Fixed] = {}
         self._makers: dict[tuple[str, str, str], Fixed] = {}
         self._data: dict[tuple[str, ...], str] = {}
@@ -70,7 +62,7 @@ class Keys:
         pair = cell.task, cell.estimator
         if pair not in self._answers:
             task, estimator = self._registry.tasks.owned(cell.task), self._registry.estimators.owned(cell.estimator)
-            source = self._sources.behind([task.module, estimator.module, estimator.descriptor.where], "answer")
+            source = self.sources.behind([task.module, estimator.module, estimator.descriptor.where], "answer")
             self._answers[pair] = _fixed(
                 source,
                 estimator.descriptor.distributions,
@@ -102,7 +94,7 @@ class Keys:
             for effect in effects:
                 modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
             self._makers[sensor, rig, rig_file] = _fixed(
-                self._sources.behind(modules, "recording"),
+                self.sources.behind(modules, "recording"),
                 (),
                 sensor=maker.descriptor.model_dump(),
                 rig=carrier.descriptor.model_dump(),
@@ -119,36 +111,6 @@ class Keys:
         return [*(owner.module for owner in owners), physics.module, physics.descriptor.where]
 
 
-_ALL: WeakKeyDictionary[SourceDigests, Keys] = WeakKeyDictionary()
-
-
-def keys_of(registry: Registry, sources: SourceDigests) -> Keys:
-    """Return the keys that go with `registry` and `sources`, the same ones every time."""
-    found = _ALL.get(sources)
-    if found is None or found._registry is not registry:
-        found = _ALL[sources] = Keys(registry, sources)
-    return found
-
-
-def recording_key(
-    sensor: str,
-    rig: str,
-    scene: Scene,
-    role: Role,
-    seed: int,
-    registry: Registry,
-    sources: SourceDigests,
-    rig_file: str = "",
-) -> str:
-    """Return the key of a recording that `rig` is to make of `scene`."""
-    return keys_of(registry, sources).of_recording(sensor, rig, scene, role, seed, rig_file)
-
-
-def cell_key(cell: Cell, data: Sequence[str], registry: Registry, sources: SourceDigests) -> str:
-    """Return the key of a cell's result; `data` are the content digests of its recordings, in order."""
-    return keys_of(registry, sources).of_cell(cell, data)
-
-
 def configuration_of(cell: Cell) -> Section:
     """Return what a cell's key covers of its configuration. Its number among the repeats is not: the seed is."""
     return {
@@ -159,14 +121,6 @@ def configuration_of(cell: Cell) -> Section:
         "seed": cell.seed,
         **({} if cell.latency else {"latency": False}),
     }
-
-
-@lru_cache(maxsize=8)
-def versions(more: tuple[str, ...] = ()) -> dict[str, str]:
-    """Return the versions that may change a number: Python's, those of `RELEVANT` and of the distributions `more`."""
-    installed = installed_distributions(sys.path)
-    found = {"python": f"{sys.version_info.major}.{sys.version_info.minor}"}
-    return found | {name: installed.get(normal(name), "missing") for name in (*RELEVANT, *more)}
 
 
 def _fixed(source: Source, distributions: tuple[str, ...], **descriptors: Section) -> Fixed:

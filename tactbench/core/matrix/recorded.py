@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.remembered import Facts, FileMemory
 
 
@@ -39,11 +41,12 @@ class Recorded:
         """Return those of `paths` that would have to be opened for the `fact`: ``digest`` or ``sensor``."""
         return [path for path in paths if path not in self._digests and fact not in self._facts(path)]
 
-    def learn(self, path: Path, read: Read) -> None:
-        """Take in what was read of a recording, perhaps in another process."""
-        before, facts, after = read
-        if "digest" in facts:
-            self._digests[path] = facts["digest"]
+    def learn(self, path: Path, facts: Facts, before: os.stat_result | None) -> None:
+        """Take in what was read of a recording, perhaps in another process, which looked like `before` until then."""
+        digest = facts.get("digest")
+        if digest is not None:
+            self._digests[path] = digest
+        after = stat_of(path)
         if before is not None and after is not None:
             self._memory.learn(before, after, facts)
 
@@ -52,7 +55,8 @@ class Recorded:
         if path not in self._digests:
             known = self._facts(path).get("digest")
             if known is None:
-                self.learn(path, read_digest(path))
+                before = stat_of(path)
+                self.learn(path, read_digest(path), before)
             else:
                 self._digests[path] = known
         return self._digests[path]
@@ -60,17 +64,16 @@ class Recorded:
     def subject(self, path: Path) -> Subject:
         """Return what a recording is of; raises RecordingError if it cannot be read."""
         facts = self._facts(path)
-        sensor = facts.get("sensor")
-        if sensor is None:
-            read = read_subject(path)
-            self.learn(path, read)
-            facts = read[1]
-        return Subject(str(sensor or facts["sensor"]), facts["scene"])
+        if facts.get("sensor") is None:
+            before = stat_of(path)
+            facts = read_subject(path)
+            self.learn(path, facts, before)
+        return Subject(str(facts["sensor"]), facts["scene"])
 
     def made(self, path: Path, digest: str) -> None:
         """Note the digest of a recording that was made now, as its writer computed it."""
         self._digests[path] = digest
-        self._made[path] = _stat(path)
+        self._made[path] = stat_of(path)
 
     @property
     def number_made(self) -> int:
@@ -80,37 +83,55 @@ class Recorded:
     def save(self) -> None:
         """Write what was learned; a folder that cannot be written only costs time."""
         for path, before in self._made.items():
-            now = _stat(path)
+            now = stat_of(path)
             if before is not None and now is not None:
                 self._memory.learn(before, now, {"digest": self._digests[path]})
         self._memory.save()
 
     def _facts(self, path: Path) -> Facts:
-        stat = _stat(path)
+        stat = stat_of(path)
         return {} if stat is None else self._memory.facts(stat)  # where there is none, reading says what is wrong
 
 
-Read = tuple["os.stat_result | None", "dict[str, Any]", "os.stat_result | None"]
-"""Facts, and what the file looked like before and after they were read."""
-
-
-def read_digest(path: Path) -> Read:
+def read_digest(path: Path) -> Facts:
     """Read the content digest of a recording; raises RecordingError if it cannot be read."""
     from tactbench.core.recording.reader import content_digest
 
-    return _stat(path), {"digest": content_digest(path)}, _stat(path)
+    return {"digest": content_digest(path)}
 
 
-def read_subject(path: Path) -> Read:
+def read_subject(path: Path) -> Facts:
     """Read what a recording is of; raises RecordingError if it cannot be read."""
     from tactbench.core.recording.reader import read_meta
 
-    before, meta, after = _stat(path), read_meta(path), _stat(path)
-    return before, {"sensor": meta.sensor.name, "scene": meta.scene.name if meta.scene else None}, after
+    meta = read_meta(path)
+    return {"sensor": meta.sensor.name, "scene": meta.scene.name if meta.scene else None}
 
 
-def _stat(path: Path) -> os.stat_result | None:
+def stat_of(path: Path) -> os.stat_result | None:
+    """Return what a file looks like; None where there is none."""
     try:
         return path.stat()
     except OSError:
         return None
+
+
+def read_all(
+    read: Callable[[Path], Facts], paths: Sequence[Path], recorded: Recorded, choice: EngineChoice
+) -> dict[Path, BaseException]:
+    """Have `recorded` learn what `read` finds in every path; return what stopped it where it did.
+
+    One child process reads one file after the other; a file that ends it, or takes longer than a cell may, costs its
+    own result only.
+    """
+    if not paths:
+        return {}
+    importlib.import_module("h5py")  # once here, not once in every process that reads
+    before = {path: stat_of(path) for path in paths}
+    failed: dict[Path, BaseException] = {}
+    for path, facts in choice.pool(1).each(read, paths):
+        if isinstance(facts, BaseException):
+            failed[path] = facts
+        else:
+            recorded.learn(path, facts, before[path])
+    return failed

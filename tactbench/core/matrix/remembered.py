@@ -21,9 +21,6 @@ _FORMAT = f"tactbench-memory 1, Python {sys.version_info.major}.{sys.version_inf
 
 _MOST = 200_000
 """Files remembered; the ones not asked for longest are forgotten first."""
-_MOST_BESIDE = 20_000
-"""Of a personal memory, files remembered beside those asked for last: it serves all that a user ever runs, and is read
-whole every time."""
 _LARGEST = 256 * 2**20
 """Bytes of a memory that is still read: 200,000 files take about 30 MiB."""
 
@@ -42,26 +39,20 @@ class FileMemory:
         The JSON file that holds them.
     clock
         Nanoseconds since the epoch, as disks count them.
-    personal
-        Whether it is one that this user's runs share: it is believed only where nobody else could have written it, and
-        shows nobody else which files there are.
 
     Notes
     -----
     The trap of such memories: a file changed twice within one tick of the disk's clock looks the same after both. So
     facts are only written down about files that had been at rest for longer than a tick when they were read; younger
-    ones, and those from the future after a clock stepped back, are read again the next time. A personal memory outlives
-    disks: images of whole systems count in whole seconds, and two of them may have another file of the same size in the
-    same place with the same times. Of such disks it remembers nothing.
+    ones, and those from the future after a clock stepped back, are read again the next time.
 
     Several processes may use one file at once: each writes it whole, and adds to what the others have written.
     """
 
-    def __init__(self, path: Path, clock: Callable[[], int] = time.time_ns, *, personal: bool = False) -> None:
+    def __init__(self, path: Path, clock: Callable[[], int] = time.time_ns) -> None:
         self._path = path
         self._clock = clock
-        self._personal = personal
-        self._known = self._read()
+        self._known = _entries(path)
         self._used: dict[str, list[object]] = {}
         self._fresh = False
 
@@ -87,35 +78,17 @@ class FileMemory:
         """Write down what was learned; a folder that cannot be written only costs time."""
         if not self._fresh:
             return
-        rest = [(place, entry) for place, entry in self._read().items() if place not in self._used]
-        if self._personal:
-            rest = rest[-_MOST_BESIDE:]
+        rest = [(place, entry) for place, entry in _entries(self._path).items() if place not in self._used]
         kept = dict([*rest, *self._used.items()][-_MOST:])
         content = json.dumps({"format": _FORMAT, "files": kept}, separators=(",", ":")).encode()
         try:
-            if self._personal:
-                self._path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-                if not _nobody_elses(self._path.parent.stat()):
-                    return
-            else:
-                self._path.parent.mkdir(parents=True, exist_ok=True)
-            # Not synced: what a power cut takes costs time.
-            replace_file(self._path, content, sync=False, mode=0o600 if self._personal else 0o666)
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(self._path, content, sync=False)  # what a power cut takes costs time
         except OSError:
             return
         self._fresh = False
 
-    def _read(self) -> dict[str, list[object]]:
-        try:
-            if self._personal and not (_nobody_elses(self._path.parent.stat()) and _nobody_elses(self._path.lstat())):
-                return {}
-            return _entries(self._path)
-        except OSError:
-            return {}
-
     def _at_rest(self, stat: os.stat_result) -> bool:
-        if self._personal and stat.st_ctime_ns % 1_000_000_000 == 0:
-            return False
         coarse = stat.st_mtime_ns % 1_000_000_000 == 0
         tick = _COARSE_TICK_NS if coarse else _TICK_NS
         return self._clock() - max(stat.st_mtime_ns, stat.st_ctime_ns) > tick
@@ -126,17 +99,12 @@ def _place(stat: os.stat_result) -> str:
     return f"{stat.st_dev:x}:{stat.st_ino:x}"
 
 
-def _nobody_elses(stat: os.stat_result) -> bool:
-    """Return whether a file or folder is this user's, and nobody else may read or write it."""
-    return not hasattr(os, "geteuid") or (stat.st_uid == os.geteuid() and not stat.st_mode & 0o077)
-
-
 def _entries(path: Path) -> dict[str, list[object]]:
     try:
         if path.stat().st_size > _LARGEST:
             return {}
         content = json.loads(path.read_bytes())
-    except (ValueError, RecursionError):
+    except (OSError, ValueError, RecursionError):
         return {}
     if not isinstance(content, dict) or content.get("format") != _FORMAT or not isinstance(content.get("files"), dict):
         return {}

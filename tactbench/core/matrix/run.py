@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.matrix.acquiring import acquire_missing
-from tactbench.core.matrix.engines.choice import EngineChoice
-from tactbench.core.matrix.evaluating import Evaluated, evaluate_all
-from tactbench.core.matrix.explanation import Book
+from tactbench.core.matrix.engine import EngineChoice
+from tactbench.core.matrix.evaluate import Evaluated, evaluate_all
 from tactbench.core.matrix.key_book import KeyBook
-from tactbench.core.matrix.keys import keys_of
-from tactbench.core.matrix.leaving import fill_baselines, scores_text
-from tactbench.core.matrix.personal import sources_of_this_user
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.planning import Material, plan
+from tactbench.core.matrix.plan_recordings import RecordingPlan, plan
 from tactbench.core.matrix.progress import Prefixed, Progress, Silence
-from tactbench.core.matrix.provenance import gather
+from tactbench.core.matrix.record import acquire_missing
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.matrix.summary import fill_baselines, scores_text
+from tactbench.core.matrix.why import Book
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import installed
+from tactbench.core.provenance.gather import gather
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
 
@@ -124,37 +121,31 @@ def _carry_out(
     shown: Callable[[Sequence[Row]], None],
 ) -> Outcome:
     registry = installed()
-    sources = sources_of_this_user()
+    keys = Keys(registry)
     recorded = Recorded(store.folder / "cache" / "recordings.json")
-    book = Book(KeyBook(store.folder / "cache" / "keys"), keys_of(registry, sources))
-    cells, material = plan(matrix, registry, sources, store, recordings, recorded, choice)
-    provenance = gather(sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.named(len(cells)))
+    book = Book(KeyBook(store.folder / "cache" / "keys"), keys)
+    cells, material = plan(matrix, registry, keys, store, recordings, recorded, choice)
+    provenance = gather(keys.sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
     made_by = store.begin(provenance)
-    inherited = choice.named(len(cells)) != "dask"
     found = Evaluated()
     rows: list[Row] = []
     rounds = _rounds(cells, choice, material)
     for number, some in enumerate(rounds, 1):
-        ready = partial(_import_estimators, some, choice) if inherited else None
         during = told if len(rounds) == 1 else Prefixed(told, f"replicate {number} of {len(rounds)}: ")
-        acquire_missing(material, some, book, choice, during, ready, operator)
-        # A reader that nobody hears while libraries are imported would seem to take too long.
-        fresh = store.blank and choice.forks(len(some)) and choice.limits.timeout_s is None
-        with _read_ahead(some, material, choice) if fresh else nullcontext():
-            evaluated = evaluate_all(some, material, book, choice, store, made_by, during)
+        acquire_missing(material, some, book, choice, during, operator)
+        evaluated = evaluate_all(some, material, book, choice, store, made_by, during)
         found.rows |= evaluated.rows
         found.computed += evaluated.computed
         rows += [found.rows[cell.name] for cell in some]
         if number < len(rounds) and evaluated.computed:
             shown(tuple(rows))
     fill_baselines(rows)
-    sources.save()
     recorded.save()
     used = {cell.name: tuple(material.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, found.computed, recorded.number_made, used)
 
 
-def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: Material) -> list[list[Cell]]:
+def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: RecordingPlan) -> list[list[Cell]]:
     """Return the cells of each replicate that has to be recorded; all at once where recordings exist already.
 
     Between rounds nothing is under way, so that a table can be shown. On a cluster, which takes seconds to start, all
@@ -162,18 +153,6 @@ def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: Material) -> 
     """
     rounds: dict[int, list[Cell]] = {}
     for cell in cells:
-        number = cell.repeat if material.orders else 1
-        rounds.setdefault(min(number, 2) if choice.named(len(cells)) == "dask" else number, []).append(cell)
+        number = cell.repeat if material.requests else 1
+        rounds.setdefault(min(number, 2) if choice.name == "dask" else number, []).append(cell)
     return list(rounds.values())
-
-
-def _read_ahead(cells: Sequence[Cell], material: Material, choice: EngineChoice) -> AbstractContextManager[None]:
-    from tactbench.core.matrix.ahead import read_ahead
-
-    return read_ahead(cells, material, choice)
-
-
-def _import_estimators(cells: Sequence[Cell], choice: EngineChoice) -> None:
-    from tactbench.core.matrix.preloading import import_estimators
-
-    import_estimators(cells, choice)

@@ -1,17 +1,17 @@
-"""The registry: every plugin greeted alone, every failure kept as a row.
+"""The registry: every plugin is asked alone, and every failure is kept as a row.
 
 Three holes of plain pluggy are closed here: a plugin that fails on import stops nobody else; two plugins giving one
-name are refused naming both distributions; a misspelt hook is an error.
+name are refused naming both distributions; a misspelt hook is an error. Plugins of other distributions are imported in
+child processes: what their import does to its process, or how that ends, is no other's, and what comes back is data.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
-from operator import itemgetter
 from types import ModuleType
 from typing import Any, Generic, Literal, TypeVar, cast
 
@@ -54,6 +54,11 @@ class Owned(Generic[D]):
     module: str
     distribution: str
     version: str
+
+    @property
+    def ours(self) -> bool:
+        """Whether it comes with this package: tested with it, and trusted not to change or end whoever imports it."""
+        return _is_ours(self.module)
 
 
 @dataclass
@@ -151,13 +156,19 @@ _KINDS: dict[str, type[Any]] = {
 }
 
 
-def load_registry(points: Iterable[EntryPoint] | None = None) -> Registry:
+ENTRY_POINT_S = 20.0
+"""Seconds that the import of a plugin, and its hooks, may take."""
+
+
+def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: float = ENTRY_POINT_S) -> Registry:
     """Load every plugin of the entry-point group, each one alone.
 
     Parameters
     ----------
     points
         Entry points to load instead of the installed ones.
+    timeout_s
+        Seconds that each may take.
 
     Returns
     -------
@@ -174,8 +185,10 @@ def load_registry(points: Iterable[EntryPoint] | None = None) -> Registry:
             owners[id(point.dist)] = _owner(point)
         owner = owners[id(point.dist)]
         unique[point.name, point.value, owner[0]] = point, owner
-    for _, (point, owner) in sorted(unique.items(), key=itemgetter(0)):
-        _greet(registry, point, owner)
+    several = [unique[key] for key in sorted(unique)]
+    answers = _asked_apart([point for point, _ in several if not _is_ours(point.module)], timeout_s)
+    for point, owner in several:
+        _add(registry, point, owner, answers.get((point.name, point.value)))
     return registry
 
 
@@ -185,23 +198,63 @@ def installed() -> Registry:
     return load_registry()
 
 
-def _greet(registry: Registry, point: EntryPoint, owner: tuple[str, str]) -> None:
+def _is_ours(module: str) -> bool:
+    return module.partition(".")[0] == __name__.partition(".")[0]
+
+
+def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], answer: Any) -> None:
+    """Add what a plugin brings: `answer` of a child process, or what it answers here if it is one of ours."""
     distribution, version = owner
-    brings: list[str] = []
     try:
-        offered = _ask(point)
-    except BaseException as error:
-        if isinstance(error, KeyboardInterrupt):
-            raise
-        reason = str(error) if isinstance(error, PluginError) else f"{type(error).__name__}: {error}"
-        row = PluginRow(point.name, point.value, distribution, version, "failed", (), reason)
-        registry.plugins.append(row)
+        if isinstance(answer, BaseException):
+            raise answer
+        offered = _ask(point) if answer is None else _described(answer)
+    except Exception as error:
+        reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", None)
+        reason = reason or f"{type(error).__name__}: {error}"
+        registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "failed", (), reason))
         return
+    brings: list[str] = []
     for family, descriptors in offered.items():
         for descriptor in descriptors:
             registry.shelves()[family].add(Owned(descriptor, point.value, distribution, version))
             brings.append(f"{family[:-1]} {descriptor.name}")
     registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "loaded", tuple(brings)))
+
+
+def _asked_apart(points: Sequence[EntryPoint], timeout_s: float) -> dict[tuple[str, str], Any]:
+    """Ask each plugin in a child process; return what it describes, or what stopped it, by name and module."""
+    if not points:
+        return {}
+    from tactbench.core.pool.limits import Limits
+    from tactbench.core.pool.pool import Pool
+    from tactbench.core.pool.processes import can_fork
+
+    pool = Pool(_AT_ONCE, Limits(timeout_s=timeout_s), preload=None if can_fork() else (__name__,))
+    return dict(pool.each(_describe, [(point.name, point.value) for point in points]))
+
+
+_AT_ONCE = 4
+"""Plugins that are asked at the same time."""
+
+
+def _describe(point: tuple[str, str]) -> dict[str, list[dict[str, Any]]]:
+    """Ask a plugin; return its descriptors as JSON has them."""
+    offered = _ask(EntryPoint(*point, group=hookspecs.GROUP))
+    return {family: [_plain(descriptor) for descriptor in several] for family, several in offered.items()}
+
+
+def _plain(descriptor: Any) -> dict[str, Any]:
+    plain: dict[str, Any] = descriptor.model_dump()
+    if isinstance(descriptor, SensorDescriptor):  # with what stays out of recordings and keys
+        spec = descriptor.spec
+        plain["spec"]["data_sheet"] = spec.data_sheet.model_dump()
+        plain["spec"]["likeness"] = [figure.model_dump() for figure in spec.likeness]
+    return plain
+
+
+def _described(answer: Mapping[str, Any]) -> dict[str, list[Any]]:
+    return {family: [_KINDS[family].model_validate(one) for one in several] for family, several in answer.items()}
 
 
 def _ask(point: EntryPoint) -> dict[str, list[Any]]:

@@ -16,7 +16,7 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.preparation import assigned, prepared
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.selection import features_of
-from tactbench.core.matrix.keys import versions
+from tactbench.core.provenance.source import versions
 from tactbench.core.report.results import Results
 from tactbench.core.report.stored import stored
 from tactbench.core.samples import Answers, FloatArray, IntArray

@@ -6,7 +6,7 @@ import json
 from collections import Counter
 from typing import Any
 
-from tactbench.core.matrix.keys import RELEVANT
+from tactbench.core.provenance.source import RELEVANT
 from tactbench.core.report.figures.published_and_ours import COLUMN
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.leaderboards import block_anchor

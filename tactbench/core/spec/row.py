@@ -1,15 +1,127 @@
-"""The format of a row: what may stand under each of its keys, for whoever writes, reads or shows rows."""
+"""The row of a cell: the one description of it, for whoever writes, reads or shows rows."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import NoneType
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-_NOTHING = type(None)
-_WORDS = {
-    str: "text", float: "a number", int: "a whole number", bool: "yes or no", list: "a list", dict: "a mapping",
-    _NOTHING: "nothing",
-}  # fmt: skip
+from pydantic import BaseModel, ConfigDict, Field
+
+from tactbench.core.spec.status import Status
+
+LOWER_IS_BETTER = frozenset({"rmse", "mae"})
+"""Metrics of a row's score that are errors."""
+
+Numbers = dict[str, float]
+
+
+class RowModel(BaseModel):
+    """One cell. Times are seconds unless the name says otherwise; a row may have other keys, of which nothing is asked.
+
+    Rows are handed about as plain mappings; this model says what they hold, what stands there before anything is known,
+    and checks what comes from a file.
+    """
+
+    model_config = ConfigDict(extra="allow", strict=True, defer_build=True)
+
+    # What was asked
+    cell: str
+    sensor: str = ""
+    task: str = ""
+    rig: str = ""
+    protocol: str = ""
+    split: str | None = None
+    estimator: str = ""
+    params: dict[str, Any] = Field(default_factory=dict)
+    is_baseline: bool = False
+    looks_at: str = ""
+    repeat: int = 1
+    repeats: int = 1
+    seed: int = 0
+    simulation: dict[str, Any] = Field(default_factory=dict)
+    # How it ended
+    status: Status
+    reason: str = ""
+    traceback: str = ""
+    signal: int | None = None
+    log: str = ""
+    # The score
+    metric: str = ""
+    unit: str = ""
+    equivalence: float | None = None
+    reference_score: float | None = None
+    score: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+    ci_method: str = ""
+    reference_floor: float | None = None
+    score_beyond_floor: float | None = None
+    beyond_floor_ci_low: float | None = None
+    beyond_floor_ci_high: float | None = None
+    true_score: float | None = None
+    true_ci_low: float | None = None
+    true_ci_high: float | None = None
+    tare_s: float | None = None
+    baseline: float | None = None
+    published: float | None = None
+    published_reference: str = ""
+    published_remark: str = ""
+    n_recordings: int | None = None
+    n_sessions: int | None = None
+    n_train: int | None = None
+    n_test: int | None = None
+    # What it cost
+    sim_s: float | None = None
+    search_s: float | None = None
+    fit_s: float | None = None
+    predict_s: float | None = None
+    batch_rows: int | None = None
+    latency_ms_p50: float | None = None
+    latency_ms_p95: float | None = None
+    latency_ms_max: float | None = None
+    latency_n: int | None = None
+    answer_delay_ms: float | None = None
+    delay_parts_ms: Numbers = Field(default_factory=dict)
+    threads: int | None = None
+    peak_rss_mb: float | None = None
+    wall_s: float | None = None
+    concurrency: int | None = None
+    host: str = ""
+    made_by: str = ""
+    # What it rests on
+    simulated: bool = False
+    emulated: bool = False
+    dagger: bool = False
+    stamps: list[str] = Field(default_factory=list)
+    remarks: list[str] = Field(default_factory=list)
+    assumptions: dict[str, Any] = Field(default_factory=dict)
+    plan: list[dict[str, Any]] = Field(default_factory=list)
+    counts: Numbers = Field(default_factory=dict)
+    chosen: Numbers = Field(default_factory=dict)
+    search: list[dict[str, Any]] = Field(default_factory=list)
+    recordings: list[str] = Field(default_factory=list)
+    digests: list[str] = Field(default_factory=list)
+    scores: Numbers = Field(default_factory=dict)
+    fold_sizes: dict[str, Any] = Field(default_factory=dict)
+    confusion: list[list[Any]] | None = None
+    classes: list[str | bool | int | float] = Field(default_factory=list)
+    replicates: dict[str, Any] = Field(default_factory=dict)
+
+
+class ReplicatedRow(RowModel):
+    """Several replicates of a cell as one row, as tables show them; and what a file adds to a row."""
+
+    key: str = ""
+    n_replicates: int | None = None
+    replicate_unit: str | None = None
+    score_min: float | None = None
+    score_max: float | None = None
+    recordings_right: float | None = None
+    recordings_asked: float | None = None
+    replicate_scores: list[float] | None = None
+    seeds: list[float] | None = None
 
 
 @dataclass(frozen=True)
@@ -21,6 +133,12 @@ class Held:
     """Types of what a list, or the values of a mapping, may hold; empty: any."""
 
 
+_WORDS = {
+    str: "text", float: "a number", int: "a whole number", bool: "yes or no", list: "a list", dict: "a mapping",
+    NoneType: "nothing",
+}  # fmt: skip
+
+
 def in_words(types: Iterable[type]) -> str:
     """Return types in words: ``a number or nothing``."""
     given = set(types)
@@ -29,36 +147,23 @@ def in_words(types: Iterable[type]) -> str:
     return " or ".join([word for one, word in _WORDS.items() if one in given])
 
 
-def _each(names: str, types: Iterable[type], inside: Iterable[type] = ()) -> dict[str, Held]:
-    return dict.fromkeys(names.split(), Held(frozenset(types), frozenset(inside)))
+def _members(annotation: Any) -> list[Any]:
+    """Return the members of a union; of anything else, itself."""
+    is_union = get_origin(annotation) not in (None, list, dict, Literal)
+    return list(get_args(annotation)) if is_union else [annotation]
 
 
-_NUMBERS = (int, float)
+def _types(annotation: Any) -> frozenset[type]:
+    found = {str if get_origin(one) is Literal else get_origin(one) or one for one in _members(annotation)}
+    return frozenset(found | {int} if float in found else found)
 
-LOWER_IS_BETTER = frozenset({"rmse", "mae"})
-"""Metrics of a row's score that are errors."""
 
-FORMAT: Mapping[str, Held] = {
-    **_each("key cell sensor task rig protocol estimator status reason traceback log metric unit ci_method", [str]),
-    **_each("published_reference published_remark host made_by looks_at", [str]),
-    **_each("split", [str, _NOTHING]),
-    **_each("repeat repeats seed", [int]),
-    **_each("signal n_recordings n_sessions n_train n_test batch_rows latency_n threads concurrency", [int, _NOTHING]),
-    **_each("score ci_low ci_high baseline published equivalence reference_score", [*_NUMBERS, _NOTHING]),
-    **_each("reference_floor score_beyond_floor beyond_floor_ci_low beyond_floor_ci_high", [*_NUMBERS, _NOTHING]),
-    **_each("true_score true_ci_low true_ci_high tare_s", [*_NUMBERS, _NOTHING]),
-    **_each("sim_s search_s fit_s predict_s latency_ms_p50 latency_ms_p95 peak_rss_mb wall_s", [*_NUMBERS, _NOTHING]),
-    **_each("latency_ms_max answer_delay_ms", [*_NUMBERS, _NOTHING]),
-    **_each("is_baseline simulated emulated dagger", [bool]),
-    **_each("stamps remarks recordings digests", [list], [str]),
-    **_each("n_replicates", [int, _NOTHING]),
-    **_each("replicate_unit", [str, _NOTHING]),
-    **_each("score_min score_max recordings_right recordings_asked", [*_NUMBERS, _NOTHING]),
-    **_each("replicate_scores seeds", [list, _NOTHING], _NUMBERS),
-    **_each("plan search", [list], [dict]),
-    **_each("classes", [list], [str, bool, *_NUMBERS]),
-    **_each("confusion", [list, _NOTHING], [list]),
-    **_each("counts chosen scores delay_parts_ms", [dict], _NUMBERS),
-    **_each("params simulation assumptions replicates fold_sizes", [dict]),
-}
+def _held(annotation: Any) -> Held:
+    inner = [get_args(one)[-1] for one in _members(annotation) if get_origin(one) in (list, dict)]
+    inside = _types(inner[0]) if inner and inner[0] is not Any else frozenset()
+    return Held(_types(annotation), inside)
+
+
+FORMAT: Mapping[str, Held] = {name: _held(kind) for name, kind in get_type_hints(ReplicatedRow).items()
+                              if name in ReplicatedRow.model_fields}  # fmt: skip
 """By key. A row may have other keys, of which nothing is asked."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from statistics import median, median_low
 from typing import Any
 
-from tactbench.core.matrix.leaving import fill_baselines
+from tactbench.core.matrix.summary import fill_baselines
 from tactbench.core.statistics.median import FEWEST, LEVEL, median_interval
 
 Row = Mapping[str, Any]

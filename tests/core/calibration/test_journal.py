@@ -1,6 +1,7 @@
 """Draws are written down one by one, and never done twice."""
 
 import json
+from functools import partial
 
 import pytest
 
@@ -24,30 +25,24 @@ class Ended(BaseException):
     pass
 
 
-def _stops_at(number):
-    def one(trial):
-        if trial.number == number:
-            raise Ended
-        return work(trial)
-
-    return one
+def _stops_at(number, trial):
+    if trial.number == number:
+        raise Ended
+    return work(trial)
 
 
-def _noting(path):
-    def one(trial):
-        with path.open("a") as file:
-            file.write(f"{trial.number}\n")
-        return work(trial)
-
-    return one
+def _noting(path, trial):
+    with path.open("a") as file:
+        file.write(f"{trial.number}\n")
+    return work(trial)
 
 
 def test_a_run_that_was_ended_goes_on_to_the_same_file(tmp_path):
     whole, _ = _run(tmp_path / "whole.jsonl")
     with pytest.raises(TactbenchError, match="draw 11 was ended"):
-        _run(tmp_path / "cut.jsonl", work=_stops_at(11))
+        _run(tmp_path / "cut.jsonl", work=partial(_stops_at, 11))
     assert len((tmp_path / "cut.jsonl").read_text().splitlines()) == 1 + 11
-    rest, journal = _run(tmp_path / "cut.jsonl", work=_noting(tmp_path / "done"))
+    rest, journal = _run(tmp_path / "cut.jsonl", work=partial(_noting, tmp_path / "done"))
     assert (tmp_path / "done").read_text().split() == [str(number) for number in range(11, 30)]
     assert (tmp_path / "cut.jsonl").read_bytes() == (tmp_path / "whole.jsonl").read_bytes()
     assert draws_csv(procedure(), rest) == draws_csv(procedure(), whole)

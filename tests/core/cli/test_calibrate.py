@@ -10,7 +10,7 @@ import pytest
 
 from tests.conftest import Shell, Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
-from tests.core.matrix.engines.patience import ending
+from tests.core.pool.patience import ending
 
 PROCEDURE = """
 title: Small

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from tests.core.matrix.engines.patience import ending
+from tests.core.pool.patience import ending
 
 FORCE = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.core.matrix.engines.patience import ending
+from tests.core.pool.patience import ending
 
 ROOT = Path(__file__).parents[3]
 

@@ -63,17 +63,18 @@ def test_a_finished_cell_is_a_hit_and_says_where_it_lies(here):
 
 
 def test_the_words_and_the_run_agree(here):
-    assert "2 of 4 answers were found finished" not in here(*RUN, code=1).stderr
-    (here.acme / "filters.py").write_text("LAW = (\n    0.75  # as it was\n)\n")
-    assert why(here)["answer"] == "hit"
+    filters = here.acme / "filters.py"
+    original = filters.read_text()
     assert "3 of 4 answers were found finished" in here(*RUN, code=1).stderr
-    (here.acme / "filters.py").write_text("LAW = 0.5\n")
+    filters.write_text("LAW = 0.5\n")
     found = why(here)
     assert (found["answer"], found["reasons"]) == ("miss", ["acme/filters.py changed"])
     assert "2 of 4 answers were found finished" in here(*RUN, code=1).stderr
     assert why(here)["answer"] == "hit"
+    filters.write_text(original + "# a comment\n")
+    assert why(here)["answer"] == "miss", "every byte counts"
     # Back as it was: the first result is still there.
-    (here.acme / "filters.py").write_text("LAW = 0.75\n")
+    filters.write_text(original)
     assert why(here)["answer"] == "hit"
 
 

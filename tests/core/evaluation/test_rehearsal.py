@@ -6,7 +6,7 @@ import sys
 
 SCRIPT = """
 from tactbench.core.evaluation.rehearsal import rehearse
-from tactbench.core.matrix.engines.family import can_fork
+from tactbench.core.pool.processes import can_fork
 from tactbench.core.plugins.registry import installed, load_object
 
 rehearsed = [(one, kind) for one in installed().estimators if one.rehearsal is not None for kind in one.kinds]

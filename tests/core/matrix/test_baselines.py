@@ -3,7 +3,7 @@
 import pytest
 
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.matrix.leaving import fill_baselines
+from tactbench.core.matrix.summary import fill_baselines
 from tests.core.leaderboard.rows import row
 
 
@@ -45,13 +45,13 @@ def test_nobody_who_is_no_better_has_a_place(metric, good, bad):
         one["cell"] = f"{one['sensor']}-{one['estimator']}"
     table = build_table(rows)
     (block,) = table.blocks
-    places = {line.cell: line.cells[0] for line in block.lines}
+    places = {line.row["cell"]: line.cells[0] for line in block.lines}
     assert places.pop("a-lasso") == "1"
     assert places.pop("b-lasso") == "–"
     assert set(places.values()) == {"base"}
-    kinds = {line.cell: line.kind for line in block.lines}
+    kinds = {line.row["cell"]: line.kind for line in block.lines}
     assert kinds["b-lasso"] == "result"
-    order = [line.cell for line in block.lines]
+    order = [line.row["cell"] for line in block.lines]
     assert order[:2] == ["a-lasso", "b-lasso"]
     (note,) = [note for note in table.notes if "cannot be told from the trivial baseline" in note]
     assert note.startswith("b/question/lasso (deployable) cannot")

@@ -7,12 +7,13 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+import h5py
 import pytest
 
 from tactbench.core.matrix.store import Store
 from tests.conftest import Shell
 from tests.core.cost.test_ladder import presses
-from tests.core.matrix.engines.patience import ending, until
+from tests.core.pool.patience import ending, until
 
 ENGINES = {
     "in-process": ("--engine", "in-process"),
@@ -43,6 +44,13 @@ ENDS = {
     "evil-scribble": ("done", None, ""),
     "evil-kill": ("crashed", 9, "SIGKILL"),
     "evil-import": ("crashed", 6, "SIGABRT"),
+    "evil-patch": ("done", None, ""),
+    "evil-lie": ("failed", None, "its score is 0.125, and its answers give"),
+    "evil-promise": ("crashed", None, "do not begin with the length of a result"),
+    "evil-built-elsewhere": ("done", None, ""),
+    "evil-built-deaf": ("done", None, ""),
+    "evil-built-limited": ("failed", None, "Too many open files"),
+    "evil-built-kill": ("crashed", 9, "SIGKILL"),
 }
 """Status, signal and a part of the reason of every evil cell."""
 
@@ -115,6 +123,14 @@ def test_every_evil_cell_has_one_row_and_the_others_are_right(engine, alone, tmp
     assert until(lambda: not processes_in(tmp_path)), processes_in(tmp_path)
 
 
+@pytest.mark.parametrize("engine", ["in-process", "isolated", "dask"])
+def test_a_library_that_a_strangers_estimator_patches_is_patched_for_no_other_cell(engine, alone, tmp_path):
+    honest, shelf = alone
+    (tmp_path / "shelf").symlink_to(shelf)
+    run(Shell(tmp_path), "--estimator", "evil-patch", "--estimator", "ols", *ENGINES[engine], code=0)
+    assert [line for line in lines_of(tmp_path / "out") if "/evil-patch/" not in line] == honest
+
+
 def test_what_a_cell_prints_is_in_its_row(alone, tmp_path):
     (tmp_path / "shelf").symlink_to(alone[1])
     for engine in ("in-process", "isolated"):
@@ -125,15 +141,16 @@ def test_what_a_cell_prints_is_in_its_row(alone, tmp_path):
             assert said in log
 
 
-def test_one_cell_that_ends_the_run_has_its_row_after_the_next_one(alone, tmp_path):
+def test_a_single_cell_has_a_process_of_its_own_unless_it_is_asked_to_have_none(alone, tmp_path):
     (tmp_path / "shelf").symlink_to(alone[1])
     shell = Shell(tmp_path)
     run(shell, "--estimator", "ols", code=0)  # the baselines are there: one cell is left
-    asked = (*ASKED, "--estimator", "evil-abort", "--out", "out", "--format", "json")
-    assert shell(*asked, plugins=("evil",), code=None).returncode < 0, "a single cell is carried out in the run itself"
     rows, _ = run(shell, "--estimator", "evil-abort")
     assert (rows["evil-abort"]["status"], rows["mean"]["status"]) == ("crashed", "done")
-    assert not list((tmp_path / "out").rglob("running"))
+    asked = (*ASKED, "--estimator", "evil-abort", "--engine", "in-process", "--out", "out", "--format", "json")
+    assert shell(*asked, plugins=("evil",), code=None).returncode < 0, "carried out in the run itself"
+    rows, _ = run(shell, "--estimator", "evil-raise", "--engine", "in-process")
+    assert rows["evil-raise"]["status"] == "failed", "what was finished is kept"
 
 
 def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
@@ -147,6 +164,16 @@ def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
     assert {(row["status"], "flat.h5" in row["reason"]) for row in rows if row["sensor"] == "icub"} == {
         ("failed", True)
     }
+
+
+def test_a_recording_that_lacks_its_streams_is_told_by_its_cells(tmp_path):
+    presses(tmp_path / "shelf")
+    damaged = sorted((tmp_path / "shelf").rglob("*.h5"))[0]
+    with h5py.File(damaged, "a") as file:
+        del file["streams"]
+    asked = (*ASKED, "--estimator", "ols", "--estimator", "ridge", "--format", "json")
+    rows = json.loads(Shell(tmp_path)(*asked, code=1).stdout)
+    assert all(row["status"] == "failed" and damaged.name in row["reason"] for row in rows)
 
 
 @pytest.mark.parametrize("asked", [("--sensor", "made"), ()])

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.matrix.differences import differences
 from tactbench.core.matrix.key_book import Entry, KeyBook, recording_names
 from tactbench.core.matrix.keys import Fixed
+from tactbench.core.matrix.why import differences
 
 FIXED = Fixed("f", {"task": {"metric": "rmse"}, "source of acme": {"a.py": "1"}, "versions": {"numpy": "2.0"}})
 DATA = {"press": {"digest": "d1", "path": "recordings/press.h5"}}

@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from tactbench.core.matrix.keys import cell_key
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import plan_cells
-from tactbench.core.matrix.source import SourceDigests
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import MatrixSpec, TaskChoice
@@ -39,11 +38,12 @@ def test_a_row_without_latency_says_so_and_is_not_taken_for_one_with(tmp_path, t
     assert timed["score"] == row["score"]
 
 
-def test_only_a_cell_without_latency_has_another_key(tmp_path):
-    registry, sources = load_registry(), SourceDigests(tmp_path / "sources.json")
+def test_only_a_cell_without_latency_has_another_key():
+    registry = load_registry()
     matrix = MatrixSpec(repeats=1, tasks=(TaskChoice(name="force"),))
     cell = plan_cells(matrix, ["icub"], registry)[0]
     without = plan_cells(matrix.model_copy(update={"latency": False}), ["icub"], registry)[0]
     assert without == replace(cell, latency=False)
-    keys = [cell_key(one, ["0" * 64], registry, sources) for one in (cell, replace(cell, latency=True), without)]
-    assert keys[0] == keys[1] != keys[2]
+    keys = Keys(registry)
+    found = [keys.of_cell(one, ["0" * 64]) for one in (cell, replace(cell, latency=True), without)]
+    assert found[0] == found[1] != found[2]

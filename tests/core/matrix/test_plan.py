@@ -1,8 +1,8 @@
 import pytest
 
 from tactbench.core.errors import UnknownNameError, UsageError
-from tactbench.core.matrix.material import need_of
 from tactbench.core.matrix.plan import plan_cells
+from tactbench.core.matrix.plan_recordings import request_key
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 
@@ -77,4 +77,6 @@ def test_a_pair_that_does_not_go_together_is_refused_alone_and_planned_among_oth
         plan(registry, TaskChoice(name="force", protocol="karl2016", split="unit"))
     both = plan(registry, TaskChoice(name="force", protocol=("karl2016", "deployable"), split="unit"))
     assert ways(both) == [("karl2016", "unit"), ("deployable", "unit")]
-    assert {need_of(cell)[2] for cell in both if cell.protocol == "karl2016"} == {None}, "nothing is recorded for it"
+    assert {request_key(cell)[2] for cell in both if cell.protocol == "karl2016"} == {None}, (
+        "nothing is recorded for it"
+    )

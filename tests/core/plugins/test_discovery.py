@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 
 def plugins(shell, *folders, code):
     return json.loads(shell("plugins", "--format", "json", plugins=folders, code=code).stdout)
@@ -55,6 +57,33 @@ def test_a_plugin_for_another_api_version_is_refused(shell, tmp_path):
     found = plugins(shell, str(tmp_path / "site"), code=1)
     (row,) = [row for row in found["plugins"] if row["distribution"] == "old-tactile"]
     assert "TACTBENCH_API = 0" in row["reason"]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("import os\nos._exit(0)", "exit code 0"),
+        ("import os\nos.abort()", "SIGABRT"),
+        ("raise SystemExit(0)", "SystemExit"),
+    ],
+    ids=["vanishes", "aborts", "exits"],
+)
+def test_one_whose_import_ends_its_process_ends_no_command(shell, tmp_path, text, says):
+    package = tmp_path / "site" / "ending_tactile"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text(text + "\n")
+    info = tmp_path / "site" / "ending_tactile-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: ending-tactile\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[tactbench]\nending = ending_tactile\n")
+    found = plugins(shell, str(tmp_path / "site"), code=1)
+    (row,) = [row for row in found["plugins"] if row["distribution"] == "ending-tactile"]
+    assert says in row["reason"]
+    listed = shell("list", "sensors", plugins=(str(tmp_path / "site"),))
+    assert "biotac" in listed.stdout
+    assert "tactbench plugins" in listed.stderr
+    run = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--no-latency")
+    assert "ideal" in shell(*run, plugins=(str(tmp_path / "site"),)).stdout
 
 
 def test_ours_come_in_by_the_same_door(shell):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fractions
 import re
 import sys
 from importlib import metadata
@@ -12,7 +13,9 @@ import pytest
 from tactbench.core.errors import DuplicateNameError, PluginError, UnknownNameError
 from tactbench.core.plugins import hookspecs
 from tactbench.core.plugins.registry import Registry, installed, load_object, load_registry
+from tactbench.plugin import SensorDescriptor
 from tactbench.plugin.devices import DeviceDescriptor
+from tactbench.sensors.ideal import SPEC as IDEAL
 
 HEAD = """
 from tactbench.plugin import *
@@ -167,10 +170,52 @@ def test_a_plugin_that_fails_is_a_row_and_the_others_are_loaded(site, code):
     assert [len(shelf.names()) for shelf in registry.shelves().values()] == [1, 0, 0, 0, 0, 0]
 
 
-def test_ctrl_c_during_an_import_is_no_failure_of_the_plugin(site):
-    site.install("slow", "raise KeyboardInterrupt")
-    with pytest.raises(KeyboardInterrupt):
-        site.load()
+ENDS = {
+    "exits at once": ("import os; os._exit(0)", "exit code 0"),
+    "pretends that the user has pressed Ctrl-C": ("raise KeyboardInterrupt", "KeyboardInterrupt"),
+    "aborts": ("import os; os.abort()", "signal 6"),
+    "kills its group": ("import os; os.killpg(0, 9)", "signal 9"),
+    "loops": ("while True: pass", "longer than 10 s"),
+    "hangs and hears no signal": (
+        "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); time.sleep(1000)",
+        "longer than 10 s",
+    ),
+    "closes what is not its own": ("import os; os.closerange(3, 64)", "gave no"),
+}
+
+
+def test_a_plugin_whose_import_ends_its_process_is_a_row(site):
+    for name, (code, _) in ENDS.items():
+        site.install(name.split()[0], code)
+    registry = load_registry(site.install("pad-maker", PAD).points(), timeout_s=10.0)
+    reasons = {row.distribution: row.reason for row in registry.failures}
+    assert {name: reasons[name.split()[0]] for name in ENDS} == {
+        name: reasons[name.split()[0]] for name, (_, says) in ENDS.items() if says in reasons[name.split()[0]]
+    }
+    assert registry.sensors.names() == ["pad"]
+
+
+def test_what_an_import_changes_changes_nothing_here(site):
+    patches = "import fractions\nfractions.Fraction = None\n" + PAD
+    (row,) = site.install("patch", patches).load().plugins
+    assert row.status == "loaded"
+    assert fractions.Fraction(1, 2) == 0.5
+    assert "patch" not in sys.modules
+
+
+def test_a_descriptor_from_a_child_process_is_the_one_that_the_plugin_gave(site):
+    code = PAD.replace('return [sensor("pad")]', "return [SensorDescriptor(spec=IDEAL)]")
+    code += """
+@hookimpl
+def tactbench_estimators():
+    return [EstimatorDescriptor(name="guess", title="a guess", kinds=("regression",), where="six:build",
+                                params={"a": 1, "b": (1.5, float("inf")), "c": None, "d": "x"}, grid={"a": (1, 2.5)})]
+"""
+    registry = site.install("pad-maker", code).load()
+    assert registry.sensors["ideal"] == SensorDescriptor(spec=IDEAL)
+    guess = registry.estimators["guess"]
+    assert guess.params == {"a": 1, "b": (1.5, float("inf")), "c": None, "d": "x"}
+    assert guess.grid == {"a": (1, 2.5)}
 
 
 def test_a_name_given_twice_is_refused_naming_both_and_the_rest_is_used(site):

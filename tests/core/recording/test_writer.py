@@ -17,7 +17,7 @@ from tactbench.core.recording.salvage import REMARK, rescue, salvage
 from tactbench.core.recording.times import recomputed_t_ns
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block, Quality
-from tests.core.matrix.engines.patience import ending
+from tests.core.pool.patience import ending
 
 ROWS = 50
 

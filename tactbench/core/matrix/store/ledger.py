@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,7 +12,7 @@ from typing import Any
 
 from tactbench.core.errors import FolderError
 from tactbench.core.matrix.store import limits
-from tactbench.core.matrix.store.rows import Row, row_checker, too_deep
+from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
 from tactbench.core.matrix.store.sharing import canonical, definition, joined, parted, shared_lines
 
 NAME = "index.jsonl"
@@ -99,8 +98,7 @@ def read_ledger(folder: Path) -> Ledger:
             f"{path} is larger than {limits.LEDGER_BYTES // 2**20} MiB, more than any ledger that tactbench reads.",
             hint="Split the matrix over several folders, or delete this one if it is not yours.",
         )
-    with _without_collecting():
-        _take_in(ledger, content)
+    _take_in(ledger, content)
     return ledger
 
 
@@ -110,7 +108,6 @@ def _take_in(ledger: Ledger, content: bytes) -> None:
     waiting: list[tuple[dict[str, Any], int]] = []
     shared: dict[str, Any] = {}
     sizes: dict[str, int] = {}
-    known_keys: dict[tuple[str, ...], tuple[str, ...]] = {}
     for line, said in _parsed(content):
         if isinstance(said, dict) and "shared" in said:
             digest = definition(line)
@@ -120,10 +117,6 @@ def _take_in(ledger: Ledger, content: bytes) -> None:
                 shared.setdefault(digest, said["value"])
                 sizes[digest] = len(line)
         elif isinstance(said, dict) and isinstance(said.get("row"), dict) and not _monstrous(line, said):
-            row = said["row"]
-            keys = tuple(row)
-            # The same keys as objects: looking them up in row after row then compares no texts.
-            said["row"] = dict(zip(known_keys.setdefault(keys, keys), row.values(), strict=True))
             waiting.append((said, len(line)))
         else:
             broken += 1
@@ -153,24 +146,6 @@ def _lines(entry: Entry, known: set[str]) -> tuple[list[str], set[str]]:
     if entry.shard is not None:
         said["shard"] = list(entry.shard)
     return [*shared_lines(fresh), canonical(said)], set(fresh)
-
-
-@contextmanager
-def _without_collecting() -> Iterator[None]:
-    """Let no garbage be looked for while millions of objects are made to stay: it would take as long again.
-
-    Afterwards they are among the old ones, as if it had been looked for: else the next look would go over all of them.
-    """
-    before = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if before:
-            if not gc.get_freeze_count():
-                gc.freeze()
-                gc.unfreeze()
-            gc.enable()
 
 
 def _parsed(content: bytes) -> Iterator[tuple[str, Any]]:
@@ -209,7 +184,6 @@ def _fill(
     ledger: Ledger, waiting: Sequence[tuple[dict[str, Any], int]], shared: Mapping[str, Any], sizes: Mapping[str, int]
 ) -> None:
     """Turn lines into entries."""
-    wrong = row_checker()
     characters, lost, over = 0, 0, 0
     for said, size in waiting:
         references, shard = said.get("refs", {}), said.get("shard")
@@ -222,7 +196,7 @@ def _fill(
         except (KeyError, TypeError, AttributeError):
             lost += 1
             continue
-        fault = wrong(row)
+        fault = fault_in_row(row)
         done = not fault and row["status"] == "done"
         if done and not (_is_shard(shard) and limits.is_key(row.get("key"))):
             fault = "it names no shard: it is of another version"

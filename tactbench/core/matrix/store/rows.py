@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
+from pydantic import ValidationError
+
 from tactbench.core.matrix.store.limits import DEPTH
-from tactbench.core.spec.row import FORMAT, in_words
-from tactbench.core.spec.status import STATUSES
+from tactbench.core.spec.row import FORMAT, ReplicatedRow, in_words
 
 Row = dict[str, Any]
-"""One cell, as `tactbench.core.matrix.answer.opening` lays it out. What comes from a ledger shares its big values with
-other rows: they are never changed in place."""
+"""One cell, as `tactbench.core.spec.row.RowModel` describes it. What comes from a ledger shares its big values
+with other rows: they are never changed in place."""
 
 NAMING = ("cell", "repeat", "repeats")
 """What a matrix calls a cell; the key covers everything else."""
 
-_INSIDE = tuple((name, held.inside) for name, held in FORMAT.items() if held.inside)
 _NESTED = {dict, list}
 
 _finite = json.JSONEncoder(sort_keys=True, allow_nan=False).encode
@@ -43,44 +43,24 @@ def plain(row: Mapping[str, Any]) -> tuple[Row, str]:
     return back, text
 
 
-def row_checker() -> Callable[[Row], str]:
-    """Return a function that says what is wrong with a row, or nothing.
-
-    It remembers which combinations of keys and types it has seen, and which shared values: thousands of rows are alike.
-    """
-    alike: set[tuple[Any, ...]] = set()
-    seen: dict[int, Any] = {}
-
-    def wrong(row: Row) -> str:
-        shape = (*row, *map(type, row.values()))
-        if shape not in alike:
-            said = _mistyped(row)
-            if said:
-                return said
-            alike.add(shape)
-        if row["status"] not in STATUSES:
-            return f"a cell cannot be {row['status']!r}"
-        for name, allowed in _INSIDE:
-            values = row.get(name)
-            if values and id(values) not in seen:
-                inside: Iterable[Any] = values.values() if isinstance(values, dict) else values
-                if not allowed.issuperset(map(type, inside)):
-                    return f"{name!r} holds something else than {in_words(allowed)}"
-                seen[id(values)] = values  # kept, so that no other object gets its id
+def fault_in_row(row: Row) -> str:
+    """Return what is wrong with a row, as a clause; "" if nothing is."""
+    try:
+        ReplicatedRow.model_validate(row)
+    except ValidationError as error:
+        name = str(error.errors(include_url=False)[0]["loc"][0])
+    else:
         return ""
-
-    return wrong
-
-
-def _mistyped(row: Row) -> str:
-    for name in ("cell", "status"):
-        if name not in row:
-            return f"it has no {name!r}"
-    for name, value in row.items():
-        held = FORMAT.get(name)
-        if held is not None and type(value) not in held.types:
-            return f"{name!r} is {in_words([type(value)])}, not {in_words(held.types)}"
-    return ""
+    if name not in row:
+        return f"it has no {name!r}"
+    held, given = FORMAT[name], row[name]
+    if type(given) not in held.types:
+        return f"{name!r} is {in_words([type(given)])}, not {in_words(held.types)}"
+    return (
+        f"a cell cannot be {given!r}"
+        if name == "status"
+        else f"{name!r} holds something else than {in_words(held.inside)}"
+    )
 
 
 def too_deep(value: Any) -> bool:

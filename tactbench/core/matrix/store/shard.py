@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from tactbench.core.errors import FormatError
 from tactbench.core.matrix.store import limits
-from tactbench.core.matrix.store.rows import Row, row_checker, too_deep
+from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -44,94 +44,37 @@ def build(row: str, provenance: str, sets: Mapping[Role, Answers]) -> bytes:
     Notes
     -----
     Built in memory: HDF5 cannot give up a file on a full disk without crashing the process, and what is written is
-    known, byte by byte, before any of it is. By h5py's low level, with types that are made once: they take as long as
-    all else, and a run may have ten thousand of these.
+    known, byte by byte, before any of it is.
     """
-    from h5py import h5d, h5f, h5s
+    import h5py
 
     content = _Content(row, provenance)
     # The name is nobody's, but must be unique in the process.
-    file = h5f.create(f"cell-{next(_NUMBERS)}".encode(), h5f.ACC_TRUNC, fapl=_in_memory())
-    try:
+    with h5py.File(f"cell-{next(_NUMBERS)}", "w", driver="core", backing_store=False, block_size=_GROWTH_BYTES) as file:
         for role in sorted(sets):
             table = _table(sets[role])
             content.add(role, table)
-            kind = _kind(table.dtype)
-            dataset = h5d.create(file, role.encode(), kind, h5s.create_simple(table.shape), _stored(table))
-            if len(table):
-                dataset.write(h5s.ALL, h5s.ALL, table, mtype=kind)
+            stored: dict[str, Any] = {}
+            if table.nbytes >= _COMPRESSED_BYTES:
+                stored = {"chunks": (min(len(table), _CHUNK_ROWS),), "shuffle": True, "compression": 4}
+            file.create_dataset(role, data=table, **stored)
         facts = {"format": f"{FORMAT} {VERSION}", "row": row, "provenance": provenance, "sha256": content.hexdigest()}
         for name, fact in facts.items():
             _write_text(file, name, fact)
-        h5f.flush(file)
-        image: bytes = file.get_file_image()
-    finally:
-        file.close()
+        file.flush()
+        image: bytes = file.id.get_file_image()
     return image
-
-
-def _stored(table: npt.NDArray[Any]) -> Any:
-    """Return how a table is laid out: None for as it is."""
-    from h5py import h5p
-
-    if table.nbytes < _COMPRESSED_BYTES:
-        return None
-    stored = h5p.create(h5p.DATASET_CREATE)
-    stored.set_chunk((min(len(table), _CHUNK_ROWS),))
-    stored.set_shuffle()
-    stored.set_deflate(4)
-    return stored
-
-
-@lru_cache(maxsize=1)
-def _in_memory() -> Any:
-    """Return how a file is opened that is nowhere but in memory."""
-    from h5py import h5p
-
-    access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fapl_core(_GROWTH_BYTES, False)
-    return access
-
-
-@lru_cache(maxsize=32)
-def _kind(dtype: npt.DTypeLike) -> Any:
-    """Return HDF5's type for a type of numpy; making one takes as long as writing a small table."""
-    from h5py import h5t
-
-    return h5t.py_create(dtype)
-
-
-@lru_cache(maxsize=64)
-def _text_kind(length: int) -> Any:
-    """Return HDF5's type for a text of so many bytes."""
-    from h5py import h5t
-
-    kind = h5t.C_S1.copy()
-    kind.set_size(length)
-    kind.set_cset(h5t.CSET_UTF8)
-    return kind
-
-
-@lru_cache(maxsize=1)
-def _scalar() -> Any:
-    from h5py import h5s
-
-    return h5s.create(h5s.SCALAR)
 
 
 def _write_text(file: Any, name: str, text: str) -> None:
     """Write a text as an attribute, or as a dataset where it is longer than attributes of HDF5 may be."""
-    import h5py
     import numpy as np
 
-    content = text.encode()
-    kind = _text_kind(len(content))
-    value = np.frombuffer(content, dtype=f"S{len(content)}").reshape(())
-    if len(content) <= _ATTRIBUTE_BYTES:
-        h5py.h5a.create(file, name.encode(), kind, _scalar()).write(value, mtype=kind)
+    value = np.bytes_(text.encode())
+    if len(value) <= _ATTRIBUTE_BYTES:
+        file.attrs[name] = value
     else:
-        everything = h5py.h5s.ALL
-        h5py.h5d.create(file, name.encode(), kind, _scalar()).write(everything, everything, value, mtype=kind)
+        file.create_dataset(name, data=value)
 
 
 def _table(answers: Answers) -> npt.NDArray[Any]:
@@ -195,7 +138,7 @@ def row_in(path: Path, image: bytes) -> Row:
         row = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise _damaged(path, error) from error
-    fault = "its row is none" if not isinstance(row, dict) or too_deep(row) else row_checker()(row)
+    fault = "its row is none" if not isinstance(row, dict) or too_deep(row) else fault_in_row(row)
     if not fault and (row["status"] != "done" or row.get("key") != path.name.removesuffix(ENDING)):
         fault = "its row is of another cell"
     if fault:

@@ -37,7 +37,7 @@ PLAN = [{"effect": f"effect {number}", "reason": "called for by a test, at lengt
 
 def whole(cell: str, score: float = 1.0, **more):
     """Return a finished row with every key of the format."""
-    from tactbench.core.matrix.answer import opening
+    from tactbench.core.matrix.evaluate_cell import opening
     from tactbench.core.matrix.plan import Cell
     from tactbench.core.plugins.registry import load_registry
 

@@ -14,7 +14,7 @@ from tactbench.core.errors import FolderError
 from tactbench.core.matrix.store import Store, limits
 from tactbench.core.matrix.store.ledger import Entry, read_ledger, whole_text
 from tactbench.core.matrix.store.sharing import canonical, joined, parted
-from tests.core.matrix.engines.patience import ending
+from tests.core.pool.patience import ending
 
 from .made import PLAN, ended, kept, key
 

@@ -13,7 +13,7 @@ import pytest
 from tactbench.core.errors import FolderError
 from tactbench.core.matrix.store import Store
 from tactbench.core.recording.partial import Partial
-from tests.core.matrix.engines.patience import ending
+from tests.core.pool.patience import ending
 
 from .made import ended, kept, key
 

@@ -12,7 +12,7 @@ import pytest
 from tactbench.core.matrix.store import Store, limits, shard
 from tactbench.core.matrix.store.ledger import Entry, whole_text
 from tactbench.core.matrix.store.sharing import canonical
-from tests.core.matrix.test_merging import record
+from tests.core.matrix.test_merge import record
 
 from .made import answers, done, kept, key
 

@@ -21,6 +21,12 @@ ESTIMATORS = {
     "evil-daemon": "Leaves a process behind that has left its group, and answers honestly",
     "evil-scribble": "Writes rubbish over every file of the result folder's cells",
     "evil-kill": "Kills its whole group of processes",
+    "evil-lie": "Changes how scores are computed",
+    "evil-promise": "Writes the beginning of a result that would never end",
+    "evil-built-elsewhere": "Changes the working folder when it is built",
+    "evil-built-deaf": "Ignores the ends of processes when it is built",
+    "evil-built-limited": "Lowers the number of files that may be open when it is built",
+    "evil-built-kill": "Kills its whole group of processes when it is built",
 }
 
 
@@ -32,7 +38,13 @@ def tactbench_estimators():
     ] + [
         EstimatorDescriptor(
             name="evil-import", title="Aborts when it is imported", kinds=KINDS, where="evil_tactile.bomb:build"
-        )
+        ),
+        EstimatorDescriptor(
+            name="evil-patch",
+            title="Patches scikit-learn when it is imported",
+            kinds=KINDS,
+            where="evil_tactile.patch:build",
+        ),
     ]
 
 

@@ -1,12 +1,16 @@
 """The code behind the estimators. What they do, they do when they are taught; otherwise they answer the mean."""
 
 import os
+import resource
 import signal
+import stat
 import sys
 import time
 from pathlib import Path
 
 import numpy as np
+
+from tactbench.core.evaluation import metrics
 
 
 class Mean:
@@ -92,6 +96,42 @@ def _kill():
     os.killpg(0, signal.SIGKILL)
 
 
+def _built(first):
+    """Return what does something when it is built, and answers honestly."""
+
+    def build(*, kind, seed, threads):
+        first()
+        return Mean()
+
+    return build
+
+
+def _lower_limits():
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
+    Path(os.devnull).read_bytes()
+
+
+def _lie():
+    metrics.Metric.of = lambda self, y, predicted, n_classes=0: 0.125
+
+
+def _promise():
+    """Write the beginning of a message that never ends wherever that is possible."""
+    for descriptor in range(3, 64):
+        try:
+            if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
+                os.write(descriptor, b"tactpool" + (2**40).to_bytes(8, "little") * 2)
+        except OSError:
+            continue
+    _hang()
+
+
+evil_built_elsewhere = _built(lambda: os.chdir("/"))
+evil_built_deaf = _built(lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN))
+evil_built_limited = _built(_lower_limits)
+evil_built_kill = _built(_kill)
+evil_lie = _estimator(_lie)
+evil_promise = _estimator(_promise)
 evil_raise = _estimator(_raise)
 evil_exit = _estimator(lambda: sys.exit("I am off"))
 evil_interrupt = _estimator(_interrupt)

@@ -1,0 +1,274 @@
+"""Where the recordings of cells come from: made by a rig on request, or there already. Nothing is recorded yet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import cast
+
+from tactbench.core.errors import MissingRecordingError, NotApplicable, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.evaluation.few_shot import shots
+from tactbench.core.matrix.engine import EngineChoice
+from tactbench.core.matrix.installed import built, listed
+from tactbench.core.matrix.keys import Keys
+from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves
+from tactbench.core.matrix.recorded import Recorded, Subject, read_all, read_subject
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.interfaces import Shelf
+from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.plugins.rig_files import load_rig_file
+from tactbench.core.spec.matrix import MatrixSpec
+from tactbench.core.spec.rig_file import RigFile
+from tactbench.core.spec.scene import Role, Scene, Simulation
+from tactbench.core.spec.task import TaskSpec, in_drawn_order
+
+RequestKey = tuple[str, str, str | None, int]
+"""Sensor, task, split and seed: what decides which recordings a cell needs."""
+
+
+def request_key(cell: Cell) -> RequestKey:
+    """Return what recordings a cell needs; those of a split that its protocol cannot serve are never made."""
+    return cell.sensor, cell.task, cell.split if serves(cell.protocol, cell.split) else None, cell.seed
+
+
+@dataclass(frozen=True)
+class RecordingRequest:
+    """One recording to be made."""
+
+    sensor: str
+    rig: str
+    scene: Scene
+    role: Role
+    seed: int
+    path: Path
+    rig_file: str = ""
+    """What the rig file says, as canonical JSON; empty: there is none."""
+
+
+def requests_for(
+    cells: Iterable[Cell], registry: Registry, keys: Keys, store: Store, simulation: Simulation
+) -> dict[RequestKey, list[RecordingRequest]]:
+    """Return the recordings needed, in the campaign's order, carried out as `simulation` asks.
+
+    Where the campaign leaves the order to be drawn, it is drawn with the cell's seed.
+    Tasks and campaigns that ask for the same scene in the same role share the recording.
+    """
+    requests: dict[RequestKey, list[RecordingRequest]] = {}
+    for cell in cells:
+        wanted = request_key(cell)
+        if wanted in requests:
+            continue
+        requests[wanted] = []
+        for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(wanted[2]), cell.seed):
+            scene = planned.scene.asked(simulation)
+            key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
+            path = store.recording_path(cell.sensor, scene.name, key)
+            requests[wanted].append(
+                RecordingRequest(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, cell.rig_file)
+            )
+    return requests
+
+
+UNKNOWN = "unknown"
+"""Sensor of recordings that cannot be read and lie where nothing tells whose they are."""
+
+
+@dataclass(frozen=True)
+class RecordingSource:
+    """What a shelf holds."""
+
+    recordings: Mapping[str, Mapping[Path, Subject]]
+    """By name of sensor."""
+    unreadable: Mapping[str, Mapping[Path, BaseException]] = field(default_factory=dict)
+    """What could not be read, and why, by name of the sensor that it seems to be of."""
+
+    @property
+    def sensors(self) -> list[str]:
+        """Names of the sensors, in order."""
+        return sorted({*self.recordings, *self.unreadable})
+
+
+def recording_source(
+    paths: Sequence[Path], asked: Sequence[str], registry: Registry, recorded: Recorded, choice: EngineChoice
+) -> RecordingSource:
+    """Look at the recordings of a shelf, in a process of its own: one that breaks the reader breaks nothing else.
+
+    Raises
+    ------
+    MissingRecordingError
+        If there are none.
+    """
+    if not paths:
+        raise MissingRecordingError("The shelf is empty.", hint="Import recordings with `tactbench import`.")
+    found: dict[str, dict[Path, Subject]] = {}
+    broken = read_all(read_subject, recorded.unread(paths, "sensor"), recorded, choice)
+    for path in paths:
+        if path not in broken:
+            subject = recorded.subject(path)
+            found.setdefault(subject.sensor, {})[path] = subject
+    unreadable: dict[str, dict[Path, BaseException]] = {}
+    for path, error in broken.items():
+        unreadable.setdefault(_owner(path, list(asked) or list(found), registry), {})[path] = error
+    return RecordingSource(found, unreadable)
+
+
+def _owner(path: Path, sensors: Sequence[str], registry: Registry) -> str:
+    """Return whose recording this seems to be: a folder above has the name of a sensor, or there is one only."""
+    for folder in path.parent.parts[::-1]:
+        if folder in sensors or folder in registry.sensors:
+            return folder
+    return sensors[0] if len(sensors) == 1 else UNKNOWN
+
+
+def sensors_on(shelf: RecordingSource, asked: Iterable[str]) -> list[str]:
+    """Return the sensors to run: those asked for, or all that the shelf has recordings of."""
+    names = list(asked)
+    for name in names:
+        if name not in shelf.sensors:
+            raise UnknownNameError("sensor in these recordings", name, shelf.sensors)
+    return names or shelf.sensors
+
+
+def serving(
+    task: TaskSpec, split: str | None, sensor: str, shelf: RecordingSource, registry: Registry
+) -> tuple[list[Path], BaseException | None]:
+    """Return the recordings of a sensor that belong to `task` under `split`, and why one of them cannot be read.
+
+    A recording of a scene that some task planned serves the campaigns that plan a scene of this name; a recording whose
+    scene nobody planned (an imported table) may serve any task. One that cannot be read is taken for a recording of the
+    scene that its file is named after, and otherwise for one that would have served.
+    """
+    names = {planned.scene.name for planned in task.scenes_for(split)}
+    readable = [
+        path
+        for path, (_, scene) in shelf.recordings.get(sensor, {}).items()
+        if scene is None or not names or scene in names
+    ]
+    broken = shelf.unreadable.get(sensor, {})
+    if not broken:
+        return readable, None
+    others = {planned.scene.name for known in registry.tasks for planned in known.spec.scenes_for(split)} - names
+    for path, error in broken.items():
+        if not names or path.stem.rpartition("-")[0] not in others:
+            return readable, error
+    return readable, None
+
+
+ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuffled")
+"""Splits that every recording acquired by a rig can be asked for; its scene's labels are further ones."""
+
+
+@dataclass
+class RecordingPlan:
+    """Where the recordings of cells come from."""
+
+    recorded: Recorded
+    """What is known of recordings, those made now among them."""
+    requests: dict[RequestKey, list[RecordingRequest]] = field(default_factory=dict)
+    """What a rig has to record."""
+    shelf: dict[RequestKey, list[Path]] = field(default_factory=dict)
+    """What exists already."""
+    troubles: dict[RequestKey, BaseException] = field(default_factory=dict)
+    """Why there are no recordings, or not all of them."""
+    refused: dict[Path, BaseException] = field(default_factory=dict)
+    """Recordings that could not be made, and why."""
+
+    def paths(self, cell: Cell) -> list[Path]:
+        """Return the recordings of a cell."""
+        wanted = request_key(cell)
+        return self.shelf.get(wanted) or [request.path for request in self.requests.get(wanted, ())]
+
+    def trouble(self, cell: Cell) -> BaseException | None:
+        """Return why a cell cannot have its recordings, if so."""
+        wanted = request_key(cell)
+        if wanted in self.troubles:
+            return self.troubles[wanted]
+        paths = self.paths(cell)
+        if not paths:
+            return NotApplicable(
+                f"Task {cell.task!r} has no scenes for rig {cell.rig!r}, and there are no recordings of it.",
+                hint="Use --rig replay --recordings DIR.",
+            )
+        return next((self.refused[path] for path in paths if path in self.refused), None)
+
+
+def plan(
+    matrix: MatrixSpec,
+    registry: Registry,
+    keys: Keys,
+    store: Store,
+    recordings: Path | None,
+    recorded: Recorded,
+    choice: EngineChoice | None = None,
+) -> tuple[list[Cell], RecordingPlan]:
+    """Return the cells of `matrix`, and where their recordings come from.
+
+    A rig that cannot be built, or that lists its recordings badly, costs the cells that need it, not the run.
+
+    Raises
+    ------
+    UsageError
+        If the matrix asks for something that is not there.
+    """
+    chosen = choice or EngineChoice()
+    rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
+    if not registry.rigs[matrix.rig].simulated:  # a simulated one is no shelf: it is built when it has to record
+        ((_, paths),) = chosen.pool(1).each(_shelved, [(matrix.rig, recordings, rig_file)])
+        if isinstance(paths, TactbenchError) and paths.exit_code == UsageError.exit_code:
+            raise paths  # the user's to mend
+        if isinstance(paths, BaseException):
+            return _without_rig(matrix, registry, recorded, paths)
+        if paths is not None:
+            return _from_shelf(matrix, registry, [Path(path) for path in paths], recorded, chosen)
+    cells = plan_cells(matrix, _named(matrix, registry), registry, rig_file)
+    for task in {cell.task for cell in cells}:
+        _known_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
+    return cells, RecordingPlan(recorded, requests_for(cells, registry, keys, store, matrix.simulation))
+
+
+def _from_shelf(
+    matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], recorded: Recorded, choice: EngineChoice
+) -> tuple[list[Cell], RecordingPlan]:
+    found = recording_source(paths, matrix.sensors, registry, recorded, choice)
+    cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
+    material = RecordingPlan(recorded)
+    for wanted in dict.fromkeys(request_key(cell) for cell in cells):
+        sensor, task, split, _ = wanted
+        material.shelf[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
+        if trouble is not None:
+            material.troubles[wanted] = trouble
+    return cells, material
+
+
+def _without_rig(
+    matrix: MatrixSpec, registry: Registry, recorded: Recorded, trouble: BaseException
+) -> tuple[list[Cell], RecordingPlan]:
+    """Return the cells of a rig that cannot be used; every one of them says why."""
+    if not matrix.sensors:
+        raise trouble
+    cells = plan_cells(matrix, matrix.sensors, registry)
+    return cells, RecordingPlan(recorded, troubles={request_key(cell): trouble for cell in cells})
+
+
+def _shelved(asked: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
+    """Return the recordings of a rig that replays, None of one that records: in a child process, where it is built."""
+    name, recordings, rig_file = asked
+    rig = built(name, installed(), recordings, rig_file)
+    return [str(path) for path in listed(name, cast(Shelf, rig))] if hasattr(rig, "recordings") else None
+
+
+def _named(matrix: MatrixSpec, registry: Registry) -> list[str]:
+    if not matrix.sensors:
+        raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
+    return [registry.sensors[name].name for name in matrix.sensors]
+
+
+def _known_splits(task: TaskSpec, splits: Sequence[str | None]) -> None:
+    """Refuse a split that no recording of this task's scenes can be asked for, before any is made."""
+    labels = {label for planned in task.scenes for label in planned.scene.labels}
+    few = (FEW_SHOT,) if any(shots(name) for name in task.splits) else ()
+    known = {*ACQUIRED_SPLITS, *task.splits, *task.campaigns, *labels, *few}
+    for split in splits:
+        if split is not None and split not in known and shots(split) is None:
+            raise UnknownNameError(f"split of task {task.name!r}", split, known)

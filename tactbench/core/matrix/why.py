@@ -1,0 +1,241 @@
+"""Why a cell would be reused, or computed: what its key is made of now, held against what it was made of before."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import TactbenchError
+from tactbench.core.matrix.key_book import Entry, KeyBook, Sections, recording_names
+from tactbench.core.matrix.keys import Fixed, Keys, Section, configuration_of
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan_recordings import RecordingRequest
+from tactbench.core.matrix.recorded import Recorded
+from tactbench.core.matrix.store import Store
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What would happen to a cell, and why."""
+
+    key: str
+    """Empty: not known before its recordings are there."""
+    hit: bool
+    reasons: tuple[str, ...]
+    """What differs from the result that is there, in words; what is missing."""
+    unknown: str = ""
+    """Why nothing can be said about what differs."""
+
+
+def recording_entry(request: RecordingRequest, keys: Keys) -> Entry:
+    """Return what went into a recording's key, for the book."""
+    scene = {"role": request.role, "seed": request.seed, "scene": request.scene.model_dump()}
+    return Entry(
+        _name(request), request.path.stem[-12:], scene, keys.maker(request.sensor, request.rig, request.rig_file)
+    )
+
+
+@dataclass(frozen=True)
+class Book:
+    """Where a run notes what goes into the keys it makes."""
+
+    pages: KeyBook
+    keys: Keys
+
+    def note_recordings(self, requests: Sequence[RecordingRequest]) -> None:
+        """Note what goes into the keys of recordings that are to be made."""
+        self.pages.write(recording_entry(request, self.keys) for request in requests)
+
+    def note_cells(self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path) -> None:
+        """Note what goes into the keys of cells that are to be computed: each with its key and its recordings."""
+        self.pages.write(self._entries(cells, recorded, folder))
+
+    def _entries(
+        self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path
+    ) -> Iterator[Entry]:
+        data: dict[tuple[Path, ...], dict[str, dict[str, str]]] = {}
+        for cell, key, paths in cells:
+            several = tuple(paths)
+            if several not in data:  # one object for all cells of the same recordings: the book writes it once
+                data[several] = _data(paths, recorded, folder)
+            yield Entry(cell.name, key, _configuration(cell), self.keys.answer(cell), data[several])
+
+
+def explain(
+    cell: Cell,
+    paths: Sequence[Path],
+    requests: Sequence[RecordingRequest],
+    keys: Keys,
+    recorded: Recorded,
+    book: KeyBook,
+    store: Store,
+    known: str,
+) -> Explanation:
+    """Say whether the result of `cell` would be reused, and what differs.
+
+    Parameters
+    ----------
+    paths
+        Its recordings, whether they are there or not.
+    requests
+        How they are made; none if they were made elsewhere.
+    known
+        Key of the latest result of that name, or nothing.
+    """
+    now = _sections(keys.answer(cell), _configuration(cell))
+    missing = [path for path in paths if not path.exists()]
+    before = book.sections(cell.name, known) if known else book.sections(cell.name)
+    if missing or not paths:
+        reasons = differences({name: part for name, part in (before or {}).items() if name != "data"}, now)
+        reasons = reasons if before else []
+        return Explanation("", False, (*reasons, *_unmade(paths, requests, missing, keys, book)))
+    try:
+        key = keys.of_cell(cell, [recorded.digest(path) for path in paths])
+        now["data"] = _plain(_data(paths, recorded, store.folder))
+    except TactbenchError as error:
+        return Explanation("", False, (str(error),))
+    if key == known or store.finished(key) is not None:
+        return Explanation(key, True, ())
+    if before is None:
+        said = "" if not known else "What the result that is there was made of is not recorded in this folder."
+        return Explanation(key, False, ("It was never computed into this folder.",) if not known else (), said)
+    return Explanation(key, False, tuple(differences(before, now)))
+
+
+def _unmade(
+    paths: Sequence[Path], requests: Sequence[RecordingRequest], missing: Sequence[Path], keys: Keys, book: KeyBook
+) -> list[str]:
+    """Say why recordings have to be made; a reason that several share is said once."""
+    if not paths:
+        return ["There are no recordings of it."]
+    if not requests:
+        return [f"recording {path} is not there" for path in missing]
+    reasons: dict[str, None] = {}
+    never: list[str] = []
+    for request in requests:
+        if request.path not in missing:
+            continue
+        entry = recording_entry(request, keys)
+        before = book.sections(entry.name)
+        if before is None:
+            never.append(request.scene.name)
+            continue
+        found = differences(before, _sections(entry.fixed, entry.configuration))
+        reasons.update(dict.fromkeys(found or [f"recording {request.scene.name} was removed"]))
+    said = [f"{len(never)} of {len(requests)} recordings were never made, {never[0]} first"] if never else []
+    return [*said, *reasons]
+
+
+def _name(request: RecordingRequest) -> str:
+    return f"recording {request.sensor} {request.rig} {request.scene.name} {request.role} {request.seed}"
+
+
+def _configuration(cell: Cell) -> Section:
+    # What the simulation was asked for decides through the recordings' bytes; here it tells why those differ.
+    return {**configuration_of(cell), "simulation": cell.simulation.model_dump(exclude_defaults=True)}
+
+
+def _sections(fixed: Fixed, configuration: Section) -> dict[str, Section]:
+    return {name: _plain(part) for name, part in {**fixed.sections, "configuration": configuration}.items()}
+
+
+def _plain(section: Section) -> Section:
+    """Return a section as it reads when it comes back from the book."""
+    plain: Section = json.loads(json.dumps(section, default=repr))
+    return plain
+
+
+def _data(paths: Sequence[Path], recorded: Recorded, folder: Path) -> dict[str, dict[str, str]]:
+    return {
+        name: {"digest": recorded.digest(path), "path": beside(path, folder)}
+        for name, path in zip(recording_names(paths), paths, strict=True)
+    }
+
+
+def beside(path: Path, folder: Path) -> str:
+    """Return `path` relative to the result folder where it lies inside, so that the folder may be moved."""
+    inside = path.is_relative_to(folder)
+    return str(path.relative_to(folder)) if inside else str(path.resolve())
+
+
+_SOURCE = "source of "
+_LONGEST = 60
+"""Characters of a value that are shown."""
+
+
+def differences(before: Sections, now: Sections) -> list[str]:
+    """Return one sentence for everything that differs, the most telling first; none if nothing does."""
+    found: list[str] = []
+    for name in sorted({*before, *now}, key=_order):
+        old, new = before.get(name, {}), now.get(name, {})
+        if old != new:
+            found += _section(name, old, new)
+    return found
+
+
+def _order(section: str) -> tuple[int, str]:
+    first = ("configuration", "data")
+    last = ("versions",)
+    return (first.index(section) if section in first else 9 if section in last else 5, section)
+
+
+def _section(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    if name.startswith(_SOURCE):
+        package = name.removeprefix(_SOURCE)
+        if not old or not new:
+            yield f"the source of {package} {'counts now' if new else 'counts no longer'}"
+            return
+        for file in sorted({*old, *new}):
+            if old.get(file) != new.get(file):
+                yield f"{package}/{file} {_came_or_went(old, new, file, 'changed')}"
+    elif name == "data":
+        for recording in sorted({*old, *new}):
+            if _digest(old.get(recording)) != _digest(new.get(recording)):
+                yield f"recording {recording} {_came_or_went(old, new, recording, 'has other bytes')}"
+    else:
+        within = "" if name in ("configuration", "versions") else f"{name}: "
+        flat_old, flat_new = dict(_flat(old)), dict(_flat(new))
+        for place in sorted({*flat_old, *flat_new}):
+            if _filled(place, flat_old) or _filled(place, flat_new):
+                continue
+            if flat_old.get(place, _NONE) != flat_new.get(place, _NONE):
+                yield f"{within}{place} {_shown(flat_old.get(place, _NONE))} -> {_shown(flat_new.get(place, _NONE))}"
+
+
+_NONE = object()
+
+
+def _filled(place: str, facts: Mapping[str, Any]) -> bool:
+    """Return whether there is something inside `place`: that is told instead."""
+    return any(name.startswith((f"{place}.", f"{place}[") if place else "") and name != place for name in facts)
+
+
+def _digest(recording: Any) -> Any:
+    """Return what decides of a recording; where it lies does not."""
+    return recording.get("digest") if isinstance(recording, Mapping) else None
+
+
+def _came_or_went(old: Mapping[str, Any], new: Mapping[str, Any], name: str, otherwise: str) -> str:
+    return "is new" if name not in old else "is gone" if name not in new else otherwise
+
+
+def _flat(facts: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every leaf with its dotted place."""
+    if isinstance(facts, Mapping) and facts:
+        for name, value in facts.items():
+            yield from _flat(value, f"{prefix}.{name}" if prefix else str(name))
+    elif isinstance(facts, list | tuple) and any(isinstance(value, Mapping | list | tuple) for value in facts):
+        for place, value in enumerate(facts):
+            yield from _flat(value, f"{prefix}[{place}]")
+    else:
+        yield prefix, list(facts) if isinstance(facts, tuple) else facts
+
+
+def _shown(value: Any) -> str:
+    if value is _NONE:
+        return "nothing"
+    text = value if isinstance(value, str) else repr(value)
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"

@@ -1,0 +1,108 @@
+"""How much memory processes hold, and whether the system has ended some for want of it. Linux; elsewhere unknown."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from pathlib import Path
+
+from tactbench.core.pool.processes import descendants
+
+MB = 2**20
+
+
+def resident_mb(pid: int) -> float:
+    """Return the resident memory of a process, MB; 0 where it is not known."""
+    try:
+        with open(f"/proc/{pid}/statm", "rb") as file:  # noqa: PTH123  (often, and quicker)
+            return int(file.read().split()[1]) * _page() / MB
+    except (OSError, IndexError, ValueError):
+        return 0.0
+
+
+def taken_mb(pid: int, shared_mb: float) -> float:
+    """Return what a process and those below it hold beyond the `shared_mb` that it began with, MB.
+
+    Notes
+    -----
+    Pages shared by several processes of the family are counted once, by their proportional share
+    (proc_pid_smaps(5), Pss); what is shared with processes outside is at most `shared_mb`, which is taken off, so that
+    the sum of a family is never too large.
+    """
+    below = descendants(pid)
+    alone = resident_mb(pid)
+    together = sum(_proportional_mb(one) for one in (pid, *below)) if below else 0.0
+    return max(alone, together) - shared_mb
+
+
+@contextmanager
+def data_limit(memory_mb: int | None) -> Iterator[None]:
+    """Let this process ask for so much more memory, MB, and no more: then it meets a MemoryError."""
+    if memory_mb is None:
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    wanted = _data_bytes() + memory_mb * MB
+    allowed = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (allowed, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
+
+
+def oom_kills() -> int:
+    """Return how many processes the system has ended so far because memory was short; it only ever rises."""
+    found = 0
+    for path in ("/proc/vmstat", *_own_counters()):
+        with suppress(OSError):
+            found += sum(int(count) for count in re.findall(r"^oom_kill (\d+)$", Path(path).read_text(), re.MULTILINE))
+    return found
+
+
+def first_to_go() -> None:
+    """Have the system end this process before any that has not said so, if memory is short."""
+    with suppress(OSError):
+        adjustment = os.open("/proc/self/oom_score_adj", os.O_WRONLY)  # a file of Python's would cost five times that
+        os.write(adjustment, b"1000")
+        os.close(adjustment)
+
+
+@lru_cache(maxsize=1)
+def _own_counters() -> tuple[str, ...]:
+    """Return the files in which the control groups of this process count, in both versions of them."""
+    found: list[str] = []
+    with suppress(OSError):
+        for line in Path("/proc/self/cgroup").read_text().splitlines():
+            _, controllers, group = line.split(":", 2)
+            if controllers == "":
+                found.append(f"/sys/fs/cgroup{group}/memory.events")
+            elif "memory" in controllers.split(","):
+                found.append(f"/sys/fs/cgroup/memory{group}/memory.oom_control")
+    return tuple(found)
+
+
+def _proportional_mb(pid: int) -> float:
+    with suppress(OSError):
+        text = Path(f"/proc/{pid}/smaps_rollup").read_text()
+        if match := re.search(r"^Pss:\s+(\d+) kB", text, re.MULTILINE):
+            return int(match[1]) / 1024
+    return 0.0
+
+
+def _data_bytes() -> int:
+    """Return what RLIMIT_DATA counts of this process now (setrlimit(2): data, heap and private writable mappings)."""
+    with suppress(OSError):
+        if match := re.search(r"^VmData:\s+(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE):
+            return int(match[1]) * 1024
+    return 0
+
+
+@lru_cache(maxsize=1)
+def _page() -> int:
+    return os.sysconf("SC_PAGE_SIZE")

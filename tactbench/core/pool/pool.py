@@ -1,0 +1,154 @@
+"""The process pool: each item of work in a child process, within limits."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing.connection import wait
+from typing import Any, TypeVar
+
+from tactbench.core.pool.limits import UNLIMITED, Limits
+from tactbench.core.pool.processes import interrupts_blocked, kill_orphans, own_children, set_subreaper
+from tactbench.core.pool.worker import PENDING, Worker
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class Pool:
+    """Up to `jobs` child processes.
+
+    Parameters
+    ----------
+    jobs
+        Items carried out at the same time.
+    limits
+        What each may take; its process is ended beyond.
+    reuse
+        Whether a process gets another item once it is through with one, which then finds what that has loaded. All
+        items are taken before the first begins. Else each has a process of its own, which shares what this process
+        holds when the item is taken, if it forks.
+    preload
+        None: this process forks, which must have one thread. Else a fork server of `multiprocessing` does, which first
+        imports these modules; work and items are pickled.
+    wanted
+        Asked while items are at work whether anybody still waits for them; the iteration ends where nobody does.
+
+    Notes
+    -----
+    The process of an item is the subreaper of whatever that starts, and is ended after it. What it leaves behind when
+    it crashes becomes a child of this process and is ended then.
+    """
+
+    def __init__(
+        self,
+        jobs: int = 1,
+        limits: Limits = UNLIMITED,
+        *,
+        reuse: bool = False,
+        preload: Sequence[str] | None = None,
+        wanted: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self._jobs = jobs
+        self._limits = limits
+        self._reuse = reuse
+        self._preload = preload
+        self._wanted = wanted
+
+    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
+        """Yield every item with its result or what stopped it, in the order in which they end.
+
+        Notes
+        -----
+        An item whose process ends before it has begun gets another one, once.
+        """
+        every = list(items) if self._reuse else []
+        coming = enumerate(every) if self._reuse else ((0, item) for item in items)
+        again: deque[tuple[int, T]] = deque()
+        """Items whose processes ended before they had begun."""
+        busy: list[Worker] = []
+        idle: list[Worker] = []
+        with _children_of_items(busy, idle) as spared:
+            while True:
+                while len(busy) < self._jobs:
+                    second = bool(again)
+                    index, item = again.popleft() if again else next(coming, (-1, None))
+                    if index < 0:
+                        break
+                    try:
+                        self._begin(work, every or [item], index, second, busy, idle)
+                    except Exception as error:  # it cannot be pickled, or the system starts no more processes
+                        yield item, error  # type: ignore[misc]
+                if not busy or not self._wanted():
+                    return
+                wait([one for worker in busy for one in worker.waits_on], min(worker.wait_s() for worker in busy))
+                for worker in list(busy):
+                    outcome = worker.outcome()
+                    if outcome is PENDING:
+                        continue
+                    item = worker.items[worker.index]
+                    retry = not (worker.begun or worker.second or worker.alive)
+                    self._end_item(worker, busy, idle)
+                    kill_orphans(spared)
+                    if retry:
+                        again.append((worker.index, item))
+                    else:
+                        yield item, outcome
+
+    def _begin(
+        self,
+        work: Callable[[Any], Any],
+        items: Sequence[Any],
+        index: int,
+        second: bool,
+        busy: list[Worker],
+        idle: list[Worker],
+    ) -> None:
+        with interrupts_blocked():
+            worker = idle.pop() if idle else Worker(work, items, self._limits, self._preload)
+            busy.append(worker)
+            worker.begin(index, second)
+
+    def _end_item(self, worker: Worker, busy: list[Worker], idle: list[Worker]) -> None:
+        """End whatever an item that is over has started, and its process unless another item may have it."""
+        with interrupts_blocked():
+            busy.remove(worker)
+            if self._reuse and worker.alive:
+                worker.end_below()
+                idle.append(worker)
+            else:
+                worker.kill()
+                worker.close()
+
+
+@contextmanager
+def _children_of_items(busy: list[Worker], idle: list[Worker]) -> Iterator[set[int]]:
+    """Have orphans of items become children of this process; at the end, leave no process of an item.
+
+    Yields the children that were there before.
+    """
+    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGCHLD) == signal.SIG_IGN:
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else the system reaps children, and nobody hears how they ended
+    before: bool | None = None
+    spared: set[int] = set()
+    try:
+        with interrupts_blocked():
+            spared |= own_children()
+            before = set_subreaper(True)
+        yield spared
+    finally:
+        try:
+            for worker in busy:
+                worker.give_grace()
+        finally:
+            with interrupts_blocked():
+                for worker in (*busy, *idle):
+                    worker.kill()
+                for worker in (*busy, *idle):
+                    worker.close()
+                if before is not None:
+                    kill_orphans(spared)
+                    set_subreaper(before)

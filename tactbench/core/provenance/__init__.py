@@ -1,0 +1,1 @@
+"""What made a result: source, versions, machine."""
