@@ -1,4 +1,4 @@
-"""The documents: every page is found from the index, every link leads somewhere, and the floors are those that are held."""
+"""Every page is found from the index, every link leads somewhere, and the floors drawn are those that are held."""
 
 import re
 import tomllib
