@@ -18,7 +18,7 @@ from tactbench.core.errors import (
     UsageError,
 )
 from tactbench.core.plugins.hookspecs import hookimpl
-from tactbench.core.plugins.interfaces import Acquisition, Estimator, Rig, RigContext, Shelf
+from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.drive import ForceLoop
@@ -66,6 +66,7 @@ __all__ = [
     "Published",
     "Quality",
     "Quantity",
+    "ReplayRig",
     "Rig",
     "RigContext",
     "RigDescriptor",
@@ -75,7 +76,6 @@ __all__ = [
     "Scene",
     "SensorDescriptor",
     "SensorSpec",
-    "Shelf",
     "Source",
     "Statement",
     "StreamSpec",

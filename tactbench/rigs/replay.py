@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from tactbench.plugin import MissingRecordingError, RigContext, RigDescriptor, Shelf, UsageError, hookimpl
+from tactbench.plugin import MissingRecordingError, ReplayRig, RigContext, RigDescriptor, UsageError, hookimpl
 
 TACTBENCH_API = 1
 
@@ -13,7 +13,7 @@ ENDING = ".h5"
 _HINT = "Make some with `tactbench import MAPPING.yaml --out DIR` or `tactbench record --out FILE`."
 
 
-class RecordingShelf(Shelf):
+class RecordingFolder(ReplayRig):
     """The recordings of one folder and all folders below it.
 
     Parameters
@@ -47,8 +47,8 @@ class RecordingShelf(Shelf):
         return any(part.startswith(".") for part in path.relative_to(self.folder).parts)
 
 
-def build(context: RigContext) -> RecordingShelf:
-    """Return the shelf.
+def build(context: RigContext) -> RecordingFolder:
+    """Return the rig.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def build(context: RigContext) -> RecordingShelf:
             "The rig 'replay' needs to know where the recordings are.",
             hint=f"Name their folder with --recordings DIR. {_HINT}",
         )
-    return RecordingShelf(Path(context.recordings))
+    return RecordingFolder(Path(context.recordings))
 
 
 @hookimpl

@@ -1,4 +1,4 @@
-"""The shelf: a fixed order, nothing unfinished, and a next step for an empty one."""
+"""Replayed recordings: a fixed order, nothing unfinished, and a next step for an empty one."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from tactbench.plugin import RigContext
 from tactbench.rigs.replay import tactbench_rigs
 
 
-def shelf(folder: Path | None):
+def replay(folder: Path | None):
     (descriptor,) = tactbench_rigs()
     return load_object(descriptor.where)(RigContext(recordings=folder))
 
@@ -20,23 +20,23 @@ def test_all_recordings_below_the_folder_in_a_fixed_order(tmp_path):
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(b"")
-    found = [path.relative_to(tmp_path).as_posix() for path in shelf(tmp_path).recordings()]
+    found = [path.relative_to(tmp_path).as_posix() for path in replay(tmp_path).recordings()]
     assert found == ["a.h5", "b/10.h5", "b/2.h5", "b-c/1.h5"]
 
 
 def test_without_a_folder_the_option_is_named():
     with pytest.raises(UsageError, match="--recordings DIR"):
-        shelf(None)
+        replay(None)
 
 
 def test_a_folder_that_is_not_there_or_empty(tmp_path):
     with pytest.raises(MissingRecordingError, match="nowhere"):
-        shelf(tmp_path / "nowhere").recordings()
+        replay(tmp_path / "nowhere").recordings()
     with pytest.raises(MissingRecordingError, match="tactbench import"):
-        shelf(tmp_path).recordings()
+        replay(tmp_path).recordings()
 
 
 def test_only_unfinished_recordings_are_mentioned_but_not_replayed(tmp_path):
     (tmp_path / "press.h5.partial").write_bytes(b"")
     with pytest.raises(MissingRecordingError, match="1 unfinished"):
-        shelf(tmp_path).recordings()
+        replay(tmp_path).recordings()

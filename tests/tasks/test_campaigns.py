@@ -32,7 +32,7 @@ def test_scenes_of_a_campaign_have_names_of_their_own(name, split, planned):
 
 @pytest.mark.parametrize("name", TASKS)
 def test_one_name_is_one_scene_in_all_campaigns_of_a_task(name):
-    """Recordings on a shelf are found by the name of their scene."""
+    """Recordings that are replayed are found by the name of their scene."""
     task = TASKS[name]
     by_name = {}
     for item in itertools.chain(task.scenes, *task.campaigns.values()):

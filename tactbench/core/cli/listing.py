@@ -22,7 +22,7 @@ def command(family: str | None, shape: str) -> None:
     found = {
         name: {
             descriptor.name: getattr(descriptor, "title", None) or descriptor.spec.title
-            for descriptor in registry.shelves()[name]
+            for descriptor in registry.families()[name]
         }
         for name in families
         if name != SCENARIOS

@@ -140,7 +140,7 @@ def _built(registry: Registry, name: str, devices: RigFile | None, operator: Ope
     from tactbench.core.errors import UsageError
     from tactbench.core.matrix.installed import rig_of
 
-    # A folder is given so that a shelf can be built, and then be told from a rig that presses.
+    # A folder is given so that a rig that replays can be built, and then be told from one that presses.
     rig: Rig = rig_of(name, registry, Path(), devices, operator)  # type: ignore[assignment]
     if not hasattr(rig, "open"):
         raise UsageError(

@@ -22,10 +22,10 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()
-    shelves = registry.shelves()
+    families = registry.families()
     for name in names:
-        if not any(name in shelf for shelf in shelves.values()):
-            known = [known for shelf in shelves.values() for known in shelf.names()]
+        if not any(name in family for family in families.values()):
+            known = [known for family in families.values() for known in family.names()]
             raise UnknownNameError("sensor, rig, task, estimator or effect", name, known)
     only_sensors = all(name in registry.sensors for name in names)
     if shape == "md" and not only_sensors:
@@ -38,13 +38,13 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     if sensors:
         _sensors(sensors, everything, shape)
     if not only_sensors:
-        _pages([shelf.owned(name) for name in names for kind, shelf in shelves.items()
-                if kind != "sensors" and name in shelf])  # fmt: skip
+        _pages([family.owned(name) for name in names for kind, family in families.items()
+                if kind != "sensors" and name in family])  # fmt: skip
 
 
 def _described(name: str, registry: Registry) -> list[dict[str, Any]]:
     """Return what is installed under `name`, one description for each kind of plugin that has it."""
-    owners = [shelf.owned(name) for shelf in registry.shelves().values() if name in shelf]
+    owners = [family.owned(name) for family in registry.families().values() if name in family]
     return [{"brought by": _owner(owned), **_dumped(owned.descriptor)} for owned in owners]
 
 

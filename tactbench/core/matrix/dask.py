@@ -232,7 +232,7 @@ def environment(registry: Registry) -> dict[str, str]:
 
     A plugin that could not be loaded does not count, nor does a distribution that is missing.
     """
-    modules = {shelf.owned(one.name).module for shelf in registry.shelves().values() for one in shelf}
+    modules = {family.owned(one.name).module for family in registry.families().values() for one in family}
     modules |= {one.where for one in registry.estimators}
     behind = SourceDigests().behind(modules, "answer")
     found = {f"the source of {package}": digest_of(files) for package, files in sorted(behind.packages.items())}

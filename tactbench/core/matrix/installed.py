@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tactbench.core.errors import RigError, TactbenchError
-from tactbench.core.plugins.interfaces import Operator, Rig, RigContext, Shelf
+from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import Registry, load_object
 from tactbench.core.spec.rig_file import RigFile
 
@@ -18,7 +18,7 @@ def rig_of(
     recordings: Path | None = None,
     rig_file: RigFile | None = None,
     operator: Operator | None = None,
-) -> Rig | Shelf:
+) -> Rig | ReplayRig:
     """Build the rig called `name`; raises UsageError if the rig file is for another one."""
     descriptor = registry.rigs[name]
     if rig_file is not None:
@@ -27,7 +27,7 @@ def rig_of(
     built = load_object(descriptor.where)(context)
     if not (hasattr(built, "open") or hasattr(built, "recordings")):
         raise RigError(
-            f"The rig {name!r} has neither open() nor recordings().", hint="See docs/plugins.md: a Rig or a Shelf."
+            f"The rig {name!r} has neither open() nor recordings().", hint="See docs/plugins.md: a Rig or a ReplayRig."
         )
     return built  # type: ignore[no-any-return]
 
@@ -38,16 +38,16 @@ def built(
     recordings: Path | None = None,
     rig_file: RigFile | None = None,
     operator: Operator | None = None,
-) -> Rig | Shelf:
+) -> Rig | ReplayRig:
     """Build the rig called `name`; raises RigError where its own code fails, whatever that raises."""
     with _its_own_code(f"The rig {name!r} could not be built"):
         return rig_of(name, registry, recordings, rig_file, operator)
 
 
-def listed(name: str, shelf: Shelf) -> list[Path]:
-    """Return the recordings of the shelf called `name`; raises RigError where its own code fails."""
+def listed(name: str, rig: ReplayRig) -> list[Path]:
+    """Return the recordings of the rig called `name`; raises RigError where its own code fails."""
     with _its_own_code(f"The recordings of rig {name!r} cannot be listed"):
-        return list(shelf.recordings())
+        return list(rig.recordings())
 
 
 @contextmanager

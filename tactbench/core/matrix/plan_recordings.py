@@ -15,7 +15,7 @@ from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves
 from tactbench.core.matrix.recorded import Recorded, Subject, read_all, read_subject
 from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.interfaces import Shelf
+from tactbench.core.plugins.interfaces import ReplayRig
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.spec.matrix import MatrixSpec
@@ -76,7 +76,7 @@ UNKNOWN = "unknown"
 
 @dataclass(frozen=True)
 class RecordingSource:
-    """What a shelf holds."""
+    """What a rig that replays has."""
 
     recordings: Mapping[str, Mapping[Path, Subject]]
     """By name of sensor."""
@@ -92,7 +92,7 @@ class RecordingSource:
 def recording_source(
     paths: Sequence[Path], asked: Sequence[str], registry: Registry, recorded: Recorded, choice: EngineChoice
 ) -> RecordingSource:
-    """Look at the recordings of a shelf, in a process of its own: one that breaks the reader breaks nothing else.
+    """Look at recordings that are replayed, in a process of its own: one that breaks the reader breaks nothing else.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def recording_source(
         If there are none.
     """
     if not paths:
-        raise MissingRecordingError("The shelf is empty.", hint="Import recordings with `tactbench import`.")
+        raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
     found: dict[str, dict[Path, Subject]] = {}
     broken = read_all(read_subject, recorded.unread(paths, "sensor"), recorded, choice)
     for path in paths:
@@ -121,17 +121,17 @@ def _owner(path: Path, sensors: Sequence[str], registry: Registry) -> str:
     return sensors[0] if len(sensors) == 1 else UNKNOWN
 
 
-def sensors_on(shelf: RecordingSource, asked: Iterable[str]) -> list[str]:
-    """Return the sensors to run: those asked for, or all that the shelf has recordings of."""
+def sensors_on(source: RecordingSource, asked: Iterable[str]) -> list[str]:
+    """Return the sensors to run: those asked for, or all that the rig has recordings of."""
     names = list(asked)
     for name in names:
-        if name not in shelf.sensors:
-            raise UnknownNameError("sensor in these recordings", name, shelf.sensors)
-    return names or shelf.sensors
+        if name not in source.sensors:
+            raise UnknownNameError("sensor in these recordings", name, source.sensors)
+    return names or source.sensors
 
 
 def serving(
-    task: TaskSpec, split: str | None, sensor: str, shelf: RecordingSource, registry: Registry
+    task: TaskSpec, split: str | None, sensor: str, source: RecordingSource, registry: Registry
 ) -> tuple[list[Path], BaseException | None]:
     """Return the recordings of a sensor that belong to `task` under `split`, and why one of them cannot be read.
 
@@ -142,10 +142,10 @@ def serving(
     names = {planned.scene.name for planned in task.scenes_for(split)}
     readable = [
         path
-        for path, (_, scene) in shelf.recordings.get(sensor, {}).items()
+        for path, (_, scene) in source.recordings.get(sensor, {}).items()
         if scene is None or not names or scene in names
     ]
-    broken = shelf.unreadable.get(sensor, {})
+    broken = source.unreadable.get(sensor, {})
     if not broken:
         return readable, None
     others = {planned.scene.name for known in registry.tasks for planned in known.spec.scenes_for(split)} - names
@@ -167,7 +167,7 @@ class RecordingPlan:
     """What is known of recordings, those made now among them."""
     requests: dict[RequestKey, list[RecordingRequest]] = field(default_factory=dict)
     """What a rig has to record."""
-    shelf: dict[RequestKey, list[Path]] = field(default_factory=dict)
+    replayed: dict[RequestKey, list[Path]] = field(default_factory=dict)
     """What exists already."""
     troubles: dict[RequestKey, BaseException] = field(default_factory=dict)
     """Why there are no recordings, or not all of them."""
@@ -177,7 +177,7 @@ class RecordingPlan:
     def paths(self, cell: Cell) -> list[Path]:
         """Return the recordings of a cell."""
         wanted = request_key(cell)
-        return self.shelf.get(wanted) or [request.path for request in self.requests.get(wanted, ())]
+        return self.replayed.get(wanted) or [request.path for request in self.requests.get(wanted, ())]
 
     def trouble(self, cell: Cell) -> BaseException | None:
         """Return why a cell cannot have its recordings, if so."""
@@ -213,21 +213,21 @@ def plan(
     """
     chosen = choice or EngineChoice()
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
-    if not registry.rigs[matrix.rig].simulated:  # a simulated one is no shelf: it is built when it has to record
-        ((_, paths),) = chosen.pool(1).each(_shelved, [(matrix.rig, recordings, rig_file)])
+    if not registry.rigs[matrix.rig].simulated:  # a simulated one replays nothing: it is built when it has to record
+        ((_, paths),) = chosen.pool(1).each(_replayed, [(matrix.rig, recordings, rig_file)])
         if isinstance(paths, TactbenchError) and paths.exit_code == UsageError.exit_code:
             raise paths  # the user's to mend
         if isinstance(paths, BaseException):
             return _without_rig(matrix, registry, recorded, paths)
         if paths is not None:
-            return _from_shelf(matrix, registry, [Path(path) for path in paths], recorded, chosen)
+            return _from_replay(matrix, registry, [Path(path) for path in paths], recorded, chosen)
     cells = plan_cells(matrix, _named(matrix, registry), registry, rig_file)
     for task in {cell.task for cell in cells}:
         _known_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
     return cells, RecordingPlan(recorded, requests_for(cells, registry, keys, store, matrix.simulation))
 
 
-def _from_shelf(
+def _from_replay(
     matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], recorded: Recorded, choice: EngineChoice
 ) -> tuple[list[Cell], RecordingPlan]:
     found = recording_source(paths, matrix.sensors, registry, recorded, choice)
@@ -235,7 +235,7 @@ def _from_shelf(
     material = RecordingPlan(recorded)
     for wanted in dict.fromkeys(request_key(cell) for cell in cells):
         sensor, task, split, _ = wanted
-        material.shelf[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
+        material.replayed[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
         if trouble is not None:
             material.troubles[wanted] = trouble
     return cells, material
@@ -251,11 +251,11 @@ def _without_rig(
     return cells, RecordingPlan(recorded, troubles={request_key(cell): trouble for cell in cells})
 
 
-def _shelved(asked: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
+def _replayed(asked: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
     """Return the recordings of a rig that replays, None of one that records: in a child process, where it is built."""
     name, recordings, rig_file = asked
     rig = built(name, installed(), recordings, rig_file)
-    return [str(path) for path in listed(name, cast(Shelf, rig))] if hasattr(rig, "recordings") else None
+    return [str(path) for path in listed(name, cast(ReplayRig, rig))] if hasattr(rig, "recordings") else None
 
 
 def _named(matrix: MatrixSpec, registry: Registry) -> list[str]:

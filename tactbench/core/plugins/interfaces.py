@@ -125,7 +125,7 @@ class Explaining(Rig, Protocol):
         """
 
 
-class Shelf(Protocol):
+class ReplayRig(Protocol):
     """A rig whose scenes were carried out elsewhere: it hands out recordings that exist."""
 
     def recordings(self) -> Sequence[Path]:
@@ -192,5 +192,5 @@ class RigContext:
 class RigFactory(Protocol):
     """What ``RigDescriptor.where`` names."""
 
-    def __call__(self, context: RigContext) -> Rig | Shelf:
+    def __call__(self, context: RigContext) -> Rig | ReplayRig:
         """Return the rig; raises UsageError when `context` lacks something it needs."""

@@ -62,7 +62,7 @@ class Owned(Generic[D]):
 
 
 @dataclass
-class Shelfful(Generic[D]):
+class Family(Generic[D]):
     """All descriptors of one kind, by name."""
 
     kind: str
@@ -116,16 +116,16 @@ class Shelfful(Generic[D]):
 class Registry:
     """Everything that is installed."""
 
-    sensors: Shelfful[SensorDescriptor] = field(default_factory=lambda: Shelfful("sensor"))
-    rigs: Shelfful[RigDescriptor] = field(default_factory=lambda: Shelfful("rig"))
-    devices: Shelfful[DeviceDescriptor] = field(default_factory=lambda: Shelfful("device"))
-    tasks: Shelfful[TaskDescriptor] = field(default_factory=lambda: Shelfful("task"))
-    estimators: Shelfful[EstimatorDescriptor] = field(default_factory=lambda: Shelfful("estimator"))
-    effects: Shelfful[EffectDescriptor] = field(default_factory=lambda: Shelfful("effect"))
+    sensors: Family[SensorDescriptor] = field(default_factory=lambda: Family("sensor"))
+    rigs: Family[RigDescriptor] = field(default_factory=lambda: Family("rig"))
+    devices: Family[DeviceDescriptor] = field(default_factory=lambda: Family("device"))
+    tasks: Family[TaskDescriptor] = field(default_factory=lambda: Family("task"))
+    estimators: Family[EstimatorDescriptor] = field(default_factory=lambda: Family("estimator"))
+    effects: Family[EffectDescriptor] = field(default_factory=lambda: Family("effect"))
     plugins: list[PluginRow] = field(default_factory=list)
 
-    def shelves(self) -> Mapping[str, Shelfful[Any]]:
-        """Return the six shelves by the name of their hook's plural."""
+    def families(self) -> Mapping[str, Family[Any]]:
+        """Return the six families by the name of their hook's plural."""
         return {
             "sensors": self.sensors,
             "rigs": self.rigs,
@@ -143,7 +143,7 @@ class Registry:
     @property
     def refused(self) -> list[DuplicateNameError]:
         """The names that are given twice."""
-        return [error for shelf in self.shelves().values() for error in shelf.refused()]
+        return [error for family in self.families().values() for error in family.refused()]
 
 
 _KINDS: dict[str, type[Any]] = {
@@ -217,7 +217,7 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], answer: 
     brings: list[str] = []
     for family, descriptors in offered.items():
         for descriptor in descriptors:
-            registry.shelves()[family].add(Owned(descriptor, point.value, distribution, version))
+            registry.families()[family].add(Owned(descriptor, point.value, distribution, version))
             brings.append(f"{family[:-1]} {descriptor.name}")
     registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "loaded", tuple(brings)))
 

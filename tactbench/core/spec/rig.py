@@ -76,7 +76,7 @@ class RigDescriptor(Frozen):
     name: str = Field(pattern=_NAME)
     title: str
     where: str = Field(pattern=_WHERE)
-    """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a Shelf."""
+    """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a ReplayRig."""
     simulated: bool = False
     """Rows from this rig are marked SIM and never ranked against hardware."""
     rungs: tuple[str, ...] = ()

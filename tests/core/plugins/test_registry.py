@@ -107,7 +107,7 @@ def site(tmp_path, monkeypatch):
 
 def test_there_is_a_hook_for_each_kind_and_no_other():
     hooks = {name for name in vars(hookspecs) if name.startswith("tactbench_")}
-    assert hooks == {f"tactbench_{kind}" for kind in Registry().shelves()}
+    assert hooks == {f"tactbench_{kind}" for kind in Registry().families()}
 
 
 def test_a_plugin_may_bring_every_kind_of_thing(site):
@@ -117,7 +117,7 @@ def test_a_plugin_may_bring_every_kind_of_thing(site):
     assert set(row.brings) == {
         "sensor pad", "rig press", "device scale", "device pad", "task push", "estimator guess",
     }  # fmt: skip
-    names = {kind: shelf.names() for kind, shelf in registry.shelves().items()}
+    names = {kind: family.names() for kind, family in registry.families().items()}
     assert names == {
         "sensors": ["pad"], "rigs": ["press"], "devices": ["pad", "scale"], "tasks": ["push"],
         "estimators": ["guess"], "effects": [],
@@ -167,7 +167,7 @@ def test_a_plugin_that_fails_is_a_row_and_the_others_are_loaded(site, code):
     assert failed.reason
     assert re.search(reason, failed.reason), failed.reason
     # Nothing of a plugin is used unless all of it is right.
-    assert [len(shelf.names()) for shelf in registry.shelves().values()] == [1, 0, 0, 0, 0, 0]
+    assert [len(family.names()) for family in registry.families().values()] == [1, 0, 0, 0, 0, 0]
 
 
 ENDS = {

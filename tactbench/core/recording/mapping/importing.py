@@ -127,7 +127,7 @@ def import_tables(
 
 
 def _aside(out: Path) -> Path:
-    """Make the folder in which recordings wait until all of them are good; hidden, so that no shelf shows it."""
+    """Make the folder in which recordings wait until all of them are good; hidden, so that no rig replays it."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         return Path(tempfile.mkdtemp(prefix=".importing-", dir=out))
