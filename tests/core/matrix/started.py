@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
+from tempfile import TemporaryDirectory
 
 from tests.conftest import ROOT
 from tests.core.pool.patience import until
@@ -17,6 +18,8 @@ class Started:
         self.folder = folder
         folder.mkdir(exist_ok=True)
         self._stack = ExitStack()
+        scratch = TemporaryDirectory(prefix="tb-", ignore_cleanup_errors=True)
+        self._scratch = self._stack.enter_context(scratch)
         file = folder / "scheduler.json"
         self.scheduler = self._start("dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
         try:
@@ -38,7 +41,7 @@ class Started:
     def _start(self, program, *arguments, path=(), cwd=None):
         log = self._stack.enter_context((self.folder / f"{program}.log").open("ab"))
         env = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, [*path, ROOT])), "OMP_NUM_THREADS": "1"}
-        env["TMPDIR"] = str(self.folder)  # what they keep for themselves goes with the test
+        env["TMPDIR"] = self._scratch  # short: a socket of theirs has its path in there
         host = ("--host", "127.0.0.1")
         process = subprocess.Popen(
             [sys.executable, "-m", f"distributed.cli.{program}", *arguments, *host],
