@@ -23,15 +23,20 @@ class Sensor:
     last_ns = 0
 
 
-def test_while_it_runs_counts_are_those_of_its_own_thread():
+def armed(sensor, *, stale_s, asked=lambda guard: guard):
+    """Return a control of an armed guard, which it asks through `asked`, the world, the guard and what is asked."""
     setting = FAULTS.Setting()
     world = FAULTS.Pressed(setting)
     guard = world.guard()
     guard.start()
-    asked = Asked(guard)
-    armed = guard.arm(setting.limits)
-    press = Press(SETTINGS, COURSE, 1e-6)
-    control = Control(asked, setting.limits, armed, press, Sensor(), world.clock, period_s=0.02, stale_s=1e9)
+    report = guard.arm(setting.limits)
+    through, press = asked(guard), Press(SETTINGS, COURSE, 1e-6)
+    control = Control(through, setting.limits, report, press, sensor, world.clock, period_s=0.02, stale_s=stale_s)
+    return control, world, guard, through
+
+
+def test_while_it_runs_counts_are_those_of_its_own_thread():
+    control, _, guard, asked = armed(Sensor(), stale_s=1e9, asked=Asked)
     control.start()
     seen, waits = {}, threading.Event()
     for _ in range(1000):
@@ -48,33 +53,22 @@ def test_while_it_runs_counts_are_those_of_its_own_thread():
 
 
 def test_a_rig_that_has_hung_does_not_blame_the_sensor():
-    setting = FAULTS.Setting()
-    world = FAULTS.Pressed(setting)
-    guard = world.guard()
-    guard.start()
-    armed = guard.arm(setting.limits)
-    press, sensor = Press(SETTINGS, COURSE, 1e-6), Sensor()
-    control = Control(guard, setting.limits, armed, press, sensor, world.clock, period_s=0.02, stale_s=0.1)
+    sensor = Sensor()
+    control, world, guard, _ = armed(sensor, stale_s=0.1)
     for _ in range(10):
         sensor.last_ns = world.clock()
         control.carry(world.clock() + 20_000_000)
-    assert not press.over
+    assert not control.press.over
     guard.advance(world.clock() + 4_000_000_000)
     control.carry(world.clock() + 100_000_000)
-    assert press.ended == "in standoff: no beat in time"
+    assert control.press.ended == "in standoff: no beat in time"
     guard.close()
 
 
 def test_a_sensor_that_sends_nothing_ends_the_press():
-    setting = FAULTS.Setting()
-    world = FAULTS.Pressed(setting)
-    guard = world.guard()
-    guard.start()
-    armed = guard.arm(setting.limits)
-    press = Press(SETTINGS, COURSE, 1e-6)
-    control = Control(guard, setting.limits, armed, press, Sensor(), world.clock, period_s=0.02, stale_s=0.1)
+    control, world, guard, _ = armed(Sensor(), stale_s=0.1)
     control.carry(world.clock() + 90_000_000)
-    assert press.ended == ""
+    assert control.press.ended == ""
     control.carry(world.clock() + 60_000_000)
-    assert "the sensor has sent nothing for 1" in press.ended
+    assert "the sensor has sent nothing for 1" in control.press.ended
     guard.close()

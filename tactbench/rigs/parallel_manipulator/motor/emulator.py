@@ -61,6 +61,9 @@ class MotorEmulator(DeviceEmulator):
         What is wrong with it; may be changed at any time.
     """
 
+    keeps_pace = True
+    """Bytes take their time here, at the rate that the drive is set to."""
+
     def __init__(
         self,
         load: Load | None,
@@ -86,9 +89,6 @@ class MotorEmulator(DeviceEmulator):
         self._in: deque[tuple[float, bytes]] = deque()
         self._answers: deque[tuple[float, str]] = deque()
         self._out: deque[tuple[float, bytes]] = deque()
-
-    keeps_pace = True
-    """Bytes take their time here, at the rate that the drive is set to."""
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> list[Sent]:
         """Take bytes that the host sends from `now_s` on, at the line's rate; return what `poll` returns.
