@@ -17,6 +17,7 @@ from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, r
 from tactbench.core.evaluation.fitting import answers as answers_of
 from tactbench.core.evaluation.fitting import fit
 from tactbench.core.evaluation.interval import LEVEL, score_interval
+from tactbench.core.evaluation.leaks import leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
 from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import ProtocolSpec, protocol_called
@@ -144,6 +145,7 @@ class _Folds:
         self.chosen: list[Choice] = []
         self.names: list[str] = []
         self.folds = self.n_train = self.k = 0
+        self.stamps: tuple[str, ...] = data.stamps
         self.search_s = self.fit_s = self.predict_s = 0.0
         self.model: Estimator | None = None
         self.test: Any = None
@@ -226,6 +228,7 @@ def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> Cell
         tare_s(data)  # refuses recordings of which only some can be tared
     assignments = assigned(context.task, estimator, data, folds.split, context.seed)
     assert_disjoint(assignments)
+    folds.stamps += (SHUFFLED_STAMP,) if folds.split == "shuffled" else leak_stamps(data, assignments)
     build = builder(estimator, context.params, context.task, context.seed, context.threads)
     with thread_limit(context.threads):
         for number, assignment in enumerate(assignments):
@@ -343,7 +346,7 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
         counts=dict(folds.counts),
         chosen=_chosen(folds.chosen, folds.names),
         dagger=rules.uses_test_statistics,
-        stamps=(SHUFFLED_STAMP,) if split == "shuffled" else (),
+        stamps=folds.stamps,
         search_s=folds.search_s,
         fit_s=folds.fit_s,
         predict_s=folds.predict_s,

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable
+from tactbench.core.evaluation.alignment import require_forward
 from tactbench.core.evaluation.channels import channel_on, channels_for, feature_streams, features_on, on_clock
 from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.samples import FloatArray, IntArray, StreamData
@@ -52,6 +53,8 @@ class Dataset:
     """What was left out, and why"""
     paths: tuple[Path, ...] = ()
     """The files of the tables"""
+    stamps: tuple[str, ...] = ()
+    """What a reader of a score must know of the recordings"""
 
     @property
     def metas(self) -> tuple[RecordingMeta, ...]:
@@ -70,6 +73,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
         If a channel has no sample at all, the recordings disagree about their channels, or nothing is left.
     """
     counts: Counter[str] = Counter()
+    repeated: dict[str, int] = {}
     read: list[tuple[RecordingMeta, _Raw]] = []
     used: list[Path] = []
     for path in recordings:
@@ -77,7 +81,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
             if recording.meta.excluded:
                 counts[f"recordings left out ({recording.meta.excluded})"] += 1
                 continue
-            read.append((recording.meta, _read(recording, task, counts)))
+            read.append((recording.meta, _read(recording, task, counts, repeated)))
             used.append(path)
     if not read:
         raise DataError("No recording is left to evaluate.", hint="See what was left out with `tactbench inspect`.")
@@ -94,7 +98,15 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
         counts[f"of {sum(len(table.row) for table in tables)} rows have no {_wanted(task)} and were left out"] = (
             unlabelled
         )
-    return Dataset(tables, read[0][1].features, classes, dict(counts), tuple(used))
+    return Dataset(tables, read[0][1].features, classes, dict(counts), tuple(used), _clock_stamps(repeated))
+
+
+def _clock_stamps(repeated: Mapping[str, int]) -> tuple[str, ...]:
+    if not repeated:
+        return ()
+    worst = max(repeated, key=lambda name: repeated[name])
+    number = f"{len(repeated)} recording{'s' if len(repeated) > 1 else ''}"
+    return (f"clock: times equal the one before in {number}, {repeated[worst]} times in {worst!r}.",)
 
 
 @dataclass
@@ -109,10 +121,13 @@ class _Raw:
     groups: dict[str, npt.NDArray[np.str_]]
 
 
-def _read(recording: Recording, task: TaskSpec, counts: Counter[str]) -> _Raw:
+def _read(recording: Recording, task: TaskSpec, counts: Counter[str], repeated: dict[str, int]) -> _Raw:
     meta = recording.meta
     streams = [recording.read(name) for name in feature_streams(recording, task)]
     data = streams[0]
+    again = max(require_forward(stream, meta.name) for stream in streams)
+    if again:
+        repeated[meta.name] = again
     columns = [features_on(meta, data, stream, task, counts) for stream in streams]
     names = tuple(name for some, _ in columns for name in some)
     X = np.hstack([block for _, block in columns])

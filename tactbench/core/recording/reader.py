@@ -89,6 +89,8 @@ class Recording:
         False for what a crash left behind.
     version
         That of the file's format.
+    stream_names
+        Names of the streams that hold data, the sensor's first, in the order of the specs.
     """
 
     def __init__(self, path: Path, file: Any, text: str, *, complete: bool) -> None:
@@ -103,6 +105,7 @@ class Recording:
         self._streams = trust.subgroup(path, file, "streams")
         if self._streams is None:
             raise FormatError(f"{path} has no streams.", hint=trust.SEE)
+        self.stream_names = tuple(name for name in self._specs if name in self._streams)
 
     def __enter__(self) -> Recording:
         return self
@@ -115,11 +118,6 @@ class Recording:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    @property
-    def stream_names(self) -> tuple[str, ...]:
-        """Names of the streams that hold data, the sensor's first, in the order of the specs."""
-        return tuple(name for name in self._specs if name in self._streams)
 
     def stream(self, name: str) -> LazyStream:
         """Return a stream to slice.
@@ -163,13 +161,15 @@ class Recording:
                 raise _damaged(self.path, error) from error
         return digest.hexdigest()
 
-    def verify(self) -> None:
-        """Compare the data with the digest that was written with it; raises FormatError if they differ."""
-        if self.content_digest() != self._file.attrs.get("content_sha256", ""):
+    def verify(self) -> str:
+        """Compare the data with the digest that was written with it, and return it; FormatError if they differ."""
+        digest = self.content_digest()
+        if digest != self._file.attrs.get("content_sha256", ""):
             raise FormatError(
                 f"{self.path} does not hold what was written: its content digest differs.",
-                hint="The file was changed or damaged afterwards; get it again from its source.",
+                hint="The file was changed or damaged afterwards; get it again from its source, or record it again.",
             )
+        return digest
 
 
 def open_recording(path: Path) -> Recording:
@@ -192,9 +192,9 @@ def read_meta(path: Path) -> RecordingMeta:
 
 
 def content_digest(path: Path) -> str:
-    """Return the digest of what a recording says."""
+    """Return the digest of what a recording says; FormatError if that is not what was written."""
     with open_recording(path) as recording:
-        return recording.content_digest()
+        return recording.verify()
 
 
 _NOTE = "annotations/"
@@ -294,6 +294,7 @@ def _envelope(path: Path, file: Any) -> str:
         raise FormatError(f"{path} was not finished.", hint="Record it again.")
     text = file.attrs["meta"]
     text = bytes(text).decode() if isinstance(text, bytes) else str(text)
+    text.encode()  # h5py keeps bytes that are no UTF-8 as surrogates
     if len(text) > layout.MAX_META_CHARACTERS:
         raise FormatError(f"{path} has a meta text of {len(text)} characters.", hint=trust.SEE)
     return text
@@ -302,9 +303,13 @@ def _envelope(path: Path, file: Any) -> str:
 def parse_meta(path: Path, text: str) -> RecordingMeta:
     """Return a meta text as a model; FormatError, naming `path`, if it makes no sense."""
     try:
-        return RecordingMeta.model_validate(json.loads(text))
-    except (json.JSONDecodeError, RecursionError) as error:
+        content = json.loads(text)
+        if "\\ud" in text or "\\uD" in text:  # a surrogate, perhaps without its other half: nothing can print it
+            layout.canonical(content).encode()
+    except (ValueError, RecursionError) as error:
         raise _damaged(path, error) from error
+    try:
+        return RecordingMeta.model_validate(content)
     except UsageError as error:
         raise FormatError(f"{path} says something that cannot be: {error.message}", hint=trust.SEE) from error
     except ValidationError as error:

@@ -261,12 +261,9 @@ class RecordingWriter:
 def _columns(block: Block, spec: StreamSpec) -> Columns:
     """Return what is stored of `block`, by column; quality only if something is not good."""
     columns: Columns = {"data": _stored(block.data, spec)}
-    if block.t_ns is not None:
-        columns["t_ns"] = np.asarray(block.t_ns, dtype=np.int64)
-    if block.sequence is not None:
-        columns["sequence"] = np.asarray(block.sequence, dtype=np.int64)
-    if block.device_ns is not None:
-        columns["device_ns"] = np.asarray(block.device_ns, dtype=np.int64)
+    for name, numbers in (("t_ns", block.t_ns), ("sequence", block.sequence), ("device_ns", block.device_ns)):
+        if numbers is not None:
+            columns[name] = _whole(np.asarray(numbers), name, spec)
     if block.quality is not None:
         if block.quality.shape != block.data.shape:
             raise RigError(
@@ -276,6 +273,17 @@ def _columns(block: Block, spec: StreamSpec) -> Columns:
         if block.quality.any():
             columns["quality"] = np.asarray(block.quality, dtype=np.uint8)
     return columns
+
+
+def _whole(numbers: npt.NDArray[Any], name: str, spec: StreamSpec) -> npt.NDArray[np.int64]:
+    if numbers.dtype.kind not in "iu" and not (
+        numbers.dtype.kind == "f" and np.array_equal(np.rint(numbers), numbers) and (np.abs(numbers) < 2.0**63).all()
+    ):
+        raise RigError(
+            f"A block of stream {spec.name!r} has {name} that are no whole numbers, NaN perhaps.",
+            hint="Give times as whole nanoseconds and sequence numbers as counted; never invent one.",
+        )
+    return numbers.astype(np.int64)
 
 
 def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:

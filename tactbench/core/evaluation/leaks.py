@@ -1,0 +1,95 @@
+"""Test rows that stand among the training rows too: one recording under two names, or pieces of one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.splits import Assignment, Mask
+from tactbench.core.samples import FloatArray
+
+BLOCK = 16
+"""Consecutive rows that must be equal; a recording of fewer rows counts as a whole."""
+CHANGES = 0.5
+"""Share of the rows of a block that must differ from the row before: sensors at rest repeat themselves."""
+MOST_SHARED = 0.05
+"""Share of the test rows of a fold that is put up with. Two presses on a sensor with noise share none."""
+
+_Hashes = npt.NDArray[np.uint64]
+
+
+def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
+    """Return a stamp if readings of a fold's test set stand in its training set too, else nothing."""
+    rows = [_row_hashes(table.X) for table in data.tables]
+    worst, pair = 0.0, ("", "")
+    for fold in assignments:
+        share, found = _shared(data, rows, fold)
+        if share > worst:
+            worst, pair = share, found
+    if worst <= MOST_SHARED:
+        return ()
+    return (
+        f"leaks: {worst:.0%} of the test rows of a fold are equal to training rows, in blocks of {BLOCK}; "
+        f"{pair[0]!r} repeats {pair[1]!r}.",
+    )
+
+
+def _shared(data: Dataset, rows: Sequence[_Hashes], fold: Assignment) -> tuple[float, tuple[str, str]]:
+    """Return which share of a fold's test rows stands in its training rows, and the pair of recordings most alike."""
+    trained = [_blocks(rows[place][mask])[0] for place, mask in enumerate(_fitted(fold))]
+    known = np.concatenate(trained)
+    owner = np.repeat(np.arange(len(trained)), [len(one) for one in trained])
+    order = np.argsort(known, kind="stable")
+    known, owner = known[order], owner[order]
+    total = covered = most = 0
+    pair = ("", "")
+    for place, mask in enumerate(fold.test):
+        hashes, starts, length = _blocks(rows[place][mask])
+        total += int(mask.sum())
+        at = np.searchsorted(known, hashes)
+        there = at < len(known)
+        there[there] = known[at[there]] == hashes[there]
+        same = np.flatnonzero(there)
+        if not len(same):
+            continue
+        inside = np.zeros(int(mask.sum()), dtype=bool)
+        for step in range(length):
+            inside[starts[same] + step] = True
+        covered += int(inside.sum())
+        if int(inside.sum()) > most:
+            most = int(inside.sum())
+            other = int(np.bincount(owner[at[same]]).argmax())
+            pair = (data.tables[place].meta.name, data.tables[other].meta.name)
+    return (covered / total if total else 0.0), pair
+
+
+def _fitted(fold: Assignment) -> list[Mask]:
+    if fold.validation is None:
+        return list(fold.train)
+    return [train | validation for train, validation in zip(fold.train, fold.validation, strict=True)]
+
+
+def _row_hashes(X: FloatArray) -> _Hashes:
+    """Return a number for each row of (n, q) readings: equal rows have equal ones, others hardly ever."""
+    bits = np.ascontiguousarray(X + 0.0).view(np.uint64)  # adding 0 makes -0 and 0 one
+    mixed = (bits ^ (bits >> np.uint64(32))) * _factors(X.shape[1])
+    return np.asarray((mixed ^ (mixed >> np.uint64(29))).sum(axis=1, dtype=np.uint64))
+
+
+def _blocks(rows: _Hashes) -> tuple[_Hashes, npt.NDArray[np.int64], int]:
+    """Return a number for each block of consecutive rows that changes enough, the block's first row, and its length."""
+    length = min(BLOCK, len(rows))
+    if length < 2:
+        return np.zeros(0, np.uint64), np.zeros(0, np.int64), length
+    windows = np.lib.stride_tricks.sliding_window_view(rows, length)
+    changing = (np.diff(windows, axis=1) != 0).sum(axis=1) >= CHANGES * (length - 1)
+    starts = np.flatnonzero(changing)
+    return (windows[starts] * _factors(length)).sum(axis=1, dtype=np.uint64), starts, length
+
+
+def _factors(count: int) -> _Hashes:
+    """Return `count` odd numbers, always the same."""
+    return np.random.default_rng(16).integers(0, 2**63, count, dtype=np.uint64) * np.uint64(2) + np.uint64(1)
