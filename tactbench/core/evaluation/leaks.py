@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from tactbench.core.evaluation.dataset import Dataset
+from tactbench.core.evaluation.dataset import Dataset, Table
 from tactbench.core.evaluation.splits import Assignment, Mask
-from tactbench.core.samples import FloatArray
 
 BLOCK = 16
 """Consecutive rows that must be equal; a recording of fewer rows counts as a whole."""
@@ -23,7 +22,7 @@ _Hashes = npt.NDArray[np.uint64]
 
 def leak_stamps(data: Dataset, assignments: Sequence[Assignment]) -> tuple[str, ...]:
     """Return a stamp if readings of a fold's test set stand in its training set too, else nothing."""
-    rows = [_row_hashes(table.X) for table in data.tables]
+    rows = [_row_hashes(table) for table in data.tables]
     worst, pair = 0.0, ("", "")
     for fold in assignments:
         share, found = _shared(data, rows, fold)
@@ -72,8 +71,12 @@ def _fitted(fold: Assignment) -> list[Mask]:
     return [train | validation for train, validation in zip(fold.train, fold.validation, strict=True)]
 
 
-def _row_hashes(X: FloatArray) -> _Hashes:
-    """Return a number for each row of (n, q) readings: equal rows have equal ones, others hardly ever."""
+def _row_hashes(table: Table) -> _Hashes:
+    """Return a number for each row of readings and force: equal rows have equal ones, others hardly ever.
+
+    With the force, since a sensor without noise repeats itself where the reference does not.
+    """
+    X = table.X if table.force is None else np.column_stack([table.X, table.force])
     bits = np.ascontiguousarray(X + 0.0).view(np.uint64)  # adding 0 makes -0 and 0 one
     mixed = (bits ^ (bits >> np.uint64(32))) * _factors(X.shape[1])
     return np.asarray((mixed ^ (mixed >> np.uint64(29))).sum(axis=1, dtype=np.uint64))

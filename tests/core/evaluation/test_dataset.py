@@ -148,3 +148,22 @@ def test_several_force_channels_need_a_name(tmp_path):
     assert table.force is not None, "the paper's rule looks at the force in the curvature task too"
     named = force_task(target=ChannelTarget(kind="force", name="fb"))
     assert set(load_dataset(named, [tmp_path / "a.h5"]).tables[0].y) == {2.0}
+
+
+@pytest.mark.parametrize("what", ["backwards", "still", "reference backwards"])
+def test_time_that_does_not_run_forward_is_refused(tmp_path, what):
+    t = np.arange(0.0, 100.0, 10.0)
+    turned, constant = t[::-1].copy(), np.full(10, 30.0)
+    slow = {"backwards": turned, "still": constant}.get(what, t)
+    path = two_streams(tmp_path / "a.h5", (slow, t), (slow, t), (turned if "reference" in what else t, t))
+    with pytest.raises(DataError, match="stands still" if what == "still" else "runs backwards 9 times"):
+        load_dataset(force_task(), [path])
+
+
+def test_times_that_repeat_are_stamped(tmp_path):
+    X, force = ramp(0, n=50)
+    t_ns = np.arange(50) * 10 * MS
+    t_ns[20] = t_ns[19]
+    data = load_dataset(force_task(), [record(tmp_path / "a.h5", X, force, t_ns=t_ns)])
+    assert data.stamps == ("clock: times equal the one before in 1 recording, 1 times in 'a'.",)
+    assert load_dataset(force_task(), [record(tmp_path / "b.h5", X, force)]).stamps == ()

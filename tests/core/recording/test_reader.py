@@ -2,6 +2,7 @@
 
 import json
 import random
+import zlib
 
 import h5py
 import numpy as np
@@ -316,3 +317,83 @@ def test_a_journal_is_read_block_by_block(tmp_path, make_meta):
         ((stream, columns),) = journal.blocks()
     assert stream == "taxels"
     assert columns["data"].dtype == np.uint16
+
+
+def _crafted(path, change):
+    """Let `change` make something of the data's place in the streams of a sound recording."""
+    with h5py.File(path, "r+") as file:
+        group = file["streams/taxels"]
+        change(group)
+    with pytest.raises(FormatError) as caught:
+        read_all(path)
+    return str(caught.value)
+
+
+def _replaced(group, name, **stored):
+    del group[name]
+    return group.create_dataset(name, **stored)
+
+
+def test_a_chunk_larger_than_anything_in_it(good):
+    def change(group):
+        dtype = group["data"].dtype
+        made = _replaced(
+            group, "data", shape=(3000, 3), dtype=dtype, chunks=(2**25, 3), maxshape=(None, 3), compression="gzip"
+        )
+        made.id.write_direct_chunk((0, 0), zlib.compress(bytes(3000)))
+
+    assert "has chunks of" in _crafted(good, change)
+
+
+def test_a_chunk_that_inflates_to_more_than_it_claims(good):
+    """HDF5 inflates a chunk to its end, whatever size it should have."""
+
+    def change(group):
+        dtype = group["data"].dtype
+        made = _replaced(group, "data", shape=(2**19, 3), dtype=dtype, chunks=(2**19, 3), compression="gzip")
+        made.id.write_direct_chunk((0, 0), zlib.compress(bytes(300 * 2**20)))
+
+    assert "does not hold what it claims" in _crafted(good, change)
+
+
+def test_more_values_than_a_file_of_its_size_means(good):
+    def change(group):
+        dtype = group["data"].dtype
+        made = _replaced(group, "data", shape=(2**24, 3), dtype=dtype, chunks=(2**16, 3), compression="gzip")
+        zeros = zlib.compress(bytes(2**16 * 3 * dtype.itemsize))
+        for start in range(0, 2**24, 2**16):
+            made.id.write_direct_chunk((start, 0), zeros)
+
+    assert "claims 50331648 values" in _crafted(good, change)
+
+
+def test_texts_that_share_one_place(good):
+    """Every row refers to the same text of 64 KiB in the heap."""
+
+    def change(group):
+        notes = group["annotations"]
+        del notes["object"]
+        made = notes.create_dataset(
+            "object", shape=(3000,), dtype=h5py.string_dtype("utf-8"), chunks=(3000,), compression="gzip"
+        )
+        made[0] = "x" * 2**16
+        reference = zlib.decompress(made.id.read_direct_chunk((0,))[1])[:16]
+        made.id.write_direct_chunk((0,), zlib.compress(reference * 3000))
+
+    assert "claims texts of 196608000 bytes" in _crafted(good, change)
+
+
+def test_an_altered_recording_is_refused_by_whoever_reads_its_digest(good):
+    with h5py.File(good, "r+") as file:
+        file["streams/taxels/data"][17, 1] += 1
+    with pytest.raises(FormatError, match="content digest differs"):
+        content_digest(good)
+
+
+@pytest.mark.parametrize("name", ["ba\udcefd", "ba\\ud800d"])
+def test_texts_that_nothing_can_print(good, name):
+    with h5py.File(good, "r+") as file:
+        text = file.attrs["meta"]
+        file.attrs["meta"] = np.bytes_(text.replace(json.loads(text)["name"], name).encode("utf-8", "surrogateescape"))
+    with pytest.raises(FormatError, match="damaged"):
+        open_recording(good)

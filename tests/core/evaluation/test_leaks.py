@@ -1,0 +1,52 @@
+"""A recording under two names, or a piece of one, on both sides of a split is stamped; alike presses are not."""
+
+import time
+
+import numpy as np
+import pytest
+
+from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.plugins.registry import load_registry
+
+from .made import force_task, record
+from .test_karl2016 import ramp
+
+ESTIMATOR = load_registry().estimators["ols"]
+
+
+def stamps(paths, split="session"):
+    context = CellContext(force_task(), ESTIMATOR, {}, "deployable", split, seed=1, clock=time.perf_counter)
+    return evaluate(context, paths).stamps
+
+
+def test_sessions_of_their_own_have_no_stamp(tmp_path):
+    paths = [record(tmp_path / f"{n}.h5", *ramp(n, n=200), session=str(n)) for n in range(3)]
+    assert stamps(paths) == ()
+    assert stamps(paths, "in-session") == ()
+
+
+@pytest.mark.parametrize("split", ["session", "roles"])
+def test_one_recording_under_two_sessions_or_roles(tmp_path, split):
+    roles = ("train", "train", "test") if split == "roles" else (None,) * 3
+    seeds = (0, 1, 0)
+    paths = [record(tmp_path / f"{n}.h5", *ramp(seeds[n], n=200), session=str(n), role=roles[n]) for n in range(3)]
+    (stamp,) = stamps(paths, split)
+    assert stamp.startswith("leaks: 100% of the test rows of a fold are equal to training rows")
+    assert "'2' repeats '0'" in stamp or "'0' repeats '2'" in stamp
+
+
+def test_a_piece_of_a_training_recording_at_another_time(tmp_path):
+    X, force = ramp(0, n=200)
+    other, other_force = ramp(1, n=200)
+    mixed = np.concatenate([other[:150], X[100:150]]), np.concatenate([other_force[:150], force[100:150]])
+    paths = [record(tmp_path / "a.h5", X, force, session="1"), record(tmp_path / "b.h5", *mixed, session="2")]
+    assert stamps(paths)[0].startswith("leaks: 25%")
+
+
+def test_a_sensor_at_rest_repeats_itself_and_is_no_leak(tmp_path):
+    paths = []
+    for n in range(2):
+        X, force = ramp(n, n=400)
+        X[:200], force[:200] = 7.0, 0.0
+        paths.append(record(tmp_path / f"{n}.h5", X, force, session=str(n)))
+    assert stamps(paths) == ()
