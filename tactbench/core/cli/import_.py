@@ -88,18 +88,14 @@ def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: 
 
 def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:
     """Return ``key=value`` pairs; values are read as YAML reads a number, a truth value or a text."""
-    import yaml
+    from tactbench.core.spec.yaml_file import plain_value
 
     found: dict[str, Any] = {}
     for text in given:
         key, separator, value = text.partition("=")
         if not separator or not key or key in found:
             raise click.UsageError(f"{option} {text!r}: {PAIRS} is expected, each key once.")
-        try:
-            read = yaml.safe_load(value)
-        except yaml.YAMLError:
-            read = value
-        found[key] = read if isinstance(read, str | int | float | bool) else value
+        found[key] = plain_value(value)
     return found
 
 

@@ -13,6 +13,13 @@ from tactbench.core.errors import ConfigError, nearest
 M = TypeVar("M", bound=BaseModel)
 Path_ = tuple[str | int, ...]
 
+MOST_BYTES = 2**17
+"""The parser reads some 300 kB a second; the largest file of this project has 12 kB."""
+MOST_DEPTH = 32
+MOST_ALIASES = 100
+MOST_VALUES = 20_000
+"""With every alias written out: nine lines of nine aliases each are a third of a billion values."""
+
 
 def load_yaml(path: Path, model: type[M]) -> M:
     """Read `path` and return it as a `model`.
@@ -24,7 +31,13 @@ def load_yaml(path: Path, model: type[M]) -> M:
         is offered), or a value that `model` refuses. The message starts with ``file:line``.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open("rb") as opened:
+            held = opened.read(MOST_BYTES + 1)
+        if len(held) > MOST_BYTES:
+            raise ConfigError(
+                str(path), None, f"is larger than {MOST_BYTES // 1024} KiB.", hint="Is it the right file?"
+            )
+        text = held.decode()
     except OSError as error:
         raise ConfigError(
             str(path), None, f"cannot be read: {error.strerror}.", hint="Check the path and its permissions."
@@ -32,6 +45,7 @@ def load_yaml(path: Path, model: type[M]) -> M:
     except UnicodeDecodeError as error:
         raise ConfigError(str(path), None, "is not UTF-8 text.", hint="Save it as UTF-8.") from error
     try:
+        _require_small(text, str(path))
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -49,9 +63,35 @@ def load_yaml(path: Path, model: type[M]) -> M:
         raise _explain(error, str(path), lines, data, model) from error
 
 
+def plain_value(text: str) -> Any:
+    """Return what YAML reads `text` as if that is a number, a truth value or a text, else `text` itself."""
+    try:
+        _require_small(text, "")
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        value = _scalar(node, "") if isinstance(node, yaml.ScalarNode) else text
+    except (yaml.YAMLError, ConfigError):
+        return text
+    return value if isinstance(value, str | int | float | bool) else text
+
+
+def _require_small(text: str, file: str) -> None:
+    """Refuse what nests too deep, or repeats itself too often, before it is built; ConfigError, yaml.YAMLError."""
+    depth = aliases = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        aliases += isinstance(event, yaml.AliasEvent)
+        if depth > MOST_DEPTH or aliases > MOST_ALIASES:
+            line = event.start_mark.line + 1 if event.start_mark else None
+            what = f"it nests {depth} deep" if depth > MOST_DEPTH else f"it has more than {MOST_ALIASES} aliases"
+            raise ConfigError(file, line, f"{what}.", hint="Write it out plainly.")
+
+
 def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -> Any:
     """Build plain data from `node`, remembering the line of every key and item."""
     lines.setdefault(at, node.start_mark.line + 1)
+    if len(at) > MOST_DEPTH or len(lines) > MOST_VALUES:
+        what = "an alias contains itself" if len(at) > MOST_DEPTH else f"there are more than {MOST_VALUES} values here"
+        raise ConfigError(file, node.start_mark.line + 1, f"{what}.", hint="Write it out, without aliases (*).")
     if not node.tag.startswith("tag:yaml.org,2002:") or "python" in node.tag:
         raise ConfigError(
             file, node.start_mark.line + 1, f"the tag {node.tag!r} is refused.", hint="Only plain YAML is read."
@@ -59,8 +99,8 @@ def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -
     if isinstance(node, yaml.MappingNode):
         built: dict[str | int, Any] = {}
         for key_node, value_node in node.value:
-            key = yaml.SafeLoader("").construct_object(key_node)
             line = key_node.start_mark.line + 1
+            key = _scalar(key_node, file) if isinstance(key_node, yaml.ScalarNode) else None
             if not isinstance(key, str | int):
                 raise ConfigError(file, line, "a key must be a word or a number.", hint="Quote it.")
             if key in built:
@@ -70,11 +110,15 @@ def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -
         return built
     if isinstance(node, yaml.SequenceNode):
         return [_construct(item, (*at, place), lines, file) for place, item in enumerate(node.value)]
+    return _scalar(node, file)
+
+
+def _scalar(node: yaml.Node, file: str) -> Any:
     try:
-        return yaml.SafeLoader("").construct_object(node)
+        return yaml.constructor.SafeConstructor().construct_object(node)
     except (yaml.YAMLError, ValueError) as error:
         raise ConfigError(
-            file, node.start_mark.line + 1, f"{getattr(node, 'value', '')!r} cannot be read as a plain value.",
+            file, node.start_mark.line + 1, f"{str(node.value)[:80]!r} cannot be read as a plain value.",
             hint="Only plain YAML is read: no tags that build objects.",
         ) from error  # fmt: skip
 

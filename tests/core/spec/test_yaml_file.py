@@ -6,7 +6,9 @@ from hypothesis import strategies as st
 
 from tactbench.core.errors import ConfigError
 from tactbench.core.spec.matrix import MatrixSpec
-from tactbench.core.spec.yaml_file import load_yaml
+from tactbench.core.spec.yaml_file import load_yaml, plain_value
+
+from .yaml_bombs import BOMBS
 
 GOOD = "version: 1\nsensors: [biotac]\ntasks:\n  - force\n  - name: curvature\n    estimators: [forest]\n"
 
@@ -56,3 +58,17 @@ def test_any_text_is_a_model_or_a_config_error(tmp_path_factory, text):
     path.write_text(text, encoding="utf-8", errors="replace")
     with contextlib.suppress(ConfigError):
         assert isinstance(load_yaml(path, MatrixSpec), MatrixSpec)
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_text_that_grows_when_it_is_built_is_refused(tmp_path, name):
+    """What a value makes of itself does not matter: each of these is refused, within the time that a test has."""
+    with pytest.raises(ConfigError):
+        load(tmp_path, BOMBS[name])
+    assert plain_value(BOMBS[name]) is not None
+
+
+@pytest.mark.parametrize(("text", "value"), [("3", 3), ("0.5", 0.5), ("yes", True), ("a b", "a b"), ("[1]", "[1]")])
+def test_a_plain_value(text, value):
+    assert plain_value(text) == value
+    assert type(plain_value(text)) is type(value)
