@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +15,7 @@ from tactbench.core.samples import Block
 from tactbench.core.spec.recording import Emulation, RecordingMeta, StreamClock, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Role, Scene
+from tactbench.core.thread_limit import thread_limit
 
 
 class Acquired(NamedTuple):
@@ -65,7 +68,7 @@ def acquire(
         If the file cannot be written.
     """
     began = clock()
-    with rig.open(sensor, scene, seed=seed) as acquisition:
+    with _one_thread(descriptor), rig.open(sensor, scene, seed=seed) as acquisition:
         meta = _meta(acquisition, sensor, descriptor, scene, role, seed)
         spent = clock() - began
         key = "sim_s" if descriptor.simulated else "acquisition_s"
@@ -97,6 +100,14 @@ def acquire(
                 raise
             _conclude(writer, acquisition, descriptor, {**provenance, key: spent})
     return Acquired(writer.meta, writer.content_digest)
+
+
+def _one_thread(descriptor: RigDescriptor) -> AbstractContextManager[Any]:
+    """Return a context in which a simulation makes the same bytes whatever number of threads BLAS was started with."""
+    if not descriptor.simulated:
+        return nullcontext()
+    importlib.import_module("scipy.linalg")  # it brings a BLAS of its own: only what is loaded can be held
+    return thread_limit(1)
 
 
 def _conclude(

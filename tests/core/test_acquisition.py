@@ -1,6 +1,9 @@
 """One scene on a rig into one file: everything the rig says is kept, and a rig that fails leaves nothing."""
 
 import itertools
+import os
+import subprocess
+import sys
 from contextlib import contextmanager
 
 import numpy as np
@@ -8,7 +11,7 @@ import pytest
 
 from tactbench.core.acquisition import acquire
 from tactbench.core.errors import LinkUnplugged, RecordingError, RigError
-from tactbench.core.recording.reader import open_recording
+from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
 from tactbench.core.spec.quantity import Source, assumed
@@ -291,3 +294,14 @@ def test_an_interrupted_recording_that_cannot_be_completed_leaves_its_journal(tm
     assert "gone" in meta.excluded
     assert meta.streams["taxels"] == StreamCounts(received=162, written=160, dropped=2)
     assert meta.clocks["taxels"].method == "hull-1way"
+
+
+def test_a_simulation_says_the_same_whatever_number_of_threads_blas_was_started_with(tmp_path):
+    digests = set()
+    for threads in ("1", "2"):
+        path = tmp_path / threads / "press.h5"
+        env = {**os.environ, "OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads}
+        command = [sys.executable, "-m", "tactbench", "record", "--sensor", "icub", "--cap-mm", "5", "--seconds", "10"]
+        subprocess.run([*command, "--out", path], env=env, check=True, capture_output=True)
+        digests.add(content_digest(path))
+    assert len(digests) == 1

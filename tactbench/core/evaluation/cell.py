@@ -31,7 +31,7 @@ from tactbench.core.evaluation.splits import (
     assert_disjoint,
     choose_split,
 )
-from tactbench.core.evaluation.thread_limit import thread_limit
+from tactbench.core.thread_limit import thread_limit
 from tactbench.core.evaluation.timing import (
     AT_LEAST,
     peak_rss_mb,

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 
-from tactbench.core.evaluation.thread_limit import thread_limit
+from tactbench.core.thread_limit import thread_limit
 from tactbench.core.plugins.interfaces import Estimator
 
 _ROWS, _FEATURES = 40, 3

@@ -397,7 +397,7 @@ Groups = Mapping[Wanted, Sequence[Job]]
 
 def shared(groups: Groups, pool: Pool) -> Iterator[Job]:
     """Yield the cells group by group; before each group, load here what several of its cells need."""
-    from tactbench.core.evaluation.thread_limit import find_libraries
+    from tactbench.core.thread_limit import find_libraries
 
     for (task, recordings), jobs in groups.items():
         import_estimators([job.cell for job in jobs])
@@ -441,7 +441,7 @@ def import_ours() -> None:
 
 
 def _import(several: Set[tuple[str, str]]) -> None:
-    from tactbench.core.evaluation.thread_limit import find_libraries
+    from tactbench.core.thread_limit import find_libraries
 
     import_libraries()
     for estimator, kind in sorted(several - _tried):
