@@ -31,7 +31,6 @@ from tactbench.core.evaluation.splits import (
     assert_disjoint,
     choose_split,
 )
-from tactbench.core.thread_limit import thread_limit
 from tactbench.core.evaluation.timing import (
     AT_LEAST,
     peak_rss_mb,
@@ -45,6 +44,7 @@ from tactbench.core.samples import Answers, FloatArray, Fold, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
+from tactbench.core.thread_limit import thread_limit
 
 
 @dataclass(frozen=True)

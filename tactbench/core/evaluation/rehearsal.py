@@ -6,8 +6,8 @@ import warnings
 
 import numpy as np
 
-from tactbench.core.thread_limit import thread_limit
 from tactbench.core.plugins.interfaces import Estimator
+from tactbench.core.thread_limit import thread_limit
 
 _ROWS, _FEATURES = 40, 3
 
