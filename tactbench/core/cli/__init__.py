@@ -120,11 +120,12 @@ def _interrupted(arguments: list[str] | None) -> int:
 
 def _tell(error: Exception) -> int:
     from tactbench.core.errors import TactbenchError
+    from tactbench.core.tables.text import visible_lines
 
     if not isinstance(error, TactbenchError):
         raise error
     click.secho("Error: ", fg="red", bold=True, nl=False, err=True)
-    click.echo(error.message, err=True)
+    click.echo(visible_lines(error.message), err=True)
     if error.hint:
-        click.echo(f"  {error.hint}", err=True)
+        click.echo(visible_lines(f"  {error.hint}"), err=True)
     return error.exit_code

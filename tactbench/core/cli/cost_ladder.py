@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+
+from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from tactbench.core.cost.ladder import Ladder
@@ -51,7 +52,7 @@ def show_ladder(
         ladder = climb(matrix, registry, store, rounds=rounds, budget_s=budget, threads=threads,
                        clock=time.perf_counter, progress=told, recordings=recordings)  # fmt: skip
     if shape == "json":
-        click.echo(json.dumps(ladder.rows, indent=1, ensure_ascii=False, allow_nan=False))
+        click.echo(json_text(ladder.rows, indent=1))
     elif shape == "csv":
         click.echo(flat_csv(ladder), nl=False)
     else:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.tables.text import json_text
+
 if TYPE_CHECKING:
     from tactbench.core.cli.device_check import DeviceCheck, DeviceClock, StreamCheck
     from tactbench.core.cli.host_devices import DeviceFile, Host
@@ -32,7 +34,6 @@ def command(ctx: click.Context, rig_file: Path | None, sensor: str | None, secon
     Nothing is opened without --rig-file; motors are never started. Exit code 1 if something is wrong, 2 for a wrong
     rig file.
     """
-    import json
     import time
     from dataclasses import asdict
 
@@ -64,7 +65,7 @@ def command(ctx: click.Context, rig_file: Path | None, sensor: str | None, secon
             "devices": as_plain(checks),
             "problems": problems,
         }
-        click.echo(json.dumps(about, indent=1, ensure_ascii=False, allow_nan=False))
+        click.echo(json_text(about, indent=1))
     else:
         _print(host, registry, rig, checks, problems)
     ctx.exit(1 if problems else 0)

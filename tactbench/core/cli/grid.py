@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from tactbench.core.tables.terminal import Part
@@ -57,6 +58,6 @@ def print_records(records: Sequence[Mapping[str, Any]], shape: str) -> None:
     from tactbench.core.tables.csv_text import csv_of_records
 
     if shape == "json":
-        click.echo(json.dumps(list(records), indent=1, ensure_ascii=False, allow_nan=False))
+        click.echo(json_text(list(records), indent=1))
     else:
         click.echo(csv_of_records(records), nl=False)

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
+from tactbench.core.cli.screen import remark
+from tactbench.core.tables.text import command_line, visible
+
 if TYPE_CHECKING:
     from tactbench.core.recording.device_log import ImportedLog
     from tactbench.core.recording.mapping import ImportReport
@@ -62,8 +65,8 @@ def command(
         replace=replace,
     )  # fmt: skip
     for line in log_summary(made, target):
-        click.echo(line)
-    click.echo(f"See what is in it:  tactbench inspect {target}", err=True)
+        click.echo(visible(line))
+    remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(target))}")
 
 
 def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: bool) -> None:
@@ -83,7 +86,7 @@ def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: 
 
         report = import_tables(mapping, root=root, out=target, progress=tell, replace=replace)
     for line in summary(report, target):
-        click.echo(line)
+        click.echo(visible(line))
 
 
 def _pairs(option: str, given: tuple[str, ...]) -> dict[str, Any]:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tactbench.core.tables.text import json_text, visible
+
 if TYPE_CHECKING:
     from tactbench.core.recording.reader import Recording
 
@@ -25,8 +27,6 @@ def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bo
 
     Exit code 1 if a finding is an error, 2 if a file cannot be read.
     """
-    import json
-
     from tactbench.core.recording import salvage as unfinished
     from tactbench.core.recording.reader import open_recording
 
@@ -43,7 +43,7 @@ def command(ctx: click.Context, files: tuple[Path, ...], shape: str, salvage: bo
         if shape == "table":
             _print(described[-1])
     if shape == "json":
-        click.echo(json.dumps(described, indent=1, ensure_ascii=False, allow_nan=False))
+        click.echo(json_text(described, indent=1))
     ctx.exit(1 if any(one["severity"] == "error" for about in described for one in about["findings"]) else 0)
 
 
@@ -95,13 +95,13 @@ def _stream(recording: Recording, name: str) -> dict[str, Any]:
 
 def _print(about: dict[str, Any]) -> None:
     meta = about["meta"]
-    click.secho(about["file"], bold=True)
+    click.secho(visible(about["file"]), bold=True)
     said = [f"session {meta['session']}", f"clock {meta['clock']}"]
     said += [f"{name} {meta[name]}" for name in ("trial", "role") if meta[name]]
     mark = " (EMULATED)" if meta["emulation"] else " (SIM)" if meta["simulated"] else ""
-    click.echo(f"  {about['sensor']} on {meta['rig']}{mark}; {'; '.join(said)}")
+    _say(f"  {about['sensor']} on {meta['rig']}{mark}; {'; '.join(said)}")
     if meta["labels"]:
-        click.echo("  labels: " + ", ".join(f"{name} = {value}" for name, value in meta["labels"].items()))
+        _say("  labels: " + ", ".join(f"{name} = {value}" for name, value in meta["labels"].items()))
     for stream in about["streams"]:
         rate = "no rate"
         if stream["mean_rate_hz"]:
@@ -110,29 +110,33 @@ def _print(about: dict[str, Any]) -> None:
             f"{len(one['names'])} {one['kind']} [{one['unit']}] {_ends(one['names'])}" for one in stream["channels"]
         )
         notes = f"; labels {', '.join(stream['annotations'])}" if stream["annotations"] else ""
-        click.echo(f"  {stream['stream']} ({stream['of']}): {stream['rows']} rows, {rate}, {channels}{notes}")
+        _say(f"  {stream['stream']} ({stream['of']}): {stream['rows']} rows, {rate}, {channels}{notes}")
     for name, clock in meta["clocks"].items():
-        click.echo(f"  clock of {name}: {_clock(clock)}")
+        _say(f"  clock of {name}: {_clock(clock)}")
     if meta["emulation"]:
-        click.echo(f"  emulated: {_emulation(meta['emulation'])}")
+        _say(f"  emulated: {_emulation(meta['emulation'])}")
     for title, taken in (("effects", True), ("left out", False)):
         names = [
             f"{one['effect']}{' (asked)' if one['asked'] else ''}" for one in meta["plan"] if one["included"] == taken
         ]
         if names:
-            click.echo(f"  {title}: {', '.join(names)}")
+            _say(f"  {title}: {', '.join(names)}")
     if meta["assumptions"]:
-        click.echo("  assumed: " + ", ".join(f"{name} = {value}" for name, value in meta["assumptions"].items()))
+        _say("  assumed: " + ", ".join(f"{name} = {value}" for name, value in meta["assumptions"].items()))
     for finding in about["findings"]:
         click.secho(f"  {finding['severity']}: ", fg=COLOURS[finding["severity"]], nl=False)
-        click.echo(finding["message"])
+        _say(finding["message"])
     if not about["findings"]:
-        click.echo("  healthy: nothing was found")
+        _say("  healthy: nothing was found")
     for remark in meta["remarks"]:
-        click.echo(f"  remark: {remark}")
+        _say(f"  remark: {remark}")
     if not about["complete"]:
-        click.echo("  unfinished: this is what a crash left behind")
-    click.echo(f"  content {about['content_sha256'][:16]}{' (verified)' if about['complete'] else ''}")
+        _say("  unfinished: this is what a crash left behind")
+    _say(f"  content {about['content_sha256'][:16]}{' (verified)' if about['complete'] else ''}")
+
+
+def _say(text: str) -> None:
+    click.echo(visible(text))
 
 
 def _clock(clock: dict[str, Any]) -> str:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import click
+
+from tactbench.core.tables.text import json_text
 
 SCENARIOS = "scenarios"
 FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", SCENARIOS)
@@ -34,7 +34,7 @@ def command(family: str | None, shape: str) -> None:
             for name, _ in stated
         }
     if shape == "json":
-        click.echo(json.dumps(found, indent=1, ensure_ascii=False))
+        click.echo(json_text(found, indent=1))
         return
     for name, entries in found.items():
         click.secho(name, bold=True)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.tables.text import command_line
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -35,7 +37,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     for sentence in merged.left_out:
         remark(f"Left out: {sentence}")
     click.echo(out)
-    remark(f"Show it: tactbench leaderboard {out}")
+    remark(f"Show it: {command_line('tactbench', 'leaderboard', str(out))}")
     ctx.exit(1 if merged.left_out else 0)
 
 

@@ -9,6 +9,7 @@ import click
 
 from tactbench.core.cli.scenes import press_options, scene_of
 from tactbench.core.cli.simulation import simulation_of, simulation_options
+from tactbench.core.tables.text import command_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -114,7 +115,7 @@ def command(
     click.echo(f"{out}: {meta.sensor.name} on {meta.rig}{mark}, {scene.indenter}, in {spent:.2f} s")
     for name, value in meta.assumptions.items():
         click.echo(f"  assumed: {name} = {value}", err=True)
-    click.echo(f"See what is in it:  tactbench inspect {out}", err=True)
+    remark(f"See what is in it:  {command_line('tactbench', 'inspect', str(out))}")
 
 
 def _sliding(scene: Scene, speed_mm_s: float, sensor: SensorDescriptor) -> Scene:

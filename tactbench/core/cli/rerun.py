@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 from contextlib import redirect_stdout
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactbench.core.cli.threads import one_thread
+from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import Subject
@@ -52,7 +52,7 @@ def command(ctx: click.Context, cell: str, out: Path, shape: str) -> None:
         "differences": list(again.differences),
         "circumstances": circumstances,
     }
-    click.echo(json.dumps(facts, indent=1, ensure_ascii=False) if shape == "json" else _text(facts))
+    click.echo(json_text(facts, indent=1) if shape == "json" else _text(facts))
     ctx.exit(0 if again.identical else 1)
 
 

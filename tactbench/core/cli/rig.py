@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tactbench.core.tables.text import json_text
+
 if TYPE_CHECKING:
     from tactbench.core.plugins.checks import RigCheck
 
@@ -25,7 +27,6 @@ def check(ctx: click.Context, rig_file: Path, shape: str) -> None:
 
     Exit code 1 if the rig refuses the file, 2 if it cannot be read or lacks something.
     """
-    import json
     from dataclasses import asdict
 
     from tactbench.core.errors import UsageError
@@ -42,7 +43,7 @@ def check(ctx: click.Context, rig_file: Path, shape: str) -> None:
         )
     found: RigCheck = load_object(where)(file)
     if shape == "json":
-        click.echo(json.dumps(asdict(found), indent=1, ensure_ascii=False, allow_nan=False))
+        click.echo(json_text(asdict(found), indent=1))
     else:
         _print(found)
     ctx.exit(1 if found.problems else 0)

@@ -125,6 +125,7 @@ def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path,
 def _suggest(rows: Sequence[Mapping[str, Any]]) -> None:
     """Say what to try next, fitting to what was just run."""
     from tactbench.core.cli.screen import remark
+    from tactbench.core.tables.text import command_line
 
     row = rows[0]
     if row["simulated"]:
@@ -133,9 +134,11 @@ def _suggest(rows: Sequence[Mapping[str, Any]]) -> None:
             {"tactbench report": "all of it as one page"} if whole else {"tactbench run": "the paper's whole matrix"}
         )
         tries = first | {
-            f"tactbench run --task {row['task']} --protocol deployable": "as in use: tared before each press",
+            command_line(
+                "tactbench", "run", "--task", row["task"], "--protocol", "deployable"
+            ): "as in use: tared before each press",
             "tactbench leaderboard --format latex": "the table for a paper: SIM, † and intervals stay in it",
-            f"tactbench show {row['sensor']}": "what the sensor is, and who says so",
+            command_line("tactbench", "show", row["sensor"]): "what the sensor is, and who says so",
         }
     else:
         tries = {

@@ -33,7 +33,9 @@ def width_without_terminal() -> int:
 
 def remark(text: str) -> None:
     """Say something beside the results."""
-    click.echo(text, err=True)
+    from tactbench.core.tables.text import visible_lines
+
+    click.echo(visible_lines(text), err=True)
 
 
 def print_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], *, whole: str = "") -> None:

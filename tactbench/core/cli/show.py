@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Owned, Registry
@@ -32,7 +33,7 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
         raise UsageError("Only sensors can be shown as Markdown.", hint="Leave --format out, or take --format json.")
     if shape == "json" and not only_sensors:
         found = [shown for name in names for shown in _described(name, registry)]
-        click.echo(json.dumps(found[0] if len(found) == 1 else found, indent=1, ensure_ascii=False))
+        click.echo(json_text(found[0] if len(found) == 1 else found, indent=1))
         return
     sensors = [registry.sensors[name].spec for name in names if name in registry.sensors]
     if sensors:
@@ -97,7 +98,7 @@ def _sensors(sensors: list[SensorSpec], everything: bool, shape: str) -> None:
     from tactbench.core.report.datasheet import data_sheets, details, parameters_markdown, sensor_table, table_one
 
     if shape == "json":
-        click.echo(json.dumps([_sensor(sensor) for sensor in sensors], indent=1, ensure_ascii=False))
+        click.echo(json_text([_sensor(sensor) for sensor in sensors], indent=1))
         return
     if shape == "md":
         click.echo(parameters_markdown(sensors), nl=False)

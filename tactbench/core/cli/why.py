@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import click
 
 from tactbench.core.cli.selection import selecting_options
 from tactbench.core.cli.threads import one_thread
-from tactbench.core.tables.text import visible
+from tactbench.core.tables.text import json_text, visible
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import Subject
@@ -39,7 +38,7 @@ def command(cell: str, out: Path, shape: str, **options: Any) -> None:
 
     found = subject(out, cell, options)
     facts = _facts(found, found.explain())
-    click.echo(json.dumps(facts, indent=1, ensure_ascii=False) if shape == "json" else _text(facts))
+    click.echo(json_text(facts, indent=1) if shape == "json" else _text(facts))
 
 
 def _facts(found: Subject, why: Explanation) -> dict[str, Any]:

@@ -179,9 +179,8 @@ def _no_better_notes(rows: Sequence[Row]) -> list[str]:
 
 def _probing(row: Row) -> str:
     """Return the command that shows what the recordings of a row give away."""
-    if row["rig"] == "twin":
-        return f"tactbench run --sensor {row['sensor']} --task {row['task']} --probe"
-    return f"tactbench run --sensor {row['sensor']} --task {row['task']} --rig {row['rig']} --recordings DIR --probe"
+    replayed = () if row["rig"] == "twin" else ("--rig", row["rig"], "--recordings", "DIR")
+    return command_line("tactbench", "run", "--sensor", row["sensor"], "--task", row["task"], *replayed, "--probe")
 
 
 def _other_knowledge_notes(rows: Sequence[Row]) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any
 from tactbench.core.cost.ladder_file import VERSION
 from tactbench.core.report.ladder_table import COLUMNS, SORTED_BY, line, title
 from tactbench.core.report.section import Picture, ReportData, Section
+from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 FOLDER = "cost"
@@ -44,7 +45,8 @@ def costs_section(subject: ReportData) -> Section:
 
 def _command(subject: ReportData) -> str:
     some = next((row for row in subject.rows if row["status"] == "done"), None)
-    command = f"tactbench cost --sensor {some['sensor']} --task {some['task']}" if some else "tactbench cost"
+    words = ("--sensor", some["sensor"], "--task", some["task"]) if some else ()
+    command = command_line("tactbench", "cost", *words)
     return f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."
 
 

@@ -14,6 +14,7 @@ from tactbench.core.report.calibrated import Calibrated, PredictiveRange
 from tactbench.core.spec.task import Published, TaskSpec
 from tactbench.core.statistics.median import counted, percent
 from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.text import command_line
 
 Row = Mapping[str, Any]
 Verdict = Literal["inside", "outside", "no interval", "no answer"]
@@ -207,16 +208,16 @@ def _title(task: TaskSpec, published: Published, sensor: str | None) -> str:
 def _command(task: TaskSpec, published: Published, registry: Registry) -> str:
     """Return what to type for a row that the number may stand beside."""
     sensor = published.sensor
-    words = ["tactbench run", *([f"--sensor {sensor}"] if sensor else []), f"--task {task.name}"]
-    words.append(f"--protocol {published.protocol}")
+    words = ["tactbench", "run", *(["--sensor", sensor] if sensor else []), "--task", task.name]
+    words += ["--protocol", published.protocol]
     if published.split:
-        words.append(f"--split {published.split}")
+        words += ["--split", published.split]
     trivial = published.estimator in task.baselines  # run with any other
     if published.estimator and not trivial:
-        words.append(f"--estimator {published.estimator}")
+        words += ["--estimator", published.estimator]
     if _needs_recordings(task, published, registry):
-        words.append("--rig replay --recordings DIR")
-    return " ".join(words)
+        words += ["--rig", "replay", "--recordings", "DIR"]
+    return command_line(*words)
 
 
 def records(lines: Iterable[Reproduction]) -> list[dict[str, Any]]:

@@ -72,4 +72,4 @@ def open_results(store: Store, registry: Registry) -> Results:
     good = checked(rows)[0]
     known = {id(row) for row in good}
     shown = (*over_replicates(good), *(row for row in rows if id(row) not in known))
-    return Results(store, registry, shown, {str(row["key"]): row for row in good})
+    return Results(store, registry, shown, {str(row.get("key", "")): row for row in good})

@@ -7,6 +7,7 @@ from tactbench.core.recording.reader import read_meta
 from tactbench.core.report.datasheet import details, sensor_table, table_one
 from tactbench.core.report.section import ReportData, Section
 from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.tables.text import command_line
 
 _READINGS = 5
 """So many first lines of `details` are about readings; the parameters behind them are for `tactbench show --all`."""
@@ -28,7 +29,10 @@ def sensors_section(subject: ReportData) -> Section:
     return Section(
         "sensors",
         title,
-        paragraphs=(f"Every parameter of these sensors, and who states it: `tactbench show {' '.join(found)} --all`.",),
+        paragraphs=(
+            "Every parameter of these sensors, and who states it: "
+            f"`{command_line('tactbench', 'show', *found, '--all')}`.",
+        ),
         tables=tuple(
             sensor_table(name, specs, properties, with_source=True).compact()
             for name, properties in (("Sensor comparison", table_one(specs)), ("Readings", details(specs)[:_READINGS]))
