@@ -1,4 +1,4 @@
-"""Names from a stranger's file are shown, never acted on: by a terminal, nor by a shell that a command is pasted into."""
+"""Names from a stranger's file are shown, never acted on by a terminal, nor by a shell that a command is pasted to."""
 
 import json
 import shlex

@@ -7,7 +7,8 @@ import re
 import shutil
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast, get_args
@@ -30,6 +31,8 @@ RIG = "import"
 """What an imported recording says about its rig: somebody else's, made known by a mapping."""
 
 ENDING = ".h5"
+_IMPORTING, _LOCK = ".importing-", "lock"
+"""Of a folder in which recordings wait, and the file in it that its process holds."""
 _FILE_NAME = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
 
 Progress = Callable[[int, int, str], None]
@@ -111,8 +114,7 @@ def import_tables(
     sensor, reference, streams = sensor_of(wanted)
     sets = find(wanted, mapping.parent if root is None else root)
     made: list[Imported] = []
-    folder = _aside(out)
-    try:
+    with _aside(out) as folder:
         for done, files in enumerate(sets, 1):
             for raw in read(wanted, files):
                 meta = _meta(wanted, raw, sensor, reference)
@@ -121,20 +123,52 @@ def import_tables(
             if progress is not None:
                 progress(done, len(sets), next(iter(files.files.values())).shown)
         placed = _place(made, out, replace=replace)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
     return ImportReport(wanted.title, sensor.name, tuple(placed), _count_files(sets))
 
 
-def _aside(out: Path) -> Path:
-    """Make the folder in which recordings wait until all of them are good; hidden, so that no rig replays it."""
+@contextmanager
+def _aside(out: Path) -> Iterator[Path]:
+    """Give the folder in which recordings wait until all of them are good; hidden, so that no rig replays it.
+
+    Those that killed processes have left are removed first: nobody holds the lock in them.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
-        return Path(tempfile.mkdtemp(prefix=".importing-", dir=out))
+        for left in out.glob(f"{_IMPORTING}*"):
+            if not left.is_symlink() and left.is_dir() and not _held(left):
+                shutil.rmtree(left, ignore_errors=True)
+        folder = Path(tempfile.mkdtemp(prefix=_IMPORTING, dir=out))
+        lock = (folder / _LOCK).open("wb")
     except OSError as error:
         raise UnwritableError(
             f"The folder {out} cannot be written: {error.strerror}.", hint="Give another with --out DIR."
         ) from error
+    with lock:
+        _lock(lock.fileno())
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _held(folder: Path) -> bool:
+    """Return whether a process still writes into a folder of `_aside`."""
+    try:
+        with (folder / _LOCK).open("rb") as lock:
+            return not _lock(lock.fileno())
+    except OSError:  # no lock yet, perhaps
+        return True
+
+
+def _lock(file: int) -> bool:
+    """Lock a file for this process; the kernel lets go when it ends. Return False if another has it, or nobody can."""
+    try:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (ImportError, OSError):
+        return False
+    return True
 
 
 def _count_files(sets: Sequence[FileSet]) -> int:

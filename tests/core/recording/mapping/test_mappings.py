@@ -1,5 +1,8 @@
 """Foreign tables of every shape become recordings; every misfit is refused with its place, and nothing is left."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import yaml
@@ -452,3 +455,23 @@ def test_a_folder_that_cannot_be_written(run, put, tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(TactbenchError, match="--out"):
         run()
+
+
+def test_what_a_killed_import_left_is_removed_by_the_next_and_what_another_does_is_not(run, put, tmp_path):
+    put("a.csv", "0,1,2,3,4\n0.01,1,2,3,4\n")
+    script = "import sys, time\nfrom pathlib import Path\nfrom tactbench.core.recording.mapping import importing\n"
+    script += (
+        "with importing._aside(Path(sys.argv[1])) as folder:\n    print(folder.name, flush=True)\n    sys.stdin.read()"
+    )
+    out = tmp_path / "out"
+    with subprocess.Popen(
+        [sys.executable, "-c", script, out], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        name = other.stdout.readline().strip()
+        run()
+        assert (out / name).is_dir()
+        other.kill()
+        other.wait(60)
+    assert (out / name).is_dir()
+    run()
+    assert [path.name for path in out.iterdir()] == ["a.h5"]
