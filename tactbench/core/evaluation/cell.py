@@ -146,6 +146,7 @@ class _Folds:
         self.names: list[str] = []
         self.folds = self.n_train = self.k = 0
         self.stamps: tuple[str, ...] = data.stamps
+        self.untrained: dict[str, list[str]] = {}
         self.search_s = self.fit_s = self.predict_s = 0.0
         self.model: Estimator | None = None
         self.test: Any = None
@@ -160,6 +161,9 @@ class _Folds:
         k = choice.k if choice else estimator.window_grid[0]
         fold = prepared(assignment, data, rules, k, counts)
         _worth_answering(fold, data)
+        if data.classes:
+            for one in np.setdiff1d(fold.test.y, fold.train.y):
+                self.untrained.setdefault(str(data.classes[int(one)]), []).append(fold.name)
         X_train, X_test = features_of(fold.train, estimator), features_of(fold.test, estimator)
         model = build(choice.params if choice else {})
         began = clock()
@@ -365,11 +369,21 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
         beyond=None if floor is None else beyond_floor(floor, tested, unit, seed),
         true=None if truth is None else _against(truth, metric, tested, unit, seed),
         tare_s=held or None,
-        remarks=tuple(one for one in (no_floor, NOT_TARED if rules.tare and not held else "", *delay.remarks) if one),
+        remarks=tuple(
+            one
+            for one in (no_floor, NOT_TARED if rules.tare and not held else "", _untrained(folds), *delay.remarks)
+            if one
+        ),
     )
 
 
 NOT_TARED = "not tared: no recording states an unloaded hold"
+
+
+def _untrained(folds: _Folds) -> str:
+    """Return which classes were asked for that no training row had: no estimator can answer them."""
+    named = [f"{one!r} in {', '.join(names)}" for one, names in sorted(folds.untrained.items())]
+    return f"tested but never trained on: {'; '.join(named)}" if named else ""
 
 
 def _against(

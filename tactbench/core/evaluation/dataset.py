@@ -20,6 +20,10 @@ from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec
 
 
+LARGEST = 1e100
+"""Of a reading or a target, in whatever unit: sums of the squares of a billion of them are still numbers."""
+
+
 @dataclass(frozen=True)
 class Table:
     """One recording on the clock of its features. Rows with a missing feature are not in it."""
@@ -141,6 +145,14 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str], repeated: 
         )
     y, labelled = _target(recording, task, data)
     force = _force(recording, task, data, y)
+    targets = [("the target", y)] if task.kind == "regression" else []
+    for name, column in (*zip(names, X.T, strict=True), *targets):
+        largest = float(np.max(np.abs(column), initial=0.0, where=~np.isnan(column)))
+        if largest > LARGEST:
+            raise DataError(
+                f"In recording {meta.name!r}, {name} reaches {largest:.3g}, which cannot be computed with.",
+                hint="Is it a fill value? State it under `sentinels` in the mapping, or mark it as missing.",
+            )
     time_s = (data.t_ns - data.t_ns[0]) * 1e-9 if data.t_ns is not None else np.arange(len(X), dtype=np.float64)
     raw = _Raw(names, X, y, labelled, force, time_s, np.arange(len(X), dtype=np.int64), _groups(meta, data, task))
     whole = np.asarray(~np.isnan(X).any(axis=1))

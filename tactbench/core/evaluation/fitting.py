@@ -48,9 +48,12 @@ def answers(model: Estimator, X: FloatArray, name: str, n_classes: int) -> npt.N
     PluginContractError
         If it answers anything else.
     """
-    given = np.asarray(model.predict(X))
+    predicted = model.predict(X)
+    given = np.asarray(predicted)
     wrong = ""
-    if given.shape != (len(X),):
+    if np.ma.is_masked(predicted):
+        wrong = f"{np.ma.count_masked(predicted)} values that are masked"
+    elif given.shape != (len(X),):
         wrong = f"shape {given.shape}"
     elif given.dtype.kind not in "biuf":
         wrong = f"values of type {given.dtype}"

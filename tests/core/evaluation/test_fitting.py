@@ -39,6 +39,7 @@ class Answering:
         (np.zeros((3, 1)), 0, r"shape \(3, 1\)"),
         (np.zeros(2), 0, r"shape \(2,\)"),
         (np.array([0.0, np.nan, np.inf]), 0, "2 values that are NaN"),
+        (np.ma.masked_all(3), 0, "3 values that are masked"),
         (np.array(["a", "b", "c"]), 3, "type"),
         (np.array([0, 1, 3]), 3, "do not exist"),
         (np.array([0, 1, -1]), 3, "do not exist"),
@@ -155,3 +156,28 @@ def test_curvature_rows_of_a_single_class_each_are_answered_by_a_class(tmp_path)
     )
     # Uniform over two classes: 0.5, standard deviation 0.5 / sqrt(2000) = 0.011; five of them.
     assert result.scores["accuracy"] == pytest.approx(0.5, abs=0.056)
+
+
+@pytest.mark.parametrize("what", ["t1", "the target"])
+def test_a_number_that_cannot_be_computed_with_is_named(tmp_path, what):
+    X, force = ramp(0, n=200)
+    (X[:, 1] if what == "t1" else force)[100:] = 1e300
+    paths = [record(tmp_path / "a.h5", X, force, session="1"), record(tmp_path / "b.h5", *ramp(1, n=200), session="2")]
+    context = CellContext(
+        force_task(), load_registry().estimators["ols"], {}, "deployable", "session", seed=1, clock=ticking()
+    )
+    with pytest.raises(DataError, match=rf"In recording 'a', {what} reaches 1e\+300"):
+        evaluate(context, paths)
+
+
+def test_a_class_that_no_training_row_has_is_named(tmp_path):
+    paths = [
+        record(tmp_path / f"{name}.h5", ramp(n, n=200)[0], session=str(n), labels={"kind": name})
+        for n, name in enumerate("abc")
+    ]
+    context = CellContext(
+        label_task(), load_registry().estimators["logistic"], {}, "deployable", "session", seed=1, clock=ticking()
+    )
+    result = evaluate(context, paths)
+    assert result.score == 0.0
+    assert "tested but never trained on: 'a' in 0; 'b' in 1; 'c' in 2" in result.remarks
