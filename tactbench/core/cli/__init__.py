@@ -84,7 +84,30 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(_exit_code(arguments))
 
 
+FILES = 32
+"""Open at once: HDF5, a child process's pipes, logs and modules; a run of one job gets by with eight."""
+
+
+def _too_few_files() -> str:
+    """Return in words that too few files may be open at once; empty if enough, or if the limit could be raised."""
+    try:
+        import resource
+    except ImportError:
+        return ""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft == resource.RLIM_INFINITY or soft >= FILES:
+        return ""
+    if hard == resource.RLIM_INFINITY or hard >= FILES:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (FILES, hard))
+        return ""
+    return f"Error: {soft} files may be open at once here, and {FILES} are needed.\n  Raise it: ulimit -n 1024"
+
+
 def _exit_code(arguments: list[str] | None) -> int:
+    too_few = _too_few_files()
+    if too_few:
+        click.echo(too_few, err=True)
+        return 2
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
     except click.exceptions.Abort:

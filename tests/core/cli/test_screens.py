@@ -1,6 +1,7 @@
 """Bad input ends in one clear screen, exit code 2, and nothing half-written."""
 
 import os
+import shlex
 import subprocess
 import sys
 
@@ -102,3 +103,13 @@ def test_table_one_of_the_paper(verbs):
     assert "12" in rows["# taxels"]
     assert "capacitive" in rows["measurement principle"]
     assert rows["DC Pressure Range"].rstrip().endswith("-")
+
+
+@pytest.mark.parametrize("files", [6, 8])
+def test_a_low_limit_of_open_files_is_met_with_words(tmp_path, files):
+    command = f"ulimit -n {files}; exec {shlex.quote(sys.executable)} -m tactbench list"
+    done = subprocess.run(["bash", "-c", command], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr == (
+        f"Error: {files} files may be open at once here, and 32 are needed.\n  Raise it: ulimit -n 1024\n"
+    )
