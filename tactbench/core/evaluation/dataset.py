@@ -19,7 +19,6 @@ from tactbench.core.samples import FloatArray, IntArray, StreamData
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec
 
-
 LARGEST = 1e100
 """Of a reading or a target, in whatever unit: sums of the squares of a billion of them are still numbers."""
 

@@ -52,7 +52,7 @@ def answers(model: Estimator, X: FloatArray, name: str, n_classes: int) -> npt.N
     given = np.asarray(predicted)
     wrong = ""
     if np.ma.is_masked(predicted):
-        wrong = f"{np.ma.count_masked(predicted)} values that are masked"
+        wrong = f"{int(np.ma.getmaskarray(predicted).sum())} values that are masked"
     elif given.shape != (len(X),):
         wrong = f"shape {given.shape}"
     elif given.dtype.kind not in "biuf":
