@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Generator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import lru_cache
 
 from tactbench.core.errors import UnwritableError
@@ -54,8 +54,6 @@ def acquire_missing(
     if not missing:
         return
     book.note_recordings(missing)
-    from tactbench.core.recording.format import partial_path
-
     simulated = all(_computed(request) for request in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     told.begin("recording", len(missing), alone=False)
@@ -75,15 +73,23 @@ def acquire_missing(
                     raise outcome  # the disk is no cell's fault, and refuses the next one too
                 if isinstance(outcome, BaseException):
                     material.refused[request.path] = outcome
-                    partial_path(request.path).unlink(missing_ok=True)
+                    _discard(request)
                 else:
                     material.recorded.made(request.path, outcome)
                 told.advance(f"{request.sensor} {request.scene.name}", stopped=isinstance(outcome, BaseException))
     except BaseException:
         # Workers that were ended in the middle could not tidy up behind themselves.
         for request in missing:
-            partial_path(request.path).unlink(missing_ok=True)
+            _discard(request)
         raise
+
+
+def _discard(request: RecordingRequest) -> None:
+    """Remove what there is of a recording; a disk that refuses has been told of already."""
+    from tactbench.core.recording.format import partial_path
+
+    with suppress(OSError):
+        partial_path(request.path).unlink(missing_ok=True)
 
 
 def _computed(request: RecordingRequest) -> bool:

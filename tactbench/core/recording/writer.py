@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from types import TracebackType
@@ -255,7 +256,8 @@ class RecordingWriter:
             self._partial.close()
             self._partial = None
         if not self._keep_journal:
-            self._aside.unlink(missing_ok=True)
+            with suppress(OSError):  # a disk that refuses this has refused the recording before
+                self._aside.unlink(missing_ok=True)
 
 
 def _columns(block: Block, spec: StreamSpec) -> Columns:

@@ -15,12 +15,10 @@ from .made import answers, done, ended, kept, key
 
 
 @contextmanager
-def small_disk(folder, *options):
-    """A real file system of 600 kB."""
+def small_disk(folder, size="size=600k"):
+    """A real file system, of 600 kB unless said otherwise."""
     folder.mkdir()
-    mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=600k", "tactbench-test", str(folder)], capture_output=True
-    )
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", size, "tactbench-test", str(folder)], capture_output=True)
     if mounted.returncode:
         pytest.skip("a file system can be mounted by root only")
     try:
@@ -140,4 +138,34 @@ def test_a_disk_too_full_for_a_recording_stops_the_run_and_fails_no_cell(tmp_pat
         assert "No space left on device" in stopped.stderr
         assert str(disk / "out" / "recordings") in stopped.stderr
         assert "Traceback" not in stopped.stderr
+        assert Store(disk / "out").rows() == []
+
+
+def test_a_disk_that_turns_read_only_while_recording_is_told_on_one_screen(tmp_path):
+    with small_disk(tmp_path / "disk", "size=60m") as disk:
+        command = [
+            sys.executable,
+            "-m",
+            "tactbench",
+            "run",
+            "--repeats",
+            "1",
+            "--sensor",
+            "icub",
+            "--task",
+            "curvature",
+        ]
+        env = {**os.environ, "PYTHONPATH": str(ROOT)}
+        with subprocess.Popen([*command, "--out", disk / "out"], stderr=subprocess.PIPE, text=True, env=env) as process:
+            begun = next(line for line in process.stderr if "/15 " in line)
+            # Over itself: a disk that a process is writing to cannot be remounted.
+            subprocess.run(["mount", "--bind", disk, disk], check=True)
+            subprocess.run(["mount", "-o", "remount,bind,ro", disk], check=True)
+            try:
+                told = begun + process.stderr.read()
+                assert process.wait(60) == 2
+            finally:
+                subprocess.run(["umount", "-l", disk], check=True)
+        assert "Read-only file system" in told
+        assert "Traceback" not in told
         assert Store(disk / "out").rows() == []
