@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FolderError
+from tactbench.core.matrix.files import write_all
 from tactbench.core.matrix.store import limits
 from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
 from tactbench.core.matrix.store.sharing import canonical, definition, joined, parted, shared_lines
@@ -57,15 +57,12 @@ class Ledger:
         text = "".join(f"{line}\n" for line in lines).encode()
         file = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
         try:
-            with _alone(file):
-                end = _whole(file)
-                try:
-                    written = os.write(file, text)
-                    while written < len(text):  # the last bytes of a disk: the next write says why
-                        written += os.write(file, text[written:])
-                except BaseException:
-                    os.ftruncate(file, end)
-                    raise
+            end = _whole(file)
+            try:
+                write_all(file, text)
+            except BaseException:
+                os.ftruncate(file, end)
+                raise
         finally:
             os.close(file)
         self.known |= fresh
@@ -228,28 +225,10 @@ def _lines_of(count: int) -> str:
     return f"{count} line{'s' if count > 1 else ''}"
 
 
-@contextmanager
-def _alone(file: int) -> Iterator[None]:
-    """Keep other writers of this ledger out for the length of a line."""
-    try:
-        import fcntl
-    except ImportError:
-        yield
-        return
-    with suppress(OSError):  # some network disks know no locks
-        fcntl.flock(file, fcntl.LOCK_EX)
-    yield  # closing the file lets go
-
-
 def _whole(file: int) -> int:
     """Cut away a last line that is not whole, and return where the ledger ends."""
     end = os.fstat(file).st_size
-    if not end or os.pread(file, 1, end - 1) == b"\n":
-        return end
-    start, tail = end, b""
-    while start and b"\n" not in tail:
-        start = max(0, start - 65536)
-        tail = os.pread(file, end - start, start)
-    whole = start + tail.rfind(b"\n") + 1
-    os.ftruncate(file, whole)
-    return whole
+    if end and os.pread(file, 1, end - 1) != b"\n":
+        end = os.pread(file, end, 0).rfind(b"\n") + 1
+        os.ftruncate(file, end)
+    return end
