@@ -81,26 +81,20 @@ def main(arguments: list[str] | None = None) -> None:
     # A short-lived process that imports thousands of objects to keep: looking through them for garbage every 700 new
     # ones takes a sixth of the time of an import.
     gc.set_threshold(100_000, 50, 100)
-    sys.exit(_exit_code(arguments))
-
-
-def _exit_code(arguments: list[str] | None) -> int:
     try:
         code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
-    except click.exceptions.Abort:
-        return _interrupted(arguments)
-    except KeyboardInterrupt:
-        return _interrupted(arguments)
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        code = _interrupted(arguments)
     except click.ClickException as error:
         error.show()
-        return error.exit_code
+        code = error.exit_code
     except BrokenPipeError:
         # The reader of our output went away (`| head`): nothing to tell anybody.
         sys.stderr.close()
-        return 1
+        code = 1
     except Exception as error:
-        return _tell(error)
-    return int(code) if isinstance(code, int) else 0
+        code = _tell(error)
+    sys.exit(code if isinstance(code, int) else 0)
 
 
 def _interrupted(arguments: list[str] | None) -> int:

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.matrix.evaluate_cell import ASKED
+from tactbench.core.matrix.evaluate_cell import FIXED
 from tactbench.core.matrix.store import Row
 from tactbench.core.samples import Answers
-from tactbench.core.spec.status import STATUSES
 
 _COLUMNS = tuple(column.name for column in fields(Answers))
 
@@ -40,16 +39,14 @@ def fault_in(given: Any, asked: Row) -> str:
     row, sets = given
     if row.keys() != asked.keys():
         return f"its row has other keys: {', '.join(sorted(map(str, row.keys() ^ asked.keys())))}"
-    for name in ASKED:
+    for name in FIXED:
         if row[name] != asked[name]:
             return f"its row is that of another cell: its {name} is {row[name]!r}, not {asked[name]!r}"
-    if row["status"] not in STATUSES:
+    if row["status"] != "done":
         return f"its status is {row['status']!r}"
     recordings = row["recordings"]
     if not (isinstance(recordings, list) and all(isinstance(path, str) for path in recordings)):
         return f"its recordings are {recordings!r}"
-    if row["status"] != "done":
-        return ""
     for name in ("score", "ci_low", "ci_high"):
         if row[name] is None and name != "score":
             continue  # an interval may be undefined

@@ -30,7 +30,7 @@ from tactbench.core.errors import Crashed, EngineError, UsageError
 from tactbench.core.matrix.evaluate_cell import PRELOAD
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool.limits import Limits
-from tactbench.core.pool.message import error_of, pack, told, unpack
+from tactbench.core.pool.message import dump_error, load_error, pack, unpack
 from tactbench.core.pool.pool import Pool, R, T
 from tactbench.core.pool.processes import interrupts_blocked, set_subreaper
 from tactbench.core.provenance.source import RELEVANT, SourceDigests, digest_of, versions
@@ -135,7 +135,7 @@ class Dask:
         try:
             if future.status == "finished":
                 message = unpack(future.result(timeout=CONNECT_S))
-                return error_of(message["error"]) if "error" in message else message["value"]
+                return load_error(message["error"]) if "error" in message else message["value"]
             error = future.exception(timeout=CONNECT_S) if future.status == "error" else None
         except Exception as lost:
             return EngineError(f"What a Dask worker computed did not arrive: {lost!r}.")
@@ -179,9 +179,9 @@ def carry_out(request: bytes) -> bytes:
     pool = Pool(1, limits, preload=PRELOAD, wanted=wanted)
     for _, outcome in pool.each(partial(_in_folder, folder, concurrency, work), [item]):
         if isinstance(outcome, BaseException):
-            return pack({"error": told(outcome)})
+            return pack({"error": dump_error(outcome)})
         return pack({"value": outcome})
-    return pack({"error": told(EngineError("Nobody waits for this cell any more."))})
+    return pack({"error": dump_error(EngineError("Nobody waits for this cell any more."))})
 
 
 def _in_folder(folder: str, concurrency: int, work: Callable[..., Any], item: Any) -> Any:

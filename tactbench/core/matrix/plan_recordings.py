@@ -193,7 +193,7 @@ class RecordingPlan:
         return next((self.refused[path] for path in paths if path in self.refused), None)
 
 
-def plan(
+def plan_run(
     matrix: MatrixSpec,
     registry: Registry,
     keys: Keys,
@@ -232,13 +232,13 @@ def _from_replay(
 ) -> tuple[list[Cell], RecordingPlan]:
     found = recording_source(paths, matrix.sensors, registry, recorded, choice)
     cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
-    material = RecordingPlan(recorded)
+    recording_plan = RecordingPlan(recorded)
     for wanted in dict.fromkeys(request_key(cell) for cell in cells):
         sensor, task, split, _ = wanted
-        material.replayed[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
+        recording_plan.replayed[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
         if trouble is not None:
-            material.troubles[wanted] = trouble
-    return cells, material
+            recording_plan.troubles[wanted] = trouble
+    return cells, recording_plan
 
 
 def _without_rig(

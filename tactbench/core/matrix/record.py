@@ -24,14 +24,15 @@ GRACE_S = 5.0
 
 
 def acquire_missing(
-    material: RecordingPlan,
+    recording_plan: RecordingPlan,
     cells: Sequence[Cell],
     book: Book,
     choice: EngineChoice,
-    told: Progress,
+    progress: Progress,
     operator: Operator | None = None,
+    stage: str = "recording",
 ) -> None:
-    """Make the recordings that `cells` lack, and note in `material` which were made and what went wrong.
+    """Make the recordings that `cells` lack, and note in `recording_plan` which were made and what went wrong.
 
     Simulations do not disturb each other and are not timed by the wall: they use all cores; so are emulated devices in
     virtual time. A real rig does one scene at a time, and is asked to end before it is ended. A scene that its process
@@ -42,6 +43,8 @@ def acquire_missing(
     ----------
     operator
         Who stands at a rig of real devices.
+    stage
+        What the progress calls this.
 
     Raises
     ------
@@ -49,7 +52,7 @@ def acquire_missing(
         If the disk refuses them.
     """
     needs = dict.fromkeys(map(request_key, cells))
-    unique = {request.path: request for need in needs for request in material.requests.get(need, ())}
+    unique = {request.path: request for need in needs for request in recording_plan.requests.get(need, ())}
     missing = [request for path, request in unique.items() if not path.exists()]
     if not missing:
         return
@@ -58,7 +61,7 @@ def acquire_missing(
 
     simulated = all(_computed(request) for request in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
-    told.begin("recording", len(missing), alone=False)
+    progress.begin(stage, len(missing), alone=False)
     outcomes: Generator[tuple[RecordingRequest, str | BaseException], None, None]
     try:
         if operator is not None and not simulated:
@@ -74,11 +77,11 @@ def acquire_missing(
                 if isinstance(outcome, UnwritableError):
                     raise outcome  # the disk is no cell's fault, and refuses the next one too
                 if isinstance(outcome, BaseException):
-                    material.refused[request.path] = outcome
+                    recording_plan.refused[request.path] = outcome
                     partial_path(request.path).unlink(missing_ok=True)
                 else:
-                    material.recorded.made(request.path, outcome)
-                told.advance(f"{request.sensor} {request.scene.name}", stopped=isinstance(outcome, BaseException))
+                    recording_plan.recorded.made(request.path, outcome)
+                progress.advance(f"{request.sensor} {request.scene.name}", stopped=isinstance(outcome, BaseException))
     except BaseException:
         # Workers that were ended in the middle could not tidy up behind themselves.
         for request in missing:

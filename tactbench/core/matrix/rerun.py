@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from tactbench.core.matrix.evaluate_cell import Job, solve, unanswered
 from tactbench.core.matrix.plan import Cell
@@ -71,8 +72,10 @@ def compute_again(
     if requests and trouble is None:
         found += _recordings(paths, [(request.scene.name, made[request.path]) for request in requests])
     told(f"evaluating {cell.name}")
-    job = Job(cell, tuple(request.path for request in requests) or tuple(paths), trouble=trouble)
-    ((_, outcome),) = InProcess().each(solve, [job])
+    outcome: Any = trouble
+    if trouble is None:
+        job = Job(cell, tuple(request.path for request in requests) or tuple(paths))
+        ((_, outcome),) = InProcess().each(solve, [job])
     row, columns = (unanswered(cell, outcome), {}) if isinstance(outcome, BaseException) else outcome
     sets = {role: Answers(**columns[role]) for role in columns}
     found += _rows(before, row)
