@@ -44,7 +44,7 @@ POLL_S = 0.5
 ALONE_S = 60.0
 """Seconds that a run waits for a worker when the last one has gone."""
 MOST = 3
-"""So many differences between two environments are told."""
+"""Differences between two environments that a message names."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _LOUD = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")
 
@@ -92,7 +92,12 @@ class Dask:
                     yield item, outcome
             for item in killers:  # now alone, so that it is known which cell ends workers
                 ((_, outcome),) = self._round(client, work, [item])
-                yield item, _killer() if isinstance(outcome, KilledWorker) else outcome
+                if isinstance(outcome, KilledWorker):
+                    outcome = Crashed(
+                        "Workers ended over this cell again and again, at last with no other cell at work.",
+                        hint="The cell, or a plugin it loads, ends processes other than its own.",
+                    )
+                yield item, outcome
 
     def _round(self, client: Any, work: Callable[..., R], items: Sequence[T]) -> Iterator[tuple[T, Any]]:
         """Submit `items`, twice as many at a time as may be at work; yield each with what came of it."""
@@ -149,13 +154,6 @@ class Dask:
             f"The Dask scheduler at {client.scheduler.address} {what} before this cell was computed.",
             hint="Start it, or workers for it, and give the same command again: what was finished is kept.",
         )
-
-
-def _killer() -> Crashed:
-    return Crashed(
-        "Workers ended over this cell again and again, at last with no other cell at work.",
-        hint="The cell, or a plugin it loads, ends processes other than its own.",
-    )
 
 
 # On a worker
@@ -246,15 +244,8 @@ def environment(registry: Registry) -> dict[str, str]:
 
 def differences(here: Mapping[str, str], there: Mapping[str, str]) -> list[str]:
     """Return what `there` has otherwise than `here`, one clause for each; what only `there` has does not matter."""
-    return [_clause(name, value, there.get(name)) for name, value in here.items() if there.get(name) != value]
-
-
-def _clause(name: str, here: str, there: str | None) -> str:
-    if there is None:
-        return f"{name.removeprefix('the ')} is missing there"
-    if name.startswith("the version"):
-        return f"{name} is {there} there and {here} here"
-    return f"{name} differs"
+    found = {name: there.get(name, "missing") for name in here}
+    return [f"{name} is {found[name]} there and {here[name]} here" for name in here if found[name] != here[name]]
 
 
 # The client's side

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.installed import built
+from tactbench.core.matrix.installed import rig_of
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, request_key
 from tactbench.core.matrix.progress import Progress
@@ -114,7 +114,7 @@ def _one_by_one(
 @lru_cache(maxsize=4)
 def _rig(name: str, rig_file: str, operator: Operator | None) -> Rig:
     devices = RigFile.model_validate_json(rig_file) if rig_file else None
-    return built(name, installed(), rig_file=devices, operator=operator)  # type: ignore[return-value]
+    return rig_of(name, installed(), rig_file=devices, operator=operator)  # type: ignore[return-value]
 
 
 def record(request: RecordingRequest, operator: Operator | None = None) -> str:

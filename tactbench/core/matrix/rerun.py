@@ -16,6 +16,7 @@ from tactbench.core.matrix.record import record
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import SEED_DECIDES
+from tactbench.core.matrix.why import short
 from tactbench.core.pool.in_process import InProcess
 from tactbench.core.samples import Answers
 
@@ -104,7 +105,7 @@ def _rows(before: Row, now: Row) -> list[str]:
     if before["status"] != "done" or now["status"] != "done":
         names = ["status", "reason"]
     return [
-        f"{name}: {_shown(before.get(name))} before, {_shown(fresh.get(name))} now"
+        f"{name}: {short(before.get(name))} before, {short(fresh.get(name))} now"
         for name in names
         if before.get(name) != fresh.get(name)
     ]
@@ -127,8 +128,3 @@ def _answers(before: Mapping[str, Answers], now: Mapping[str, Answers]) -> list[
                 other = sum(a.tobytes() != b.tobytes() for a, b in zip(old.astype(new.dtype), new, strict=True))
                 found.append(f"answers on {role}: {other} of {len(new)} values of {column.name} differ")
     return found
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:59] + "…"

@@ -65,9 +65,9 @@ def removed(folder: Path) -> FolderError:
     )
 
 
-def sync_folder(folder: Path) -> None:
-    """Make what was renamed into `folder` survive a power cut; a system that cannot is not asked twice."""
-    opened = os.open(folder, os.O_RDONLY)
+def sync_path(path: Path) -> None:
+    """Have a file, or the names in a folder, survive a power cut, where the system can sync that."""
+    opened = os.open(path, os.O_RDONLY)
     try:
         os.fsync(opened)
     except OSError as error:

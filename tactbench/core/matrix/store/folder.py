@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.errors import FormatError, RecordingError
 from tactbench.core.matrix.files import replace_file, write_file
 from tactbench.core.matrix.store import leftovers, limits
-from tactbench.core.matrix.store.disk import refusal, removed, sync_folder, writing
+from tactbench.core.matrix.store.disk import refusal, removed, sync_path, writing
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
 from tactbench.core.matrix.store.rows import NAMING, Row, plain
@@ -39,7 +39,6 @@ class Store:
     def __init__(self, folder: Path, *, recordings: tuple[Path, ...] = ()) -> None:
         self.folder = folder
         self._cells = folder / "cells"
-        self._cells_name = str(self._cells)
         self._allowed = [path.resolve() for path in recordings]
         self._same_content: dict[tuple[Path, str], bool] = {}
         self._lock: Lock | None = None
@@ -142,7 +141,7 @@ class Store:
                 with suppress(OSError):
                     aside.unlink(missing_ok=True)
                 raise
-            sync_folder(self._cells)
+            sync_path(self._cells)
         self._place(entry)
         return dict(told)
 
@@ -309,7 +308,7 @@ class Store:
             for entry in self._ledger.entries:
                 self._place(entry)
             known = {f"{key}.h5" for key in self._done}
-            for name in sorted(self._names() - known):
+            for name in sorted(self._sizes().keys() - known):
                 self._adopt(name)
         return self._ledger
 
@@ -339,16 +338,9 @@ class Store:
 
     def _size(self, key: str) -> int:
         try:
-            return os.lstat(f"{self._cells_name}{os.sep}{key}.h5").st_size  # asked for every cell of every run
+            return self._shard(key).lstat().st_size
         except OSError:
             return -1
-
-    def _names(self) -> set[str]:
-        try:
-            with os.scandir(self._cells) as found:
-                return {one.name for one in found if one.name.endswith(".h5")}
-        except OSError:
-            return set()
 
     def _sizes(self) -> dict[str, int]:
         try:
