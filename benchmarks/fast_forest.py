@@ -24,7 +24,7 @@ from tactbench.core.cost.rounds import measure
 from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.matrix.progress import Silence
-from tactbench.core.matrix.run import carry_out
+from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
@@ -38,7 +38,7 @@ def arrays(sensor: str, folder: Path) -> TimedEstimator:
     """Return the plain forest with the arrays of its cell."""
     registry = load_registry()
     choice = TaskChoice(name=TASK, protocol=PROTOCOL, estimators=(EstimatorChoice(name="majority"),))
-    outcome = carry_out(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder))
+    outcome = run_matrix(MatrixSpec(repeats=1, sensors=(sensor,), tasks=(choice,)), Store(folder))
     spec = registry.tasks[TASK].spec
     data = load_dataset(spec, outcome.recordings[outcome.rows[0]["cell"]])
     return timed_estimator(spec, registry.estimators["forest"], {}, PROTOCOL, "roles", data, seed=1, threads=1)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tactbench.core.matrix.run import carry_out
+from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.statistics.median import median_interval
@@ -41,7 +41,7 @@ def main() -> None:
         ),
     )  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
-        rows = carry_out(matrix, Store(asked.out or Path(folder))).rows
+        rows = run_matrix(matrix, Store(asked.out or Path(folder))).rows
     cells = defaultdict(list)
     for row in rows:
         if row["status"] == "done" and not row["is_baseline"]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.evaluation.fitting import fit
-from tactbench.core.matrix.evaluate_cell import Job, solve
+from tactbench.core.matrix.evaluate_cell import Job, solve, unanswered
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.provenance.source import versions
 from tactbench.plugin import NotApplicable, load_object, load_registry
@@ -54,10 +54,11 @@ def test_a_cell_without_the_extra_is_skipped_with_the_reason_and_is_no_failure(t
         sensor="made", task="curvature", rig="replay", protocol="deployable", split="session", estimator="forest-fast",
         params=(), baseline=False, repeat=1, repeats=1, seed=1,
     )  # fmt: skip
-    row, arrays = solve(Job(cell, paths))
+    with pytest.raises(NotApplicable) as reason:
+        solve(Job(cell, paths))
+    row = unanswered(cell, reason.value)
     assert row["status"] == "skipped", row["reason"]
     assert "pip install 'tactbench[fast]'" in row["reason"]
-    assert arrays == {}
 
 
 def test_a_cell_of_it_is_keyed_by_the_version_of_the_extra():

@@ -81,7 +81,24 @@ def main(arguments: list[str] | None = None) -> None:
     # A short-lived process that imports thousands of objects to keep: looking through them for garbage every 700 new
     # ones takes a sixth of the time of an import.
     gc.set_threshold(100_000, 50, 100)
-    sys.exit(_exit_code(arguments))
+    too_few = _too_few_files()
+    if too_few:
+        click.echo(too_few, err=True)
+        sys.exit(2)
+    try:
+        code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
+    except (click.exceptions.Abort, KeyboardInterrupt):
+        code = _interrupted(arguments)
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except BrokenPipeError:
+        # The reader of our output went away (`| head`): nothing to tell anybody.
+        sys.stderr.close()
+        code = 1
+    except Exception as error:
+        code = _tell(error)
+    sys.exit(code if isinstance(code, int) else 0)
 
 
 FILES = 32
@@ -101,29 +118,6 @@ def _too_few_files() -> str:
         resource.setrlimit(resource.RLIMIT_NOFILE, (FILES, hard))
         return ""
     return f"Error: {soft} files may be open at once here, and {FILES} are needed.\n  Raise it: ulimit -n 1024"
-
-
-def _exit_code(arguments: list[str] | None) -> int:
-    too_few = _too_few_files()
-    if too_few:
-        click.echo(too_few, err=True)
-        return 2
-    try:
-        code: Any = cli.main(args=arguments, prog_name="tactbench", standalone_mode=False)
-    except click.exceptions.Abort:
-        return _interrupted(arguments)
-    except KeyboardInterrupt:
-        return _interrupted(arguments)
-    except click.ClickException as error:
-        error.show()
-        return error.exit_code
-    except BrokenPipeError:
-        # The reader of our output went away (`| head`): nothing to tell anybody.
-        sys.stderr.close()
-        return 1
-    except Exception as error:
-        return _tell(error)
-    return int(code) if isinstance(code, int) else 0
 
 
 def _interrupted(arguments: list[str] | None) -> int:

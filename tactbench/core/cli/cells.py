@@ -64,7 +64,7 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
     from tactbench.core.cli.selection import matrix_asked
     from tactbench.core.matrix.keys import Keys
     from tactbench.core.matrix.naming import cell_of, meant
-    from tactbench.core.matrix.plan_recordings import plan, request_key
+    from tactbench.core.matrix.plan_recordings import plan_run, request_key
     from tactbench.core.matrix.recorded import Recorded
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
@@ -93,7 +93,7 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
         was = {"sensors": (rows[given]["sensor"],), "tasks": (rows[given]["task"],), "rig": rows[given]["rig"]}
         asked |= {name: value for name, value in was.items() if not asked[name]}
     matrix, folder = matrix_asked(registry, **asked)
-    cells, needed = plan(matrix, registry, keys, store, folder, recorded)
+    cells, needed = plan_run(matrix, registry, keys, store, folder, recorded)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
     made = tuple(needed.requests.get(request_key(cell), ()))
     return Subject(store, keys, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)

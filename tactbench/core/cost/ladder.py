@@ -15,7 +15,7 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.run import Outcome, carry_out
+from tactbench.core.matrix.run import Outcome, run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import MatrixSpec
@@ -68,7 +68,7 @@ def climb(
     if len(asked) > 1:
         several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in asked))
         raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
-    outcome = carry_out(matrix, store, recordings=recordings, progress=progress)
+    outcome = run_matrix(matrix, store, recordings=recordings, progress=progress)
     task = registry.tasks[matrix.tasks[0].name].spec
     done = [row for row in outcome.rows if row["status"] == "done" and row["seed"] == matrix.seed]
     data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None

@@ -9,7 +9,7 @@ from pathlib import Path
 from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.metrics import metric_called
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.run import carry_out
+from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
@@ -79,7 +79,7 @@ def task_score(
         rig=rig, seed=seed, repeats=1, sensors=(sensor,), tasks=(choice,), simulation=simulation, latency=False
     )
     with tempfile.TemporaryDirectory(prefix="tactbench-score-") as folder:
-        outcome = carry_out(matrix, Store(Path(folder)), progress=progress)
+        outcome = run_matrix(matrix, Store(Path(folder)), progress=progress)
     row = next(row for row in outcome.rows if row["estimator"] == estimator)
     return TaskScore(
         task=task,

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from tactbench.core.leaderboard.records import JSON_KEYS
-from tactbench.core.spec.row import FORMAT, in_words
-from tactbench.core.spec.status import STATUSES
+from tactbench.core.matrix.store.rows import fault_in_row
 
 Row = dict[str, Any]
 
@@ -33,15 +32,13 @@ def _mistyped(row: Row) -> str:
     lacking = [key for key in _STORED if key not in row]
     if lacking:
         return f"its row is of another version (it lacks {', '.join(lacking[:3])}); run it again"
-    for key in _STORED:
-        if not _fits(key, row[key]):
-            return f"its {key} is {type(row[key]).__name__}, not {in_words(FORMAT[key].types)}"
-    return ""
+    return fault_in_row(row)
 
 
 def _senseless(row: Row) -> str:
-    if row["status"] not in STATUSES:
-        return f"its status is none of {', '.join(STATUSES)}"
+    for key, value in row.items():
+        if type(value) is int and abs(value) >= _LARGEST and key != "seed":
+            return f"its {key} is larger than a table holds"
     if row["status"] == "done" and row["score"] is None:
         return "it is done and has no score"
     if not _WHOLE.issuperset(map(type, row["counts"].values())):
@@ -54,12 +51,6 @@ def _is_square(confusion: list[Any] | None) -> bool:
         isinstance(line, list) and len(line) == len(confusion) and all(type(count) is int for count in line)
         for line in confusion
     )
-
-
-def _fits(key: str, value: Any) -> bool:
-    if type(value) is int and abs(value) >= _LARGEST and key != "seed":
-        return False
-    return type(value) in FORMAT[key].types
 
 
 _STORED = tuple(key for key in JSON_KEYS if key != "key")

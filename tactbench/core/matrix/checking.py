@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from tactbench.core.matrix.evaluate_cell import ASKED
+from tactbench.core.matrix.evaluate_cell import FIXED
 from tactbench.core.matrix.store import Row
+from tactbench.core.matrix.store.rows import fault_in_row
 from tactbench.core.samples import Answers
-from tactbench.core.spec.status import STATUSES
 
 _COLUMNS = tuple(column.name for column in fields(Answers))
 
@@ -40,20 +40,18 @@ def fault_in(given: Any, asked: Row) -> str:
     row, sets = given
     if row.keys() != asked.keys():
         return f"its row has other keys: {', '.join(sorted(map(str, row.keys() ^ asked.keys())))}"
-    for name in ASKED:
+    for name in FIXED:
         if row[name] != asked[name]:
             return f"its row is that of another cell: its {name} is {row[name]!r}, not {asked[name]!r}"
-    if row["status"] not in STATUSES:
-        return f"its status is {row['status']!r}"
-    recordings = row["recordings"]
-    if not (isinstance(recordings, list) and all(isinstance(path, str) for path in recordings)):
-        return f"its recordings are {recordings!r}"
     if row["status"] != "done":
-        return ""
+        return f"its status is {row['status']!r}"
+    fault = fault_in_row(row)
+    if fault:
+        return fault
     for name in ("score", "ci_low", "ci_high"):
         if row[name] is None and name != "score":
             continue  # an interval may be undefined
-        if not (isinstance(row[name], int | float) and math.isfinite(row[name])):
+        if row[name] is None or not math.isfinite(row[name]):
             return f"its {name} is {row[name]!r}, not a finite number"
     return _fault_in_answers(sets, row)
 

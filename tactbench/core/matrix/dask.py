@@ -30,7 +30,7 @@ from tactbench.core.errors import Crashed, EngineError, UsageError
 from tactbench.core.matrix.evaluate_cell import PRELOAD
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool.limits import Limits
-from tactbench.core.pool.message import error_of, pack, told, unpack
+from tactbench.core.pool.message import dump_error, load_error, pack, unpack
 from tactbench.core.pool.pool import Pool, R, T
 from tactbench.core.pool.processes import interrupts_blocked, set_subreaper
 from tactbench.core.provenance.source import RELEVANT, SourceDigests, digest_of, versions
@@ -44,7 +44,7 @@ POLL_S = 0.5
 ALONE_S = 60.0
 """Seconds that a run waits for a worker when the last one has gone."""
 MOST = 3
-"""So many differences between two environments are told."""
+"""Differences between two environments that a message names."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _LOUD = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")
 
@@ -92,7 +92,12 @@ class Dask:
                     yield item, outcome
             for item in killers:  # now alone, so that it is known which cell ends workers
                 ((_, outcome),) = self._round(client, work, [item])
-                yield item, _killer() if isinstance(outcome, KilledWorker) else outcome
+                if isinstance(outcome, KilledWorker):
+                    outcome = Crashed(
+                        "Workers ended over this cell again and again, at last with no other cell at work.",
+                        hint="The cell, or a plugin it loads, ends processes other than its own.",
+                    )
+                yield item, outcome
 
     def _round(self, client: Any, work: Callable[..., R], items: Sequence[T]) -> Iterator[tuple[T, Any]]:
         """Submit `items`, twice as many at a time as may be at work; yield each with what came of it."""
@@ -135,7 +140,7 @@ class Dask:
         try:
             if future.status == "finished":
                 message = unpack(future.result(timeout=CONNECT_S))
-                return error_of(message["error"]) if "error" in message else message["value"]
+                return load_error(message["error"]) if "error" in message else message["value"]
             error = future.exception(timeout=CONNECT_S) if future.status == "error" else None
         except Exception as lost:
             return EngineError(f"What a Dask worker computed did not arrive: {lost!r}.")
@@ -149,13 +154,6 @@ class Dask:
             f"The Dask scheduler at {client.scheduler.address} {what} before this cell was computed.",
             hint="Start it, or workers for it, and give the same command again: what was finished is kept.",
         )
-
-
-def _killer() -> Crashed:
-    return Crashed(
-        "Workers ended over this cell again and again, at last with no other cell at work.",
-        hint="The cell, or a plugin it loads, ends processes other than its own.",
-    )
 
 
 # On a worker
@@ -179,9 +177,9 @@ def carry_out(request: bytes) -> bytes:
     pool = Pool(1, limits, preload=PRELOAD, wanted=wanted)
     for _, outcome in pool.each(partial(_in_folder, folder, concurrency, work), [item]):
         if isinstance(outcome, BaseException):
-            return pack({"error": told(outcome)})
+            return pack({"error": dump_error(outcome)})
         return pack({"value": outcome})
-    return pack({"error": told(EngineError("Nobody waits for this cell any more."))})
+    return pack({"error": dump_error(EngineError("Nobody waits for this cell any more."))})
 
 
 def _in_folder(folder: str, concurrency: int, work: Callable[..., Any], item: Any) -> Any:
@@ -246,15 +244,8 @@ def environment(registry: Registry) -> dict[str, str]:
 
 def differences(here: Mapping[str, str], there: Mapping[str, str]) -> list[str]:
     """Return what `there` has otherwise than `here`, one clause for each; what only `there` has does not matter."""
-    return [_clause(name, value, there.get(name)) for name, value in here.items() if there.get(name) != value]
-
-
-def _clause(name: str, here: str, there: str | None) -> str:
-    if there is None:
-        return f"{name.removeprefix('the ')} is missing there"
-    if name.startswith("the version"):
-        return f"{name} is {there} there and {here} here"
-    return f"{name} differs"
+    found = {name: there.get(name, "missing") for name in here}
+    return [f"{name} is {found[name]} there and {here[name]} here" for name in here if found[name] != here[name]]
 
 
 # The client's side

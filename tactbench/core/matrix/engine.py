@@ -21,10 +21,9 @@ class Engine(Protocol):
     """Carries out work; what comes of an item does not depend on which engine it was."""
 
     def each(self, work: Callable[..., R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
-        """Yield every item exactly once with its result, or with what stopped it, as they come.
+        """Yield every item exactly once, as they end, with its result or the TactbenchError that stopped it.
 
-        What stopped an item is the exception that was raised, or `tactbench.core.errors.CellStopped`. Only a real
-        Ctrl-C by the user ends the iteration. Items may be taken one by one, as there is room for them, or all at once.
+        Only a Ctrl-C by the user ends the iteration. Items may be taken one by one, or all at once.
         """
 
 

@@ -1,21 +1,29 @@
-"""Answering the cells: those that are finished are found again, the others go to an engine."""
+"""Evaluating the cells: those that are finished are found in the store, the others go to an engine."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import PluginContractError
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.evaluate_cell import Answer, Job, opening, reused, solve, this_host, unanswered
+from tactbench.core.matrix.evaluate_cell import (
+    Job,
+    import_estimators,
+    opening,
+    reused,
+    shared,
+    solve,
+    this_host,
+    unanswered,
+)
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingPlan
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.recorded import read_all, read_digest
+from tactbench.core.matrix.recorded import Recorded, read_all, read_digest
 from tactbench.core.matrix.store import NotPlainError, Row, Store
 from tactbench.core.matrix.why import Book, beside
 from tactbench.core.plugins.registry import installed
@@ -23,161 +31,111 @@ from tactbench.core.samples import Answers
 from tactbench.core.spec.status import STOPPED
 
 
-@dataclass
-class Evaluated:
-    """The rows so far."""
-
-    rows: dict[str, Row] = field(default_factory=dict)
-    """By name of the cell."""
-    computed: int = 0
-    """Cells computed now; the others were found finished."""
-
-
 def evaluate_all(
     cells: Sequence[Cell],
-    material: RecordingPlan,
+    recording_plan: RecordingPlan,
     book: Book,
     choice: EngineChoice,
     store: Store,
     made_by: str,
-    told: Progress,
-) -> Evaluated:
+    progress: Progress,
+    stage: str = "evaluating",
+) -> tuple[dict[str, Row], int]:
     """Give every cell its row: found in `store`, computed now, or saying why it could not be.
 
-    `made_by` is the id of this run's provenance.
+    Parameters
+    ----------
+    made_by
+        Id of this run's provenance.
+    stage
+        What the progress calls this.
+
+    Returns
+    -------
+    rows, computed
+        By name of the cell; how many were not found finished.
     """
-    done = Evaluated()
-    known = _Known({}, material, store.folder, made_by)
-    waiting: list[Job] = []
-    unreadable = _unreadable(cells, material, choice)
+    recorded = recording_plan.recorded
+    rows: dict[str, Row] = {}
+    keys: dict[str, str] = {}
+    jobs: list[Job] = []
+    stopped: list[tuple[Cell, BaseException]] = []
+    """Cells without their recordings."""
+    needed = {path: None for cell in cells if not recording_plan.trouble(cell) for path in recording_plan.paths(cell)}
+    unreadable = read_all(read_digest, recorded.unread(needed, "digest"), recorded, choice)
     for cell in cells:
-        paths = material.paths(cell)
-        trouble = material.trouble(cell)
-        if unreadable and trouble is None:
-            trouble = next((unreadable[path] for path in paths if path in unreadable), None)
+        paths = recording_plan.paths(cell)
+        trouble = recording_plan.trouble(cell) or next((unreadable[one] for one in paths if one in unreadable), None)
         if trouble is None:
             try:
-                known.keys[cell.name] = book.keys.of_cell(cell, [material.recorded.digest(path) for path in paths])
+                digests = tuple(recorded.digest(path) for path in paths)
+                keys[cell.name] = book.keys.of_cell(cell, digests)
             except Exception as error:
                 trouble = error
-        found = store.finished(known.keys[cell.name]) if trouble is None else None
-        if found is not None and found["status"] == "done":
-            done.rows[cell.name] = reused(found, cell, installed().tasks[cell.task].spec)
-            store.reuse(done.rows[cell.name])
+        if trouble is not None:
+            stopped.append((cell, trouble))
+            continue
+        found = store.finished(keys[cell.name])
+        if found is not None:
+            rows[cell.name] = reused(found, cell, installed().tasks[cell.task].spec)
+            store.reuse(rows[cell.name])
         else:
-            remote = choice.name == "dask" and trouble is None
-            digests = tuple(material.recorded.digest(path) for path in paths) if remote else ()
-            waiting.append(Job(cell, tuple(paths), digests, trouble))
-    done.computed = len(waiting)
-    if waiting:
-        keyed = ((one.cell, known.keys[one.cell.name], one.recordings) for one in waiting if one.trouble is None)
-        book.note_cells(keyed, material.recorded, store.folder)
-        _compute(waiting, known, choice, store, told, done)
-        overwritten = [job for job in waiting if _overwritten(done.rows[job.cell.name], store)]
-        if overwritten:
-            _compute(overwritten, known, choice, store, told, done)
-    return done
+            jobs.append(Job(cell, tuple(paths), digests if choice.name == "dask" else ()))
+    computed = len(jobs) + len(stopped)
+    if computed:
+        progress.begin(stage, computed, alone=choice.here(len(jobs)))
+    book.note_cells(((job.cell, keys[job.cell.name], job.recordings) for job in jobs), recorded, store.folder)
+    for cell, trouble in stopped:
+        known = {"key": "", "made_by": made_by, "host": this_host()}
+        rows[cell.name] = store.note({**unanswered(cell, trouble), **known})
+        progress.advance(cell.name, stopped=rows[cell.name]["status"] in STOPPED)
+    for _ in range(2):  # a cell may have written over the shard of an earlier one, which is then computed again
+        here = choice.here(len(jobs))
+        work = partial(solve, concurrency=choice.concurrency(len(jobs)), working=progress.working if here else None)
+        with closing(choice.engine(len(jobs)).each(work, _ordered(jobs, choice))) as outcomes:
+            for job, outcome in outcomes:
+                known = {"key": keys[job.cell.name], "made_by": made_by, "host": this_host()}
+                rows[job.cell.name] = _kept(job.cell, outcome, known, recorded, store)
+                progress.advance(job.cell.name, stopped=rows[job.cell.name]["status"] in STOPPED)
+        done = [job for job in jobs if rows[job.cell.name]["status"] == "done"]
+        jobs = [job for job in done if store.finished(keys[job.cell.name]) is None]
+        if not jobs:
+            break
+    return rows, computed
 
 
-def _overwritten(row: Row, store: Store) -> bool:
-    """Return whether a cell was finished and its shard is not what was written: a later cell has laid hands on it."""
-    return row["status"] == "done" and store.finished(row["key"]) is None
+def _kept(cell: Cell, outcome: Any, known: Row, recorded: Recorded, store: Store) -> Row:
+    """Write the row of a cell, and return it as the store will give it back.
+
+    What stopped the cell, or what is wrong with its result, makes the row. `known` is what rows say that the run knows,
+    and their cells do not.
+    """
+    from tactbench.core.matrix.checking import fault_in
+
+    if isinstance(outcome, BaseException):
+        return store.note({**unanswered(cell, outcome), **known})
+    fault = fault_in(outcome, opening(cell, installed().tasks[cell.task].spec))
+    if not fault:
+        row, columns = outcome
+        paths = [Path(path) for path in row["recordings"]]
+        row |= {**known, "host": row["host"] or known["host"]}
+        row["digests"] = [recorded.digest(path) for path in paths]
+        row["recordings"] = [beside(path, store.folder) for path in paths]
+        try:
+            return store.keep(row["key"], row, {role: Answers(**columns[role]) for role in columns})
+        except NotPlainError as error:
+            fault = f"its row is not plain data: {error}"
+    refused = PluginContractError(f"The cell's result is not one: {fault}.", hint="Its estimator or task is at fault.")
+    return store.note({**unanswered(cell, refused), **known})
 
 
-@dataclass(frozen=True)
-class _Known:
-    """What rows say that the run knows, and their cells do not."""
-
-    keys: dict[str, str]
-    """By name of the cell."""
-    material: RecordingPlan
-    folder: Path
-    made_by: str
-    read: dict[tuple[str, ...], Row] = field(default_factory=dict)
-    """What rows say of the same recordings."""
-
-    def told(self, row: Row) -> Row:
-        """Return `row` with all of it."""
-        named = tuple(row["recordings"])
-        if named not in self.read:
-            paths = [Path(path) for path in named]
-            digests = [self.material.recorded.digest(path) for path in paths]
-            self.read[named] = {"digests": digests, "recordings": [beside(path, self.folder) for path in paths]}
-        known = {"key": self.keys.get(row["cell"], ""), "made_by": self.made_by, "host": row["host"] or this_host()}
-        return {**row, **self.read[named], **known}
-
-
-def _unreadable(cells: Sequence[Cell], material: RecordingPlan, choice: EngineChoice) -> dict[Path, BaseException]:
-    """Have the digest of every recording at hand; return why some have none."""
-    wanted = {path: None for cell in cells if material.trouble(cell) is None for path in material.paths(cell)}
-    return read_all(read_digest, material.recorded.unread(wanted, "digest"), material.recorded, choice)
-
-
-def _compute(
-    waiting: list[Job], known: _Known, choice: EngineChoice, store: Store, told: Progress, done: Evaluated
-) -> None:
-    jobs = [job for job in waiting if job.trouble is None]
-    here = choice.here(len(jobs))
-    told.begin("evaluating", len(waiting), alone=here)
-    work = partial(solve, concurrency=choice.concurrency(len(jobs)), working=told.working if here else None)
-    engine = choice.engine(len(jobs))
-    without_recordings: Iterator[tuple[Job, Any]] = (
-        (job, (unanswered(job.cell, job.trouble), {})) for job in waiting if job.trouble is not None
-    )
-    with closing(_each(without_recordings, engine.each(work, _ordered(jobs, choice)))) as outcomes:
-        for job, outcome in outcomes:
-            _entered(job.cell, outcome, known, store, told, done)
-
-
-def _entered(cell: Cell, outcome: Any, known: _Known, store: Store, told: Progress, done: Evaluated) -> None:
-    """Keep what came of a cell."""
-    try:
-        row = _written(_judged(cell, outcome, known), known, store)
-    except NotPlainError as error:
-        row = _written(_refused(cell, f"its row is not plain data: {error}"), known, store)
-    done.rows[cell.name] = row
-    told.advance(cell.name, stopped=row["status"] in STOPPED)
-
-
-def _written(outcome: Answer, known: _Known, store: Store) -> Row:
-    """Write a row, and return it as the store will give it back."""
-    row, sets = outcome
-    told = known.told(row)
-    return store.keep(told["key"], told, sets) if told["status"] == "done" else store.note(told)
-
-
-def _each(*several: Iterable[tuple[Job, Any]]) -> Generator[tuple[Job, Any], None, None]:
-    for some in several:
-        yield from some
-
-
-def _ordered(jobs: list[Job], choice: EngineChoice) -> Iterable[Job]:
+def _ordered(jobs: Sequence[Job], choice: EngineChoice) -> Iterable[Job]:
     """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
-    from tactbench.core.matrix.evaluate_cell import import_estimators, shared
-
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
         groups.setdefault((job.cell.task, job.recordings), []).append(job)
     if choice.forks(len(jobs)):
         return shared(groups, choice.pool(1))
     if choice.here(len(jobs)):
-        import_estimators([job.cell for job in jobs])
+        import_estimators(job.cell for job in jobs)
     return [job for group in groups.values() for job in group]
-
-
-def _judged(cell: Cell, outcome: Any, known: _Known) -> Answer:
-    """Return the row and answers of a cell; what stopped it, or what is wrong with them, makes the row."""
-    from tactbench.core.matrix.checking import fault_in
-
-    if isinstance(outcome, BaseException):
-        return unanswered(cell, outcome), {}
-    fault = fault_in(outcome, opening(cell, installed().tasks[cell.task].spec))
-    if fault:
-        return _refused(cell, fault)
-    row, columns = outcome
-    return row, {role: Answers(**columns[role]) for role in columns}
-
-
-def _refused(cell: Cell, fault: str) -> Answer:
-    error = PluginContractError(f"The cell's result is not one: {fault}.", hint="Its estimator or task is at fault.")
-    return unanswered(cell, error), {}

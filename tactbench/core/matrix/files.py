@@ -45,13 +45,18 @@ def write_file(path: Path, content: bytes, *, sync: bool, mode: int = 0o666) -> 
     """
     file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), mode)
     try:
-        written = os.write(file, content)
-        while written < len(content):  # the last bytes of a disk: the next write says why; or two gigabytes
-            written += os.write(file, content[written:])
+        write_all(file, content)
         if sync:
             os.fsync(file)
     finally:
         os.close(file)
+
+
+def write_all(file: int, content: bytes) -> None:
+    """Write all of `content`: one call takes two gigabytes at most, and on a full disk the next one says why."""
+    written = os.write(file, content)
+    while written < len(content):
+        written += os.write(file, content[written:])
 
 
 def _holds(path: Path, content: bytes) -> bool:

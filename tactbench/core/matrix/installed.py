@@ -19,43 +19,35 @@ def rig_of(
     rig_file: RigFile | None = None,
     operator: Operator | None = None,
 ) -> Rig | ReplayRig:
-    """Build the rig called `name`; raises UsageError if the rig file is for another one."""
+    """Build the rig called `name`.
+
+    Raises
+    ------
+    UsageError
+        If the rig file is for another one.
+    RigError
+        If its own code fails, whatever that raises, or it is no rig.
+    """
     descriptor = registry.rigs[name]
     if rig_file is not None:
         rig_file.checked_for(name)
     context = RigContext(effects=tuple(registry.effects), recordings=recordings, rig_file=rig_file, operator=operator)
-    built = load_object(descriptor.where)(context)
+    with failing_as(f"The rig {name!r} could not be built"):
+        built: Rig | ReplayRig = load_object(descriptor.where)(context)
     if not (hasattr(built, "open") or hasattr(built, "recordings")):
         raise RigError(
             f"The rig {name!r} has neither open() nor recordings().", hint="See docs/plugins.md: a Rig or a ReplayRig."
         )
-    return built  # type: ignore[no-any-return]
-
-
-def built(
-    name: str,
-    registry: Registry,
-    recordings: Path | None = None,
-    rig_file: RigFile | None = None,
-    operator: Operator | None = None,
-) -> Rig | ReplayRig:
-    """Build the rig called `name`; raises RigError where its own code fails, whatever that raises."""
-    with _its_own_code(f"The rig {name!r} could not be built"):
-        return rig_of(name, registry, recordings, rig_file, operator)
-
-
-def listed(name: str, rig: ReplayRig) -> list[Path]:
-    """Return the recordings of the rig called `name`; raises RigError where its own code fails."""
-    with _its_own_code(f"The recordings of rig {name!r} cannot be listed"):
-        return list(rig.recordings())
+    return built
 
 
 @contextmanager
-def _its_own_code(what: str) -> Iterator[None]:
+def failing_as(what: str) -> Iterator[None]:
+    """Raise RigError, whose message begins with `what`, in place of whatever a rig's own code raises."""
     try:
         yield
     except TactbenchError:
         raise
     except (Exception, SystemExit) as error:
-        said = f"{what}: {type(error).__name__}: {error}".rstrip(": ")
-        raise RigError(said + ".", hint="See `tactbench plugins` for who brings it.") from error
+        text = f"{what}: {type(error).__name__}: {error}".rstrip(": ")
+        raise RigError(text + ".", hint="See `tactbench plugins` for who brings it.") from error

@@ -3,8 +3,8 @@
 ::
 
     OUT/cache/keys/
-      keys.jsonl        one line a key: name, key, configuration, and which sections went into it
-      DIGEST.json       one section, or one list of sections, shared by every key it went into
+      keys.jsonl        one line a key: name, key, configuration, and the digests of what else went into it
+      DIGEST.json       what several keys share: descriptors, versions and sources; the digests of the recordings
 
 It only explains: losing it costs no result.
 """
@@ -19,14 +19,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tactbench.core.matrix.files import replace_file
 from tactbench.core.matrix.keys import Fixed, Section
 
 Sections = Mapping[str, Section]
 
-_REFERENCE = re.compile(r"[0-9a-f]{32}")
-_LARGEST_SECTION = 16 * 2**20
-_LARGEST_BOOK = 512 * 2**20
-"""Bytes that are still read: folders come from strangers."""
+_DIGEST = re.compile(r"[0-9a-f]{32}")
+_LARGEST = 512 * 2**20
+"""Bytes of a file that are still read: folders come from strangers."""
 
 
 class Entry(NamedTuple):
@@ -72,47 +72,35 @@ class KeyBook:
         line = lines.get(key) or lines.get(name)
         if line is None:
             return None
-        fixed = self._section(line.get("fixed"))
-        sections = {section: self._section(reference) for section, reference in fixed.items()}
-        sections["configuration"] = line["configuration"]
-        if line.get("data"):
-            sections["data"] = self._section(line["data"])
-        return sections
+        sections = {**self._part(line.get("fixed")), "configuration": line["configuration"]}
+        return {**sections, "data": self._part(line["data"])} if line.get("data") else sections
 
     def _line(self, entry: Entry, kept: dict[int, str]) -> dict[str, Any]:
-        """Return an entry's line; `kept` are the sections written now, by identity: many entries share one object."""
+        """Return an entry's line; `kept` are the digests of parts by identity: many entries share one object."""
+        parts = {"fixed": entry.fixed.sections, "data": entry.data}
+        for part in parts.values():
+            if part and id(part) not in kept:
+                kept[id(part)] = self._keep(part)
+        digests = {name: kept[id(part)] for name, part in parts.items() if part}
+        return {"name": entry.name, "key": entry.key, "configuration": dict(entry.configuration), **digests}
 
-        def keep(section: Section) -> str:
-            if id(section) not in kept:
-                kept[id(section)] = self._keep(section)
-            return kept[id(section)]
-
-        sections = entry.fixed.sections
-        if id(sections) not in kept:
-            kept[id(sections)] = self._keep({name: keep(section) for name, section in sections.items()})
-        line = {
-            "name": entry.name,
-            "key": entry.key,
-            "configuration": dict(entry.configuration),
-            "fixed": kept[id(sections)],
-        }
-        return {**line, "data": keep(entry.data)} if entry.data else line
-
-    def _keep(self, section: Section) -> str:
-        content = json.dumps(section, sort_keys=True, separators=(",", ":"), default=repr).encode()
-        reference = hashlib.sha256(content).hexdigest()[:32]
-        path = self._folder / f"{reference}.json"
+    def _keep(self, part: Mapping[str, Section]) -> str:
+        content = json.dumps(part, sort_keys=True, separators=(",", ":"), default=repr).encode()
+        digest = hashlib.sha256(content).hexdigest()[:32]
+        path = self._folder / f"{digest}.json"
         if not path.exists():
-            aside = path.with_suffix(".partial")
-            aside.write_bytes(content)  # not synced: what a power cut takes costs an explanation
-            aside.replace(path)
-        return reference
+            replace_file(path, content, sync=False)  # what a power cut takes costs an explanation
+        return digest
 
-    def _section(self, reference: object) -> dict[str, Any]:
-        if not isinstance(reference, str) or not _REFERENCE.fullmatch(reference):
+    def _part(self, digest: object) -> dict[str, Any]:
+        if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):
             return {}
-        found = _json(self._folder / f"{reference}.json", _LARGEST_SECTION)
-        return found if isinstance(found, dict) else {}
+        path = self._folder / f"{digest}.json"
+        try:
+            found = json.loads(path.read_bytes()) if path.stat().st_size < _LARGEST else None
+        except (OSError, ValueError, RecursionError):
+            found = None
+        return found if isinstance(found, dict) and all(isinstance(one, dict) for one in found.values()) else {}
 
     def _read(self) -> dict[str, dict[str, Any]]:
         """Return the latest line of each name, and every line by its key."""
@@ -120,7 +108,7 @@ class KeyBook:
             self._lines = {}
             path = self._folder / "keys.jsonl"
             try:
-                lines = path.read_text(encoding="utf-8").splitlines() if path.stat().st_size < _LARGEST_BOOK else []
+                lines = path.read_text(encoding="utf-8").splitlines() if path.stat().st_size < _LARGEST else []
             except (OSError, ValueError):
                 lines = []
             for text in lines:
@@ -131,13 +119,6 @@ class KeyBook:
                 except (ValueError, KeyError, TypeError, RecursionError):
                     continue  # a line cut short
         return self._lines
-
-
-def _json(path: Path, largest: int) -> Any:
-    try:
-        return json.loads(path.read_bytes()) if path.stat().st_size <= largest else None
-    except (OSError, ValueError, RecursionError):
-        return None
 
 
 def recording_names(paths: Sequence[Path]) -> list[str]:

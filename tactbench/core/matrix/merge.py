@@ -23,16 +23,16 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from tactbench.core.errors import FolderError, FormatError, MissingRecordingError
 from tactbench.core.matrix.store import Row, Store
-from tactbench.core.matrix.store.disk import sync_folder, writing
+from tactbench.core.matrix.store.disk import sync_path, writing
 from tactbench.core.matrix.store.ledger import NAME, Entry, whole_text
 from tactbench.core.matrix.store.leftovers import alive
 from tactbench.core.matrix.store.rows import NAMING, named
 from tactbench.core.matrix.store.sharing import canonical
 from tactbench.core.matrix.summary import SEED_DECIDES
+from tactbench.core.matrix.why import short
 from tactbench.core.spec.status import STATUSES
 
 _SHOWN = 10
@@ -188,13 +188,8 @@ def _difference(one: Row, other: Row) -> str:
     """Return where two rows of one key differ in what a seed decides, in words; empty if nowhere."""
     for name in SEED_DECIDES:
         if name not in NAMING and canonical(one.get(name)) != canonical(other.get(name)):
-            return f"has two values of {name!r} under one key: {_short(other.get(name))} and {_short(one.get(name))}"
+            return f"has two values of {name!r} under one key: {short(other.get(name))} and {short(one.get(name))}"
     return ""
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:59]}…"
 
 
 def _provenances(stores: Iterable[Store]) -> dict[str, str]:
@@ -274,17 +269,10 @@ def _made(out: Path) -> Iterator[Path]:
             for part in ("cells", "provenance", "recordings", "cache"):
                 (aside / part).mkdir(parents=True, exist_ok=True)
             yield aside
-            for folder, _, names in os.walk(aside, topdown=False):
-                for name in names:
-                    _synced(Path(folder) / name)
-                sync_folder(Path(folder))
+            for path in (*aside.rglob("*"), aside):
+                sync_path(path)
             aside.rename(out)
-            sync_folder(whole.parent)
+            sync_path(whole.parent)
         except BaseException:
             shutil.rmtree(aside, ignore_errors=True)
             raise
-
-
-def _synced(path: Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import cast
 
 from tactbench.core.errors import MissingRecordingError, NotApplicable, TactbenchError, UnknownNameError, UsageError
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.installed import built, listed
+from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves
 from tactbench.core.matrix.recorded import Recorded, Subject, read_all, read_subject
 from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.interfaces import ReplayRig
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.spec.matrix import MatrixSpec
@@ -193,7 +191,7 @@ class RecordingPlan:
         return next((self.refused[path] for path in paths if path in self.refused), None)
 
 
-def plan(
+def plan_run(
     matrix: MatrixSpec,
     registry: Registry,
     keys: Keys,
@@ -232,13 +230,13 @@ def _from_replay(
 ) -> tuple[list[Cell], RecordingPlan]:
     found = recording_source(paths, matrix.sensors, registry, recorded, choice)
     cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
-    material = RecordingPlan(recorded)
+    recording_plan = RecordingPlan(recorded)
     for wanted in dict.fromkeys(request_key(cell) for cell in cells):
         sensor, task, split, _ = wanted
-        material.replayed[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
+        recording_plan.replayed[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
         if trouble is not None:
-            material.troubles[wanted] = trouble
-    return cells, material
+            recording_plan.troubles[wanted] = trouble
+    return cells, recording_plan
 
 
 def _without_rig(
@@ -254,8 +252,11 @@ def _without_rig(
 def _replayed(asked: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
     """Return the recordings of a rig that replays, None of one that records: in a child process, where it is built."""
     name, recordings, rig_file = asked
-    rig = built(name, installed(), recordings, rig_file)
-    return [str(path) for path in listed(name, cast(ReplayRig, rig))] if hasattr(rig, "recordings") else None
+    rig = rig_of(name, installed(), recordings, rig_file)
+    if not hasattr(rig, "recordings"):
+        return None
+    with failing_as(f"The recordings of rig {name!r} cannot be listed"):
+        return [str(path) for path in rig.recordings()]
 
 
 def _named(matrix: MatrixSpec, registry: Registry) -> list[str]:

@@ -41,31 +41,3 @@ class Silence:
 
     def working(self, what: str) -> None:
         """Say nothing."""
-
-
-class Prefixed:
-    """A progress whose stages are named as part of a larger one.
-
-    Parameters
-    ----------
-    whole
-        Receives everything.
-    prefix
-        Stands before the name of every stage.
-    """
-
-    def __init__(self, whole: Progress, prefix: str) -> None:
-        self._whole = whole
-        self._prefix = prefix
-
-    def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
-        """Start a stage."""
-        self._whole.begin(f"{self._prefix}{stage}", total, alone=alone)
-
-    def advance(self, what: str, *, stopped: bool = False) -> None:
-        """Finish one step."""
-        self._whole.advance(what, stopped=stopped)
-
-    def working(self, what: str) -> None:
-        """Say what is being done now."""
-        self._whole.working(what)

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.installed import built
+from tactbench.core.matrix.installed import rig_of
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, request_key
 from tactbench.core.matrix.progress import Progress
@@ -24,14 +24,15 @@ GRACE_S = 5.0
 
 
 def acquire_missing(
-    material: RecordingPlan,
+    recording_plan: RecordingPlan,
     cells: Sequence[Cell],
     book: Book,
     choice: EngineChoice,
-    told: Progress,
+    progress: Progress,
     operator: Operator | None = None,
+    stage: str = "recording",
 ) -> None:
-    """Make the recordings that `cells` lack, and note in `material` which were made and what went wrong.
+    """Make the recordings that `cells` lack, and note in `recording_plan` which were made and what went wrong.
 
     Simulations do not disturb each other and are not timed by the wall: they use all cores; so are emulated devices in
     virtual time. A real rig does one scene at a time, and is asked to end before it is ended. A scene that its process
@@ -42,6 +43,8 @@ def acquire_missing(
     ----------
     operator
         Who stands at a rig of real devices.
+    stage
+        What the progress calls this.
 
     Raises
     ------
@@ -49,14 +52,14 @@ def acquire_missing(
         If the disk refuses them.
     """
     needs = dict.fromkeys(map(request_key, cells))
-    unique = {request.path: request for need in needs for request in material.requests.get(need, ())}
+    unique = {request.path: request for need in needs for request in recording_plan.requests.get(need, ())}
     missing = [request for path, request in unique.items() if not path.exists()]
     if not missing:
         return
     book.note_recordings(missing)
     simulated = all(_computed(request) for request in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
-    told.begin("recording", len(missing), alone=False)
+    progress.begin(stage, len(missing), alone=False)
     outcomes: Generator[tuple[RecordingRequest, str | BaseException], None, None]
     try:
         if operator is not None and not simulated:
@@ -72,11 +75,11 @@ def acquire_missing(
                 if isinstance(outcome, UnwritableError):
                     raise outcome  # the disk is no cell's fault, and refuses the next one too
                 if isinstance(outcome, BaseException):
-                    material.refused[request.path] = outcome
+                    recording_plan.refused[request.path] = outcome
                     _discard(request)
                 else:
-                    material.recorded.made(request.path, outcome)
-                told.advance(f"{request.sensor} {request.scene.name}", stopped=isinstance(outcome, BaseException))
+                    recording_plan.recorded.made(request.path, outcome)
+                progress.advance(f"{request.sensor} {request.scene.name}", stopped=isinstance(outcome, BaseException))
     except BaseException:
         # Workers that were ended in the middle could not tidy up behind themselves.
         for request in missing:
@@ -117,7 +120,7 @@ def _one_by_one(
 @lru_cache(maxsize=4)
 def _rig(name: str, rig_file: str, operator: Operator | None) -> Rig:
     devices = RigFile.model_validate_json(rig_file) if rig_file else None
-    return built(name, installed(), rig_file=devices, operator=operator)  # type: ignore[return-value]
+    return rig_of(name, installed(), rig_file=devices, operator=operator)  # type: ignore[return-value]
 
 
 def record(request: RecordingRequest, operator: Operator | None = None) -> str:

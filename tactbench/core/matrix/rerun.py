@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from tactbench.core.matrix.evaluate_cell import Job, solve, unanswered
 from tactbench.core.matrix.plan import Cell
@@ -15,6 +16,7 @@ from tactbench.core.matrix.record import record
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import SEED_DECIDES
+from tactbench.core.matrix.why import short
 from tactbench.core.pool.in_process import InProcess
 from tactbench.core.samples import Answers
 
@@ -71,8 +73,10 @@ def compute_again(
     if requests and trouble is None:
         found += _recordings(paths, [(request.scene.name, made[request.path]) for request in requests])
     told(f"evaluating {cell.name}")
-    job = Job(cell, tuple(request.path for request in requests) or tuple(paths), trouble=trouble)
-    ((_, outcome),) = InProcess().each(solve, [job])
+    outcome: Any = trouble
+    if trouble is None:
+        job = Job(cell, tuple(request.path for request in requests) or tuple(paths))
+        ((_, outcome),) = InProcess().each(solve, [job])
     row, columns = (unanswered(cell, outcome), {}) if isinstance(outcome, BaseException) else outcome
     sets = {role: Answers(**columns[role]) for role in columns}
     found += _rows(before, row)
@@ -101,7 +105,7 @@ def _rows(before: Row, now: Row) -> list[str]:
     if before["status"] != "done" or now["status"] != "done":
         names = ["status", "reason"]
     return [
-        f"{name}: {_shown(before.get(name))} before, {_shown(fresh.get(name))} now"
+        f"{name}: {short(before.get(name))} before, {short(fresh.get(name))} now"
         for name in names
         if before.get(name) != fresh.get(name)
     ]
@@ -124,8 +128,3 @@ def _answers(before: Mapping[str, Answers], now: Mapping[str, Answers]) -> list[
                 other = sum(a.tobytes() != b.tobytes() for a, b in zip(old.astype(new.dtype), new, strict=True))
                 found.append(f"answers on {role}: {other} of {len(new)} values of {column.name} differ")
     return found
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:59] + "…"

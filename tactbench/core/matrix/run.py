@@ -1,4 +1,4 @@
-"""A run: plan, acquire, evaluate, store; then the rows, in the order of the plan."""
+"""A run: plan, record, evaluate, store; then the rows, in the order of the plan."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.evaluate import Evaluated, evaluate_all
+from tactbench.core.matrix.evaluate import evaluate_all
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.plan_recordings import RecordingPlan, plan
-from tactbench.core.matrix.progress import Prefixed, Progress, Silence
+from tactbench.core.matrix.plan_recordings import RecordingPlan, plan_run
+from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.record import acquire_missing
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
@@ -38,7 +38,7 @@ class Outcome:
     recorded: int
     """Recordings made now."""
     recordings: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
-    """The files each cell was answered from, by its name."""
+    """The files each cell was evaluated on, by its name."""
 
     @property
     def failures(self) -> list[Row]:
@@ -56,30 +56,7 @@ def run_matrix(
     progress: Progress | None = None,
     shown: Callable[[Sequence[Row]], None] | None = None,
 ) -> Outcome:
-    """Carry out `matrix` and write the files of a run: ``run.json`` and ``scores.json``.
-
-    The parameters are those of `carry_out`.
-    """
-    with store.hold():
-        outcome = carry_out(
-            matrix, store, choice=choice, recordings=recordings, operator=operator, progress=progress, shown=shown
-        )
-        store.write("run.json", json.dumps(outcome.provenance, indent=1, sort_keys=True) + "\n")
-        store.write("scores.json", scores_text(outcome.rows))
-    return outcome
-
-
-def carry_out(
-    matrix: MatrixSpec,
-    store: Store,
-    *,
-    choice: EngineChoice | None = None,
-    recordings: Path | None = None,
-    operator: Operator | None = None,
-    progress: Progress | None = None,
-    shown: Callable[[Sequence[Row]], None] | None = None,
-) -> Outcome:
-    """Acquire and answer `matrix`, reusing what `store` already has; the files of the last run stay as they are.
+    """Record and evaluate `matrix`, reusing what `store` already has.
 
     Parameters
     ----------
@@ -94,7 +71,7 @@ def carry_out(
     operator
         Who mounts caps and presses, at a rig of real devices.
     progress
-        Told what happens.
+        Receives what happens.
     shown
         Called with all rows so far after each replicate but the last.
 
@@ -105,47 +82,39 @@ def carry_out(
     FolderError
         If another run holds the folder, or the disk refuses; what was finished before is kept.
     """
-    chosen = (choice or EngineChoice()).checked()
-    chosen.ready()
+    choice = (choice or EngineChoice()).checked()
+    choice.ready()
+    progress = progress or Silence()
     with store.hold():
-        return _carry_out(matrix, store, chosen, recordings, operator, progress or Silence(), shown or (lambda _: None))
+        registry = installed()
+        keys = Keys(registry)
+        recorded = Recorded(store.folder / "cache" / "recordings.json")
+        book = Book(KeyBook(store.folder / "cache" / "keys"), keys)
+        cells, recording_plan = plan_run(matrix, registry, keys, store, recordings, recorded, choice)
+        provenance = gather(keys.sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
+        made_by = store.begin(provenance)
+        rows: list[Row] = []
+        computed = 0
+        rounds = _rounds(cells, choice, recording_plan)
+        for number, some in enumerate(rounds, 1):
+            prefix = f"replicate {number} of {len(rounds)}: " if len(rounds) > 1 else ""
+            acquire_missing(recording_plan, some, book, choice, progress, operator, stage=f"{prefix}recording")
+            found, now = evaluate_all(
+                some, recording_plan, book, choice, store, made_by, progress, stage=f"{prefix}evaluating"
+            )
+            rows += [found[cell.name] for cell in some]
+            computed += now
+            if shown is not None and now and number < len(rounds):
+                shown(tuple(rows))
+        fill_baselines(rows)
+        recorded.save()
+        store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
+        store.write("scores.json", scores_text(rows))
+    used = {cell.name: tuple(recording_plan.paths(cell)) for cell in cells}
+    return Outcome(tuple(rows), provenance, computed, recorded.number_made, used)
 
 
-def _carry_out(
-    matrix: MatrixSpec,
-    store: Store,
-    choice: EngineChoice,
-    recordings: Path | None,
-    operator: Operator | None,
-    told: Progress,
-    shown: Callable[[Sequence[Row]], None],
-) -> Outcome:
-    registry = installed()
-    keys = Keys(registry)
-    recorded = Recorded(store.folder / "cache" / "recordings.json")
-    book = Book(KeyBook(store.folder / "cache" / "keys"), keys)
-    cells, material = plan(matrix, registry, keys, store, recordings, recorded, choice)
-    provenance = gather(keys.sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
-    made_by = store.begin(provenance)
-    found = Evaluated()
-    rows: list[Row] = []
-    rounds = _rounds(cells, choice, material)
-    for number, some in enumerate(rounds, 1):
-        during = told if len(rounds) == 1 else Prefixed(told, f"replicate {number} of {len(rounds)}: ")
-        acquire_missing(material, some, book, choice, during, operator)
-        evaluated = evaluate_all(some, material, book, choice, store, made_by, during)
-        found.rows |= evaluated.rows
-        found.computed += evaluated.computed
-        rows += [found.rows[cell.name] for cell in some]
-        if number < len(rounds) and evaluated.computed:
-            shown(tuple(rows))
-    fill_baselines(rows)
-    recorded.save()
-    used = {cell.name: tuple(material.paths(cell)) for cell in cells}
-    return Outcome(tuple(rows), provenance, found.computed, recorded.number_made, used)
-
-
-def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: RecordingPlan) -> list[list[Cell]]:
+def _rounds(cells: Sequence[Cell], choice: EngineChoice, recording_plan: RecordingPlan) -> list[list[Cell]]:
     """Return the cells of each replicate that has to be recorded; all at once where recordings exist already.
 
     Between rounds nothing is under way, so that a table can be shown. On a cluster, which takes seconds to start, all
@@ -153,6 +122,6 @@ def _rounds(cells: Sequence[Cell], choice: EngineChoice, material: RecordingPlan
     """
     rounds: dict[int, list[Cell]] = {}
     for cell in cells:
-        number = cell.repeat if material.requests else 1
+        number = cell.repeat if recording_plan.requests else 1
         rounds.setdefault(min(number, 2) if choice.name == "dask" else number, []).append(cell)
     return list(rounds.values())

@@ -162,69 +162,42 @@ def beside(path: Path, folder: Path) -> str:
 
 
 _SOURCE = "source of "
-_LONGEST = 60
-"""Characters of a value that are shown."""
+_NONE = object()
 
 
 def differences(before: Sections, now: Sections) -> list[str]:
     """Return one sentence for everything that differs, the most telling first; none if nothing does."""
+    first = {"configuration": 0, "data": 1, "versions": 3}
     found: list[str] = []
-    for name in sorted({*before, *now}, key=_order):
-        old, new = before.get(name, {}), now.get(name, {})
-        if old != new:
-            found += _section(name, old, new)
+    for name in sorted({*before, *now}, key=lambda one: (first.get(one, 2), one)):
+        found += _section(name, before.get(name, {}), now.get(name, {}))
     return found
 
 
-def _order(section: str) -> tuple[int, str]:
-    first = ("configuration", "data")
-    last = ("versions",)
-    return (first.index(section) if section in first else 9 if section in last else 5, section)
-
-
 def _section(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    if name.startswith(_SOURCE):
-        package = name.removeprefix(_SOURCE)
-        if not old or not new:
-            yield f"the source of {package} {'counts now' if new else 'counts no longer'}"
-            return
-        for file in sorted({*old, *new}):
-            if old.get(file) != new.get(file):
-                yield f"{package}/{file} {_came_or_went(old, new, file, 'changed')}"
-    elif name == "data":
-        for recording in sorted({*old, *new}):
-            if _digest(old.get(recording)) != _digest(new.get(recording)):
-                yield f"recording {recording} {_came_or_went(old, new, recording, 'has other bytes')}"
-    else:
-        within = "" if name in ("configuration", "versions") else f"{name}: "
-        flat_old, flat_new = dict(_flat(old)), dict(_flat(new))
-        for place in sorted({*flat_old, *flat_new}):
-            if _filled(place, flat_old) or _filled(place, flat_new):
-                continue
-            if flat_old.get(place, _NONE) != flat_new.get(place, _NONE):
-                yield f"{within}{place} {_shown(flat_old.get(place, _NONE))} -> {_shown(flat_new.get(place, _NONE))}"
-
-
-_NONE = object()
-
-
-def _filled(place: str, facts: Mapping[str, Any]) -> bool:
-    """Return whether there is something inside `place`: that is told instead."""
-    return any(name.startswith((f"{place}.", f"{place}[") if place else "") and name != place for name in facts)
-
-
-def _digest(recording: Any) -> Any:
-    """Return what decides of a recording; where it lies does not."""
-    return recording.get("digest") if isinstance(recording, Mapping) else None
-
-
-def _came_or_went(old: Mapping[str, Any], new: Mapping[str, Any], name: str, otherwise: str) -> str:
-    return "is new" if name not in old else "is gone" if name not in new else otherwise
+    package = name.removeprefix(_SOURCE)
+    if package != name and bool(old) != bool(new):
+        yield f"the source of {package} {'counts now' if new else 'counts no longer'}"
+        return
+    if name == "data":  # where a recording lies decides nothing
+        old, new = ({key: one.get("digest") for key, one in side.items()} for side in (old, new))
+    flat_old, flat_new = dict(_flat(old)), dict(_flat(new))
+    for place in sorted({*flat_old, *flat_new}):
+        was, is_ = flat_old.get(place, _NONE), flat_new.get(place, _NONE)
+        if was == is_:
+            continue
+        if package != name or name == "data":
+            what = f"{package}/{place}" if package != name else f"recording {place}"
+            other = "has other bytes" if name == "data" else "changed"
+            yield f"{what} {'is new' if was is _NONE else 'is gone' if is_ is _NONE else other}"
+        else:
+            within = "" if name in ("configuration", "versions") else f"{name}: "
+            yield f"{within}{place} {short(was)} -> {short(is_)}"
 
 
 def _flat(facts: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Yield every leaf with its dotted place."""
-    if isinstance(facts, Mapping) and facts:
+    if isinstance(facts, Mapping):
         for name, value in facts.items():
             yield from _flat(value, f"{prefix}.{name}" if prefix else str(name))
     elif isinstance(facts, list | tuple) and any(isinstance(value, Mapping | list | tuple) for value in facts):
@@ -234,8 +207,7 @@ def _flat(facts: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
         yield prefix, list(facts) if isinstance(facts, tuple) else facts
 
 
-def _shown(value: Any) -> str:
-    if value is _NONE:
-        return "nothing"
-    text = value if isinstance(value, str) else repr(value)
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+def short(value: Any) -> str:
+    """Return a value as text of 60 characters at most."""
+    text = "nothing" if value is _NONE else value if isinstance(value, str) else repr(value)
+    return text if len(text) <= 60 else f"{text[:59]}…"

@@ -19,7 +19,7 @@ from tactbench.core.pool.endings import out_of_memory
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.log import flush, print_to
 from tactbench.core.pool.memory import data_limit, first_to_go
-from tactbench.core.pool.message import pack, told
+from tactbench.core.pool.message import dump_error, pack
 from tactbench.core.pool.processes import die_with_parent, reap_finished, set_subreaper
 
 WHERE_SIGNAL = getattr(signal, "SIGUSR2", None)
@@ -115,9 +115,9 @@ def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> bytes:
     except _Ended:
         os._exit(0)
     except MemoryError as error:
-        text = told(out_of_memory(limits, error, "".join(traceback.format_exception(error))))
+        text = dump_error(out_of_memory(limits, error, "".join(traceback.format_exception(error))))
     except BaseException as error:
-        text = told(error)
+        text = dump_error(error)
         if spent is not None:
             text["message"] = f"Its result cannot be sent as JSON and arrays: {text['message']}"
     return pack({"error": text, "spent_s": time.perf_counter() - began if spent is None else spent})

@@ -5,16 +5,18 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-from tactbench.core.errors import OutOfMemory, TimedOut
+from tactbench.core.errors import CellStopped
 from tactbench.core.pool.endings import out_of_memory, too_slow
 from tactbench.core.pool.limits import UNLIMITED, Limits
 from tactbench.core.pool.log import open_log, printing_to, tail
 from tactbench.core.pool.memory import data_limit
+from tactbench.core.pool.message import dump_error, load_error
 from tactbench.core.pool.pool import R, T
 
 AGAIN_S = 0.2
@@ -45,7 +47,7 @@ class InProcess:
     def _one(self, work: Callable[[T], R], item: T) -> R | BaseException:
         log = open_log()
         outcome: R | BaseException
-        here = os.getpid()
+        here, began_s = os.getpid(), time.monotonic()
         with printing_to(log), _interrupts_noted() as interrupted:
             alarm = _Alarm(self._limits.timeout_s)
             try:
@@ -56,15 +58,15 @@ class InProcess:
             except MemoryError as error:
                 outcome = out_of_memory(self._limits, error)
             except BaseException as error:
-                outcome = error
+                outcome = load_error(dump_error(error))
             if os.getpid() != here:
                 os._exit(0)  # a child that the work forked, and that returned from it: it has nothing to say here
         said = tail(log)
         os.close(log)
         if interrupted:
             raise KeyboardInterrupt
-        if isinstance(outcome, TimedOut | OutOfMemory):
-            outcome.log = said
+        if isinstance(outcome, CellStopped):
+            outcome.log, outcome.spent_s = said, time.monotonic() - began_s
         return outcome
 
 

@@ -151,21 +151,20 @@ def _read(text: bytes, arrays: bytes) -> dict[str, Any]:
     return message
 
 
-def told(error: BaseException) -> dict[str, Any]:
+def dump_error(error: BaseException) -> dict[str, Any]:
     """Return an exception as text; `kind` is the name of its class if that is one of `tactbench.core.errors`."""
     where = "".join(traceback.format_exception(error))
     name = type(error).__name__
     if isinstance(error, TactbenchError) and getattr(errors, name, None) is type(error):
-        where = str(error.traceback_text) or where
-        said: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "kind": name,
             "message": str(error.message),
             "hint": str(error.hint),
-            "traceback": where,
+            "traceback": str(error.traceback_text) or where,
         }
         if isinstance(error, CellStopped):
-            said |= {"signal": error.signal, "log": error.log, "spent_s": error.spent_s}
-        return said
+            fields |= {"signal": error.signal, "log": error.log, "spent_s": error.spent_s}
+        return fields
     try:
         text = str(error)
     except Exception:
@@ -173,14 +172,14 @@ def told(error: BaseException) -> dict[str, Any]:
     return {"kind": "", "message": f"{name}: {text}", "hint": "", "traceback": where}
 
 
-def error_of(said: Mapping[str, Any], log: str = "") -> TactbenchError:
-    """Return the exception that `told` has put into words; `log` is what was printed, if the words do not hold it."""
-    kind = getattr(errors, said["kind"], None) if said["kind"] else Raised
+def load_error(fields: Mapping[str, Any], log: str = "") -> TactbenchError:
+    """Return the exception that `dump_error` made text of; `log` is what was printed, if the text does not hold it."""
+    kind = getattr(errors, fields["kind"], None) if fields["kind"] else Raised
     if not (isinstance(kind, type) and issubclass(kind, TactbenchError)):
-        raise ValueError(f"there is no error called {said['kind']!r}")
-    error = _rebuild(kind, said["message"], said["hint"])
-    error.traceback_text = said["traceback"]
+        raise ValueError(f"there is no error called {fields['kind']!r}")
+    error = _rebuild(kind, fields["message"], fields["hint"])
+    error.traceback_text = fields["traceback"]
     if isinstance(error, CellStopped):
-        error.signal, error.log = said.get("signal"), said.get("log") or log
-        error.spent_s = said.get("spent_s")
+        error.signal, error.log = fields.get("signal"), fields.get("log") or log
+        error.spent_s = fields.get("spent_s")
     return error

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import wait
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from tactbench.core.pool.limits import UNLIMITED, Limits
 from tactbench.core.pool.processes import interrupts_blocked, kill_orphans, own_children, set_subreaper
@@ -79,7 +79,10 @@ class Pool:
                     if index < 0:
                         break
                     try:
-                        self._begin(work, every or [item], index, second, busy, idle)
+                        with interrupts_blocked():
+                            worker = idle.pop() if idle else Worker(work, every or [item], self._limits, self._preload)
+                            busy.append(worker)
+                            worker.begin(index, second)
                     except Exception as error:  # it cannot be pickled, or the system starts no more processes
                         yield item, error  # type: ignore[misc]
                 if not busy or not self._wanted():
@@ -97,20 +100,6 @@ class Pool:
                         again.append((worker.index, item))
                     else:
                         yield item, outcome
-
-    def _begin(
-        self,
-        work: Callable[[Any], Any],
-        items: Sequence[Any],
-        index: int,
-        second: bool,
-        busy: list[Worker],
-        idle: list[Worker],
-    ) -> None:
-        with interrupts_blocked():
-            worker = idle.pop() if idle else Worker(work, items, self._limits, self._preload)
-            busy.append(worker)
-            worker.begin(index, second)
 
     def _end_item(self, worker: Worker, busy: list[Worker], idle: list[Worker]) -> None:
         """End whatever an item that is over has started, and its process unless another item may have it."""

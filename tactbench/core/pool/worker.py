@@ -16,7 +16,7 @@ from tactbench.core.pool import endings, memory
 from tactbench.core.pool.child import WHERE_SIGNAL, run_child
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.log import cut_back, flush, open_log, tail
-from tactbench.core.pool.message import Inbox, error_of
+from tactbench.core.pool.message import Inbox, load_error
 from tactbench.core.pool.processes import kill_below, kill_tree
 
 STACK_S = 0.1
@@ -145,7 +145,7 @@ class Worker:
     def _result(self, message: dict[str, Any]) -> Any:
         if self._limits.exceeded(float(message["spent_s"])):
             return self._stop(endings.too_slow(self._limits))
-        return error_of(message["error"], self._printed()) if "error" in message else message["value"]
+        return load_error(message["error"], self._printed()) if "error" in message else message["value"]
 
     def _stop(self, why: CellStopped) -> CellStopped:
         """End the process; return why."""

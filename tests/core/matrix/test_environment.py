@@ -30,8 +30,10 @@ def test_a_plugin_counts_with_every_byte(tmp_path):
     (package,) = [path for path in (tmp_path / "good").iterdir() if (path / "__init__.py").exists()]
     assert differences(here, asked(tmp_path / "good")) == []
     (package / "beside.py").write_text("FACTOR = 2\n")
-    assert differences(here, asked(tmp_path / "good")) == [f"the source of {package.name} differs"]
-    assert differences(here, asked()) == [f"source of {package.name} is missing there"]
+    source = f"the source of {package.name}"
+    there = asked(tmp_path / "good")
+    assert differences(here, there) == [f"{source} is {there[source]} there and {here[source]} here"]
+    assert differences(here, asked()) == [f"{source} is missing there and {here[source]} here"]
 
 
 def test_what_only_the_other_side_has_does_not_matter():

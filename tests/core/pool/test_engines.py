@@ -93,7 +93,7 @@ def test_whatever_an_item_does_it_does_to_itself(name, what, kind, says):
 
 @pytest.mark.parametrize(
     ("what", "kind"),
-    [("raises", ValueError), ("exits", SystemExit), ("interrupts", KeyboardInterrupt), ("hangs", TimedOut),
+    [("raises", Raised), ("exits", Raised), ("interrupts", Raised), ("hangs", TimedOut),
      ("eats", OutOfMemory), ("refuses", NotApplicable)],
 )  # fmt: skip
 def test_in_process_everything_short_of_the_processs_end_is_a_result(what, kind):
@@ -277,7 +277,7 @@ def test_in_process_the_users_ctrl_c_ends_the_iteration_and_a_plugins_does_not()
         with pytest.raises(KeyboardInterrupt):
             list(InProcess().each(work_here, ["item"]))
     ((_, outcome),) = InProcess().each(work, ["interrupts"])
-    assert type(outcome) is KeyboardInterrupt
+    assert type(outcome) is Raised
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

@@ -65,30 +65,9 @@ def removed(folder: Path) -> FolderError:
     )
 
 
-def sync_all(folder: Path) -> None:
-    """Make everything that was written to the disk of `folder` survive a power cut: dear once, cheap for many files."""
-    opened = os.open(folder, os.O_RDONLY)
-    try:
-        if _syncfs(opened):
-            os.sync()
-    finally:
-        os.close(opened)
-
-
-def _syncfs(descriptor: int) -> int:
-    """Sync the one file system that a descriptor lies on; not 0 where that cannot be done."""
-    import ctypes
-
-    try:
-        failed: int = ctypes.CDLL(None).syncfs(descriptor)
-    except (AttributeError, OSError, TypeError):  # neither Linux nor a libc that is known
-        return -1
-    return failed
-
-
-def sync_folder(folder: Path) -> None:
-    """Make what was renamed into `folder` survive a power cut; a system that cannot is not asked twice."""
-    opened = os.open(folder, os.O_RDONLY)
+def sync_path(path: Path) -> None:
+    """Have a file, or the names in a folder, survive a power cut, where the system can sync that."""
+    opened = os.open(path, os.O_RDONLY)
     try:
         os.fsync(opened)
     except OSError as error:

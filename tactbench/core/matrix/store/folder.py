@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.errors import FormatError
+from tactbench.core.errors import FormatError, RecordingError
 from tactbench.core.matrix.files import replace_file, write_file
 from tactbench.core.matrix.store import leftovers, limits
-from tactbench.core.matrix.store.disk import refusal, removed, sync_all, sync_folder, writing
-from tactbench.core.matrix.store.following import Following
+from tactbench.core.matrix.store.disk import refusal, removed, sync_path, writing
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
 from tactbench.core.matrix.store.rows import NAMING, Row, plain
@@ -25,11 +23,6 @@ if TYPE_CHECKING:
     from tactbench.core.spec.scene import Role
 
 _PARTS = ("recordings", "cells", "provenance", "cache")
-_SYNC_EVERY_S = 0.1
-"""Cells that take longer are on the disk, bytes and name, before the next one begins. Where many end within this time
-they are synced together: each for itself would take longer than all else that is done for a small cell. A power cut may
-then leave files with a name and without their bytes; the next run, which sees that this one broke off, reads every
-shard again before it believes one. A process that is killed loses nothing either way."""
 
 
 class Store:
@@ -46,15 +39,14 @@ class Store:
     def __init__(self, folder: Path, *, recordings: tuple[Path, ...] = ()) -> None:
         self.folder = folder
         self._cells = folder / "cells"
-        self._cells_name = str(self._cells)
-        self._follow = Following(folder, recordings)
+        self._allowed = [path.resolve() for path in recordings]
+        self._same_content: dict[tuple[Path, str], bool] = {}
         self._lock: Lock | None = None
         self._ledger: Ledger | None = None
         self._done: dict[str, Entry] = {}
         self._latest: dict[str, Entry] = {}
         self._orphans: list[Entry] = []
         self._provenance = ("", "{}")
-        self._synced, self._unsynced = -_SYNC_EVERY_S, 0
 
     # One run at a time
 
@@ -80,14 +72,7 @@ class Store:
             raise refusal(self.folder, error, begun=False) from error
         try:
             leftovers.sweep(self.folder)
-            if self._lock.broke_off:
-                self._distrust()
-            try:
-                yield self
-            finally:
-                if self._unsynced and self._lock.in_place():
-                    with suppress(OSError):
-                        self._sync()
+            yield self
         finally:
             self._lock.release()
             self._lock = None
@@ -114,7 +99,8 @@ class Store:
         """Return the row of a finished cell whose shard is there in full length, or None."""
         self._read()
         entry = self._done.get(key)
-        return dict(entry.row) if entry is not None and self._size(key) == _bytes(entry) else None
+        whole = entry is not None and entry.shard is not None and self._size(key) == entry.shard[1]
+        return dict(entry.row) if entry is not None and whole else None
 
     def keep(self, key: str, row: Mapping[str, Any], sets: Mapping[Role, Answers]) -> Row:
         """Write a finished cell: its shard aside, synced; its line in the ledger; then the shard gets its name.
@@ -147,18 +133,15 @@ class Store:
         with self._written():
             if self._lock is None:
                 self._cells.mkdir(parents=True, exist_ok=True)
-            due = time.monotonic() - self._synced >= _SYNC_EVERY_S
             try:
-                write_file(aside, image, sync=due and not self._unsynced)  # else all are synced together below
+                write_file(aside, image, sync=True)
                 ledger.append(entry)
                 aside.replace(path)
             except BaseException:
                 with suppress(OSError):
                     aside.unlink(missing_ok=True)
                 raise
-            self._unsynced += 1
-            if due:
-                self._sync()
+            sync_path(self._cells)
         self._place(entry)
         return dict(told)
 
@@ -289,7 +272,11 @@ class Store:
         return said if whole else {}
 
     def recording(self, path: str, digest: str = "") -> Path | None:
-        """Return the file of a recording that a row names, or None if it may not be followed.
+        """Return the file of a recording that a row names, or None if it may not be opened.
+
+        Opened are files inside the result folder; files in the folders that the user has named; and elsewhere regular
+        files that hold the very content that the row names, so that one's own runs on recordings elsewhere need no
+        naming, while a stranger's row shows nothing that the stranger does not have already.
 
         Parameters
         ----------
@@ -298,7 +285,15 @@ class Store:
         digest
             The content digest that stands beside it in ``row["digests"]``.
         """
-        return self._follow(path, digest)
+        if "\0" in path:
+            return None
+        found = (self.folder / path).resolve()
+        if any(found.is_relative_to(root) for root in (self.folder.resolve(), *self._allowed)):
+            return found
+        pair = (found, digest)
+        if pair not in self._same_content:
+            self._same_content[pair] = bool(digest) and found.is_file() and _content(found) == digest
+        return found if self._same_content[pair] else None
 
     def recordings(self, row: Mapping[str, Any]) -> list[tuple[str, Path | None]]:
         """Return each recording that a row names, in its order, and its file, or None if it may not be followed."""
@@ -313,7 +308,7 @@ class Store:
             for entry in self._ledger.entries:
                 self._place(entry)
             known = {f"{key}.h5" for key in self._done}
-            for name in sorted(self._names() - known):
+            for name in sorted(self._sizes().keys() - known):
                 self._adopt(name)
         return self._ledger
 
@@ -343,16 +338,9 @@ class Store:
 
     def _size(self, key: str) -> int:
         try:
-            return os.lstat(f"{self._cells_name}{os.sep}{key}.h5").st_size  # asked for every cell of every run
+            return self._shard(key).lstat().st_size
         except OSError:
             return -1
-
-    def _names(self) -> set[str]:
-        try:
-            with os.scandir(self._cells) as found:
-                return {one.name for one in found if one.name.endswith(".h5")}
-        except OSError:
-            return set()
 
     def _sizes(self) -> dict[str, int]:
         try:
@@ -368,24 +356,15 @@ class Store:
         with writing(self.folder):
             yield
 
-    def _sync(self) -> None:
-        if self._unsynced > 1:
-            sync_all(self._cells)
-        else:
-            sync_folder(self._cells)
-        self._synced, self._unsynced = time.monotonic(), 0
 
-    def _distrust(self) -> None:
-        """Forget finished cells whose shards are not, byte by byte, what was written."""
-        self._read()
-        for key, entry in list(self._done.items()):
-            if self._size(key) == _bytes(entry) and self.image(entry) is None:
-                del self._done[key]
-                self._read().troubles.append(f"{entry.row['cell']!r} is computed again: its shard is damaged")
+def _content(path: Path) -> str:
+    """Return the digest of a recording's content, "" if it is none."""
+    from tactbench.core.recording.reader import content_digest
 
-
-def _bytes(entry: Entry) -> int:
-    return entry.shard[1] if entry.shard is not None else -2
+    try:
+        return content_digest(path)
+    except RecordingError:
+        return ""
 
 
 def _clipped(text: Any) -> Any:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FolderError
+from tactbench.core.matrix.files import write_all
 from tactbench.core.matrix.store import limits
 from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
 from tactbench.core.matrix.store.sharing import canonical, definition, joined, parted, shared_lines
@@ -57,15 +57,12 @@ class Ledger:
         text = "".join(f"{line}\n" for line in lines).encode()
         file = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
         try:
-            with _alone(file):
-                end = _whole(file)
-                try:
-                    written = os.write(file, text)
-                    while written < len(text):  # the last bytes of a disk: the next write says why
-                        written += os.write(file, text[written:])
-                except BaseException:
-                    os.ftruncate(file, end)
-                    raise
+            end = _whole(file)
+            try:
+                write_all(file, text)
+            except BaseException:
+                os.ftruncate(file, end)
+                raise
         finally:
             os.close(file)
         self.known |= fresh
@@ -104,26 +101,54 @@ def read_ledger(folder: Path) -> Ledger:
 
 def _take_in(ledger: Ledger, content: bytes) -> None:
     """Turn the bytes of a ledger into entries."""
-    broken = 0
-    waiting: list[tuple[dict[str, Any], int]] = []
+    broken, lost, over, characters = 0, 0, 0, 0
     shared: dict[str, Any] = {}
     sizes: dict[str, int] = {}
-    for line, said in _parsed(content):
-        if isinstance(said, dict) and "shared" in said:
+    for line, record in _parsed(content):
+        if not isinstance(record, dict) or _is_monstrous(line, record):
+            broken += 1
+        elif "shared" in record:
             digest = definition(line)
-            if digest is None or _monstrous(line, said):
+            if digest is None:
                 broken += 1
             else:
-                shared.setdefault(digest, said["value"])
+                shared.setdefault(digest, record["value"])
                 sizes[digest] = len(line)
-        elif isinstance(said, dict) and isinstance(said.get("row"), dict) and not _monstrous(line, said):
-            waiting.append((said, len(line)))
+        elif isinstance(record.get("row"), dict):
+            references, shard = record.get("refs", {}), record.get("shard")
+            try:
+                characters += len(line) + sum(sizes[digest] for digest in references.values())
+                if characters > limits.SHARED_CHARACTERS:
+                    over += 1
+                    continue
+                row = joined(record["row"], references, shared)
+            except (KeyError, TypeError, AttributeError):
+                lost += 1
+                continue
+            fault = fault_in_row(row) or _fault_in_names(row, shard)
+            if fault:
+                name = str(row.get("cell", ""))[:200]
+                ledger.troubles.append(f"{f'{name!r}' if name else 'a row'} is left out: {fault}")
+            else:
+                ledger.entries.append(Entry(row, (shard[0], shard[1]) if shard and row["status"] == "done" else None))
         else:
             broken += 1
     ledger.known = set(shared)
-    _fill(ledger, waiting, shared, sizes)
-    if broken:
-        ledger.troubles.insert(0, f"{_lines_of(broken)} of {ledger.path} could not be read")
+    for count, what in (
+        (broken, "could not be read"),
+        (lost, "refer to what is not there"),
+        (over, "are left out: written out, they would fill the memory"),
+    ):
+        if count:
+            ledger.troubles.append(f"{count} line{'s' if count > 1 else ''} of {ledger.path} {what}")
+
+
+def _fault_in_names(row: Row, shard: Any) -> str:
+    """Return what is wrong with the key of a row, or with what its line says of the shard, as a clause."""
+    done, key = row["status"] == "done", row.get("key", "")
+    if done and not (_is_shard(shard) and limits.is_key(key)):
+        return "it names no shard: it is of another version"
+    return "its key is none" if key and not limits.is_key(key) else ""
 
 
 def whole_text(entries: Sequence[Entry]) -> str:
@@ -165,56 +190,19 @@ def _parsed(content: bytes) -> Iterator[tuple[str, Any]]:
             yield "", None
 
 
-def _monstrous(line: str, said: Any) -> bool:
+def _is_monstrous(line: str, record: Any) -> bool:
     """Return whether a line is nested without end, or holds half characters that cannot be printed."""
     # What is empty can only be the innermost.
     holding = line.count("[") - line.count("[]") + line.count("{") - line.count("{}")
-    if holding >= limits.DEPTH and too_deep(said):
+    if holding >= limits.DEPTH and too_deep(record):
         return True
     if "\\ud" not in line and "\\uD" not in line:
         return False
     try:
-        json.dumps(said, ensure_ascii=False).encode()
+        json.dumps(record, ensure_ascii=False).encode()
     except UnicodeEncodeError:
         return True
     return False
-
-
-def _fill(
-    ledger: Ledger, waiting: Sequence[tuple[dict[str, Any], int]], shared: Mapping[str, Any], sizes: Mapping[str, int]
-) -> None:
-    """Turn lines into entries."""
-    characters, lost, over = 0, 0, 0
-    for said, size in waiting:
-        references, shard = said.get("refs", {}), said.get("shard")
-        try:
-            characters += size + sum(sizes[digest] for digest in references.values())
-            if characters > limits.SHARED_CHARACTERS:
-                over += 1
-                continue
-            row = joined(said["row"], references, shared)
-        except (KeyError, TypeError, AttributeError):
-            lost += 1
-            continue
-        fault = fault_in_row(row)
-        done = not fault and row["status"] == "done"
-        if done and not (_is_shard(shard) and limits.is_key(row.get("key"))):
-            fault = "it names no shard: it is of another version"
-        elif not done and row.get("key") and not limits.is_key(row["key"]):
-            fault = "its key is none"
-        if fault:
-            name = row.get("cell")
-            ledger.troubles.append(
-                f"{str(name)[:200]!r} is left out: {fault}" if name else f"a row is left out: {fault}"
-            )
-            continue
-        ledger.entries.append(Entry(row, (shard[0], shard[1]) if done and shard else None))
-    if lost:
-        ledger.troubles.append(f"{_lines_of(lost)} of {ledger.path} refer to what is not there")
-    if over:
-        ledger.troubles.append(
-            f"{_lines_of(over)} of {ledger.path} are left out: written out, they would fill the memory"
-        )
 
 
 def _is_shard(said: Any) -> bool:
@@ -224,32 +212,10 @@ def _is_shard(said: Any) -> bool:
     )  # fmt: skip
 
 
-def _lines_of(count: int) -> str:
-    return f"{count} line{'s' if count > 1 else ''}"
-
-
-@contextmanager
-def _alone(file: int) -> Iterator[None]:
-    """Keep other writers of this ledger out for the length of a line."""
-    try:
-        import fcntl
-    except ImportError:
-        yield
-        return
-    with suppress(OSError):  # some network disks know no locks
-        fcntl.flock(file, fcntl.LOCK_EX)
-    yield  # closing the file lets go
-
-
 def _whole(file: int) -> int:
     """Cut away a last line that is not whole, and return where the ledger ends."""
     end = os.fstat(file).st_size
-    if not end or os.pread(file, 1, end - 1) == b"\n":
-        return end
-    start, tail = end, b""
-    while start and b"\n" not in tail:
-        start = max(0, start - 65536)
-        tail = os.pread(file, end - start, start)
-    whole = start + tail.rfind(b"\n") + 1
-    os.ftruncate(file, whole)
-    return whole
+    if end and os.pread(file, 1, end - 1) != b"\n":
+        end = os.pread(file, end, 0).rfind(b"\n") + 1
+        os.ftruncate(file, end)
+    return end

@@ -11,56 +11,36 @@ _ASIDE = re.compile(r"\..+\.(\d{1,10})\.partial")
 """Names of files written aside by `tactbench.core.matrix.files.replace_file`: hidden, with the writer's process."""
 
 
-def sweep(folder: Path) -> int:
-    """Remove half-written files of processes that are no more, and return how many.
+def sweep(folder: Path) -> None:
+    """Remove half-written files of processes that are no more.
 
-    Only names that tactbench gives, in folders that it makes. A recording that broke off is left for
-    ``tactbench inspect --salvage``, unless the same one was recorded whole since.
+    Only names that tactbench gives, in folders that it makes; no link is followed. A recording that broke off is left
+    for ``tactbench inspect --salvage``, unless the same one was recorded whole since.
     """
-    swept = 0
     for place in (folder, folder / "cells", folder / "provenance", folder / "cache"):
-        for path in _files(place, ".partial"):
+        for path in place.glob(".*.partial"):
             named = _ASIDE.fullmatch(path.name)
             if named and not alive(named[1]):
-                swept += _remove(path)
-    for sensor in _folders(folder / "recordings"):
-        swept += sum(_sweep_recording(path) for path in _files(sensor) if path.suffix != ".h5")
-    return swept
+                _remove(path)
+    for path in (folder / "recordings").glob("*/*"):
+        if path.suffix != ".h5" and not path.parent.is_symlink() and _is_over(path):
+            _remove(path)
 
 
-def _sweep_recording(path: Path) -> int:
+def _is_over(path: Path) -> bool:
+    """Return whether a file of a recording's writer is needed no more."""
     from tactbench.core.recording.format import COMPLETING, PARTIAL
 
     if path.name.endswith(COMPLETING):
-        journal = path.with_name(path.name.removesuffix(COMPLETING) + PARTIAL)
-    elif path.name.endswith(PARTIAL) and path.with_name(path.name.removesuffix(PARTIAL)).is_file():
-        journal = path
-    else:
-        return 0
-    return 0 if _being_written(journal) else _remove(path)
+        return not _being_written(path.with_name(path.name.removesuffix(COMPLETING) + PARTIAL))
+    whole = path.name.endswith(PARTIAL) and path.with_name(path.name.removesuffix(PARTIAL)).is_file()
+    return whole and not _being_written(path)
 
 
-def _files(place: Path, ending: str = "") -> list[Path]:
-    try:
-        with os.scandir(place) as found:
-            return [Path(one.path) for one in found if one.name.endswith(ending) and one.is_file(follow_symlinks=False)]
-    except OSError:
-        return []
-
-
-def _folders(place: Path) -> list[Path]:
-    try:
-        with os.scandir(place) as found:
-            return [Path(one.path) for one in found if one.is_dir(follow_symlinks=False)]
-    except OSError:
-        return []
-
-
-def _remove(path: Path) -> int:
+def _remove(path: Path) -> None:
     with suppress(OSError):
-        path.unlink()
-        return 1
-    return 0
+        if path.is_file() and not path.is_symlink():
+            path.unlink()
 
 
 def alive(process: str) -> bool:
@@ -72,12 +52,8 @@ def alive(process: str) -> bool:
     except ProcessLookupError:
         return False
     except OSError:
-        return True
-    try:
-        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]  # proc_pid_stat(5)
-    except (OSError, IndexError):
-        return True
-    return state not in "ZX"  # ended, and only not reaped yet
+        pass
+    return True
 
 
 def _being_written(journal: Path) -> bool:

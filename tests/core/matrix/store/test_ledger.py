@@ -14,7 +14,6 @@ from tactbench.core.errors import FolderError
 from tactbench.core.matrix.store import Store, limits
 from tactbench.core.matrix.store.ledger import Entry, read_ledger, whole_text
 from tactbench.core.matrix.store.sharing import canonical, joined, parted
-from tests.core.pool.patience import ending
 
 from .made import PLAN, ended, kept, key
 
@@ -60,21 +59,6 @@ def test_a_line_cut_short_anywhere_costs_that_line_only(tmp_path):
         assert [row["cell"] for row in found.rows()] == ["a", "c"]
         assert found.troubles == ()  # the torn line was cut away, nothing was glued to it
         assert found.rows()[1]["plan"] == PLAN
-
-
-def test_two_processes_never_write_into_each_others_lines(tmp_path):
-    code = (
-        "import sys\nfrom pathlib import Path\nfrom tactbench.core.matrix.store import Store\n"
-        "store = Store(Path(sys.argv[1]))\n"
-        "for n in range(100):\n"
-        "    store.note({'cell': f'{sys.argv[2]}{n}', 'status': 'failed', 'log': 'x' * (n * 50)})\n"
-    )
-    commands = [[sys.executable, "-c", code, str(tmp_path), name] for name in "ab"]
-    with ending(commands[0]) as one, ending(commands[1]) as other:
-        assert [one.wait(60), other.wait(60)] == [0, 0]
-    found = Store(tmp_path)
-    assert {row["cell"] for row in found.rows()} == {f"{name}{n}" for name in "ab" for n in range(100)}
-    assert found.troubles == ()
 
 
 def test_a_canonical_text_is_read_as_it_was(tmp_path):

@@ -149,21 +149,3 @@ def test_a_folder_removed_or_moved_in_between_is_told_and_not_made_again(tmp_pat
             assert str(tmp_path / "out") in str(error.value)
     assert not (tmp_path / "out").exists()
     assert [row["cell"] for row in Store(tmp_path / "moved").rows()] == ["a"]
-
-
-def test_after_a_run_that_broke_off_every_shard_is_read_before_it_is_believed(tmp_path):
-    """A power cut may leave a file of the right length without its bytes."""
-    with holder(tmp_path):
-        pass  # killed: it did not tidy up
-    store = Store(tmp_path)
-    kept(store, "a")
-    kept(store, "b")
-    path = tmp_path / "cells" / f"{key('a')}.h5"
-    path.write_bytes(bytes(path.stat().st_size))
-    assert (tmp_path / "cache" / "held.json").exists()
-    with Store(tmp_path).hold() as again:
-        assert again.finished(key("a")) is None
-        assert again.finished(key("b")) is not None
-        assert "'a' is computed again" in again.troubles[0]
-        kept(again, "a", 2.0)
-    assert Store(tmp_path).finished(key("a"))["score"] == 2.0
