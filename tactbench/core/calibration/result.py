@@ -15,7 +15,7 @@ from pydantic import ValidationError
 import tactbench
 from tactbench.core.calibration.draw import Draw, Varied
 from tactbench.core.errors import FormatError
-from tactbench.core.matrix.files import replace_file
+from tactbench.core.matrix.files import read_regular, replace_file
 from tactbench.core.spec.calibration import CalibrationSpec
 
 DRAWS, RUN, VARIATIONS = "draws.csv", "run.json", "variations.csv"
@@ -128,7 +128,7 @@ def _varied(spec: CalibrationSpec, lines: Iterable[Mapping[str, str]]) -> Varied
 
 def _read(folder: Path, shown: str) -> CalibrationResult:
     try:
-        about: dict[str, Any] = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        about: dict[str, Any] = json.loads(read_regular(folder / RUN, 2**24))
         spec = CalibrationSpec.model_validate(about["procedure"])
         with (folder / DRAWS).open(encoding="utf-8", newline="") as file:
             draws = tuple(_draw(spec, row) for row in csv.DictReader(file))

@@ -1,9 +1,34 @@
-"""Writing a file whole or not at all."""
+"""Writing a file whole or not at all, and reading one that anybody may have put there."""
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from pathlib import Path
+
+
+def read_regular(path: Path, most: int, *, follow: bool = True) -> bytes:
+    """Return the first `most` + 1 bytes of a file.
+
+    Parameters
+    ----------
+    most
+        What the caller takes; one byte more says that the file is larger.
+    follow
+        Whether the last part of the path may be a link.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, or is a pipe, a device or a folder: opening a pipe would wait for its other end.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    opened = os.open(path, flags if follow else flags | getattr(os, "O_NOFOLLOW", 0))
+    with open(opened, "rb") as file:  # noqa: PTH123  (a descriptor)
+        if not stat.S_ISREG(os.fstat(opened).st_mode):
+            raise OSError(errno.EINVAL, "it is no regular file", str(path))
+        return file.read(most + 1)
 
 
 def replace_file(path: Path, content: bytes, *, sync: bool = True, mode: int = 0o666) -> None:

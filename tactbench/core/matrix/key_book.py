@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tactbench.core.matrix.files import replace_file
+from tactbench.core.matrix.files import read_regular, replace_file
 from tactbench.core.matrix.keys import Fixed, Section
 
 Sections = Mapping[str, Section]
@@ -97,7 +97,7 @@ class KeyBook:
             return {}
         path = self._folder / f"{digest}.json"
         try:
-            found = json.loads(path.read_bytes()) if path.stat().st_size < _LARGEST else None
+            found = json.loads(read_regular(path, _LARGEST))
         except (OSError, ValueError, RecursionError):
             found = None
         return found if isinstance(found, dict) and all(isinstance(one, dict) for one in found.values()) else {}
@@ -108,7 +108,7 @@ class KeyBook:
             self._lines = {}
             path = self._folder / "keys.jsonl"
             try:
-                lines = path.read_text(encoding="utf-8").splitlines() if path.stat().st_size < _LARGEST else []
+                lines = read_regular(path, _LARGEST).decode().splitlines()
             except (OSError, ValueError):
                 lines = []
             for text in lines:

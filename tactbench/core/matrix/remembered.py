@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.matrix.files import replace_file
+from tactbench.core.matrix.files import read_regular, replace_file
 
 Facts = Mapping[str, str | None]
 
@@ -86,7 +86,7 @@ def _looks(stat: os.stat_result) -> tuple[str, int, int, int]:
 
 def _entries(path: Path) -> dict[str, list[Any]]:
     try:
-        content = json.loads(path.read_bytes())
+        content = json.loads(read_regular(path, 2**28))
         if content["format"] == _FORMAT:
             return {name: entry for name, entry in content["files"].items() if _is_entry(entry)}
     except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError):

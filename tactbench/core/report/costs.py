@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.cost.ladder_file import VERSION
+from tactbench.core.matrix.files import read_regular
 from tactbench.core.report.ladder_table import COLUMNS, SORTED_BY, line, title
 from tactbench.core.report.section import Picture, ReportData, Section
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
 FOLDER = "cost"
+_MOST_BYTES = 2**24
+"""Of a file of costs or its drawing: more is not read, and makes no sense then."""
 
 
 def costs_section(subject: ReportData) -> Section:
@@ -31,7 +34,7 @@ def costs_section(subject: ReportData) -> Section:
         drawing = path.with_suffix(".png")
         if drawing.is_file():
             caption = f"The numbers of the table {table.title!r}, as `tactbench cost` has drawn them."
-            pictures.append(Picture(table.title, caption, drawing.read_bytes()))
+            pictures.append(Picture(table.title, caption, read_regular(drawing, _MOST_BYTES)))
     missing = () if tables else (_command(subject),)
     return Section(
         "cost",
@@ -63,7 +66,7 @@ def read_table(path: Path, subject: ReportData) -> TextTable:
     OSError
         If it cannot be read.
     """
-    held = json.loads(path.read_text(encoding="utf-8"))
+    held = json.loads(read_regular(path, _MOST_BYTES))
     about = held if isinstance(held, dict) else {}
     if about.get("version") == VERSION:
         try:

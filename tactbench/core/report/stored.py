@@ -8,10 +8,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.matrix.files import replace_file
+from tactbench.core.matrix.files import read_regular, replace_file
 
 FOLDER = "report"
 """Inside a result folder."""
+_MOST_BYTES = 2**26
+"""Of a file of numbers."""
 
 
 def stored(results: Path, kind: str, facts: Mapping[str, Any], compute: Callable[[], Mapping[str, Any]]) -> Any:
@@ -35,7 +37,7 @@ def stored(results: Path, kind: str, facts: Mapping[str, Any], compute: Callable
     asked = json.dumps(facts, sort_keys=True)
     path = results / FOLDER / kind / f"{hashlib.sha256(asked.encode()).hexdigest()[:32]}.json"
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(read_regular(path, _MOST_BYTES))
         if found["facts"] == json.loads(asked):
             return found["numbers"]
     except (OSError, ValueError, KeyError, TypeError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import NoneType
@@ -13,6 +14,21 @@ from tactbench.core.spec.status import Status
 
 LOWER_IS_BETTER = frozenset({"rmse", "mae"})
 """Metrics of a row's score that are errors."""
+
+SCORES = {
+    "rmse": (0.0, math.inf), "mae": (0.0, math.inf), "r2": (-math.inf, 1.0), "accuracy": (0.0, 1.0),
+    "balanced_accuracy": (0.0, 1.0), "macro_f1": (0.0, 1.0),
+}  # fmt: skip
+"""What scores of a metric lie between."""
+
+INTERVALS = (
+    ("score", "ci_low", "ci_high"),
+    ("score_beyond_floor", "beyond_floor_ci_low", "beyond_floor_ci_high"),
+    ("true_score", "true_ci_low", "true_ci_high"),
+)
+"""Numbers of a row and the intervals that hold them: each is built around its number."""
+_ROUNDING = 1e-9
+"""Relative; an end that is the number itself may be computed in another order."""
 
 Numbers = dict[str, float]
 
@@ -122,6 +138,23 @@ class ReplicatedRow(RowModel):
     recordings_asked: float | None = None
     replicate_scores: list[float] | None = None
     seeds: list[float] | None = None
+
+
+def fault_in_scores(row: Mapping[str, Any]) -> str:
+    """Return which number of a row cannot be, as a clause: outside its metric's range, or outside its own interval."""
+    lowest, highest = SCORES.get(str(row.get("metric")), (-math.inf, math.inf))
+    for name, *ends in INTERVALS:
+        score, (low, high) = row.get(name), (row.get(end) for end in ends)
+        if score is None:
+            continue
+        near = _ROUNDING * (1.0 + abs(score))
+        if not lowest - near <= score <= highest + near:
+            return f"{name!r} is {score:.6g}, and no {row['metric']} is"
+        if not all(end is None or abs(end) < math.inf for end in (low, high)):
+            return f"the interval of {name!r} has no ends"
+        if (low is not None and score < low - near) or (high is not None and score > high + near):
+            return f"{name!r} is {score:.6g}, outside its own interval of {low:.6g} to {high:.6g}"
+    return ""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,9 @@ def some_rows(draw, most=6):
 def one_row(draw, place):
     status = draw(st.sampled_from(["done"] * 4 + [status for status in STATUSES if status != "done"]))
     done = status == "done"
-    metric, unit = draw(st.sampled_from([("rmse", "N"), ("macro_f1", "1"), ("accuracy", "1")]))
+    metric, unit = draw(st.sampled_from([("rmse", "N"), ("macro_f1", "1"), ("accuracy", "1"), ("r2", "1")]))
+    some = {"rmse": st.floats(0, 1e6), "r2": st.floats(-1e6, 1)}.get(metric, st.floats(0, 1))
+    low, score, high = sorted(draw(st.tuples(some, some, some)))
     more = {
         "cell": f"{place} {draw(texts)}",
         "task": metric,
@@ -51,9 +53,9 @@ def one_row(draw, place):
         "dagger": draw(st.booleans()),
         "stamps": draw(st.lists(texts, max_size=1)),
         "remarks": draw(st.lists(texts, max_size=1)),
-        "score": draw(numbers) if done else None,
-        "ci_low": draw(numbers) if done else None,
-        "ci_high": draw(numbers) if done else None,
+        "score": score if done else None,
+        "ci_low": low if done else None,
+        "ci_high": high if done else None,
         "baseline": draw(st.one_of(st.none(), numbers)),
         "published": draw(st.one_of(st.none(), numbers)),
         "published_reference": draw(texts),

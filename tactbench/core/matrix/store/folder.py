@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import FormatError, RecordingError
-from tactbench.core.matrix.files import replace_file, write_file
+from tactbench.core.matrix.files import read_regular, replace_file, write_file
 from tactbench.core.matrix.store import leftovers, limits
 from tactbench.core.matrix.store.disk import refusal, removed, sync_path, writing
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
@@ -96,11 +96,10 @@ class Store:
         return name
 
     def finished(self, key: str) -> Row | None:
-        """Return the row of a finished cell whose shard is there in full length, or None."""
+        """Return the row of a finished cell if its shard is there as it was written and holds this row, or None."""
         self._read()
         entry = self._done.get(key)
-        whole = entry is not None and entry.shard is not None and self._size(key) == entry.shard[1]
-        return dict(entry.row) if entry is not None and whole else None
+        return dict(entry.row) if entry is not None and self._is_sound(entry) else None
 
     def keep(self, key: str, row: Mapping[str, Any], sets: Mapping[Role, Answers]) -> Row:
         """Write a finished cell: its shard aside, synced; its line in the ledger; then the shard gets its name.
@@ -160,9 +159,8 @@ class Store:
         """
         if row.get("status") == "done":
             raise ValueError("a finished cell has answers: keep() it")
-        row = {
-            name: _clipped(value) if name in ("log", "traceback", "reason") else value for name, value in row.items()
-        }
+        texts = ("log", "traceback", "reason")
+        row = {"key": "", **{name: _clipped(value) if name in texts else value for name, value in row.items()}}
         ledger = self._read()
         told: Row = json.loads(canonical(row))
         before = self._latest.get(str(told.get("cell")))
@@ -214,19 +212,18 @@ class Store:
         return [dict(entry.row) for entry in self.entries()]
 
     def entries(self) -> list[Entry]:
-        """Return the latest line of every cell; a finished cell whose shard is missing or cut is none."""
+        """Return the latest line of every cell; a finished cell whose shard or row was changed since is none."""
         ledger = self._read()
-        sizes = self._sizes()
         latest: dict[str, Entry] = {}
         holes = set()
         for entry in (*self._orphans, *ledger.entries):
-            if entry.shard is None or sizes.get(f"{entry.key}.h5") == entry.shard[1]:
+            if entry.shard is None or self._is_sound(entry):
                 latest[entry.row["cell"]] = entry
             else:
                 holes.add(entry.row["cell"])
         known = set(ledger.troubles)
         lost = sorted(holes - set(latest))
-        told = [f"{name!r} is left out: its shard is missing or cut; run it again" for name in lost]
+        told = [f"{name!r} is left out: its shard is missing, cut or not of this row; run it again" for name in lost]
         ledger.troubles += [one for one in told if one not in known]
         return list(latest.values())
 
@@ -248,6 +245,13 @@ class Store:
                 self._read().troubles.append(str(error))
             return {}
 
+    def _is_sound(self, entry: Entry) -> bool:
+        """Return whether a cell's shard is the one that its line tells of, and holds the line's row."""
+        from tactbench.core.matrix.store import shard
+
+        image = self.image(entry)
+        return image is not None and shard.holds_row(self._shard(entry.key), image, entry.row)
+
     def image(self, entry: Entry) -> bytes | None:
         """Return the bytes of a cell's shard, or None if they are not those that the ledger tells of."""
         from tactbench.core.matrix.store import shard
@@ -263,8 +267,7 @@ class Store:
         if not limits.is_provenance(name):
             return {}
         try:
-            with (self.folder / "provenance" / f"{name}.json").open("rb") as file:
-                content = file.read(limits.PROVENANCE_BYTES).strip()
+            content = read_regular(self.folder / "provenance" / f"{name}.json", limits.PROVENANCE_BYTES).strip()
             said = json.loads(content)
         except (OSError, ValueError, RecursionError):
             return {}
@@ -308,7 +311,7 @@ class Store:
             for entry in self._ledger.entries:
                 self._place(entry)
             known = {f"{key}.h5" for key in self._done}
-            for name in sorted(self._sizes().keys() - known):
+            for name in sorted(self._names() - known):
                 self._adopt(name)
         return self._ledger
 
@@ -336,18 +339,11 @@ class Store:
     def _shard(self, key: str) -> Path:
         return self._cells / f"{key}.h5"
 
-    def _size(self, key: str) -> int:
+    def _names(self) -> set[str]:
         try:
-            return self._shard(key).lstat().st_size
+            return {path.name for path in self._cells.iterdir() if path.suffix == ".h5"}
         except OSError:
-            return -1
-
-    def _sizes(self) -> dict[str, int]:
-        try:
-            with os.scandir(self._cells) as found:
-                return {one.name: one.stat(follow_symlinks=False).st_size for one in found if one.name.endswith(".h5")}
-        except OSError:
-            return {}
+            return set()
 
     @contextmanager
     def _written(self) -> Iterator[None]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FolderError
-from tactbench.core.matrix.files import write_all
+from tactbench.core.matrix.files import read_regular, write_all
 from tactbench.core.matrix.store import limits
 from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
 from tactbench.core.matrix.store.sharing import canonical, definition, joined, parted, shared_lines
@@ -82,8 +82,7 @@ def read_ledger(folder: Path) -> Ledger:
     path = folder / NAME
     ledger = Ledger(path)
     try:
-        with path.open("rb") as file:
-            content = file.read(limits.LEDGER_BYTES + 1)
+        content = read_regular(path, limits.LEDGER_BYTES)
     except FileNotFoundError:
         return ledger
     except OSError as error:
@@ -121,7 +120,7 @@ def _take_in(ledger: Ledger, content: bytes) -> None:
                 if characters > limits.SHARED_CHARACTERS:
                     over += 1
                     continue
-                row = joined(record["row"], references, shared)
+                row = {"key": "", **joined(record["row"], references, shared)}
             except (KeyError, TypeError, AttributeError):
                 lost += 1
                 continue

@@ -11,8 +11,8 @@ DEPTH = 32
 SHARED_CHARACTERS = 2**31
 """What all rows of a ledger amount to once what they share is written out in each."""
 SHARD_BYTES = 2**30
-ARRAY_BYTES = 2**30
-"""Of the answers of one role, in memory: compressed bytes may claim a thousand times what they hold."""
+FEW_BYTES, LARGEST_RATIO = 2**26, 64
+"""Of the answers of one role, in memory: any number up to the first, and so many for each byte of the shard."""
 PROVENANCE_BYTES = 2**20
 TEXT_CHARACTERS = 2**16
 """Of a log or a traceback, when it is written."""

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from tactbench.core.matrix.store.limits import DEPTH
-from tactbench.core.spec.row import FORMAT, ReplicatedRow, in_words
+from tactbench.core.spec.row import FORMAT, ReplicatedRow, fault_in_scores, in_words
 
 Row = dict[str, Any]
 """One cell, as `tactbench.core.spec.row.RowModel` describes it. What comes from a ledger shares its big values
@@ -50,7 +50,7 @@ def fault_in_row(row: Row) -> str:
     except ValidationError as error:
         name = str(error.errors(include_url=False)[0]["loc"][0])
     else:
-        return ""
+        return fault_in_scores(row)
     if name not in row:
         return f"it has no {name!r}"
     held, given = FORMAT[name], row[name]

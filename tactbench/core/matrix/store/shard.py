@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
@@ -13,8 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from tactbench.core.errors import FormatError
+from tactbench.core.matrix.files import read_regular
 from tactbench.core.matrix.store import limits
-from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
+from tactbench.core.matrix.store.rows import Row, fault_in_row, named, plain, too_deep
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -33,8 +33,6 @@ _GROWTH_BYTES = 2**14
 _ATTRIBUTE_BYTES = 60_000
 """An attribute of HDF5 holds 64 KiB with its name and type."""
 _NUMBERS = count(1)
-_FILTERS = {1, 2}
-"""Deflate and shuffle, which every HDF5 library has: no other is asked to run."""
 _SEE = "Delete it, and the next run computes the cell again."
 
 
@@ -103,11 +101,8 @@ def read_image(path: Path) -> bytes:
         If there is no such file, it is a link or no file at all, or larger than any shard of ours.
     """
     try:
-        # Not through links: they may lead anywhere. Not blocking: it might be a pipe.
-        opened = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
-        with open(opened, "rb") as file:  # noqa: PTH123  (a descriptor)
-            image = file.read(limits.SHARD_BYTES + 1)
-    except (OSError, TypeError) as error:
+        image = read_regular(path, limits.SHARD_BYTES, follow=False)  # links may lead anywhere
+    except OSError as error:
         raise FormatError(f"The shard {path} cannot be read: {error}.", hint=_SEE) from error
     if len(image) > limits.SHARD_BYTES:
         raise FormatError(f"The shard {path} is larger than {limits.SHARD_BYTES // 2**20} MiB.", hint=_SEE)
@@ -144,6 +139,17 @@ def row_in(path: Path, image: bytes) -> Row:
     if fault:
         raise _damaged(path, fault)
     return dict(row)
+
+
+def holds_row(path: Path, image: bytes, row: Row) -> bool:
+    """Return whether a shard holds the row that a ledger tells of it; it may have another name there."""
+    if plain(row)[1].encode() in image:  # texts are stored as they are: no need to look where
+        return True
+    try:
+        held = row_in(path, image)
+    except FormatError:
+        return False
+    return plain(named(held, row))[1] == plain(row)[1]
 
 
 class _Content:
@@ -211,11 +217,9 @@ def _read(path: Path, file: Any, role: str) -> npt.NDArray[Any]:
     kinds = {dataset.dtype[name].kind for name in dataset.dtype.names or ()}
     if dataset.dtype.names != _columns() or not kinds <= set("iuf"):
         raise _damaged(path, f"{role} holds {dataset.dtype}")
-    if dataset.size * dataset.dtype.itemsize > limits.ARRAY_BYTES:
+    most = max(limits.FEW_BYTES, limits.LARGEST_RATIO * dataset.file.id.get_filesize())
+    if dataset.size * dataset.dtype.itemsize > most:
         raise _damaged(path, f"{role} claims {dataset.size} rows")
-    stored = dataset.id.get_create_plist()
-    if not {stored.get_filter(place)[0] for place in range(stored.get_nfilters())} <= _FILTERS:
-        raise _damaged(path, f"{role} asks for a filter")
     table: npt.NDArray[Any] = dataset[()]
     return table
 

@@ -111,7 +111,7 @@ def test_a_shard_that_is_not_whole_is_no_finished_cell(tmp_path, damage):
         assert one.finished(key("a")) is None
         assert one.answers(key("a")) == {}
         assert one.rows() == []
-        assert "missing or cut" in " ".join(one.troubles)
+        assert "its shard is missing, cut or not of this row" in " ".join(one.troubles)
     kept(store, "a", 2.0)
     assert Store(tmp_path).finished(key("a"))["score"] == 2.0
 

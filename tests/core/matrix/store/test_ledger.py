@@ -62,7 +62,7 @@ def test_a_line_cut_short_anywhere_costs_that_line_only(tmp_path):
 
 
 def test_a_canonical_text_is_read_as_it_was(tmp_path):
-    entries = [Entry(ended(name, plan=PLAN)) for name in "abc"]
+    entries = [Entry({"key": "", **ended(name, plan=PLAN)}) for name in "abc"]
     (tmp_path / "index.jsonl").write_text(whole_text(entries))
     assert read_ledger(tmp_path).entries == entries
 

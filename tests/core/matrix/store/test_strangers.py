@@ -9,6 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tactbench.core.errors import FolderError
+from tactbench.core.matrix.merge import merge
 from tactbench.core.matrix.store import Store, limits, shard
 from tactbench.core.matrix.store.ledger import Entry, whole_text
 from tactbench.core.matrix.store.sharing import canonical
@@ -56,7 +58,7 @@ def another(file, name, value):
         (lambda file: remade(file, data=np.zeros(5, dtype=FIELDS[1:])), "test holds"),
         (lambda file: remade(file, data=np.zeros(5, dtype=[("y_true", "S8"), *FIELDS[1:]])), "test holds"),
         (lambda file: remade(file, shape=(5,), dtype=[("y_true", h5py.string_dtype()), *FIELDS[1:]]), "test holds"),
-        (lambda file: remade(file, data=np.zeros(5, dtype=FIELDS), compression="lzf"), "asks for a filter"),
+        (lambda file: remade(file, data=np.zeros(5, dtype=FIELDS), compression="lzf"), "has filters"),
         (lambda file: remade(file, data=np.ones(5, dtype=FIELDS)), "does not hold what was written"),
         (lambda file: remade(file, shape=(5,), dtype=FIELDS, external=[("/etc/passwd", 0, 280)]), "another file"),
         (lambda file: another(file, "format", "else"), "no shard of this version"),
@@ -67,7 +69,6 @@ def another(file, name, value):
 )
 def test_a_shard_that_claims_what_cannot_be_answers_nothing(tmp_path, change, says):
     store = forged(tmp_path, change)
-    assert store.finished(key("a")) is not None
     assert store.answers(key("a")) == {}
     assert says in store.troubles[0]
 
@@ -89,7 +90,8 @@ def test_an_untouched_shard_made_so_is_read(tmp_path):
 
 def test_a_column_larger_than_the_limit_is_refused(tmp_path, monkeypatch):
     kept(Store(tmp_path), "a")
-    monkeypatch.setattr(limits, "ARRAY_BYTES", 100)
+    monkeypatch.setattr(limits, "FEW_BYTES", 100)
+    monkeypatch.setattr(limits, "LARGEST_RATIO", 0)
     store = Store(tmp_path)
     assert store.answers(key("a")) == {}
     assert "claims 3 rows" in store.troubles[0]
@@ -141,3 +143,57 @@ def test_a_report_of_a_strangers_folder_names_what_it_left_out(shell):
     said = shell("report", code=2).stderr
     assert "'evil' is left out: 'score' is text" in said
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("name", ["index.jsonl", "run.json", "provenance/0123456789abcdef.json"])
+def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path, name):
+    kept(Store(tmp_path), "a")
+    path = tmp_path / name
+    path.unlink(missing_ok=True)
+    path.parent.mkdir(exist_ok=True)
+    os.mkfifo(path)
+    store = Store(tmp_path)
+    if name == "index.jsonl":
+        with pytest.raises(FolderError, match="no regular file"):
+            store.rows()
+    else:
+        assert [row["cell"] for row in store.rows()] == ["a"]
+        assert store.provenance("0123456789abcdef") == {}
+
+
+def edited(folder, **changes):
+    """Change the row of a finished cell in the ledger as an editor of text would."""
+    path = folder / "index.jsonl"
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    for line in lines:
+        line.get("row", {}).update(changes)
+    path.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
+    return Store(folder)
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"score": 0.1075}, "'score' is 0.1075, outside its own interval"),
+        ({"score": 0.51, "ci_low": 0.5}, "its shard is missing, cut or not of this row"),
+        ({"sensor": "another"}, "its shard is missing, cut or not of this row"),
+        ({"metric": "mae", "score": -5.0}, "'score' is -5, and no mae is"),
+        ({"metric": "macro_f1", "score": 1.5}, "'score' is 1.5, and no macro_f1 is"),
+        ({"score": float("nan")}, "'score' is nan, and no rmse is"),
+        ({"ci_high": float("inf")}, "the interval of 'score' has no ends"),
+    ],
+)
+def test_a_row_that_is_not_its_shards_or_cannot_be_is_left_out_or_restored(tmp_path, changes, says):
+    kept(Store(tmp_path), "a", metric="rmse", score=0.55, ci_low=0.5, ci_high=0.6)
+    assert Store(tmp_path).finished(key("a"))["score"] == 0.55
+    store = edited(tmp_path, **changes)
+    # A line that cannot be leaves a shard that no line tells of: its own row is taken instead.
+    restored = store.rows()
+    assert [(row["score"], row["metric"], row.get("sensor")) for row in restored] in ([], [(0.55, "rmse", None)])
+    assert says in " ".join(store.troubles)
+    if restored:
+        assert merge([tmp_path], tmp_path / "merged").rows[0]["score"] == 0.55
+    else:
+        assert store.finished(key("a")) is None
+        with pytest.raises(FolderError, match="no results"):
+            merge([tmp_path], tmp_path / "merged")
