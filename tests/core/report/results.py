@@ -10,6 +10,7 @@ from tests.here import IN_THIS_PROCESS
 
 MATRIX = """\
 repeats: 1
+simulation: {rung: closed-form}  # the cheapest
 sensors: [icub]
 tasks:
   - name: force
