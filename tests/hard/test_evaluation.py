@@ -41,7 +41,14 @@ def _score(task, estimator, protocol, paths, params=None):
     ticks = itertools.count()
     result = evaluate(
         CellContext(
-            task, ESTIMATORS[estimator], params or {}, protocol, "roles", seed=1, clock=lambda: next(ticks) * 1e-3
+            task,
+            ESTIMATORS[estimator],
+            params or {},
+            protocol,
+            "roles",
+            seed=1,
+            clock=lambda: next(ticks) * 1e-3,
+            latency=False,
         ),
         paths,
     )

@@ -49,6 +49,7 @@ def run(task, data, split, estimator="forest", protocol="deployable"):
             split,
             seed=0,
             clock=time.perf_counter,
+            latency=False,
         ),
         data,
     )
