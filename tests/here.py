@@ -1,4 +1,7 @@
-"""Runs without child processes, for results that tests only look at."""
+"""Runs without child processes, for results that tests only look at.
+
+Recordings that were read are remembered by their paths: other ones at the same paths need another run's way.
+"""
 
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.pool.in_process import InProcess
