@@ -37,7 +37,28 @@ def after(seconds, change):
     return lambda beat, since_s: change(beat) if since_s > seconds else beat
 
 
-# Both -----------------------------------------------------------------------------------------------------------------
+def saturate(world):
+    world.force.faults.append(FAULTS.DatagramFault("saturated"))
+
+
+def lose_samples(world):
+    world.force.faults.append(FAULTS.DatagramFault("dropped", end_s=1e-9 * world.clock() + 4.5 / world.rate_hz))
+
+
+def sense(name):
+    def begin(world):
+        world.sensed = FAULTS.sensed({name: 0.0})
+
+    return begin
+
+
+@pytest.fixture
+def made(tmp_path):
+    with rig("local", tmp_path) as one:
+        yield one
+
+
+# In this process, and in one that is started for the test -------------------------------------------------------------
 
 
 @BOTH
@@ -58,84 +79,8 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
             made.world.largest_n / made.setting.stiffness_n_m, abs=5e-6
         )
         assert [event.text for event in made.guard.events()] == ["started", "homing", "armed"]
+        assert made.guard.counts()["guard"]["beats"] == press.sequence
         assert made.guard.disarm().state is GuardState.IDLE
-        assert made.out
-
-
-@BOTH
-@pytest.mark.parametrize(
-    ("name", "trigger"),
-    [
-        ("rig hangs", Trigger.BEAT_OLD),
-        ("rig skips a beat's number", Trigger.BEAT_SEQUENCE),
-        ("steps too long", Trigger.COMMANDS_REFUSED),
-        ("steps not numbers", Trigger.COMMANDS_REFUSED),
-    ],
-)
-def test_a_rig_that_goes_wrong(kind, name, trigger, tmp_path):
-    with rig(kind, tmp_path) as made:
-        begins = {}
-
-        def change(beat, since_s):
-            if beat.state == "ramp":
-                begins.setdefault(name, 0.0)
-            return FAULTS.changed(begins, made.setting, made.clock)(beat, since_s)
-
-        def beats(beat, since_s):
-            changed = change(beat, since_s)
-            if changed is None:
-                # Nothing is said for longer than is allowed; then the rig is back.
-                made.guard.advance(made.clock() + round(1.5e9 * made.setting.limits.heartbeat_s))
-                return beat
-            return changed
-
-        made.press(beats)
-        report = made.ended()
-        assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
-        assert made.out
-        assert made.world.largest_n < made.setting.allowed_n
-
-
-def saturate(world):
-    world.force.faults.append(FAULTS.DatagramFault("saturated"))
-
-
-def lose_samples(world):
-    world.force.faults.append(FAULTS.DatagramFault("dropped", end_s=1e-9 * world.clock() + 4.5 / world.rate_hz))
-
-
-def sense(name):
-    def begin(world):
-        world.sensed = FAULTS.sensed({name: 0.0})
-
-    return begin
-
-
-@BOTH
-@pytest.mark.parametrize(
-    ("begin", "trigger"),
-    [
-        (sense("one sample above the ceiling"), Trigger.FORCE_CEILING),
-        (sense("one torque above the ceiling"), Trigger.TORQUE_CEILING),
-        (sense("force stuck"), Trigger.FORCE_STUCK),
-        (saturate, Trigger.FORCE_SATURATED),
-        (lose_samples, Trigger.FORCE_GAP),
-    ],
-    ids=["ceiling of another axis", "torque", "stuck", "saturated", "lost"],
-)
-def test_a_force_that_is_wrong(kind, begin, trigger, tmp_path):
-    with rig(kind, tmp_path) as made:
-        once = []
-
-        def change(beat):
-            if not once:
-                once.append(1)
-                begin(made.world)
-            return beat
-
-        made.press(in_phase("ramp", change))
-        report = made.ended()
-        assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
         assert made.out
 
 
@@ -150,44 +95,94 @@ def test_a_force_that_is_not_a_number(kind, tmp_path, monkeypatch):
         assert made.world.largest_n < 2.0
 
 
-@BOTH
-def test_samples_that_come_twice_or_late_are_kept_out_and_counted(kind, tmp_path):
-    texts = ("doubled:every=2", "out-of-order:every=5")
-    with rig(kind, tmp_path, force=[FAULTS.DatagramFault.parse(text) for text in texts]) as made:
-        assert made.press().phase == "over"
-        numbers = np.concatenate([block.sequence for block in made.guard.force_blocks()])
-        assert (np.diff(numbers) > 0).all()
-        counts = made.guard.counts()["force"]
-        assert counts["duplicates"] == pytest.approx(numbers.size / 2, rel=0.3)
-        assert counts["late"] > numbers.size / 10
+# In this process, and in one that is started once ---------------------------------------------------------------------
 
 
-@BOTH
-def test_a_fault_stays_until_the_guard_is_disarmed_and_armed(kind, tmp_path):
-    with rig(kind, tmp_path) as made:
-        made.press(after(0.2, lambda beat: replace(beat, sequence=beat.sequence + 5)))
-        assert made.ended().state is GuardState.FAULT
+def rig_goes_wrong(made, name, trigger):
+    begins = {}
+
+    def change(beat, since_s):
+        if beat.state == "ramp":
+            begins.setdefault(name, 0.0)
+        return FAULTS.changed(begins, made.setting, made.clock)(beat, since_s)
+
+    def beats(beat, since_s):
+        changed = change(beat, since_s)
+        if changed is None:
+            # Nothing is said for longer than is allowed; then the rig is back.
+            made.guard.advance(made.clock() + round(1.5e9 * made.setting.limits.heartbeat_s))
+            return beat
+        return changed
+
+    made.press(beats)
+    report = made.ended()
+    assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
+    assert made.out
+    assert made.world.largest_n < made.setting.allowed_n
+
+
+def force_goes_wrong(made, begin, trigger):
+    once = []
+
+    def change(beat):
+        if not once:
+            once.append(1)
+            begin(made.world)
+        return beat
+
+    made.press(in_phase("ramp", change))
+    report = made.ended()
+    assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
+    assert made.out
+
+
+@pytest.fixture(scope="class")
+def started_once(tmp_path_factory):
+    with rig("process", tmp_path_factory.mktemp("guard")) as one:
+        yield one
+
+
+@pytest.fixture(params=["local", "process"])
+def either(request):
+    if request.param == "local":
+        return request.getfixturevalue("made")
+    one = request.getfixturevalue("started_once")
+    one.begin_anew()
+    return one
+
+
+class TestInEitherProcess:
+    """What passes between a rig and a guard in another process: one of each class; the rest is in virtual time."""
+
+    @pytest.mark.parametrize(
+        ("name", "trigger"),
+        [("rig hangs", Trigger.BEAT_OLD), ("steps not numbers", Trigger.COMMANDS_REFUSED)],
+    )
+    def test_a_rig_that_goes_wrong(self, either, name, trigger):
+        rig_goes_wrong(either, name, trigger)
+
+    def test_a_force_that_is_too_large(self, either):
+        force_goes_wrong(either, sense("one sample above the ceiling"), Trigger.FORCE_CEILING)
+
+    def test_a_fault_stays_until_the_guard_is_disarmed_and_armed(self, either):
+        either.press(after(0.2, lambda beat: replace(beat, sequence=beat.sequence + 5)))
+        report = either.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.BEAT_SEQUENCE)
         with pytest.raises(GuardRefusesError, match="state fault"):
-            made.guard.arm(made.setting.limits)
-        again = made.guard.beat(Beat(1, made.clock(), command=CommandKind.STEP, distance_m=1e-6))
+            either.guard.arm(either.setting.limits)
+        again = either.guard.beat(Beat(1, either.clock(), command=CommandKind.STEP, distance_m=1e-6))
         assert (again.accepted, again.state) == (False, GuardState.FAULT)
-        assert made.guard.disarm().state is GuardState.IDLE
-        assert made.press().phase == "over"
+        assert either.guard.disarm().state is GuardState.IDLE
+        assert either.press().phase == "over"
 
-
-@BOTH
-def test_a_retreat_that_is_commanded_is_no_fault(kind, tmp_path):
-    with rig(kind, tmp_path) as made:
-        made.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.RETREAT)))
-        report = made.ended()
+    def test_a_retreat_that_is_commanded_is_no_fault(self, either):
+        either.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.RETREAT)))
+        report = either.ended()
         assert (report.state, report.trigger) == (GuardState.RETREATED, Trigger.COMMANDED)
-        assert made.out
+        assert either.out
 
-
-@BOTH
-def test_what_is_wrong_before_the_first_motion_is_refused(kind, tmp_path):
-    with rig(kind, tmp_path) as made:
-        limits = made.setting.limits
+    def test_what_is_wrong_before_the_first_motion_is_refused(self, either):
+        limits = either.setting.limits
         for wrong, message in (
             ({"retreat_m": -4e-3}, "retreat_m is not the drive's"),
             ({"travel_m": (-7e-3, 2e-3)}, "not within the drive's ends"),
@@ -197,18 +192,45 @@ def test_what_is_wrong_before_the_first_motion_is_refused(kind, tmp_path):
             ({"zero": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "force ceiling"),
         ):
             with pytest.raises(GuardRefusesError, match=message):
-                made.guard.arm(replace(limits, **wrong))
-        assert made.world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=1e-9)
-        assert made.guard.arm(limits).state is GuardState.ARMED
+                either.guard.arm(replace(limits, **wrong))
+        assert either.world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=1e-9)
+        assert either.guard.arm(limits).state is GuardState.ARMED
 
 
 # In virtual time ------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def made(tmp_path):
-    with rig("local", tmp_path) as one:
-        yield one
+@pytest.mark.parametrize(
+    ("name", "trigger"),
+    [("rig skips a beat's number", Trigger.BEAT_SEQUENCE), ("steps too long", Trigger.COMMANDS_REFUSED)],
+)
+def test_a_rig_that_goes_wrong(name, trigger, made):
+    rig_goes_wrong(made, name, trigger)
+
+
+@pytest.mark.parametrize(
+    ("begin", "trigger"),
+    [
+        (sense("one torque above the ceiling"), Trigger.TORQUE_CEILING),
+        (sense("force stuck"), Trigger.FORCE_STUCK),
+        (saturate, Trigger.FORCE_SATURATED),
+        (lose_samples, Trigger.FORCE_GAP),
+    ],
+    ids=["torque", "stuck", "saturated", "lost"],
+)
+def test_a_force_that_is_wrong(begin, trigger, made):
+    force_goes_wrong(made, begin, trigger)
+
+
+def test_samples_that_come_twice_or_late_are_kept_out_and_counted(tmp_path):
+    texts = ("doubled:every=2", "out-of-order:every=5")
+    with rig("local", tmp_path, force=[FAULTS.DatagramFault.parse(text) for text in texts]) as made:
+        assert made.press().phase == "over"
+        numbers = np.concatenate([block.sequence for block in made.guard.force_blocks()])
+        assert (np.diff(numbers) > 0).all()
+        counts = made.guard.counts()["force"]
+        assert counts["duplicates"] == pytest.approx(numbers.size / 2, rel=0.3)
+        assert counts["late"] > numbers.size / 10
 
 
 @pytest.mark.parametrize("baud", [9600, 115200])
