@@ -111,7 +111,7 @@ class ForceWatch:
         data, first = np.asarray(block.data, dtype=np.float64), self.sequence + 1
         numbers = np.arange(first, first + len(data)) if block.sequence is None else block.sequence
         before = self.sequence if self.received else int(numbers[0]) - 1
-        lost = int(np.diff(numbers, prepend=before).max()) - 1
+        lost = int((numbers[1:] - numbers[:-1]).max(initial=int(numbers[0]) - before)) - 1
         same = self._same_in_a_row(data, numbers)
         self.received += len(data)
         self.sequence = int(numbers[-1])

@@ -1,6 +1,7 @@
 """The guard of the linear motor: the same rules in this process and in one of its own, against emulated devices."""
 
 import math
+import selectors
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -142,13 +143,15 @@ def started_once(tmp_path_factory):
         yield one
 
 
+@pytest.fixture
+def in_process(started_once):
+    started_once.begin_anew()
+    return started_once
+
+
 @pytest.fixture(params=["local", "process"])
 def either(request):
-    if request.param == "local":
-        return request.getfixturevalue("made")
-    one = request.getfixturevalue("started_once")
-    one.begin_anew()
-    return one
+    return request.getfixturevalue({"local": "made", "process": "in_process"}[request.param])
 
 
 class TestInEitherProcess:
@@ -195,6 +198,30 @@ class TestInEitherProcess:
                 either.guard.arm(replace(limits, **wrong))
         assert either.world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=1e-9)
         assert either.guard.arm(limits).state is GuardState.ARMED
+
+    def test_a_wake_up_without_data_is_not_a_lost_guard(self, in_process, monkeypatch):
+        guard = in_process.guard
+        guard.arm(in_process.setting.limits)
+        keys = [(key, 1) for key in guard._selector.get_map().values()]
+        guard.advance(in_process.clock() + 10_000_000)
+        with monkeypatch.context() as patch:
+            # As select() says it now and then: somebody else has read, or nothing came after all.
+            patch.setattr(guard._selector, "select", lambda timeout_s: keys)
+            for _ in range(20):
+                guard._take(0.0)
+        assert guard.beat(Beat(1, in_process.clock())).accepted
+
+    def test_a_rig_that_takes_no_samples_still_gets_its_reports(self, in_process):
+        guard = in_process.guard
+        guard._selector.unregister(guard._data)
+        try:
+            guard.arm(in_process.setting.limits)
+            for number in range(1, 20):
+                assert guard.beat(Beat(number, in_process.clock())).accepted
+                guard.advance(in_process.clock() + 20_000_000)
+            assert guard.force_blocks() == []
+        finally:
+            guard._selector.register(guard._data, selectors.EVENT_READ)
 
 
 # In virtual time ------------------------------------------------------------------------------------------------------

@@ -82,19 +82,6 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
         assert made.out
 
 
-def test_a_wake_up_without_data_is_not_a_lost_guard(tmp_path, monkeypatch):
-    with rig("process", tmp_path) as made:
-        made.guard.arm(made.setting.limits)
-        keys = [(key, 1) for key in made.guard._selector.get_map().values()]
-        made.guard.advance(made.clock() + 10_000_000)
-        with monkeypatch.context() as patch:
-            # As select() says it now and then: somebody else has read, or nothing came after all.
-            patch.setattr(made.guard._selector, "select", lambda timeout_s: keys)
-            for _ in range(20):
-                made.guard._take(0.0)
-        assert made.guard.beat(Beat(1, made.clock())).accepted
-
-
 RAISING = "tests.rigs.parallel_manipulator.broken_force:build_raising"
 TO_A_SWITCH = {"homing": "switch", "homing_speed_m_s": 5e-3, "home_m": 3e-3}
 
@@ -176,16 +163,6 @@ def stands(made):
         if abs(made.world.position_m - before_m) < 1e-6:
             return True
     return False
-
-
-def test_a_rig_that_takes_no_samples_still_gets_its_reports(tmp_path):
-    with rig("process", tmp_path) as made:
-        made.guard._selector.unregister(made.guard._data)
-        made.guard.arm(made.setting.limits)
-        for number in range(1, 20):
-            assert made.guard.beat(Beat(number, made.clock())).accepted
-            made.guard.advance(made.clock() + 20_000_000)
-        assert made.guard.force_blocks() == []
 
 
 def test_what_goes_wrong_at_the_start_is_told(tmp_path):
