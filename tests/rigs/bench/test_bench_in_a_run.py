@@ -13,6 +13,7 @@ SLOWER = "  options: {rate_hz: 250.0, counts_per_newton: 1.0e+6, counts_per_newt
 
 def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell, verbs):
     asked = ("--sensor", "icub", "--task", "force", "--protocol", "deployable", "--estimator", "ols", "--repeats", "1")
+    asked += ("--engine", "in-process", "--no-latency")
     text = EXAMPLE.read_text(encoding="utf-8")
     assert NET_FT in text
     (shell.folder / "rig.yaml").write_text(text.replace(NET_FT, NET_FT + SLOWER), encoding="utf-8")

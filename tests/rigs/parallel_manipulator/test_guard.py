@@ -1,10 +1,10 @@
 """The guard of the linear motor: the same rules in this process and in one of its own, against emulated devices."""
 
 import math
+import re
 import selectors
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,9 +24,6 @@ from tactbench.rigs.parallel_manipulator.guard_interface import (
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.worst_case import first_touch_n
 from tests.rigs.parallel_manipulator.presses import FAULTS, rig
-
-ROOT = Path(__file__).parents[3]
-BOTH = pytest.mark.parametrize("kind", ["local", "process"])
 
 
 def in_phase(name, change):
@@ -62,7 +59,7 @@ def made(tmp_path):
 # In this process, and in one that is started for the test -------------------------------------------------------------
 
 
-@BOTH
+@pytest.mark.parametrize("kind", ["local", "process"])
 def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
     with rig(kind, tmp_path) as made:
         press = made.press()
@@ -83,17 +80,6 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         assert made.guard.counts()["guard"]["beats"] == press.sequence
         assert made.guard.disarm().state is GuardState.IDLE
         assert made.out
-
-
-@BOTH
-def test_a_force_that_is_not_a_number(kind, tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    with rig(kind, tmp_path, force_driver="tests.rigs.parallel_manipulator.broken_force:build") as made:
-        made.press()
-        report = made.ended()
-        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
-        assert made.out
-        assert made.world.largest_n < 2.0
 
 
 # In this process, and in one that is started once ---------------------------------------------------------------------
@@ -171,6 +157,8 @@ class TestInEitherProcess:
         either.press(after(0.2, lambda beat: replace(beat, sequence=beat.sequence + 5)))
         report = either.ended()
         assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.BEAT_SEQUENCE)
+        (said,) = [event.text for event in either.guard.events() if event.trigger is Trigger.BEAT_SEQUENCE]
+        assert re.fullmatch(r"beat \d+ came, \d+ was expected", said)
         with pytest.raises(GuardRefusesError, match="state fault"):
             either.guard.arm(either.setting.limits)
         again = either.guard.beat(Beat(1, either.clock(), command=CommandKind.STEP, distance_m=1e-6))
@@ -247,6 +235,15 @@ def test_a_rig_that_goes_wrong(name, trigger, made):
 )
 def test_a_force_that_is_wrong(begin, trigger, made):
     force_goes_wrong(made, begin, trigger)
+
+
+def test_a_force_that_is_not_a_number(tmp_path):
+    with rig("local", tmp_path, force_driver="tests.rigs.parallel_manipulator.broken_force:build") as made:
+        made.press()
+        report = made.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
+        assert made.out
+        assert made.world.largest_n < 2.0
 
 
 def test_samples_that_come_twice_or_late_are_kept_out_and_counted(tmp_path):
