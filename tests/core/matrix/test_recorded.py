@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 
+import h5py
 import numpy as np
 import pytest
 
@@ -88,3 +89,15 @@ def test_one_that_is_gone_or_damaged_says_so(tmp_path, recording):
         Recorded(tmp_path / "memory").digest(recording)
     with pytest.raises(MissingRecordingError):
         Recorded(tmp_path / "memory").subject(recording)
+
+
+def test_one_that_was_altered_is_refused_and_not_remembered(tmp_path, recording):
+    first = rested(tmp_path / "memory")
+    first.digest(recording)
+    first.save()
+    with h5py.File(recording, "r+") as file:
+        file["streams/taxels/data"][3, 1] += 0.5
+    again = rested(tmp_path / "memory")
+    for _ in range(2):
+        with pytest.raises(FormatError, match="content digest differs"):
+            again.digest(recording)
