@@ -148,7 +148,7 @@ def fault_in_scores(row: Mapping[str, Any]) -> str:
         if score is None:
             continue
         near = _ROUNDING * (1.0 + abs(score))
-        if not lowest - near <= score <= highest + near:
+        if not (lowest - near <= score <= highest + near and abs(score) < math.inf):
             return f"{name!r} is {score:.6g}, and no {row['metric']} is"
         if not all(end is None or abs(end) < math.inf for end in (low, high)):
             return f"the interval of {name!r} has no ends"

@@ -142,7 +142,8 @@ def _explain(
     if first["type"] == "missing":
         return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add it.")
     given = first.get("input")
-    shown = f" (given: {given!r})" if isinstance(given, str | int | float | bool) else ""
+    text = repr(given) if isinstance(given, str | int | float | bool) else ""
+    shown = f" (given: {text if len(text) <= 80 else text[:79] + '…'})" if text else ""
     message = first["msg"].removeprefix("Value error, ")
     return ConfigError(file, line, f"{name}: {message}{shown}.", hint="Correct the value.")
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from tactbench.core.errors import FormatError
 from tactbench.core.matrix.files import read_regular
 from tactbench.core.matrix.store import limits
-from tactbench.core.matrix.store.rows import Row, fault_in_row, named, plain, too_deep
+from tactbench.core.matrix.store.rows import NotPlainError, Row, fault_in_row, named, plain, too_deep
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -143,13 +143,13 @@ def row_in(path: Path, image: bytes) -> Row:
 
 def holds_row(path: Path, image: bytes, row: Row) -> bool:
     """Return whether a shard holds the row that a ledger tells of it; it may have another name there."""
-    if plain(row)[1].encode() in image:  # texts are stored as they are: no need to look where
-        return True
     try:
-        held = row_in(path, image)
-    except FormatError:
+        text = plain(row)[1]
+        if text.encode() in image:  # texts are stored as they are: no need to look where
+            return True
+        return plain(named(row_in(path, image), row))[1] == text
+    except (FormatError, NotPlainError):
         return False
-    return plain(named(held, row))[1] == plain(row)[1]
 
 
 class _Content:
