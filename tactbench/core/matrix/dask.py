@@ -46,7 +46,6 @@ ALONE_S = 60.0
 MOST = 3
 """Differences between two environments that a message names."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-_LOUD = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")
 
 
 class Dask:
@@ -369,11 +368,8 @@ def _unreachable(address: str, why: str) -> UsageError:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep the library's log off the screen: what a user must know, rows and errors of ours say."""
-    before = {name: logging.getLogger(name).level for name in _LOUD}
-    for name in before:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    logging.disable()
     try:
         yield
     finally:
-        for name, level in before.items():
-            logging.getLogger(name).setLevel(level)
+        logging.disable(logging.NOTSET)

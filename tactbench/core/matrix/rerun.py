@@ -116,14 +116,12 @@ def _answers(before: Mapping[str, Answers], now: Mapping[str, Answers]) -> list[
         return ["the answers in the folder cannot be read"]
     found = []
     for role in sorted({*before, *now}):
-        if role not in before or role not in now:
-            found.append(f"answers on {role}: {'none before' if role not in before else 'none now'}")
+        if role not in before or role not in now or len(before[role]) != len(now[role]):
+            rows = [str(len(side[role])) if role in side else "no" for side in (before, now)]
+            found.append(f"answers on {role}: {rows[0]} rows before, {rows[1]} now")
             continue
         for column in fields(Answers):
             old, new = getattr(before[role], column.name), getattr(now[role], column.name)
-            if len(old) != len(new):
-                found.append(f"answers on {role}: {len(old)} rows before, {len(new)} now")
-                break
             if old.astype(new.dtype).tobytes() != new.tobytes():
                 other = sum(a.tobytes() != b.tobytes() for a, b in zip(old.astype(new.dtype), new, strict=True))
                 found.append(f"answers on {role}: {other} of {len(new)} values of {column.name} differ")

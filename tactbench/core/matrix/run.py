@@ -118,10 +118,11 @@ def _rounds(cells: Sequence[Cell], choice: EngineChoice, recording_plan: Recordi
     """Return the cells of each replicate that has to be recorded; all at once where recordings exist already.
 
     Between rounds nothing is under way, so that a table can be shown. On a cluster, which takes seconds to start, all
-    replicates after the first are one round.
+    replicates are one round.
     """
+    if choice.name == "dask" or not recording_plan.requests:
+        return [list(cells)]
     rounds: dict[int, list[Cell]] = {}
     for cell in cells:
-        number = cell.repeat if recording_plan.requests else 1
-        rounds.setdefault(min(number, 2) if choice.name == "dask" else number, []).append(cell)
+        rounds.setdefault(cell.repeat, []).append(cell)
     return list(rounds.values())

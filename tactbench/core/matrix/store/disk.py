@@ -15,7 +15,7 @@ _FULL = {
     errno.EDQUOT: "the quota is used up",
     errno.EFBIG: "a file would be larger than this process may write",
 }
-_GONE = {errno.ENOENT, errno.ESTALE, errno.ENOTDIR}
+_GONE = {errno.ENOENT, errno.ESTALE}
 KEPT = "What was finished before is kept"
 
 
@@ -34,34 +34,23 @@ def writing(folder: Path) -> Iterator[None]:
         raise refusal(folder, error) from error
 
 
-def refusal(folder: Path, error: OSError, *, begun: bool = True) -> FolderError:
-    """Return the error to raise when the system refuses to write into a result folder.
-
-    Parameters
-    ----------
-    begun
-        Whether it could be written before.
-    """
+def refusal(folder: Path, error: OSError) -> FolderError:
+    """Return the error to raise when the system refuses to write into a result folder."""
     number = error.errno or 0
     if number in _FULL:
         return FolderError(
             f"The folder {folder} cannot be written: {_FULL[number]}.",
             hint=f"{KEPT}: make room, and the same command goes on from there.",
         )
-    if begun and number in _GONE:
-        return removed(folder)
+    if number in _GONE:
+        return FolderError(
+            f"The folder {folder} was removed or moved while it was being written.",
+            hint="What was finished before lies where it was moved to; run the same command again, or with its new "
+            "place as --out DIR.",
+        )
     return FolderError(
         f"The folder {folder} cannot be written: {error.strerror or error}.",
         hint=f"{KEPT}: check its permissions, or give another one with --out DIR.",
-    )
-
-
-def removed(folder: Path) -> FolderError:
-    """Return the error to raise when a folder is not where it was."""
-    return FolderError(
-        f"The folder {folder} was removed or moved while it was being written.",
-        hint="What was finished before lies where it was moved to; run the same command again, or with its new place "
-        "as --out DIR.",
     )
 
 

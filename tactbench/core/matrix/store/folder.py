@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.errors import FormatError, RecordingError
 from tactbench.core.matrix.files import replace_file, write_file
 from tactbench.core.matrix.store import leftovers, limits
-from tactbench.core.matrix.store.disk import refusal, removed, sync_path, writing
+from tactbench.core.matrix.store.disk import sync_path, writing
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
 from tactbench.core.matrix.store.rows import NAMING, Row, plain
@@ -64,12 +65,10 @@ class Store:
         if self._lock is not None:
             yield self
             return
-        try:
+        with writing(self.folder):
             for part in _PARTS:
                 (self.folder / part).mkdir(parents=True, exist_ok=True)
             self._lock = Lock(self.folder)
-        except OSError as error:
-            raise refusal(self.folder, error, begun=False) from error
         try:
             leftovers.sweep(self.folder)
             yield self
@@ -200,11 +199,6 @@ class Store:
     # What is read
 
     @property
-    def blank(self) -> bool:
-        """Whether no cell has ever ended here."""
-        return not self._read().entries and not self._orphans
-
-    @property
     def troubles(self) -> tuple[str, ...]:
         """What of this folder could not be used, in sentences."""
         return tuple(self._read().troubles)
@@ -239,8 +233,8 @@ class Store:
             return {}
         path = self._shard(key)
         try:
-            image = shard.read_image(path)
-            if (shard.digest_of(image), len(image)) != entry.shard:
+            image = self.image(entry)
+            if image is None:
                 raise FormatError(f"The shard {path} is not the one that was written.", hint="Run the cell again.")
             return shard.answers_in(path, image)
         except FormatError as error:
@@ -351,9 +345,9 @@ class Store:
 
     @contextmanager
     def _written(self) -> Iterator[None]:
-        if self._lock is not None and not self._lock.in_place():
-            raise removed(self.folder)
         with writing(self.folder):
+            if self._lock is not None and not self._lock.in_place():
+                raise FileNotFoundError(errno.ENOENT, "not where it was")
             yield
 
 
