@@ -12,7 +12,7 @@ from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves
-from tactbench.core.matrix.recorded import Recorded, read_all, read_subject
+from tactbench.core.matrix.recorded import Recorded, read_all, read_sensor_and_scene
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.plugins.rig_files import load_rig_file
@@ -183,12 +183,12 @@ def _from_replay(
     """Return the cells of recordings that exist; a child process reads them, so that a damaged one breaks nothing."""
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
-    broken = read_all(read_subject, recorded.unread(paths, "sensor"), recorded, choice)
+    broken = read_all(read_sensor_and_scene, recorded.unread(paths, "sensor"), recorded, choice)
     scenes: dict[str, dict[Path, str | None]] = {}
     unreadable: dict[str, dict[Path, BaseException]] = {}
     for path in paths:
         if path not in broken:
-            sensor, scene = recorded.subject(path)
+            sensor, scene = recorded.sensor_and_scene(path)
             scenes.setdefault(sensor, {})[path] = scene
     for path, error in broken.items():
         unreadable.setdefault(_owner(path, matrix.sensors or list(scenes), registry), {})[path] = error

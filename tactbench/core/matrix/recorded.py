@@ -7,18 +7,9 @@ import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.remembered import Facts, FileMemory
-
-
-class Subject(NamedTuple):
-    """What a recording is a recording of."""
-
-    sensor: str
-    scene: str | None
-    """None: nobody planned its scene, for example that of an imported table."""
 
 
 class Recorded:
@@ -61,14 +52,17 @@ class Recorded:
                 self._digests[path] = known
         return self._digests[path]
 
-    def subject(self, path: Path) -> Subject:
-        """Return what a recording is of; raises RecordingError if it cannot be read."""
+    def sensor_and_scene(self, path: Path) -> tuple[str, str | None]:
+        """Return sensor and scene of a recording; raises RecordingError if it cannot be read.
+
+        There is no scene where nobody planned it, for example that of an imported table.
+        """
         facts = self._facts(path)
         if facts.get("sensor") is None:
             before = stat_of(path)
-            facts = read_subject(path)
+            facts = read_sensor_and_scene(path)
             self.learn(path, facts, before)
-        return Subject(str(facts["sensor"]), facts["scene"])
+        return str(facts["sensor"]), facts["scene"]
 
     def made(self, path: Path, digest: str) -> None:
         """Note the digest of a recording that was made now, as its writer computed it."""
@@ -100,7 +94,7 @@ def read_digest(path: Path) -> Facts:
     return {"digest": content_digest(path)}
 
 
-def read_subject(path: Path) -> Facts:
+def read_sensor_and_scene(path: Path) -> Facts:
     """Read what a recording is of; raises RecordingError if it cannot be read."""
     from tactbench.core.recording.reader import read_meta
 

@@ -38,30 +38,16 @@ def recording_entry(request: RecordingRequest, keys: Keys) -> Entry:
     )
 
 
-@dataclass(frozen=True)
-class Book:
-    """Where a run notes what goes into the keys it makes."""
-
-    pages: KeyBook
-    keys: Keys
-
-    def note_recordings(self, requests: Sequence[RecordingRequest]) -> None:
-        """Note what goes into the keys of recordings that are to be made."""
-        self.pages.write(recording_entry(request, self.keys) for request in requests)
-
-    def note_cells(self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path) -> None:
-        """Note what goes into the keys of cells that are to be computed: each with its key and its recordings."""
-        self.pages.write(self._entries(cells, recorded, folder))
-
-    def _entries(
-        self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path
-    ) -> Iterator[Entry]:
-        data: dict[tuple[Path, ...], dict[str, dict[str, str]]] = {}
-        for cell, key, paths in cells:
-            several = tuple(paths)
-            if several not in data:  # one object for all cells of the same recordings: the book writes it once
-                data[several] = _data(paths, recorded, folder)
-            yield Entry(cell.name, key, _configuration(cell), self.keys.answer(cell), data[several])
+def cell_entries(
+    cells: Iterable[tuple[Cell, str, Sequence[Path]]], keys: Keys, recorded: Recorded, folder: Path
+) -> Iterator[Entry]:
+    """Yield what went into the keys of cells, for the book: each cell with its key and its recordings."""
+    data: dict[tuple[Path, ...], dict[str, dict[str, str]]] = {}
+    for cell, key, paths in cells:
+        several = tuple(paths)
+        if several not in data:  # one object for all cells of the same recordings: the book writes it once
+            data[several] = _data(paths, recorded, folder)
+        yield Entry(cell.name, key, _configuration(cell), keys.answer(cell), data[several])
 
 
 def explain(

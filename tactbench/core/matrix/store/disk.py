@@ -16,7 +16,6 @@ _FULL = {
     errno.EFBIG: "a file would be larger than this process may write",
 }
 _GONE = {errno.ENOENT, errno.ESTALE}
-KEPT = "What was finished before is kept"
 
 
 @contextmanager
@@ -31,27 +30,16 @@ def writing(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise refusal(folder, error) from error
-
-
-def refusal(folder: Path, error: OSError) -> FolderError:
-    """Return the error to raise when the system refuses to write into a result folder."""
-    number = error.errno or 0
-    if number in _FULL:
-        return FolderError(
-            f"The folder {folder} cannot be written: {_FULL[number]}.",
-            hint=f"{KEPT}: make room, and the same command goes on from there.",
-        )
-    if number in _GONE:
-        return FolderError(
-            f"The folder {folder} was removed or moved while it was being written.",
-            hint="What was finished before lies where it was moved to; run the same command again, or with its new "
-            "place as --out DIR.",
-        )
-    return FolderError(
-        f"The folder {folder} cannot be written: {error.strerror or error}.",
-        hint=f"{KEPT}: check its permissions, or give another one with --out DIR.",
-    )
+        kept = "What was finished before is kept"
+        what = f"cannot be written: {_FULL.get(error.errno or 0) or error.strerror or error}"
+        hint = f"{kept}: check its permissions, or give another one with --out DIR."
+        if error.errno in _FULL:
+            hint = f"{kept}: make room, and the same command goes on from there."
+        elif error.errno in _GONE:
+            what = "was removed or moved while it was being written"
+            hint = "What was finished before lies where it was moved to; run the same command again, or with its new "
+            hint += "place as --out DIR."
+        raise FolderError(f"The folder {folder} {what}.", hint=hint) from error
 
 
 def sync_path(path: Path) -> None:

@@ -130,8 +130,6 @@ class Store:
         path = self._shard(key)
         aside = self._cells / f".{key}.h5.{os.getpid()}.partial"
         with self._written():
-            if self._lock is None:
-                self._cells.mkdir(parents=True, exist_ok=True)
             try:
                 write_file(aside, image, sync=True)
                 ledger.append(entry)
@@ -167,8 +165,6 @@ class Store:
         before = self._latest.get(str(told.get("cell")))
         if before is None or before.row != told:
             with self._written():
-                if self._lock is None:
-                    self.folder.mkdir(parents=True, exist_ok=True)
                 ledger.append(Entry(told))
             self._place(Entry(told))
         return dict(told)
@@ -346,7 +342,9 @@ class Store:
     @contextmanager
     def _written(self) -> Iterator[None]:
         with writing(self.folder):
-            if self._lock is not None and not self._lock.in_place():
+            if self._lock is None:
+                self._cells.mkdir(parents=True, exist_ok=True)
+            elif not self._lock.in_place():
                 raise FileNotFoundError(errno.ENOENT, "not where it was")
             yield
 
