@@ -61,7 +61,7 @@ def requests_for(
         for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(wanted[2]), cell.seed):
             scene = planned.scene.asked(simulation)
             key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
-            path = store.recording_path(cell.sensor, scene.name, key)
+            path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
             requests[wanted].append(
                 RecordingRequest(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, cell.rig_file)
             )

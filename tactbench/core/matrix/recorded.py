@@ -30,26 +30,20 @@ class Recorded:
 
     def unread(self, paths: Iterable[Path], fact: str) -> list[Path]:
         """Return those of `paths` that would have to be opened for the `fact`: ``digest`` or ``sensor``."""
-        return [path for path in paths if path not in self._digests and fact not in self._facts(path)]
+        return [path for path in paths if path not in self._digests and fact not in self._memory.facts(stat_of(path))]
 
     def learn(self, path: Path, facts: Facts, before: os.stat_result | None) -> None:
         """Take in what was read of a recording, perhaps in another process, which looked like `before` until then."""
-        digest = facts.get("digest")
-        if digest is not None:
-            self._digests[path] = digest
-        after = stat_of(path)
-        if before is not None and after is not None:
-            self._memory.learn(before, after, facts)
+        if facts.get("digest"):
+            self._digests[path] = str(facts["digest"])
+        self._memory.learn(before, stat_of(path), facts)
 
     def digest(self, path: Path) -> str:
         """Return the content digest of a recording; raises RecordingError if it cannot be read."""
         if path not in self._digests:
-            known = self._facts(path).get("digest")
-            if known is None:
-                before = stat_of(path)
-                self.learn(path, read_digest(path), before)
-            else:
-                self._digests[path] = known
+            before = stat_of(path)
+            facts = self._memory.facts(before)
+            self.learn(path, facts if facts.get("digest") else read_digest(path), before)
         return self._digests[path]
 
     def sensor_and_scene(self, path: Path) -> tuple[str, str | None]:
@@ -57,7 +51,7 @@ class Recorded:
 
         There is no scene where nobody planned it, for example that of an imported table.
         """
-        facts = self._facts(path)
+        facts = self._memory.facts(stat_of(path))
         if facts.get("sensor") is None:
             before = stat_of(path)
             facts = read_sensor_and_scene(path)
@@ -77,14 +71,8 @@ class Recorded:
     def save(self) -> None:
         """Write what was learned; a folder that cannot be written only costs time."""
         for path, before in self._made.items():
-            now = stat_of(path)
-            if before is not None and now is not None:
-                self._memory.learn(before, now, {"digest": self._digests[path]})
+            self._memory.learn(before, stat_of(path), {"digest": self._digests[path]})
         self._memory.save()
-
-    def _facts(self, path: Path) -> Facts:
-        stat = stat_of(path)
-        return {} if stat is None else self._memory.facts(stat)  # where there is none, reading says what is wrong
 
 
 def read_digest(path: Path) -> Facts:

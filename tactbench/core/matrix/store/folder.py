@@ -78,10 +78,6 @@ class Store:
 
     # What a run asks and writes
 
-    def recording_path(self, sensor: str, scene: str, key: str) -> Path:
-        """Return where the recording with this key lies, or will lie."""
-        return self.folder / "recordings" / sensor / f"{scene}-{key[:12]}.h5"
-
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Keep who computes from now on, with what, and return its id: equal provenances have equal ones."""
         text = canonical(dict(provenance))
