@@ -167,13 +167,13 @@ def carry_out(request: bytes) -> bytes:
     key = worker.get_current_task()
     work, item, folder, limits, on_host = pickle.loads(request)
 
-    def wanted() -> bool:
+    def is_needed() -> bool:
         task = worker.state.tasks.get(key)
         at_work = worker.status in (Status.running, Status.paused)  # it closes when the scheduler has gone
         return at_work and task is not None and task.state != "cancelled"
 
     concurrency = on_host.get(worker.address, worker.state.nthreads)
-    pool = Pool(1, limits, preload=PRELOAD, wanted=wanted)
+    pool = Pool(1, limits, preload=PRELOAD, is_needed=is_needed)
     for _, outcome in pool.each(partial(_in_folder, folder, concurrency, work), [item]):
         if isinstance(outcome, BaseException):
             return pack({"error": dump_error(outcome)})

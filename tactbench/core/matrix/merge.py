@@ -94,17 +94,17 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path, Sequence[
     for store in stores:
         entries = store.entries()
         if not entries:
-            said = f" ({'; '.join(store.troubles)})" if store.troubles else ""
-            raise FolderError(f"There are no results in {store.folder}{said}.", hint="Name what `run --out` wrote.")
+            troubles = f" ({'; '.join(store.troubles)})" if store.troubles else ""
+            raise FolderError(f"There are no results in {store.folder}{troubles}.", hint="Name what `run --out` wrote.")
         for entry in entries:
             _add(union, _Found(entry, store))
-        union.left_out += [f"{store.folder}: {said}" for said in store.troubles]
+        union.left_out += [f"{store.folder}: {trouble}" for trouble in store.troubles]
     recordings = _recordings(stores, union)
     if union.against:
         more = len(union.against) - _SHOWN
-        told = "; ".join(union.against[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+        listed = "; ".join(union.against[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
         raise FolderError(
-            f"The folders contradict each other: {told}.",
+            f"The folders contradict each other: {listed}.",
             hint="Nothing was written. Leave one of them out, or run the named cells again with the same version.",
         )
     entries = _lines(union)
@@ -195,9 +195,9 @@ def _provenances(stores: Iterable[Store]) -> dict[str, str]:
     for store in stores:
         with suppress(OSError):
             for path in sorted((store.folder / "provenance").iterdir()):
-                said = store.provenance(path.stem) if path.suffix == ".json" else {}
-                if said:
-                    found[path.name] = canonical(said) + "\n"
+                provenance = store.provenance(path.stem) if path.suffix == ".json" else {}
+                if provenance:
+                    found[path.name] = canonical(provenance) + "\n"
     return found
 
 

@@ -54,15 +54,15 @@ def requests_for(
     """
     requests: dict[RequestKey, list[RecordingRequest]] = {}
     for cell in cells:
-        wanted = request_key(cell)
-        if wanted in requests:
+        needed = request_key(cell)
+        if needed in requests:
             continue
-        requests[wanted] = []
-        for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(wanted[2]), cell.seed):
+        requests[needed] = []
+        for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(needed[2]), cell.seed):
             scene = planned.scene.asked(simulation)
             key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
             path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
-            requests[wanted].append(
+            requests[needed].append(
                 RecordingRequest(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, cell.rig_file)
             )
     return requests
@@ -126,14 +126,14 @@ class RecordingPlan:
 
     def paths(self, cell: Cell) -> list[Path]:
         """Return the recordings of a cell."""
-        wanted = request_key(cell)
-        return self.replayed.get(wanted) or [request.path for request in self.requests.get(wanted, ())]
+        key = request_key(cell)
+        return self.replayed.get(key) or [request.path for request in self.requests.get(key, ())]
 
     def trouble(self, cell: Cell) -> BaseException | None:
         """Return why a cell cannot have its recordings, if so."""
-        wanted = request_key(cell)
-        if wanted in self.troubles:
-            return self.troubles[wanted]
+        key = request_key(cell)
+        if key in self.troubles:
+            return self.troubles[key]
         paths = self.paths(cell)
         if not paths:
             return NotApplicable(
@@ -218,9 +218,9 @@ def _without_rig(
     return cells, RecordingPlan(recorded, troubles={request_key(cell): trouble for cell in cells})
 
 
-def _replayed(asked: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
+def _replayed(arguments: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
     """Return the recordings of a rig that replays, None of one that records: in a child process, where it is built."""
-    name, recordings, rig_file = asked
+    name, recordings, rig_file = arguments
     rig = rig_of(name, installed(), recordings, rig_file)
     if not hasattr(rig, "recordings"):
         return None

@@ -43,7 +43,7 @@ def compute_again(
     store: Store,
     paths: Sequence[Path],
     requests: Sequence[RecordingRequest],
-    told: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> Again:
     """Compute `cell` again; nothing in the result folder changes.
 
@@ -55,8 +55,8 @@ def compute_again(
         The recordings it was answered from.
     requests
         How to make them anew, into another place; none where they cannot be made anew.
-    told
-        Told what is being done.
+    report
+        Called with what is being done.
     """
     found: list[str] = []
     trouble: BaseException | None = None
@@ -64,7 +64,7 @@ def compute_again(
     for request in requests:
         if request.path in made:
             continue
-        told(f"recording {request.sensor} {request.scene.name}")
+        report(f"recording {request.sensor} {request.scene.name}")
         try:
             made[request.path] = record(request)
         except Exception as error:
@@ -72,7 +72,7 @@ def compute_again(
             break
     if requests and trouble is None:
         found += _recordings(paths, [(request.scene.name, made[request.path]) for request in requests])
-    told(f"evaluating {cell.name}")
+    report(f"evaluating {cell.name}")
     outcome: Any = trouble
     if trouble is None:
         job = Job(cell, tuple(request.path for request in requests) or tuple(paths))

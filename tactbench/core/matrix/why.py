@@ -47,7 +47,7 @@ def cell_entries(
         several = tuple(paths)
         if several not in data:  # one object for all cells of the same recordings: the book writes it once
             data[several] = _data(paths, recorded, folder)
-        yield Entry(cell.name, key, _configuration(cell), keys.answer(cell), data[several])
+        yield Entry(cell.name, key, _configuration(cell), keys.shared_by_cells(cell), data[several])
 
 
 def explain(
@@ -71,7 +71,7 @@ def explain(
     known
         Key of the latest result of that name, or nothing.
     """
-    now = _sections(keys.answer(cell), _configuration(cell))
+    now = _sections(keys.shared_by_cells(cell), _configuration(cell))
     missing = [path for path in paths if not path.exists()]
     before = book.sections(cell.name, known) if known else book.sections(cell.name)
     if missing or not paths:
@@ -86,8 +86,8 @@ def explain(
     if key == known or store.finished(key) is not None:
         return Explanation(key, True, ())
     if before is None:
-        said = "" if not known else "What the result that is there was made of is not recorded in this folder."
-        return Explanation(key, False, ("It was never computed into this folder.",) if not known else (), said)
+        unknown = "" if not known else "What the result that is there was made of is not recorded in this folder."
+        return Explanation(key, False, ("It was never computed into this folder.",) if not known else (), unknown)
     return Explanation(key, False, tuple(differences(before, now)))
 
 
@@ -111,8 +111,8 @@ def _unmade(
             continue
         found = differences(before, _sections(entry.fixed, entry.configuration))
         reasons.update(dict.fromkeys(found or [f"recording {request.scene.name} was removed"]))
-    said = [f"{len(never)} of {len(requests)} recordings were never made, {never[0]} first"] if never else []
-    return [*said, *reasons]
+    unmade = [f"{len(never)} of {len(requests)} recordings were never made, {never[0]} first"] if never else []
+    return [*unmade, *reasons]
 
 
 def _name(request: RecordingRequest) -> str:

@@ -201,8 +201,8 @@ class Worker:
         while time.monotonic() < until and not (length == len(self._printed()) > before):
             length = len(self._printed())
             wait([self._process.sentinel], STACK_S / 20)
-        said = self._printed()[before:]
-        return said if "most recent call first" in said else ""
+        printed = self._printed()[before:]
+        return printed if "most recent call first" in printed else ""
 
     def _printed(self) -> str:
         return tail(self._log.fileno())

@@ -120,9 +120,9 @@ class Store:
         if not limits.is_key(key) or row.get("status") != "done":
             raise ValueError(f"a finished cell has the status 'done' and a key of 32 hexadecimal digits, not {key!r}")
         ledger = self._read()
-        told, text = plain({**row, "key": key})
+        written, text = plain({**row, "key": key})
         image = shard.build(text, self._provenance[1], sets)
-        entry = Entry(told, (shard.digest_of(image), len(image)))
+        entry = Entry(written, (shard.digest_of(image), len(image)))
         path = self._shard(key)
         aside = self._cells / f".{key}.h5.{os.getpid()}.partial"
         with self._written():
@@ -136,7 +136,7 @@ class Store:
                 raise
             sync_path(self._cells)
         self._place(entry)
-        return dict(told)
+        return dict(written)
 
     def note(self, row: Mapping[str, Any]) -> Row:
         """Write how a cell ended that did not finish: failed, crashed, skipped.
@@ -157,13 +157,13 @@ class Store:
             name: _clipped(value) if name in ("log", "traceback", "reason") else value for name, value in row.items()
         }
         ledger = self._read()
-        told: Row = json.loads(canonical(row))
-        before = self._latest.get(str(told.get("cell")))
-        if before is None or before.row != told:
+        written: Row = json.loads(canonical(row))
+        before = self._latest.get(str(written.get("cell")))
+        if before is None or before.row != written:
             with self._written():
-                ledger.append(Entry(told))
-            self._place(Entry(told))
-        return dict(told)
+                ledger.append(Entry(written))
+            self._place(Entry(written))
+        return dict(written)
 
     def reuse(self, row: Row) -> None:
         """Say that a finished cell was found again, under the name it has in `row`.
@@ -212,8 +212,8 @@ class Store:
                 holes.add(entry.row["cell"])
         known = set(ledger.troubles)
         lost = sorted(holes - set(latest))
-        told = [f"{name!r} is left out: its shard is missing or cut; run it again" for name in lost]
-        ledger.troubles += [one for one in told if one not in known]
+        messages = [f"{name!r} is left out: its shard is missing or cut; run it again" for name in lost]
+        ledger.troubles += [one for one in messages if one not in known]
         return list(latest.values())
 
     def answers(self, key: str) -> dict[str, Answers]:
@@ -251,11 +251,11 @@ class Store:
         try:
             with (self.folder / "provenance" / f"{name}.json").open("rb") as file:
                 content = file.read(limits.PROVENANCE_BYTES).strip()
-            said = json.loads(content)
+            provenance = json.loads(content)
         except (OSError, ValueError, RecursionError):
             return {}
-        whole = provenance_id(content) == name and isinstance(said, dict)
-        return said if whole else {}
+        whole = provenance_id(content) == name and isinstance(provenance, dict)
+        return provenance if whole else {}
 
     def recording(self, path: str, digest: str = "") -> Path | None:
         """Return the file of a recording that a row names, or None if it may not be opened.

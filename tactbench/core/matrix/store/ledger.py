@@ -165,12 +165,12 @@ def whole_text(entries: Sequence[Entry]) -> str:
 def _lines(entry: Entry, known: set[str]) -> tuple[list[str], set[str]]:
     slim, references, texts = parted(entry.row)
     fresh = {digest: text for digest, text in texts.items() if digest not in known}
-    said: dict[str, Any] = {"row": slim}
+    record: dict[str, Any] = {"row": slim}
     if references:
-        said["refs"] = references
+        record["refs"] = references
     if entry.shard is not None:
-        said["shard"] = list(entry.shard)
-    return [*shared_lines(fresh), canonical(said)], set(fresh)
+        record["shard"] = list(entry.shard)
+    return [*shared_lines(fresh), canonical(record)], set(fresh)
 
 
 def _parsed(content: bytes) -> Iterator[tuple[str, Any]]:
@@ -205,10 +205,10 @@ def _is_monstrous(line: str, record: Any) -> bool:
     return False
 
 
-def _is_shard(said: Any) -> bool:
+def _is_shard(shard: Any) -> bool:
     return (
-        isinstance(said, list) and len(said) == 2 and isinstance(said[0], str) and len(said[0]) == 64
-        and type(said[1]) is int and 0 < said[1] <= limits.SHARD_BYTES
+        isinstance(shard, list) and len(shard) == 2 and isinstance(shard[0], str) and len(shard[0]) == 64
+        and type(shard[1]) is int and 0 < shard[1] <= limits.SHARD_BYTES
     )  # fmt: skip
 
 
