@@ -140,10 +140,10 @@ def _force(watched: Watched, width: int, *, low: bool) -> list[Text]:
         (bad, BAD),
     )
     lines = []
-    for row, (text, style) in zip(drawn, beside, strict=True):
+    for row, (label, style) in zip(drawn, beside, strict=True):
         line = Text.assemble((f"  {row}", "bold"))
         line.pad_right(_DIGITS_WIDTH - line.cell_len)
-        line.append(f" {text}", style)
+        line.append(f" {label}", style)
         line.pad_right(_FORCE_WIDTH - line.cell_len)
         lines.append(line)
     largest = _in_unit(watched.scene.profile.largest_n, channel.unit)

@@ -212,7 +212,7 @@ class SameEnvironment(WorkerPlugin):
         multiprocessing.current_process().daemon = False  # a daemon of `multiprocessing` may have no children
         os.environ.update(self._threads)
         multiprocessing.get_context("forkserver").set_forkserver_preload(list(PRELOAD))
-        forkserver.ensure_running()  # before the registry wants one for plugins
+        forkserver.ensure_running()  # before the registry starts one for plugins
         set_subreaper(True)  # what a crashed cell leaves behind becomes a child of this process, and is ended
         found = differences(self._expected, environment(installed()))
         self.differs = bool(found)

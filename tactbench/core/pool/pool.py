@@ -120,7 +120,7 @@ def _children_of_items(busy: list[Worker], idle: list[Worker]) -> Iterator[set[i
     Yields the children that were there before.
     """
     if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGCHLD) == signal.SIG_IGN:
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else the system reaps children, and nobody hears how they ended
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else the system reaps children, and their exit codes are lost
     before: bool | None = None
     spared: set[int] = set()
     try:
