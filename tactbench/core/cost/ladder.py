@@ -68,9 +68,9 @@ def climb(
     Ladder
         A row for every estimator, also for those that were skipped or failed; the best score first.
     """
-    asked = {(cell.protocol, cell.split) for cell in plan_cells(matrix, matrix.sensors, registry)}
-    if len(asked) > 1:
-        several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in asked))
+    ways = {(cell.protocol, cell.split) for cell in plan_cells(matrix, matrix.sensors, registry)}
+    if len(ways) > 1:
+        several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in ways))
         raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
     outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress)
     task = registry.tasks[matrix.tasks[0].name].spec

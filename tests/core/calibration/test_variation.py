@@ -46,7 +46,7 @@ def refusing(trial: Trial):
 
 def _varied(folder, work=seeing):
     spec = procedure(variations=VARIATIONS)
-    return spec, carry_out_variations(spec, 5, folder, {"commit": "c"}, jobs=1, told=Silence(), work=work)
+    return spec, carry_out_variations(spec, 5, folder, {"commit": "c"}, jobs=1, progress=Silence(), work=work)
 
 
 def _result(folder, n=40):
@@ -77,7 +77,7 @@ def test_a_changed_setting_is_another_procedure(tmp_path):
     other = [{**VARIATIONS[0], "settings": VARIATIONS[0]["settings"][::-1]}]
     spec = procedure(variations=other)
     with pytest.raises(UsageError, match="another procedure"):
-        carry_out_variations(spec, 5, tmp_path, {}, jobs=1, told=Silence(), work=seeing)
+        carry_out_variations(spec, 5, tmp_path, {}, jobs=1, progress=Silence(), work=seeing)
 
 
 def test_they_are_written_and_read_back(tmp_path):

@@ -141,7 +141,7 @@ def test_a_report_of_a_strangers_folder_names_what_it_left_out(shell):
     with (shell.folder / "tactbench-results" / "index.jsonl").open("a") as ledger:
         ledger.write(json.dumps({"row": {**done("evil"), "score": "1"}}) + "\n")
     said = shell("report", code=2).stderr
-    assert "'evil' is left out: 'score' is text" in said
+    assert "'evil' is left out: its score: Input should be a valid number" in said
     assert "Traceback" not in said
 
 
