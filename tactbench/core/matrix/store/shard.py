@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import FormatError
-from tactbench.core.matrix.files import read_regular
 from tactbench.core.matrix.store import limits
-from tactbench.core.matrix.store.rows import NotPlainError, Row, fault_in_row, named, plain, too_deep
+from tactbench.core.matrix.store.image import SEE
+from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
 from tactbench.core.recording import trust
 from tactbench.core.samples import Answers
 from tactbench.core.spec.scene import Role
@@ -31,7 +31,6 @@ _CHUNK_ROWS = 4096
 _ATTRIBUTE_BYTES = 60_000
 """An attribute of HDF5 holds 64 KiB with its name and type."""
 _COLUMNS = tuple(column.name for column in fields(Answers))
-_SEE = "Delete it, and the next run computes the cell again."
 
 
 def build(row: str, provenance: str, sets: Mapping[Role, Answers]) -> bytes:
@@ -80,28 +79,6 @@ def _table(answers: Answers) -> npt.NDArray[Any]:
     return table
 
 
-def digest_of(image: bytes) -> str:
-    """Return the digest under which the ledger knows a shard."""
-    return hashlib.sha256(image).hexdigest()
-
-
-def read_image(path: Path) -> bytes:
-    """Return the bytes of a shard.
-
-    Raises
-    ------
-    FormatError
-        If there is no such file, it is a link or no file at all, or larger than any shard of ours.
-    """
-    try:
-        image = read_regular(path, limits.SHARD_BYTES, follow=False)  # links may lead anywhere
-    except OSError as error:
-        raise FormatError(f"The shard {path} cannot be read: {error}.", hint=_SEE) from error
-    if len(image) > limits.SHARD_BYTES:
-        raise FormatError(f"The shard {path} is larger than {limits.SHARD_BYTES // 2**20} MiB.", hint=_SEE)
-    return image
-
-
 def answers_in(path: Path, image: bytes) -> dict[str, Answers]:
     """Return the answers of a shard whose bytes were compared with the ledger, by role.
 
@@ -134,17 +111,6 @@ def row_in(path: Path, image: bytes) -> Row:
     return dict(row)
 
 
-def holds_row(path: Path, image: bytes, row: Row) -> bool:
-    """Return whether a shard holds the row that a ledger tells of it; it may have another name there."""
-    try:
-        text = plain(row)[1]
-        if text.encode() in image:  # texts are stored as they are: no need to look where
-            return True
-        return plain(named(row_in(path, image), row))[1] == text
-    except (FormatError, NotPlainError):
-        return False
-
-
 def _digest(row: str, provenance: str, tables: Mapping[str, npt.NDArray[Any]]) -> str:
     """Return the digest of what a shard says, whatever bytes HDF5 made of it; `tables` in the order of their names."""
     sha = hashlib.sha256(f"{FORMAT} {VERSION}\n{row}\n{provenance}\n".encode())
@@ -159,11 +125,11 @@ def _opened(path: Path, image: bytes) -> tuple[str, dict[str, Answers]]:
     try:
         with h5py.File(io.BytesIO(image), "r") as file:
             if _text(path, file, "format") != f"{FORMAT} {VERSION}":
-                raise FormatError(f"{path} is no shard of this version.", hint=_SEE)
+                raise FormatError(f"{path} is no shard of this version.", hint=SEE)
             row = _text(path, file, "row")
             tables = {str(role): _read(path, file, role) for role in sorted(set(get_args(Role)) & set(file))}
             if _digest(row, _text(path, file, "provenance"), tables) != _text(path, file, "sha256"):
-                raise FormatError(f"{path} does not hold what was written: its digest differs.", hint=_SEE)
+                raise FormatError(f"{path} does not hold what was written: its digest differs.", hint=SEE)
     except FormatError:
         raise
     except (*trust.READ_FAILURES, MemoryError) as error:
@@ -194,4 +160,4 @@ def _read(path: Path, file: Any, role: str) -> npt.NDArray[Any]:
 
 
 def _damaged(path: Path, why: object) -> FormatError:
-    return FormatError(f"The shard {path} is damaged: {why}.", hint=_SEE)
+    return FormatError(f"The shard {path} is damaged: {why}.", hint=SEE)
