@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from tests.conftest import Verbs
+from tests.conftest import Shell, Verbs
 
 ASKED = ("run", "--repeats", "5", "--sensor", "biotac", "--sensor", "icub", "--task", "force",
          "--protocol", "deployable",
@@ -15,9 +15,9 @@ ASKED = ("run", "--repeats", "5", "--sensor", "biotac", "--sensor", "icub", "--t
 
 @pytest.fixture(scope="module")
 def verbs(tmp_path_factory):
-    verbs = Verbs(tmp_path_factory.mktemp("compared"))
-    verbs(*ASKED, "--out", "here")
-    return verbs
+    shell = Shell(tmp_path_factory.mktemp("compared"))
+    shell(*ASKED, "--out", "here")
+    return Verbs(shell.folder)
 
 
 def test_two_sensors_in_every_format(verbs):

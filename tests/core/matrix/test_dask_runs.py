@@ -13,7 +13,7 @@ from tests.conftest import Shell
 from tests.core.matrix.started import started
 from tests.core.pool.patience import ending, until
 
-RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--estimator", "lasso")
+RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--estimator", "forest-10")
 
 
 @pytest.fixture(scope="module")
