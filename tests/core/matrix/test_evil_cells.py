@@ -21,8 +21,8 @@ ENGINES = {
     "isolated-2": ("--engine", "isolated", "--jobs", "2"),
     "dask": ("--engine", "dask", "--jobs", "2"),
 }
-"""Every engine that the evil cells must survive under: one place for all of them. Of several cells the engine in-process
-carries out each in a child process, as isolated does with one job."""
+"""Every engine that the evil cells must survive under: one place for all of them. Of several cells the engine
+in-process carries out each in a child process, as isolated does with one job."""
 LEFT_OUT = {"in-process": {"evil-hang", "evil-deaf"}, "dask": {"evil-scribble"}}
 """What takes long to show again what two jobs show: time-outs one after the other, and a second cluster."""
 
