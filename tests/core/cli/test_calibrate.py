@@ -21,11 +21,11 @@ protocol: karl2016
 nuisances:
   - {name: force_noise_n, reason: r, source: assumed,
      prior: {kind: uniform, low: 0.2, high: 1.0}}
-  - {name: noise, sets: noise_scale, sensors: [icub], reason: r, source: assumed,
+  - {name: noise, sets: noise_scale, sensors: [ideal], reason: r, source: assumed,
      prior: {kind: log-uniform, low: 0.1, high: 10}}
 outputs:
-  - {name: ramp, title: Time index, sensor: icub, task: force, unit: N, estimator: {name: time-index}}
-  - {name: ridge, title: Ridge, sensor: icub, task: force, unit: N, estimator: {name: ridge}}
+  - {name: ramp, title: Time index, sensor: ideal, task: force, unit: N, estimator: {name: time-index}}
+  - {name: ridge, title: Ridge, sensor: ideal, task: force, unit: N, estimator: {name: ridge}}
 published:
   - {output: ramp, value: 0.6, scale: 0.15, scale_reason: s, use: fitted, source: {tag: assumed, reference: x}}
   - {output: ridge, value: 0.6, scale: 0.15, scale_reason: s, use: held out, source: {tag: assumed, reference: x}}
