@@ -186,7 +186,8 @@ def run(name: str, baud: int, seed: int, heartbeat_s: float | None = None) -> Re
                 with suppress(subprocess.TimeoutExpired):
                     process.wait(5.0)
                 said += [json.loads(line) for line in process.stdout]
-            _ended(log)
+            if "guard" not in scenario.who or scenario.number == signal.SIGTERM:
+                _ended(log)
             lines = log.read_text(encoding="utf-8").splitlines()
         finally:
             for who in numbers:

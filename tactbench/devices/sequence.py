@@ -85,11 +85,12 @@ class Unwrap:
             raise UsageError("Breaks of a counter are found by time, and none came.", hint="Give t_ns, or no rate_hz.")
         if not len(now):
             return now
-        times = np.broadcast_to(np.asarray(0 if t_ns is None else t_ns, dtype=np.int64), now.shape)
+        # Drivers give a row or two a millisecond: what numpy does for any shape would cost more than the rest.
+        times = np.zeros_like(now) if t_ns is None else np.broadcast_to(np.asarray(t_ns, dtype=np.int64), now.shape)
         highest = int(now[0]) if self._highest is None else self._highest
         seen_ns = int(times[0]) if self._seen_ns is None else self._seen_ns
-        steps = np.diff(now, prepend=highest) % self._modulus
-        broken = np.diff(times, prepend=seen_ns) > self._longest_ns
+        steps = _steps(highest, now) % self._modulus
+        broken = _steps(seen_ns, times) > self._longest_ns
         broken[0] |= self._restarted
         self._restarted = False
         if np.all((steps < self._modulus // 2) | broken):
@@ -114,6 +115,14 @@ class Unwrap:
             numbers[k] = highest
         self._highest, self._seen_ns = highest, seen_ns
         return numbers
+
+
+def _steps(before: int, values: IntArray) -> IntArray:
+    """Return the difference of each value from the one before it."""
+    steps = values.copy()
+    steps[0] -= before
+    steps[1:] -= values[:-1]
+    return steps
 
 
 class SequenceCheck:

@@ -11,7 +11,6 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.making import make_report
 from tactbench.core.report.results import open_results
-from tests.conftest import Shell
 from tests.core.report.results import draw_one, make_results
 
 
@@ -46,7 +45,7 @@ def chromium():
 @pytest.fixture(scope="session")
 def page(tmp_path_factory) -> Path:
     """The page of a small run, with a figure, a cost file and skipped cells."""
-    folder = make_results(Shell(tmp_path_factory.mktemp("page")))
+    folder = make_results(tmp_path_factory.mktemp("page") / "results")
     material = open_results(Store(folder), load_registry())
     (folder / "cost").mkdir()
     row = next(row for row in material.rows if row["status"] == "done")

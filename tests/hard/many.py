@@ -144,9 +144,9 @@ def main() -> int:
     wide = max(map(len, names))
     for name in names:
         counts = "  ".join(f"{verdict} {verdicts[name, verdict]:4d}" for verdict in ("passed", "refused", "failed"))
-        seconds, number = slowest[name]
+        seconds, number = slowest.get(name, (0.0, 0))
         print(f"{name:{wide}}  {counts}  slowest {seconds:6.2f} s (case {number})")
-    seconds, number, name = max((*slowest[name], name) for name in names)
+    seconds, number, name = max((*found, name) for name, found in slowest.items())
     total: Counter[str] = Counter()
     for (_, verdict), count in verdicts.items():
         total[verdict] += count

@@ -13,6 +13,7 @@ from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
 from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import metric_called
+from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.run import Outcome, run_matrix
@@ -40,6 +41,7 @@ def climb(
     clock: Callable[[], float],
     progress: Progress,
     recordings: Path | None = None,
+    choice: EngineChoice | None = None,
 ) -> Ladder:
     """Score the estimators of `matrix` and time them.
 
@@ -53,6 +55,8 @@ def climb(
         As in `tactbench.core.cost.rounds.measure`.
     recordings
         Folder for rigs that replay.
+    choice
+        Where cells are scored; times are always measured in this process.
 
     Raises
     ------
@@ -68,7 +72,7 @@ def climb(
     if len(ways) > 1:
         several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in ways))
         raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
-    outcome = run_matrix(matrix, store, recordings=recordings, progress=progress)
+    outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress, files=False)
     task = registry.tasks[matrix.tasks[0].name].spec
     done = [row for row in outcome.rows if row["status"] == "done" and row["seed"] == matrix.seed]
     data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None

@@ -54,6 +54,7 @@ def run_matrix(
     operator: Operator | None = None,
     progress: Progress | None = None,
     shown: Callable[[Sequence[Row]], None] | None = None,
+    files: bool = True,
 ) -> Outcome:
     """Record and evaluate `matrix`, reusing what `store` already has.
 
@@ -73,6 +74,8 @@ def run_matrix(
         Receives what happens.
     shown
         Called with all rows so far after each replicate but the last.
+    files
+        Whether to write ``run.json`` and ``scores.json``; else those of the last run stay as they are.
 
     Raises
     ------
@@ -107,8 +110,9 @@ def run_matrix(
                 shown(tuple(rows))
         fill_baselines(rows)
         recorded.save()
-        store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
-        store.write("scores.json", scores_text(rows))
+        if files:
+            store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
+            store.write("scores.json", scores_text(rows))
     used = {cell.name: tuple(recording_plan.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, computed, recorded.number_made, used)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 
 from tactbench.core.spec.status import Status
 
@@ -19,7 +19,7 @@ class RowModel(BaseModel):
     """One cell. Times are seconds unless the name says otherwise; a row may have other keys, of which nothing is asked.
 
     Rows are handed about as plain mappings; this model says what they hold, what stands there before anything is known,
-    and checks what comes from a file.
+    and checks what comes from a file. Each row has dictionaries and lists of its own: pydantic copies empty defaults.
     """
 
     model_config = ConfigDict(extra="allow", strict=True, defer_build=True)
@@ -32,13 +32,13 @@ class RowModel(BaseModel):
     protocol: str = ""
     split: str | None = None
     estimator: str = ""
-    params: dict[str, Any] = Field(default_factory=dict)
+    params: dict[str, Any] = {}
     is_baseline: bool = False
     looks_at: str = ""
     repeat: int = 1
     repeats: int = 1
     seed: int = 0
-    simulation: dict[str, Any] = Field(default_factory=dict)
+    simulation: dict[str, Any] = {}
     # How it ended
     status: Status
     reason: str = ""
@@ -81,7 +81,7 @@ class RowModel(BaseModel):
     latency_ms_max: float | None = None
     latency_n: int | None = None
     answer_delay_ms: float | None = None
-    delay_parts_ms: Numbers = Field(default_factory=dict)
+    delay_parts_ms: Numbers = {}
     threads: int | None = None
     peak_rss_mb: float | None = None
     wall_s: float | None = None
@@ -92,20 +92,20 @@ class RowModel(BaseModel):
     simulated: bool = False
     emulated: bool = False
     dagger: bool = False
-    stamps: list[str] = Field(default_factory=list)
-    remarks: list[str] = Field(default_factory=list)
-    assumptions: dict[str, Any] = Field(default_factory=dict)
-    plan: list[dict[str, Any]] = Field(default_factory=list)
-    counts: Numbers = Field(default_factory=dict)
-    chosen: Numbers = Field(default_factory=dict)
-    search: list[dict[str, Any]] = Field(default_factory=list)
-    recordings: list[str] = Field(default_factory=list)
-    digests: list[str] = Field(default_factory=list)
-    scores: Numbers = Field(default_factory=dict)
-    fold_sizes: dict[str, Any] = Field(default_factory=dict)
+    stamps: list[str] = []
+    remarks: list[str] = []
+    assumptions: dict[str, Any] = {}
+    plan: list[dict[str, Any]] = []
+    counts: Numbers = {}
+    chosen: Numbers = {}
+    search: list[dict[str, Any]] = []
+    recordings: list[str] = []
+    digests: list[str] = []
+    scores: Numbers = {}
+    fold_sizes: dict[str, Any] = {}
     confusion: list[list[Any]] | None = None
-    classes: list[str | bool | int | float] = Field(default_factory=list)
-    replicates: dict[str, Any] = Field(default_factory=dict)
+    classes: list[str | bool | int | float] = []
+    replicates: dict[str, Any] = {}
 
 
 class ReplicatedRow(RowModel):

@@ -90,6 +90,7 @@ _BITS = {
     OperationStatus.CURRENT_LIMITATION: Trigger.CURRENT_LIMIT,
     OperationStatus.DEVIATION_ERROR: Trigger.DEVIATION,
 }
+_ANY_BIT = sum(_BITS)
 
 
 def reaction(options: FaulhaberOptions, *, force_age_s: float = 1e-3, motor_lag_s: float = 10e-3) -> Reaction:
@@ -390,7 +391,7 @@ class LocalGuard:
             self._end_sequence = self._seen_force.sequence
             self._into_skin = False
         state = self._motor.state
-        if limits is not None and state is not None:
+        if limits is not None and state is not None and int(state.status) & _ANY_BIT:
             for bit, trigger in _BITS.items():
                 if state.status & bit:
                     return trigger, f"the drive says {(bit.name or '').lower().replace('_', ' ')}"

@@ -45,11 +45,21 @@ devices:
 """
 
 
-def doctor(folder, *arguments, code=0, **options):
+@pytest.fixture
+def doctor_here(verbs, monkeypatch):
+    """The verb in this process, with the plugin of a pad and a scale on lines."""
+    monkeypatch.syspath_prepend(str(WIRED))
+    yield lambda *arguments, code=0: verbs("doctor", *arguments, code=code)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "wired_tactile"]:
+        del sys.modules[name]
+
+
+def doctor(folder, *arguments, code=0):
+    """Return what the verb says in a process of its own."""
     env = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{WIRED}", "COLUMNS": "200", "PYTHONWARNINGS": "error"}
     done = subprocess.run(
         [sys.executable, "-m", "tactbench", "doctor", *arguments], cwd=folder, env=env, capture_output=True, text=True,
-        timeout=100, stdin=subprocess.DEVNULL, **options,
+        timeout=100, stdin=subprocess.DEVNULL,
     )  # fmt: skip
     assert done.returncode == code, f"exit {done.returncode}\n{done.stdout}\n{done.stderr}"
     return done
@@ -98,8 +108,8 @@ def host_code():
     return 1 if look_at_host().problems else 0
 
 
-def test_it_reads_as_tables(tmp_path):
-    said = doctor(tmp_path, code=host_code()).stdout
+def test_it_reads_as_tables(doctor_here):
+    said = doctor_here(code=host_code()).stdout
     for text in ("serial ports", "AF_CAN", "multicast", "sleep of 5 ms", "wired-scale"):
         assert text in said
 
@@ -128,13 +138,13 @@ def test_a_port_that_this_user_may_not_open_says_how_to():
         assert "sudo usermod -aG" in done.stdout or "udev rule" in done.stdout
 
 
-def test_a_rig_on_lines_is_opened_asked_and_read(tmp_path):
+def test_a_rig_on_lines_is_opened_asked_and_read(tmp_path, doctor_here):
     pad = b"".join(b"%d %d 500\n" % (n, 100 + n % 2) for n in range(50)) + b"nonsense here\n60 100 500\n"
     scale = b"".join(b"%d %.2f\n" % (n, 0.25 + 0.01 * (-1) ** n) for n in range(40))
     with talking(pad) as one, talking(scale) as other:
         (tmp_path / "rig.yaml").write_text(RIG.format(pad=one.name, scale=other.name))
         done = doctor(tmp_path, "--rig-file", "rig.yaml", "--seconds", "0.5", "--format", "json", code=1)
-        shown = doctor(tmp_path, "--rig-file", "rig.yaml", "--seconds", "0.5", code=1).stdout
+        shown = doctor_here("--rig-file", "rig.yaml", "--seconds", "0.5", code=1).stdout
     about = json.loads(done.stdout)
     sensor, force, motor = about["devices"]
     assert "nothing may touch them" in done.stderr
@@ -158,12 +168,10 @@ def test_a_rig_on_lines_is_opened_asked_and_read(tmp_path):
         assert text in shown
 
 
-def test_one_device_that_fails_ends_no_other(tmp_path):
+def test_one_device_that_fails_ends_no_other(tmp_path, doctor_here):
     with talking(b"1 100 500\n2 100 500\n") as line:
         (tmp_path / "rig.yaml").write_text(RIG.format(pad="/dev/is-not-there", scale=line.name))
-        about = json.loads(
-            doctor(tmp_path, "--rig-file", "rig.yaml", "--seconds", "0.3", "--format", "json", code=1).stdout
-        )
+        about = json.loads(doctor_here("--rig-file", "rig.yaml", "--seconds", "0.3", "--format", "json", code=1).stdout)
     sensor, force, _ = about["devices"]
     assert "cannot be opened" in sensor["problems"][0]
     assert "Check the name and the cable" in sensor["problems"][0]
@@ -171,16 +179,16 @@ def test_one_device_that_fails_ends_no_other(tmp_path):
     assert force["streams"][0]["rows"] == 2
 
 
-def test_a_wrong_rig_file_or_sensor_is_a_usage_error(tmp_path):
+def test_a_wrong_rig_file_or_sensor_is_a_usage_error(tmp_path, doctor_here):
     (tmp_path / "rig.yaml").write_text(RIG.format(pad="/dev/null", scale="/dev/null"))
-    assert "no sensor in this rig file called 'icub'" in doctor(
-        tmp_path, "--rig-file", "rig.yaml", "--sensor", "icub", code=2
+    assert "no sensor in this rig file called 'icub'" in doctor_here(
+        "--rig-file", "rig.yaml", "--sensor", "icub", code=2
     ).stderr  # fmt: skip
-    assert "--rig-file" in doctor(tmp_path, "--sensor", "icub", code=2).stderr
+    assert "--rig-file" in doctor_here("--sensor", "icub", code=2).stderr
     (tmp_path / "rig.yaml").write_text("rig: bench\nsensors: {no-such: {link: emulated}}\n")
-    assert "no-such" in doctor(tmp_path, "--rig-file", "rig.yaml", code=2).stderr
+    assert "no-such" in doctor_here("--rig-file", "rig.yaml", code=2).stderr
     (tmp_path / "rig.yaml").write_text("rig: bench\nsensor: {}\n")
-    assert "rig.yaml:2" in doctor(tmp_path, "--rig-file", "rig.yaml", code=2).stderr
+    assert "rig.yaml:2" in doctor_here("--rig-file", "rig.yaml", code=2).stderr
 
 
 PAD = StreamSpec(
@@ -310,14 +318,14 @@ devices: {{motor: {{device: faulhaber, link: emulated}}}}
 """
 
 
-def of_emulated(tmp_path, *arguments, code, icub="", force=""):
-    (tmp_path / "rig.yaml").write_text(EMULATED.format(icub=icub, force=force))
-    done = doctor(tmp_path, "--rig-file", "rig.yaml", "--format", "json", *arguments, code=code)
+def of_emulated(verbs, *arguments, code, icub="", force=""):
+    (verbs.folder / "rig.yaml").write_text(EMULATED.format(icub=icub, force=force))
+    done = verbs("doctor", "--rig-file", "rig.yaml", "--format", "json", *arguments, code=code)
     return json.loads(done.stdout)
 
 
-def test_emulated_devices_at_rest_are_read_and_said_to_be_emulated(tmp_path):
-    icub, biotac, force, motor = of_emulated(tmp_path, code=host_code())["devices"]
+def test_emulated_devices_at_rest_are_read_and_said_to_be_emulated(verbs):
+    icub, biotac, force, motor = of_emulated(verbs, "--seconds", "1", code=host_code())["devices"]
     rates = {stream["stream"]: stream["rate_hz"] for one in (icub, biotac, force) for stream in one["streams"]}
     assert rates == pytest.approx({"taxels": 50, "electrodes": 100, "vibration": 2200, "force_torque": 1000}, rel=0.01)
     assert all("emulated" in one["remarks"] for one in (icub, biotac, force, motor))
@@ -330,14 +338,14 @@ def test_emulated_devices_at_rest_are_read_and_said_to_be_emulated(tmp_path):
     assert motor["streams"] == []
 
 
-def test_one_sensor_of_a_rig_alone(tmp_path):
-    about = of_emulated(tmp_path, "--sensor", "biotac", "--seconds", "0.5", code=host_code())
+def test_one_sensor_of_a_rig_alone(verbs):
+    about = of_emulated(verbs, "--sensor", "biotac", "--seconds", "0.5", code=host_code())
     assert [one["name"] for one in about["devices"]] == ["biotac", "force", "motor"]
 
 
-def test_faults_of_emulated_devices_are_found(tmp_path):
+def test_faults_of_emulated_devices_are_found(verbs):
     about = of_emulated(
-        tmp_path, "--sensor", "icub", code=1,
+        verbs, "--sensor", "icub", code=1,
         icub=', faults: ["not-connected:start_s=2"]', force=', faults: ["unplug:start_s=1"]',
     )  # fmt: skip
     icub, force, _ = about["devices"]

@@ -180,8 +180,8 @@ def wired(tmp_path, seconds):
             yield terminal, line
 
 
-def test_a_device_on_a_line_is_seen_while_it_is_recorded(tmp_path):
-    with wired(tmp_path, "3") as (terminal, line):
+def test_a_device_on_a_line_is_seen_while_it_is_recorded_and_when_it_falls_silent(tmp_path):
+    with wired(tmp_path, "5") as (terminal, line):
         line.write(b"1 100 100\n2 100 100\n")
         terminal.read_screen_with("t1", "taxels 2 ")
         line.write(b"9 100 2000\n")
@@ -192,18 +192,11 @@ def test_a_device_on_a_line_is_seen_while_it_is_recorded(tmp_path):
         assert re.search(r"t1 +\+0 .*t2 +\+(1267|1900) ", "".join(lines))
         (row,) = [line.split() for line in lines if line.startswith("taxels  ")]
         assert row[3] == "6", "rows 3 to 8 are lost"
+        terminal.read_screen_with("taxels 3 silent 2 s 6")
+        line.write(b"10 100 100\n")
         terminal.last_words()
         assert terminal.process.wait(60) == 0
     assert (tmp_path / "press.h5").exists()
-
-
-def test_a_device_that_falls_silent_is_seen(tmp_path):
-    with wired(tmp_path, "4") as (terminal, line):
-        line.write(b"1 100 100\n2 100 100\n")
-        terminal.read_screen_with("taxels 2 silent 2 s 0")
-        line.write(b"3 100 100\n")
-        terminal.last_words()
-        assert terminal.process.wait(60) == 0
 
 
 def test_ctrl_c_leaves_the_terminal_as_it_was(tmp_path):

@@ -18,6 +18,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tests.core.evaluation.made import record
+from tests.here import IN_THIS_PROCESS
 
 QUICK = ("ols", "ridge", "knn", "svm", "forest-10", "mean")
 
@@ -39,7 +40,7 @@ def climbed(folder, store, *estimators, rounds=2, split=None):
                         estimators=tuple(EstimatorChoice(name=name) for name in estimators))  # fmt: skip
     matrix = MatrixSpec(rig="replay", sensors=("made",), tasks=(choice,))
     return climb(matrix, load_registry(), store, rounds=rounds, budget_s=20.0, threads=1, clock=time.perf_counter,
-                 progress=Silence(), recordings=folder)  # fmt: skip
+                 progress=Silence(), recordings=folder, choice=IN_THIS_PROCESS)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,7 @@
 """Whatever a campaign records, no group that its split keeps apart is on both sides."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -30,12 +32,15 @@ def recorded(folder, planned):
 
 
 @pytest.fixture(scope="module")
-def shelf(tmp_path_factory):
-    return {name: tmp_path_factory.mktemp(name) for name in TASKS}
+def loaded(tmp_path_factory):
+    """The recordings of a task's campaign, each campaign read only once."""
+    shelf = {name: tmp_path_factory.mktemp(name) for name in TASKS}
 
+    @functools.cache
+    def load(name, split):
+        return load_dataset(TASKS[name], list(recorded(shelf[name], TASKS[name].campaigns[split])))
 
-def loaded(shelf, name, split):
-    return load_dataset(TASKS[name], list(recorded(shelf[name], TASKS[name].campaigns[split])))
+    return load
 
 
 def values(data, group, masks):
@@ -45,8 +50,8 @@ def values(data, group, masks):
 
 
 @pytest.mark.parametrize(("name", "split"), CAMPAIGNS)
-def test_no_group_of_the_test_rows_is_in_training_nor_where_parameters_are_chosen(shelf, name, split):
-    data = loaded(shelf, name, split)
+def test_no_group_of_the_test_rows_is_in_training_nor_where_parameters_are_chosen(loaded, name, split):
+    data = loaded(name, split)
     assert choose_split(TASKS[name], DEPLOYABLE, data, split) == split
     group = "session" if shots(split) else split
     folds = make_splits(data, split, 0, one_by_one=True)
@@ -67,10 +72,10 @@ def test_no_group_of_the_test_rows_is_in_training_nor_where_parameters_are_chose
 
 
 @pytest.mark.parametrize("name", [name for name, task in TASKS.items() if "few-shot-10" in task.campaigns])
-def test_few_shots_train_on_nested_sets_and_test_on_the_same(shelf, name):
+def test_few_shots_train_on_nested_sets_and_test_on_the_same(loaded, name):
     sets = {}
     for number in (1, 2, 5, 10):
-        data = loaded(shelf, name, f"few-shot-{number}")
+        data = loaded(name, f"few-shot-{number}")
         (fold,) = make_splits(data, f"few-shot-{number}", 0)
         sets[number] = values(data, "recording", fold.train), values(data, "recording", fold.test)
     assert all(sets[a][0] < sets[b][0] for a, b in ((1, 2), (2, 5), (5, 10)))
@@ -78,8 +83,8 @@ def test_few_shots_train_on_nested_sets_and_test_on_the_same(shelf, name):
     assert len(sets[10][0]) == 10 * len(sets[1][0])
 
 
-def test_of_more_sessions_than_asked_for_the_first_train(shelf):
-    data = loaded(shelf, "force", "few-shot-10")
+def test_of_more_sessions_than_asked_for_the_first_train(loaded):
+    data = loaded("force", "few-shot-10")
     for number in (1, 2, 5, 10):
         (fold,) = make_splits(data, f"few-shot-{number}", 0)
         assert values(data, "session", fold.train) == {f"session-{place}" for place in range(1, number + 1)}
@@ -108,8 +113,8 @@ def test_more_shots_than_sessions_are_refused(tmp_path):
         choose_split(task, DEPLOYABLE, data, "few-shot-2")
 
 
-def test_a_fold_says_whether_its_radius_lies_between_those_of_training(shelf):
-    folds = make_splits(loaded(shelf, "inverse-radius", "cap_radius_mm"), "cap_radius_mm", 0, one_by_one=True)
+def test_a_fold_says_whether_its_radius_lies_between_those_of_training(loaded):
+    folds = make_splits(loaded("inverse-radius", "cap_radius_mm"), "cap_radius_mm", 0, one_by_one=True)
     told = {fold.name.removeprefix("cap_radius_mm ").split(", ")[0]: fold.name.split(", ")[1] for fold in folds}
     assert told == {
         "5.0": "extrapolated", "flat": "extrapolated",
@@ -117,8 +122,8 @@ def test_a_fold_says_whether_its_radius_lies_between_those_of_training(shelf):
     }  # fmt: skip
 
 
-def test_folds_that_test_many_numbers_say_nothing(shelf):
-    folds = make_splits(loaded(shelf, "force", "placement"), "placement", 0, one_by_one=True)
+def test_folds_that_test_many_numbers_say_nothing(loaded):
+    folds = make_splits(loaded("force", "placement"), "placement", 0, one_by_one=True)
     assert not any("polated" in fold.name for fold in folds)
 
 
@@ -134,6 +139,6 @@ def test_the_third_protocol_is_the_papers_in_everything_but_the_scale():
     assert scales(KARL2016, *some)[1].deviation == 2 * scales(third, *some)[1].deviation
 
 
-def test_a_protocol_of_roles_skips_another_split_and_says_so(shelf):
+def test_a_protocol_of_roles_skips_another_split_and_says_so(loaded):
     with pytest.raises(NotApplicable, match="by roles only"):
-        choose_split(TASKS["force"], KARL2016, loaded(shelf, "force", "unit"), "unit")
+        choose_split(TASKS["force"], KARL2016, loaded("force", "unit"), "unit")

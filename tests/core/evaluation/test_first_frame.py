@@ -29,10 +29,11 @@ def grasps(folder, *, offset, each=12, n=20, seed=3):
 def run(paths, protocol="first-frame", split=None, task=TASK):
     return evaluate(
         CellContext(
-            task, REGISTRY.estimators["forest"], {"n_estimators": 10}, protocol, split, seed=1, clock=time.perf_counter
+            task, REGISTRY.estimators["forest"], {"n_estimators": 10}, protocol, split, seed=1, clock=time.perf_counter,
+            latency=False,
         ),
         paths,
-    )
+    )  # fmt: skip
 
 
 def test_offsets_before_contact_name_the_object_and_contact_alone_does_not(tmp_path_factory):

@@ -1,7 +1,8 @@
 """Scores on real recordings lie where the data sets' own notes say, and honest splits cost what they cost.
 
 The bounds are those of the notes, found there with forests of 100 to 300 trees. Thirty trees here: the test is about
-splits, units and labels, and a forest of thirty is within 0.02 N and 0.01 of one of five hundred on these data.
+splits, units and labels, and a forest of thirty is within 0.02 N and 0.01 of one of five hundred on these data. Objects
+named from an iCub's first frames are tested beside the import of the files, which takes the longest.
 """
 
 import time
@@ -48,6 +49,7 @@ def run(task, data, split, estimator="forest", protocol="deployable"):
             split,
             seed=0,
             clock=time.perf_counter,
+            latency=False,
         ),
         data,
     )
@@ -125,20 +127,3 @@ def test_shear_force_in_session_and_by_press(sheared):
 def test_a_shear_force_is_never_taken_for_a_normal_one(sheared, presses):
     with pytest.raises(NotApplicable, match="asks for force sample, and no recording has it"):
         load_dataset(REGISTRY.tasks["force"].spec, sheared)
-
-
-def test_the_first_frame_names_the_object(shared_data, tmp_path):
-    """0.995 in the notes for the first slice alone, 1.000 for the whole grasp, 0.108 for the largest class."""
-    data = load_dataset(
-        REGISTRY.tasks["object-identity"].spec, recordings(shared_data, tmp_path, "icub-grasp", "icub-grasp")
-    )
-    assert len(data.classes) == 10
-    assert [n for why, n in data.counts.items() if "declared unreliable by its author" in why] == [27]
-    whole = run("object-identity", data, None)
-    first = run("object-identity", data, None, protocol="first-frame")
-    trivial = run("object-identity", data, None, "majority", protocol="first-frame")
-    assert (whole.split, first.split) == ("trial", "trial")
-    assert first.n_test == 203
-    assert whole.score > 0.98
-    assert first.score > 0.98
-    assert trivial.score < 0.13

@@ -43,6 +43,7 @@ def run(paths, split=None, task=None, estimator="forest", **more):
             split,
             seed=0,
             clock=ticking(),
+            latency=False,
             **more,
         ),
         paths,

@@ -1,9 +1,16 @@
-"""A small result folder, made by the real command line, and a small real figure of it."""
+"""A small result folder, made by a real run on the twin, and a small real figure of it."""
 
+import yaml
+
+from tactbench.core.matrix.run import run_matrix
+from tactbench.core.matrix.store import Store
 from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.spec.matrix import MatrixSpec
+from tests.here import IN_THIS_PROCESS
 
 MATRIX = """\
 repeats: 1
+simulation: {rung: closed-form}  # the cheapest
 sensors: [icub]
 tasks:
   - name: force
@@ -16,11 +23,10 @@ tasks:
 """
 
 
-def make_results(shell):
-    """Run the matrix in the shell's folder; return the result folder."""
-    (shell.folder / "matrix.yaml").write_text(MATRIX)
-    shell("run", "--config", "matrix.yaml")
-    return shell.folder / "tactbench-results"
+def make_results(folder):
+    """Run the matrix; the results are put into `folder`."""
+    run_matrix(MatrixSpec.model_validate(yaml.safe_load(MATRIX)), Store(folder), choice=IN_THIS_PROCESS)
+    return folder
 
 
 def draw_one(material, folder, progress=None, remark=print):

@@ -244,13 +244,14 @@ def test_a_hundred_cells_take_less_than_a_second(material):
     rows = [{**row, "cell": f"{row['cell']}-{copy}", "repeat": copy} for copy, row in copies]
     assert len(rows) >= 100
     subject = ReportData(Results(material.store, material.registry, tuple(rows[:100])))
-    seconds = []
-    for _ in range(3):
+
+    def seconds():
         began = time.process_time()  # of this process alone: what else runs on the machine is not asked
         make_page(subject)
-        seconds.append(time.process_time() - began)
+        return time.process_time() - began
+
     # The promise is one second; the quickest of three is least disturbed.
-    assert min(seconds) < 1.0
+    assert any(seconds() < 1.0 for _ in range(3))
 
 
 def replicated(material, scores):

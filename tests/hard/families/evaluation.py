@@ -19,6 +19,7 @@ import numpy as np
 
 from tactbench.core.evaluation.cell import CellContext, evaluate
 from tactbench.core.evaluation.protocols import PROTOCOLS
+from tactbench.core.plugins.registry import installed
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.plugin import (
@@ -32,7 +33,6 @@ from tactbench.plugin import (
     Source,
     StreamSpec,
     TaskSpec,
-    load_registry,
 )
 from tests.hard.cases import Case, Family
 
@@ -75,7 +75,7 @@ def families() -> dict[str, Family]:
 def different_estimators() -> list[EstimatorDescriptor]:
     """Return the installed estimators, one of each code: ten trees and five hundred are the same code."""
     first: dict[tuple[str, str], EstimatorDescriptor] = {}
-    for one in load_registry().estimators:
+    for one in installed().estimators:
         try:
             for name in one.distributions:
                 version(name)
@@ -95,7 +95,7 @@ def any_data(case: Case, *, protocol: str, name: str, kind: str) -> None:
     # A probe refuses what changes within a recording, as a force does.
     answerable = kind == "regression" and HARMLESS.issuperset(hardships) and not PROTOCOLS[protocol].probe
     case.right = "answer" if answerable else "either"
-    estimator = load_registry().estimators[name]
+    estimator = installed().estimators[name]
     with tempfile.TemporaryDirectory() as folder:
         paths = [_written(made, Path(folder) / f"r{place}.h5") for place, made in enumerate(recordings)]
         ticks = itertools.count()

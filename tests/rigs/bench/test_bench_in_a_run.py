@@ -6,18 +6,25 @@ import json
 from pathlib import Path
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "rigs" / "bench-emulated.yaml"
+NET_FT = "  device: net-ft\n  link: emulated\n"
+SLOWER = "  options: {rate_hz: 250.0, counts_per_newton: 1.0e+6, counts_per_newton_metre: 1.0e+6}\n"
+"""A quarter of its records: a minute of them is sent and read three times."""
 
 
-def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell):
+def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell, verbs):
     asked = ("--sensor", "icub", "--task", "force", "--protocol", "deployable", "--estimator", "ols", "--repeats", "1")
+    asked += ("--engine", "in-process", "--no-latency")
+    text = EXAMPLE.read_text(encoding="utf-8")
+    assert NET_FT in text
+    (shell.folder / "rig.yaml").write_text(text.replace(NET_FT, NET_FT + SLOWER), encoding="utf-8")
     shell("run", *asked)
-    out = shell("run", "--rig-file", str(EXAMPLE), *asked).stdout
+    out = shell("run", "--rig-file", "rig.yaml", *asked).stdout
     assert "EMULATED (rig bench)" in out
-    table = shell("leaderboard", "--format", "md").stdout
+    table = verbs("leaderboard", "--format", "md").stdout
     assert table.count("· EMULATED (rig bench)\n") == 1
     assert table.count("· SIM (twin)\n") == 1
     assert "| icub EMULATED | ols |" in table
-    rows = json.loads(shell("leaderboard", "--format", "json").stdout)
+    rows = json.loads(verbs("leaderboard", "--format", "json").stdout)
     score = {row["rig"]: row["score"] for row in rows if row["estimator"] == "ols"}
     # One campaign of each, of the same samples; what differs is the zero of the force, some hundredths of a newton.
     assert abs(score["bench"] - score["twin"]) < 0.05
@@ -25,13 +32,13 @@ def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell):
         "bench": (True, True),
         "twin": (True, False),
     }
-    again = shell("run", "--rig-file", str(EXAMPLE), *asked)
+    again = shell("run", "--rig-file", "rig.yaml", *asked)
     assert "0 recordings made now" in again.stderr
 
 
-def test_a_rig_file_for_another_rig_or_none_at_all_is_refused(shell):
-    assert "--rig-file" in shell("run", "--rig", "bench", "--sensor", "icub", "--task", "force", code=2).stderr
-    refused = shell("run", "--rig", "twin", "--rig-file", str(EXAMPLE), "--sensor", "icub", code=2).stderr
+def test_a_rig_file_for_another_rig_or_none_at_all_is_refused(verbs):
+    assert "--rig-file" in verbs("run", "--rig", "bench", "--sensor", "icub", "--task", "force", code=2).stderr
+    refused = verbs("run", "--rig", "twin", "--rig-file", str(EXAMPLE), "--sensor", "icub", code=2).stderr
     assert "for the rig 'bench'" in refused
 
 

@@ -25,8 +25,8 @@ PACKAGE = "tactbench.rigs.parallel_manipulator"
 NET_FT = f"{PACKAGE}.force_torque.net_ft.driver:build"
 # In real time, emulators and rig share a process and perhaps a busy machine: a force may be old, a beat late, and an
 # answer of the motor, too, whose driver is told of a slow line.
-PATIENT = {"time": "real", "force_age_s": 1.0, "heartbeat_s": 1.0, "period_s": 0.05, "wanted_n": 2.0}
-SLOW_LINE = {"baud": 600}
+PATIENT = {"time": "real", "force_age_s": 1.0, "heartbeat_s": 1.0, "wanted_n": 2.0}
+SLOW_LINE = {"baud": 2400}
 
 
 class Rig:
@@ -53,6 +53,15 @@ class Rig:
                     time.monotonic_ns() - self.clock(),
                 )
             )
+
+    def begin_anew(self):
+        """Disarm, and forget what was: for the next test with the same guard."""
+        self.guard.disarm()
+        for taken in (self.guard.force_blocks, self.guard.motor_blocks, self.guard.events):
+            taken()
+        self.world.force.faults.clear()
+        self.world.sensed = lambda wrench, at_s: wrench
+        self.world.largest_n = 0.0
 
     def press(self, change=lambda beat, since_s: beat, hold_s=0.1):
         """Press until it is over or the guard is no longer armed; return the press."""

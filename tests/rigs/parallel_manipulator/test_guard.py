@@ -1,9 +1,10 @@
 """The guard of the linear motor: the same rules in this process and in one of its own, against emulated devices."""
 
 import math
+import re
+import selectors
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,9 +25,6 @@ from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.worst_case import first_touch_n
 from tests.rigs.parallel_manipulator.presses import FAULTS, rig
 
-ROOT = Path(__file__).parents[3]
-BOTH = pytest.mark.parametrize("kind", ["local", "process"])
-
 
 def in_phase(name, change):
     """Return what changes beats once a press has come to a phase."""
@@ -35,65 +33,6 @@ def in_phase(name, change):
 
 def after(seconds, change):
     return lambda beat, since_s: change(beat) if since_s > seconds else beat
-
-
-# Both -----------------------------------------------------------------------------------------------------------------
-
-
-@BOTH
-def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
-    with rig(kind, tmp_path) as made:
-        press = made.press()
-        assert press.phase == "over", press.reports[-1]
-        assert press.reports[-1].state is GuardState.ARMED
-        assert made.world.largest_n == pytest.approx(made.setting.wanted_n, abs=0.3)
-        blocks, moved = made.guard.force_blocks(), made.guard.motor_blocks()
-        numbers = np.concatenate([block.sequence for block in blocks])
-        forces = np.concatenate([block.data for block in blocks])
-        # Raw and whole: every sample since the start, in order, as the sensor gave them.
-        assert (np.diff(numbers) == 1).all()
-        assert forces.shape[1] == 6
-        assert forces[:, 2].max() == pytest.approx(made.world.largest_n, abs=0.05)
-        assert np.concatenate([block.data for block in moved])[:, 0].max() == pytest.approx(
-            made.world.largest_n / made.setting.stiffness_n_m, abs=5e-6
-        )
-        assert [event.text for event in made.guard.events()] == ["started", "homing", "armed"]
-        assert made.guard.disarm().state is GuardState.IDLE
-        assert made.out
-
-
-@BOTH
-@pytest.mark.parametrize(
-    ("name", "trigger"),
-    [
-        ("rig hangs", Trigger.BEAT_OLD),
-        ("rig skips a beat's number", Trigger.BEAT_SEQUENCE),
-        ("steps too long", Trigger.COMMANDS_REFUSED),
-        ("steps not numbers", Trigger.COMMANDS_REFUSED),
-    ],
-)
-def test_a_rig_that_goes_wrong(kind, name, trigger, tmp_path):
-    with rig(kind, tmp_path) as made:
-        begins = {}
-
-        def change(beat, since_s):
-            if beat.state == "ramp":
-                begins.setdefault(name, 0.0)
-            return FAULTS.changed(begins, made.setting, made.clock)(beat, since_s)
-
-        def beats(beat, since_s):
-            changed = change(beat, since_s)
-            if changed is None:
-                # Nothing is said for longer than is allowed; then the rig is back.
-                made.guard.advance(made.clock() + round(1.5e9 * made.setting.limits.heartbeat_s))
-                return beat
-            return changed
-
-        made.press(beats)
-        report = made.ended()
-        assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
-        assert made.out
-        assert made.world.largest_n < made.setting.allowed_n
 
 
 def saturate(world):
@@ -111,83 +50,130 @@ def sense(name):
     return begin
 
 
-@BOTH
-@pytest.mark.parametrize(
-    ("begin", "trigger"),
-    [
-        (sense("one sample above the ceiling"), Trigger.FORCE_CEILING),
-        (sense("one torque above the ceiling"), Trigger.TORQUE_CEILING),
-        (sense("force stuck"), Trigger.FORCE_STUCK),
-        (saturate, Trigger.FORCE_SATURATED),
-        (lose_samples, Trigger.FORCE_GAP),
-    ],
-    ids=["ceiling of another axis", "torque", "stuck", "saturated", "lost"],
-)
-def test_a_force_that_is_wrong(kind, begin, trigger, tmp_path):
+@pytest.fixture
+def made(tmp_path):
+    with rig("local", tmp_path) as one:
+        yield one
+
+
+# In this process, and in one that is started for the test -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["local", "process"])
+def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
     with rig(kind, tmp_path) as made:
-        once = []
-
-        def change(beat):
-            if not once:
-                once.append(1)
-                begin(made.world)
-            return beat
-
-        made.press(in_phase("ramp", change))
-        report = made.ended()
-        assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
-        assert made.out
-
-
-@BOTH
-def test_a_force_that_is_not_a_number(kind, tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    with rig(kind, tmp_path, force_driver="tests.rigs.parallel_manipulator.broken_force:build") as made:
-        made.press()
-        report = made.ended()
-        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
-        assert made.out
-        assert made.world.largest_n < 2.0
-
-
-@BOTH
-def test_samples_that_come_twice_or_late_are_kept_out_and_counted(kind, tmp_path):
-    texts = ("doubled:every=2", "out-of-order:every=5")
-    with rig(kind, tmp_path, force=[FAULTS.DatagramFault.parse(text) for text in texts]) as made:
-        assert made.press().phase == "over"
-        numbers = np.concatenate([block.sequence for block in made.guard.force_blocks()])
-        assert (np.diff(numbers) > 0).all()
-        counts = made.guard.counts()["force"]
-        assert counts["duplicates"] == pytest.approx(numbers.size / 2, rel=0.3)
-        assert counts["late"] > numbers.size / 10
-
-
-@BOTH
-def test_a_fault_stays_until_the_guard_is_disarmed_and_armed(kind, tmp_path):
-    with rig(kind, tmp_path) as made:
-        made.press(after(0.2, lambda beat: replace(beat, sequence=beat.sequence + 5)))
-        assert made.ended().state is GuardState.FAULT
-        with pytest.raises(GuardRefusesError, match="state fault"):
-            made.guard.arm(made.setting.limits)
-        again = made.guard.beat(Beat(1, made.clock(), command=CommandKind.STEP, distance_m=1e-6))
-        assert (again.accepted, again.state) == (False, GuardState.FAULT)
+        press = made.press()
+        assert press.phase == "over", press.reports[-1]
+        assert press.reports[-1].state is GuardState.ARMED
+        assert made.world.largest_n == pytest.approx(made.setting.wanted_n, abs=0.3)
+        blocks, moved = made.guard.force_blocks(), made.guard.motor_blocks()
+        numbers = np.concatenate([block.sequence for block in blocks])
+        forces = np.concatenate([block.data for block in blocks])
+        # Raw and whole: every sample since the start, in order, as the sensor gave them.
+        assert (np.diff(numbers) == 1).all()
+        assert forces.shape[1] == 6
+        assert forces[:, 2].max() == pytest.approx(made.world.largest_n, abs=0.05)
+        assert np.concatenate([block.data for block in moved])[:, 0].max() == pytest.approx(
+            made.world.largest_n / made.setting.stiffness_n_m, abs=5e-6
+        )
+        assert [event.text for event in made.guard.events()] == ["started", "homing", "armed"]
+        assert made.guard.counts()["guard"]["beats"] == press.sequence
         assert made.guard.disarm().state is GuardState.IDLE
-        assert made.press().phase == "over"
-
-
-@BOTH
-def test_a_retreat_that_is_commanded_is_no_fault(kind, tmp_path):
-    with rig(kind, tmp_path) as made:
-        made.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.RETREAT)))
-        report = made.ended()
-        assert (report.state, report.trigger) == (GuardState.RETREATED, Trigger.COMMANDED)
         assert made.out
 
 
-@BOTH
-def test_what_is_wrong_before_the_first_motion_is_refused(kind, tmp_path):
-    with rig(kind, tmp_path) as made:
-        limits = made.setting.limits
+# In this process, and in one that is started once ---------------------------------------------------------------------
+
+
+def rig_goes_wrong(made, name, trigger):
+    begins = {}
+
+    def change(beat, since_s):
+        if beat.state == "ramp":
+            begins.setdefault(name, 0.0)
+        return FAULTS.changed(begins, made.setting, made.clock)(beat, since_s)
+
+    def beats(beat, since_s):
+        changed = change(beat, since_s)
+        if changed is None:
+            # Nothing is said for longer than is allowed; then the rig is back.
+            made.guard.advance(made.clock() + round(1.5e9 * made.setting.limits.heartbeat_s))
+            return beat
+        return changed
+
+    made.press(beats)
+    report = made.ended()
+    assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
+    assert made.out
+    assert made.world.largest_n < made.setting.allowed_n
+
+
+def force_goes_wrong(made, begin, trigger):
+    once = []
+
+    def change(beat):
+        if not once:
+            once.append(1)
+            begin(made.world)
+        return beat
+
+    made.press(in_phase("ramp", change))
+    report = made.ended()
+    assert (report.state, report.trigger) == (GuardState.FAULT, trigger)
+    assert made.out
+
+
+@pytest.fixture(scope="class")
+def started_once(tmp_path_factory):
+    with rig("process", tmp_path_factory.mktemp("guard")) as one:
+        yield one
+
+
+@pytest.fixture
+def in_process(started_once):
+    started_once.begin_anew()
+    return started_once
+
+
+@pytest.fixture(params=["local", "process"])
+def either(request):
+    return request.getfixturevalue({"local": "made", "process": "in_process"}[request.param])
+
+
+class TestInEitherProcess:
+    """What passes between a rig and a guard in another process: one of each class; the rest is in virtual time."""
+
+    @pytest.mark.parametrize(
+        ("name", "trigger"),
+        [("rig hangs", Trigger.BEAT_OLD), ("steps not numbers", Trigger.COMMANDS_REFUSED)],
+    )
+    def test_a_rig_that_goes_wrong(self, either, name, trigger):
+        rig_goes_wrong(either, name, trigger)
+
+    def test_a_force_that_is_too_large(self, either):
+        force_goes_wrong(either, sense("one sample above the ceiling"), Trigger.FORCE_CEILING)
+
+    def test_a_fault_stays_until_the_guard_is_disarmed_and_armed(self, either):
+        either.press(after(0.2, lambda beat: replace(beat, sequence=beat.sequence + 5)))
+        report = either.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.BEAT_SEQUENCE)
+        (said,) = [event.text for event in either.guard.events() if event.trigger is Trigger.BEAT_SEQUENCE]
+        assert re.fullmatch(r"beat \d+ came, \d+ was expected", said)
+        with pytest.raises(GuardRefusesError, match="state fault"):
+            either.guard.arm(either.setting.limits)
+        again = either.guard.beat(Beat(1, either.clock(), command=CommandKind.STEP, distance_m=1e-6))
+        assert (again.accepted, again.state) == (False, GuardState.FAULT)
+        assert either.guard.disarm().state is GuardState.IDLE
+        assert either.press().phase == "over"
+
+    def test_a_retreat_that_is_commanded_is_no_fault(self, either):
+        either.press(in_phase("ramp", lambda beat: replace(beat, command=CommandKind.RETREAT)))
+        report = either.ended()
+        assert (report.state, report.trigger) == (GuardState.RETREATED, Trigger.COMMANDED)
+        assert either.out
+
+    def test_what_is_wrong_before_the_first_motion_is_refused(self, either):
+        limits = either.setting.limits
         for wrong, message in (
             ({"retreat_m": -4e-3}, "retreat_m is not the drive's"),
             ({"travel_m": (-7e-3, 2e-3)}, "not within the drive's ends"),
@@ -197,18 +183,79 @@ def test_what_is_wrong_before_the_first_motion_is_refused(kind, tmp_path):
             ({"zero": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}, "force ceiling"),
         ):
             with pytest.raises(GuardRefusesError, match=message):
-                made.guard.arm(replace(limits, **wrong))
-        assert made.world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=1e-9)
-        assert made.guard.arm(limits).state is GuardState.ARMED
+                either.guard.arm(replace(limits, **wrong))
+        assert either.world.position_m == pytest.approx(FAULTS.RETREAT_M, abs=1e-9)
+        assert either.guard.arm(limits).state is GuardState.ARMED
+
+    def test_a_wake_up_without_data_is_not_a_lost_guard(self, in_process, monkeypatch):
+        guard = in_process.guard
+        guard.arm(in_process.setting.limits)
+        keys = [(key, 1) for key in guard._selector.get_map().values()]
+        guard.advance(in_process.clock() + 10_000_000)
+        with monkeypatch.context() as patch:
+            # As select() says it now and then: somebody else has read, or nothing came after all.
+            patch.setattr(guard._selector, "select", lambda timeout_s: keys)
+            for _ in range(20):
+                guard._take(0.0)
+        assert guard.beat(Beat(1, in_process.clock())).accepted
+
+    def test_a_rig_that_takes_no_samples_still_gets_its_reports(self, in_process):
+        guard = in_process.guard
+        guard._selector.unregister(guard._data)
+        guard.force_blocks()  # those that were taken before
+        try:
+            guard.arm(in_process.setting.limits)
+            for number in range(1, 20):
+                assert guard.beat(Beat(number, in_process.clock())).accepted
+                guard.advance(in_process.clock() + 20_000_000)
+            assert guard.force_blocks() == []
+        finally:
+            guard._selector.register(guard._data, selectors.EVENT_READ)
 
 
 # In virtual time ------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def made(tmp_path):
-    with rig("local", tmp_path) as one:
-        yield one
+@pytest.mark.parametrize(
+    ("name", "trigger"),
+    [("rig skips a beat's number", Trigger.BEAT_SEQUENCE), ("steps too long", Trigger.COMMANDS_REFUSED)],
+)
+def test_a_rig_that_goes_wrong(name, trigger, made):
+    rig_goes_wrong(made, name, trigger)
+
+
+@pytest.mark.parametrize(
+    ("begin", "trigger"),
+    [
+        (sense("one torque above the ceiling"), Trigger.TORQUE_CEILING),
+        (sense("force stuck"), Trigger.FORCE_STUCK),
+        (saturate, Trigger.FORCE_SATURATED),
+        (lose_samples, Trigger.FORCE_GAP),
+    ],
+    ids=["torque", "stuck", "saturated", "lost"],
+)
+def test_a_force_that_is_wrong(begin, trigger, made):
+    force_goes_wrong(made, begin, trigger)
+
+
+def test_a_force_that_is_not_a_number(tmp_path):
+    with rig("local", tmp_path, force_driver="tests.rigs.parallel_manipulator.broken_force:build") as made:
+        made.press()
+        report = made.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
+        assert made.out
+        assert made.world.largest_n < 2.0
+
+
+def test_samples_that_come_twice_or_late_are_kept_out_and_counted(tmp_path):
+    texts = ("doubled:every=2", "out-of-order:every=5")
+    with rig("local", tmp_path, force=[FAULTS.DatagramFault.parse(text) for text in texts]) as made:
+        assert made.press().phase == "over"
+        numbers = np.concatenate([block.sequence for block in made.guard.force_blocks()])
+        assert (np.diff(numbers) > 0).all()
+        counts = made.guard.counts()["force"]
+        assert counts["duplicates"] == pytest.approx(numbers.size / 2, rel=0.3)
+        assert counts["late"] > numbers.size / 10
 
 
 @pytest.mark.parametrize("baud", [9600, 115200])

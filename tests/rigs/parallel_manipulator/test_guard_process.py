@@ -11,7 +11,7 @@ import pytest
 
 from tactbench.plugin import Block, Quality
 from tactbench.plugin.devices import LinkError, LinkTimeout
-from tactbench.rigs.parallel_manipulator.guard_interface import Beat, GuardLostError
+from tactbench.rigs.parallel_manipulator.guard_interface import Beat, GuardLostError, GuardState, Trigger
 from tactbench.rigs.parallel_manipulator.guard_messages import (
     FORCE,
     MOTOR,
@@ -31,7 +31,6 @@ ROOT = Path(__file__).parents[3]
 @pytest.mark.parametrize(
     ("name", "baud"),
     [
-        ("kill rig, a sibling alive", 115200),
         ("kill rig, a sibling alive", 9600),
         ("stop rig", 115200),
         ("kill guard", 9600),
@@ -82,19 +81,7 @@ def test_a_guard_that_is_lost_says_so_ever_after(tmp_path):
         assert made.out
 
 
-def test_a_wake_up_without_data_is_not_a_lost_guard(tmp_path, monkeypatch):
-    with rig("process", tmp_path) as made:
-        made.guard.arm(made.setting.limits)
-        keys = [(key, 1) for key in made.guard._selector.get_map().values()]
-        made.guard.advance(made.clock() + 10_000_000)
-        with monkeypatch.context() as patch:
-            # As select() says it now and then: somebody else has read, or nothing came after all.
-            patch.setattr(made.guard._selector, "select", lambda timeout_s: keys)
-            for _ in range(20):
-                made.guard._take(0.0)
-        assert made.guard.beat(Beat(1, made.clock())).accepted
-
-
+NOT_A_NUMBER = "tests.rigs.parallel_manipulator.broken_force:build"
 RAISING = "tests.rigs.parallel_manipulator.broken_force:build_raising"
 TO_A_SWITCH = {"homing": "switch", "homing_speed_m_s": 5e-3, "home_m": 3e-3}
 
@@ -136,7 +123,8 @@ def homed_to_a_switch_behind_the_skin(made):
 def test_an_error_within_the_guard_while_homing_lets_the_motor_stand(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     monkeypatch.setattr(FAULTS, "STATED", FAULTS.STATED | TO_A_SWITCH)
-    with rig("process", tmp_path, force_driver=RAISING) as made:
+    # At 5 mm/s on 2 N/mm, 3 N are 0.3 s after the driver's error: what a busy machine may take.
+    with rig("process", tmp_path, FAULTS.Setting(stiffness_n_m=2e3), force_driver=RAISING) as made:
         homed_to_a_switch_behind_the_skin(made)
         with pytest.raises(GuardLostError, match="told to stand"):
             made.guard.arm(made.setting.limits)
@@ -178,32 +166,26 @@ def stands(made):
     return False
 
 
-def test_a_rig_that_takes_no_samples_still_gets_its_reports(tmp_path):
-    with rig("process", tmp_path) as made:
-        made.guard._selector.unregister(made.guard._data)
-        made.guard.arm(made.setting.limits)
-        for number in range(1, 20):
-            assert made.guard.beat(Beat(number, made.clock())).accepted
-            made.guard.advance(made.clock() + 20_000_000)
-        assert made.guard.force_blocks() == []
-
-
 def test_what_goes_wrong_at_the_start_is_told(tmp_path):
     with pytest.raises(LinkError, match="cannot be opened"):  # noqa: SIM117
         with rig("process", tmp_path, address="serial:///dev/nothing-there?baud=9600"):
             pass
 
 
-def test_the_log_says_when_and_what(tmp_path):
-    with rig("process", tmp_path) as made:
-        made.press(lambda beat, since_s: FAULTS.replace(beat, sequence=0))
-        made.ended()
+def test_a_force_that_is_not_a_number_and_the_log_says_when_and_what(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    with rig("process", tmp_path, force_driver=NOT_A_NUMBER) as made:
+        made.press()
+        report = made.ended()
+        assert (report.state, report.trigger) == (GuardState.FAULT, Trigger.FORCE_NOT_A_NUMBER)
+        assert made.out
+        assert made.world.largest_n < 2.0
         log = made.log
-    entries = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
-    assert entries[0].keys() == {"started", "unix_ns", "pid"}
-    texts = [entry["text"] for entry in entries if "text" in entry]
+    found = entries(log)
+    assert found[0].keys() == {"started", "unix_ns", "pid"}
+    texts = [entry["text"] for entry in found if "text" in entry]
     assert texts[:3] == ["started", "homing", "armed"]
-    assert texts[3] == "beat 0 came, 1 was expected"
+    assert texts[3] == "a sample of the force sensor is not a number"
     assert texts[4].startswith("out after ")
     assert texts[-1] == "disarmed"
 

@@ -9,8 +9,8 @@ from tactbench.core.recording.reader import open_recording
 from tests.core.cli.terminals import on_terminal, plain
 from tests.rigs.parallel_manipulator.spring import EXAMPLE
 
-RECORD = ("-m", "tactbench", "record", "--rig-file", "rig.yaml", "--sensor", "icub", "--seconds", "30", "--live")
-SHOWN = re.compile(r"([\d.]+) of 30\.0 s")
+RECORD = ("-m", "tactbench", "record", "--rig-file", "rig.yaml", "--sensor", "icub", "--seconds", "15", "--live")
+SHOWN = re.compile(r"([\d.]+) of 15\.0 s")
 
 
 @pytest.mark.parametrize("times", [1, 3])
@@ -19,7 +19,7 @@ def test_ctrl_c_in_the_recorded_part(tmp_path, times):
     with on_terminal([*RECORD, "--out", "press.h5"], columns=120, cwd=tmp_path) as terminal:
         for _ in range(200):
             shown = SHOWN.findall(plain(terminal.seen))
-            if shown and float(shown[-1]) > 12.0:
+            if shown and float(shown[-1]) > 6.0:
                 break
             terminal.read_until(" s", 1)
         for _ in range(times):

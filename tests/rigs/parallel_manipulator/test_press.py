@@ -80,25 +80,25 @@ def test_the_recording_says_what_happened(five_newtons):
 
 
 def test_follows_a_slow_ramp_as_theory_says():
-    # Of a ramp of 5 N in 60 s the first 20 s, with the loop's gains of k K = 10: 6.1 mN behind, whatever the stiffness.
-    scene = ramp(1.625, 0.5, 20.0)
-    found = on_spring(20.0, scene, noise_n=0.01, **(QUICK | {"settings__force_loop__integral_mm_n_s": 0.5}))
+    # Of a ramp of 5 N in 60 s the first 12 s, with the loop's gains of k K = 10: 6.1 mN behind, whatever the stiffness.
+    scene = ramp(11.5 / 12.0, 0.5, 12.0)
+    found = on_spring(20.0, scene, noise_n=0.007, **(QUICK | {"settings__force_loop__integral_mm_n_s": 0.5}))
     t_s = found.t_s["force_torque"]
     on_ramp = t_s > 4
     off = (found.force_n - np.interp(t_s, *scene.profile.corners))[on_ramp]
-    # 1600 samples of 10 mN move the mean by 0.25 mN.
+    # 800 samples of 7 mN move the mean by 0.25 mN.
     assert off.mean() == pytest.approx(-6.1e-3, abs=0.75e-3)
     motor_s, motor_m = found.t_s["motor"], found.data["motor"][:, 0]
     true = 20e3 * (motor_m - 1e-3 * found.acquisition.drawn["skin mm"])
     true_off = (true - np.interp(motor_s, *scene.profile.corners))[motor_s > 4]
-    assert true_off.std() <= 10e-3
+    assert true_off.std() <= 7e-3
 
 
 @pytest.mark.parametrize("stiffness", [5.0, 20.0])
 def test_a_first_touch_stays_within_its_bound(stiffness):
     # 0.31 N at 20 N/mm, 0.5 mm/s with a control period of 10 ms; the guard looks every millisecond.
     found = on_spring(
-        stiffness, ramp(1.0, 0.3, 2.0), settings__touch__touch_speed_mm_s=0.5,
+        stiffness, ramp(0.3, 0.3, 0.6), settings__touch__touch_speed_mm_s=0.5,
         **(QUICK | {"settings__force_loop__integral_mm_n_s": 10.0 / stiffness}),
     )  # fmt: skip
     bound = first_touch_n(0.1, 1e3 * stiffness, 0.5e-3, 1.0, 0.01, 0.01)
@@ -108,7 +108,7 @@ def test_a_first_touch_stays_within_its_bound(stiffness):
 
 
 def test_a_motor_that_does_not_come_out_is_said():
-    found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=9"], **QUICK)
+    found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=6"], **QUICK)
     assert "in ramp: motor's link is gone" in found.acquisition.ended
     assert "stand clear" in found.acquisition.ended
     assert found.acquisition.stop("stopped by hand") == found.press.not_out != ""
@@ -117,7 +117,7 @@ def test_a_motor_that_does_not_come_out_is_said():
 def test_a_press_that_is_stopped_retreats_within_a_control_period():
     rig = ParallelManipulator(file_of(**QUICK), None, SpringRig(5.0))
     with rig.open(load_registry().sensors["icub"], ramp(5.0, 0.5, 20.0), seed=1) as acquisition:
-        next(block for block in acquisition if block.t_ns[-1] > acquisition.begin_ns + 3e9)
+        next(block for block in acquisition if block.t_ns[-1] > acquisition.begin_ns + 2e9)
         assert acquisition.control.press.state is PressState.RAMP
         stopped_ns = acquisition.clock()
         assert acquisition.stop("stopped by hand") == ""
@@ -146,7 +146,7 @@ def test_scenes_that_the_rig_cannot_press_are_refused():
 
 
 def test_the_same_seed_gives_the_same_bytes():
-    first, second = (on_spring(5.0, ramp(1.0, 0.3, 1.5), **QUICK) for _ in range(2))
+    first, second = (on_spring(5.0, ramp(1.0, 0.3, 1.0), **QUICK) for _ in range(2))
     for name in first.data:
         assert np.array_equal(first.data[name], second.data[name])
         assert np.array_equal(first.t_s[name], second.t_s[name])

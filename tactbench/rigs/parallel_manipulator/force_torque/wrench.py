@@ -58,7 +58,8 @@ class SampleCounter:
             If the device has begun to count anew: it was without power, or another host commands it.
         """
         found = self._unwrap(numbers)
-        if self._newest is None or (np.diff(found, prepend=self._newest) <= 0).any() or self._behind:
+        in_order = self._newest is not None and found[0] > self._newest and (found[1:] > found[:-1]).all()
+        if not in_order or self._behind:
             self._look_back(found)
         else:
             self._newest = self._previous = int(found[-1])

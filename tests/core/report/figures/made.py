@@ -11,6 +11,7 @@ from tactbench.core.report.results import open_results
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.plugin import Block, ChannelSpec, SensorSpec, Source, StreamSpec
+from tests.here import IN_THIS_PROCESS
 
 REGISTRY = load_registry()
 DISCARDED = 600
@@ -64,7 +65,7 @@ def results(folder, *, sensors=("alpha", "beta"), kept=KEPT, simulated=True, pro
         rig="replay",
         tasks=tuple(TaskChoice(name=name, protocol=protocol, split=split, estimators=asked[name]) for name in tasks),
     )
-    run_matrix(matrix, Store(folder / "results"), recordings=recordings)
+    run_matrix(matrix, Store(folder / "results"), choice=IN_THIS_PROCESS, recordings=recordings)
     return folder / "results"
 
 

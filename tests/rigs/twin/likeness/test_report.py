@@ -108,11 +108,11 @@ def test_a_folder_without_recordings_is_an_error(tmp_path):
         checks(SENSORS["icub"], tmp_path)
 
 
-def test_real_fingertips_lie_in_the_ranges(shared_data, shell):
+def test_real_fingertips_lie_in_the_ranges(shared_data, verbs):
     # The ranges come from these files: the statistics must find them again.
     mapping = Path(__file__).parents[4] / "examples" / "mappings" / "icub-grasp.yaml"
-    shell("import", str(mapping), "--root", str(shared_data / "icub-grasp"), "--out", "grasps")
-    every = checks(SENSORS["icub"], shell.folder / "grasps")
+    verbs("import", str(mapping), "--root", str(shared_data / "icub-grasp"), "--out", "grasps")
+    every = checks(SENSORS["icub"], verbs.folder / "grasps")
     found = {verdict.name: verdict for check in every for verdict in check.run()}
     assert all(verdict.met for verdict in found.values()), {n: v.found for n, v in found.items() if not v.met}
     assert len(found) == 12

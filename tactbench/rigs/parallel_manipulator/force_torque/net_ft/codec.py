@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import struct
 from enum import Enum, IntEnum, IntFlag
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -259,16 +260,22 @@ class CountScale(BaseModel):
 
     def wrench(self, counts: npt.ArrayLike) -> FloatArray:
         """Return (…, 6) Fx, Fy, Fz [N], Tx, Ty, Tz [N*m] of (…, 6) counts."""
-        wrench: FloatArray = np.asarray(counts, dtype=float) / self._divisors()
+        wrench: FloatArray = np.asarray(counts, dtype=float) / self._divisors
         return wrench
 
     def counts(self, wrench: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """Return the (…, 6) nearest counts of a (…, 6) wrench [N, N*m], within the 32 bits of a record."""
-        nearest = np.rint(np.asarray(wrench, dtype=float) * self._divisors())
-        return np.clip(nearest, -(2**31), 2**31 - 1).astype(np.int64)
+        return within_32_bits(np.rint(np.asarray(wrench, dtype=float) * self._divisors)).astype(np.int64)
 
+    @cached_property
     def _divisors(self) -> FloatArray:
         return np.repeat([self.per_newton, self.per_newton_metre], 3)
+
+
+def within_32_bits(counts: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return counts as near as the signed 32 bits of a record allow."""
+    found: npt.NDArray[Any] = np.minimum(np.maximum(counts, -(2**31)), 2**31 - 1)
+    return found
 
 
 def read_configuration(data: bytes) -> CountScale:
