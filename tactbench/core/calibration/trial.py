@@ -148,6 +148,7 @@ def _answer(
                     None,
                     seed=seed,
                     clock=time.perf_counter,
+                    latency=False,
                 ),
                 thinned(data, output.every),
             )

@@ -72,7 +72,7 @@ def climb(
     if len(ways) > 1:
         several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in ways))
         raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
-    outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress, summary=False)
+    outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress, files=False)
     task = registry.tasks[matrix.tasks[0].name].spec
     done = [row for row in outcome.rows if row["status"] == "done" and row["seed"] == matrix.seed]
     data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None

@@ -54,7 +54,7 @@ def run_matrix(
     operator: Operator | None = None,
     progress: Progress | None = None,
     shown: Callable[[Sequence[Row]], None] | None = None,
-    summary: bool = True,
+    files: bool = True,
 ) -> Outcome:
     """Record and evaluate `matrix`, reusing what `store` already has.
 
@@ -74,8 +74,8 @@ def run_matrix(
         Receives what happens.
     shown
         Called with all rows so far after each replicate but the last.
-    summary
-        Whether ``run.json`` and ``scores.json`` are written; without, those of the last run stay.
+    files
+        Whether to write ``run.json`` and ``scores.json``; else those of the last run stay as they are.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def run_matrix(
                 shown(tuple(rows))
         fill_baselines(rows)
         recorded.save()
-        if summary:
+        if files:
             store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
             store.write("scores.json", scores_text(rows))
     used = {cell.name: tuple(recording_plan.paths(cell)) for cell in cells}
