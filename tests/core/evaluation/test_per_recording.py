@@ -250,6 +250,14 @@ def other_names(streams):
     return {f"first {streams[0].data[0, 0]}": 0.0}
 
 
+def a_summarys_name(streams):
+    return {"t0 deviation": 0.0}
+
+
+def too_large(streams):
+    return {"large": 1e200}
+
+
 def not_a_number(streams):
     return {"bad": float("nan")}
 
@@ -262,6 +270,10 @@ def test_a_task_may_name_code_for_features_of_its_own(tmp_path):
     assert any(f"{HERE}:crest_factor" in remark for remark in run(own, paths).remarks)
     both = task(features_by=f"{HERE}:crest_factor")
     assert len(summarised(load_dataset(both, paths), both, protocol_called("deployable")).features) == 6
+    with pytest.raises(PluginContractError, match="is a summary's name"):
+        run(task(features_by=f"{HERE}:a_summarys_name"), paths)
+    with pytest.raises(DataError, match="cannot be computed with"):
+        run(task(features_by=f"{HERE}:too_large"), paths)
     for name, words in (("other_names", "other features"), ("not_a_number", "no finite number")):
         with pytest.raises(PluginContractError, match=words):
             run(task(summaries=(), features_by=f"{HERE}:{name}"), paths)
@@ -346,6 +358,7 @@ def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_pa
         ({"splits": ("recording", "in-session")}, "cuts recordings in time"),
         ({"summaries": (MOVES[0], MOVES[0])}, "the same"),
         ({"features_by": "no colon"}, "pattern"),
+        ({"summaries": (Summary(measure="mean", kinds=("ac_pressure",)),)}, "features do not have"),
     ],
 )
 def test_a_task_that_contradicts_itself_is_refused(wrong, words):
