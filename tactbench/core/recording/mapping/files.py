@@ -100,8 +100,14 @@ def _matching(name: str, source: TableSource, root: Path) -> list[FoundFile]:
             hint="Check --root: the pattern starts below it.",
         )
     found = []
+    inside = root.resolve()
     for path in sorted(paths, key=lambda one: one.relative_to(root).parts):
         shown = path.relative_to(root).as_posix()
+        if not path.resolve().is_relative_to(inside):
+            raise MappingError(
+                f"{shown} leads out of {root}, to {path.resolve()}.",
+                hint="Links are followed below the root only: copy what it leads to, or name a --root that holds both.",
+            )
         match = re.search(source.path, shown)
         if match is None:
             raise MappingError(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
@@ -16,9 +17,13 @@ from tactbench.core.spec.sensor import ChannelKind, Vector
 Column = int | str
 """A column by its place (from 0) or by its name in the header."""
 
+_regular: Any = importlib.import_module("re._parser")
+"""How the standard library reads regular expressions; it says so nowhere else."""
+_REPEATS = (_regular.MAX_REPEAT, _regular.MIN_REPEAT, _regular.POSSESSIVE_REPEAT)
+
 WORD = r"^[a-z][a-z0-9_]*$"
-MUST_NAME_SENTINELS = ("force", "torque")
-"""Kinds that are targets: a number that means "no sample" would be learnt as if it were one."""
+MUST_NAME_SENTINELS = {"force": "N", "torque": "N*m"}
+"""Kinds that are targets, and what their units are converted to; a number that means "no sample" would be learnt."""
 
 
 class Csv(Frozen):
@@ -114,6 +119,11 @@ class TableSource(Frozen):
         for name in groups:
             if not re.match(WORD, name):
                 raise ValueError(f"the group {name!r} must be a word in lower case")
+        if _nests(_regular.parse(path), repeated=False):
+            raise ValueError(
+                "a repeated group has a repetition or alternatives inside, which may take for ever; write it flat: "
+                "[a-z_]+ for ([a-z]+_?)+, or a fixed number of times {8} inside"
+            )
         return path
 
 
@@ -167,6 +177,20 @@ class ChannelGroup(Frozen):
     rest_source: Source | None = None
     positions_m: tuple[Vector, ...] = ()
     position_source: Source | None = None
+
+    @field_validator("unit")
+    @classmethod
+    def _measures_its_kind(cls, unit: str, info: ValidationInfo) -> str:
+        kind = info.data.get("kind")
+        if kind in MUST_NAME_SENTINELS:
+            try:
+                _convertible(unit, MUST_NAME_SENTINELS[kind])
+            except ValueError as error:
+                raise ValueError(
+                    f"a {kind} is in {MUST_NAME_SENTINELS[kind]} or what converts to it ({error}); a scale's kg is "
+                    "`given_in: kgf`, a raw reading is `kind: taxel` or `other`"
+                ) from error
+        return unit
 
     @model_validator(mode="after")
     def _consistent(self) -> ChannelGroup:
@@ -294,6 +318,27 @@ class Mapping(Frozen):
         if arrays and len(self.tables) > 1:
             raise ValueError(f"table {arrays[0]} is an archive and cannot be joined with others")
         return self
+
+
+def _nests(parsed: Any, *, repeated: bool) -> bool:
+    """Return whether a part of a parsed regular expression that is repeated can itself be matched in several lengths.
+
+    Such an expression may try as many ways as there are subsets of the letters before it gives up.
+    """
+    for name, argument in parsed:
+        again = repeated
+        if name in _REPEATS:
+            least, most, _ = argument
+            if repeated and least != most:
+                return True
+            again = repeated or most > 1
+        elif name is _regular.BRANCH and repeated:
+            return True
+        for part in argument if isinstance(argument, tuple) else (argument,):
+            inside = part if isinstance(part, list) else [part]
+            if any(isinstance(one, _regular.SubPattern) and _nests(one, repeated=again) for one in inside):
+                return True
+    return False
 
 
 def _convertible(given: str, wanted: str) -> None:

@@ -1,5 +1,6 @@
 """Foreign tables of every shape become recordings; every misfit is refused with its place, and nothing is left."""
 
+import re
 import subprocess
 import sys
 
@@ -316,6 +317,53 @@ def test_a_sentinel_that_nobody_named_is_refused(run, put, tmp_path):
 def test_a_rare_extreme_is_a_reading(run, put, odd):
     put("press.csv", rows(100, force=lambda row: odd if row < 5 else row))  # 5 %: the bound itself is not above it
     assert one(run(streams__force__channels=[{**FORCE, "sentinels": []}]), "force")[0].quality is None
+
+
+@pytest.mark.parametrize("name", ["csv", "text"])
+def test_a_header_of_numbers_is_a_row(run, put, tmp_path, name):
+    put("press.csv", rows() if name == "csv" else rows().replace(",", " "))
+    refused(run, tmp_path, "press.csv: its header row has the number '0.00' in column 0",
+            tables__table__read={"format": name, "header": True})  # fmt: skip
+    assert run(tables__table__read={"format": name, "header": False}).rows == 40
+
+
+def test_named_columns_are_read_by_place_too(run, put):
+    put("press.csv", "t,a,b,c,f\n" + rows())
+    assert run(tables__table__read={"format": "csv", "header": True}).rows == 40
+
+
+def test_a_link_out_of_the_root_is_refused(run, put, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "secret.csv").write_text(rows())
+    put("a/press.csv", rows())
+    (tmp_path / "data" / "b").symlink_to(tmp_path / "elsewhere")
+    refused(run, tmp_path, "b/secret.csv leads out of", "elsewhere", tables__table__files="*/*.csv")
+    (tmp_path / "data" / "b").unlink()
+    (tmp_path / "data" / "b").symlink_to("a")
+    assert run(tables__table__files="b/*.csv").rows == 40
+
+
+@pytest.mark.parametrize(
+    "path", ["(a+)+$", "([a-z]*_?)*x", "(?:a|ab)*$", "(?:(?:a?){9}){9}", "(?=(a+)+b)", "(?>(a+)*)b"]
+)
+def test_an_expression_that_may_take_for_ever_is_refused(run, put, tmp_path, path):
+    put("a" * 60 + ".csv", rows())
+    refused(run, tmp_path, "mapping.yaml:", "tables.table.path", "for ever", tables__table__path=path)
+
+
+@pytest.mark.parametrize("path", ["^(?P<a>[a-z]+)_?(?:x|y)?", "(?:[a-z]{2}){2}", "a+(?:b+)?", "[^/]+$", "(?:[ab]|c)+"])
+def test_an_expression_without_nested_repetitions_is_taken(run, put, path):
+    put("aaaa.csv", rows())
+    assert run(tables__table__path=path).rows == 40
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("force", "kg"), ("force", "mm"), ("force", "count"), ("torque", "N")])
+def test_a_target_in_a_unit_of_something_else_is_refused(run, put, tmp_path, kind, unit):
+    put("press.csv", rows())
+    channel = {"columns": 4, "name": "fz", "kind": kind, "unit": unit, "sentinels": []}
+    error = refused(run, tmp_path, f"'{unit}'", f"a {kind} is in", streams__force__channels=[channel])
+    line = int(re.search(r"mapping.yaml:(\d+):", str(error))[1])
+    assert (tmp_path / "mapping.yaml").read_text().splitlines()[line - 1].strip() == f"unit: {unit}"
 
 
 def test_words_for_no_sample(run, put):
