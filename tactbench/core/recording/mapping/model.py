@@ -58,10 +58,20 @@ class Records(Frozen):
     no_sample: tuple[str, ...] = ()
 
 
-class Npz(Frozen):
-    """Arrays in one NumPy archive, never pickled ones."""
+class Xlsx(Frozen):
+    """A sheet of an Excel workbook; the extra ``[xlsx]``."""
 
-    format: Literal["npz"] = "npz"
+    format: Literal["xlsx"] = "xlsx"
+    sheet: str | None = None
+    """None: the only one."""
+    header: bool
+    skip_lines: int = Field(default=0, ge=0)
+    no_sample: tuple[str, ...] = ()
+
+
+class Arrays(Frozen):
+    """Arrays in one file."""
+
     array: str
     axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1, max_length=3)
     """What each axis of the array counts; an axis that is left out has length 1."""
@@ -69,12 +79,24 @@ class Npz(Frozen):
     """Words taken from arrays with one value a recording: word -> array."""
 
     @model_validator(mode="after")
-    def _axes_differ(self) -> Npz:
+    def _axes_differ(self) -> Arrays:
         if len(set(self.axes)) != len(self.axes):
             raise ValueError("an axis is named twice")
         if self.per_recording and "recording" not in self.axes:
             raise ValueError("per_recording needs an axis called recording")
         return self
+
+
+class Npz(Arrays):
+    """Arrays in one NumPy archive, never pickled ones."""
+
+    format: Literal["npz"] = "npz"
+
+
+class Mat(Arrays):
+    """Arrays in one MATLAB file of version 7 or before, never in structures or cells."""
+
+    format: Literal["mat"] = "mat"
 
 
 class Time(Frozen):
@@ -99,7 +121,7 @@ class TableSource(Frozen):
     """Which: a pattern below the root, with ``*`` within a folder and ``**`` across folders."""
     path: str = ""
     """Regular expression searched in each path; its named groups become words."""
-    read: Annotated[Csv | Text | Records | Npz, Field(discriminator="format")]
+    read: Annotated[Csv | Text | Records | Xlsx | Npz | Mat, Field(discriminator="format")]
     time: Time | None = None
 
     @field_validator("files")
@@ -247,7 +269,8 @@ class StreamSource(Frozen):
 class SensorDeclaration(Frozen):
     """The sensor, as far as its source describes it."""
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    name: str = Field(pattern=r"^[a-z{][a-z0-9_{}-]*$")
+    """A text with ``{word}`` in it where one mapping covers several devices; title alike."""
     title: str
     principle: str
     principle_source: Source
@@ -314,7 +337,7 @@ class Mapping(Frozen):
             raise ValueError("tables with a clock each, joined by rows, need `times_within_ms`")
         if self.join is not None and self.join.by == "clock" and (self.clock == "none" or self.split_by):
             raise ValueError("a join by clock needs a clock, and rows that need not be split")
-        arrays = [name for name, table in self.tables.items() if isinstance(table.read, Npz)]
+        arrays = [name for name, table in self.tables.items() if isinstance(table.read, Arrays)]
         if arrays and len(self.tables) > 1:
             raise ValueError(f"table {arrays[0]} is an archive and cannot be joined with others")
         return self

@@ -1,11 +1,14 @@
 """Foreign tables of every shape become recordings; every misfit is refused with its place, and nothing is left."""
 
+import copy
 import re
 import subprocess
 import sys
 
 import numpy as np
+import openpyxl
 import pytest
+import scipy.io
 import yaml
 
 from tactbench.core.errors import ConfigError, MappingError, TactbenchError
@@ -45,7 +48,7 @@ def mapping(**change):
         if value is None:
             inside.pop(last)
         else:
-            inside[last] = value
+            inside[last] = copy.deepcopy(value)
     return said
 
 
@@ -219,6 +222,121 @@ def test_archives_that_do_not_fit(run, tmp_path, arrays, says):
 def test_an_archive_that_is_none(run, put, tmp_path):
     put("x.npz", "PK\x03\x04 not an archive")
     refused(run, tmp_path, "x.npz", **NPZ)
+
+
+MAT = {**NPZ, "tables__table": {"files": "*.mat", "read": {**NPZ["tables__table"]["read"], "format": "mat"}}}
+
+
+def test_a_matlab_file_of_arrays(run, tmp_path):
+    X = np.random.default_rng(0).normal(size=(11, 5, 3))
+    scipy.io.savemat(tmp_path / "data" / "x.mat", {"X": X, "y": np.arange(11) % 2}, do_compression=True)
+    report = run(**MAT)
+    with open_recording(report.recordings[7].path) as recording:
+        np.testing.assert_allclose(recording.read("taxels").data, X[7], rtol=1e-6)  # stored as float32
+        assert recording.meta.labels == {"slip": "yes", "block": "1"}
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"MATLAB 5.0 MAT-file, cut short" + bytes(9), "cannot be read as a MATLAB file"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(200), "cannot be read as a MATLAB file"),
+        ({"x": np.zeros(3)}, "Did you mean 'x'"),
+        ({"X": {"inside": np.zeros(3)}, "y": np.zeros(2)}, "holds [('inside', 'O')], not numbers"),
+        ({"X": np.zeros((2, 3)), "y": np.zeros(2)}, "no column 1"),
+    ],
+)
+def test_matlab_files_that_do_not_fit(run, tmp_path, content, says):
+    path = tmp_path / "data" / "x.mat"
+    if not isinstance(content, bytes):
+        scipy.io.savemat(path, {"y": np.zeros(1), **content})
+    else:
+        path.write_bytes(content)
+    refused(run, tmp_path, says, **MAT)
+
+
+def workbook(path, table, sheets=("press",), above=0):
+    book = openpyxl.Workbook()
+    book.active.title = sheets[0]
+    for name in sheets[1:]:
+        book.create_sheet(name)
+    for _ in range(above):
+        book.active.append(["measured on a Monday"])
+    for line in table:
+        book.active.append(line)
+    book.save(path)
+
+
+XLSX = {
+    "tables__table__files": "*.xlsx",
+    "tables__table__read": {"format": "xlsx", "header": True, "skip_lines": 2, "no_sample": [""]},
+}
+
+
+def test_a_sheet_of_an_excel_workbook(run, tmp_path):
+    table = [["t", "a", "b", "c", "f"], *([row * 0.01, row, row / 3, None if row == 3 else 1, row * 1.5]
+                                          for row in range(20))]  # fmt: skip
+    workbook(tmp_path / "data" / "press.xlsx", table, above=2)
+    report = run(**XLSX, streams__taxels__channels=[{**TAXELS, "columns": ["a", "b", "c"]}])
+    taxels, _ = one(report)
+    assert np.array_equal(taxels.data[:, 0], np.arange(20))
+    np.testing.assert_allclose(taxels.data[:, 1], np.arange(20) / 3, rtol=1e-14)  # openpyxl writes 15 digits
+    assert report.missing == {"tc": 1}
+
+
+@pytest.mark.parametrize(
+    ("table", "more", "says"),
+    [
+        ([["t", "a"], [1, "x"]], {}, "column 1: 'x' is not a number"),
+        ([["t", "a", "b", "c", "f"]], {}, "no rows"),
+        ([[0, 1, 2, 3, 4], [1, 1, 2, 3, 4]], {}, "header row has the number '0' in column 0"),
+        ([["t"], [1]], {"tables__table__read__sheet": "none"}, "no sheet 'none'"),
+    ],
+)
+def test_sheets_that_do_not_fit(run, tmp_path, table, more, says):
+    workbook(tmp_path / "data" / "press.xlsx", table, above=2)
+    refused(run, tmp_path, says, "press.xlsx", **XLSX, **more)
+
+
+def test_one_of_several_sheets_must_be_named_and_a_damaged_workbook_is_refused(run, tmp_path):
+    workbook(tmp_path / "data" / "press.xlsx", [], sheets=("one", "two"))
+    assert "one, two" in refused(run, tmp_path, "several sheets", **XLSX).hint
+    (tmp_path / "data" / "press.xlsx").write_bytes(b"PK\x03\x04")
+    refused(run, tmp_path, "cannot be read as an Excel workbook", **XLSX)
+
+
+def test_a_sheet_that_claims_too_many_cells_is_refused(run, tmp_path):
+    book = openpyxl.Workbook()
+    book.active["XFD40000"] = 1
+    book.save(tmp_path / "data" / "press.xlsx")
+    refused(run, tmp_path, "more than 20000000 cells", **XLSX)
+
+
+@pytest.mark.parametrize(("name", "hint"), [("a.xlsx", "format: xlsx"), ("a.mat", "format: mat"), ("a.xls", "CSV")])
+def test_a_file_of_another_kind_is_told_how_to_read_it(run, tmp_path, name, hint):
+    (tmp_path / "data" / name).write_bytes(b"\xd0\xcf\x11\xe0")
+    assert hint in refused(run, tmp_path, "is not UTF-8 text", tables__table__files="a.*").hint
+
+
+def test_one_mapping_covers_several_devices(run, put):
+    for device in ("a", "b"):
+        put(f"{device}/press.csv", rows())
+    said = mapping(
+        tables__table__files="*/press.csv",
+        tables__table__path="(?P<device>[a-z])/",
+        recording={"name": "press-{device}", "session": "{device}"},
+    )
+    said["sensor"] |= {"name": "pad-{device}", "title": "pad {device}"}
+    report = run(said)
+    assert report.sensors == ("pad-a", "pad-b")
+    with open_recording(report.recordings[1].path) as recording:
+        assert (recording.meta.sensor.name, recording.meta.sensor.title) == ("pad-b", "pad b")
+
+
+@pytest.mark.parametrize(("name", "says"), [("pad-{where}", "'where'"), ("pad-{file}", "'pad-Press'")])
+def test_a_device_without_a_name_is_refused(run, put, tmp_path, name, says):
+    put("Press.csv", rows())
+    refused(run, tmp_path, says, sensor={**mapping()["sensor"], "name": name})
 
 
 PROBE = {"path": "(?P<start>[0-9]+)_probe", "read": {"format": "csv", "header": False}}
