@@ -92,7 +92,12 @@ def test_the_operating_point_is_the_best_that_is_allowed(recordings, rules, boun
         return
     chosen = curve.at(curve.operating_point(bound))
     assert chosen.false_alarms_per_minute <= bound
-    assert chosen.recall == curve.scores.recall[rate <= bound].max()
+    best = max(
+        zip(curve.scores.recall, np.nan_to_num(curve.scores.f1), curve.threshold, rate <= bound, strict=True),
+        key=lambda row: (row[3], *row[:3]),
+    )
+    assert curve.operating_point(bound) == best[2]
+    assert chosen.recall == best[0]
 
 
 def test_a_detector_that_hits_nothing_within_the_bound_never_raises_an_alarm():
