@@ -7,13 +7,14 @@ Makes a small result folder on the twin, and then, each in a process of its own 
 - crafted: HDF5 files that claim more than they hold, in recordings and shards;
 - folders: result folders whose lines, names and files a stranger has chosen;
 - YAML: texts that grow when they are built;
-- random: hypothesis-like noise over the same files, several bytes at a time.
+- noise: bytes changed, moved and repeated in the same files.
 
-What is read must be what was written, or be refused with one of the project's own errors, or be left out with a sentence.
+What is read must be what was written, or be refused with one of the project's own errors, or be left out with a
+sentence.
 
 Usage: python benchmarks/hostile_files.py [FLIPS] [TRUNCATIONS] [SEED] [MINUTES]
 
-With MINUTES the kinds are gone through again, with other seeds, until so much time has passed: an hour before a release.
+With MINUTES damage goes on with other seeds until so much time has passed: an hour before a release.
 """
 
 from __future__ import annotations
@@ -271,6 +272,10 @@ def _million_lines(folder: Path) -> None:
     (folder / "index.jsonl").write_text("{}\n" * 1_000_000)
 
 
+def _long_line(folder: Path) -> None:
+    (folder / "index.jsonl").write_text('{"row": {"cell": "' + "x" * 20 * 2**20 + '"}}\n')
+
+
 def _shared(folder: Path) -> None:
     text = json.dumps({"shared": "0" * 64, "value": "x" * 2**20})
     line = json.dumps({"row": {"cell": "a", "status": "failed"}, "refs": {"reason": "0" * 64}})
@@ -319,13 +324,14 @@ def _large_answers(path: Path) -> None:
 
 
 FOLDERS: dict[str, Callable[[Path], None]] = {
-    "a million lines": _million_lines, "a value shared by thousands": _shared, "a pipe for the ledger": _pipe("index.jsonl"),
+    "a million lines": _million_lines, "a value shared by thousands": _shared,
+    "a pipe for the ledger": _pipe("index.jsonl"),
     "a pipe for the run": _pipe("run.json"), "shards are links": _shard(_linked),
     "shards are empty": _shard(lambda path: path.write_bytes(b"")), "shards are large": _shard(_large_answers),
     "large shards without a ledger": _orphaned(_large_answers), "no ledger": _orphaned(lambda path: None),
     "shards are folders": _shard(lambda path: (path.unlink(), path.mkdir())[0]),
     "a folder for the ledger": lambda folder: ((folder / "index.jsonl").unlink(), (folder / "index.jsonl").mkdir())[0],
-    "a line of 20 MiB": lambda folder: (folder / "index.jsonl").write_text('{"row": {"cell": "' + "x" * 20 * 2**20 + '"}}\n') and None,
+    "a line of 20 MiB": _long_line,
 }  # fmt: skip
 
 

@@ -7,7 +7,7 @@ parsed, each shard and each recording opens and holds what its digest says, and 
 still finished, with the same row. At the end of every folder: scores.json and the table without times are, byte by
 byte, those of the undisturbed run, and no half-written file is left.
 
-Usage: python benchmarks/kill_nine.py [--kills 100] [--matrix twin|trivial] [--jobs 2] [--seed 1]
+Usage: python benchmarks/kill_nine.py [--kills 100] [--matrix twin|trivial] [--repeats 100] [--jobs 2] [--seed 1]
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TWIN = (
     "--sensor", "icub", "--task", "curvature", "--repeats", "2", "--estimator", "lda", "--estimator", "logistic",
     "--estimator", "knn",
 )  # fmt: skip
-TRIVIAL = ("--task", "nothing-asked", "--estimator", "nothing", "--repeats", "100", "--no-latency")
+TRIVIAL = ("--task", "nothing-asked", "--estimator", "nothing", "--no-latency")
 
 
 def started(arguments: list[str], folder: Path) -> subprocess.Popen[bytes]:
@@ -74,6 +74,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--matrix", choices=("twin", "trivial"), default="twin")
+    parser.add_argument("--repeats", type=int, default=100, help="Of the trivial matrix.")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
@@ -84,7 +85,7 @@ def main() -> None:
         if asked.matrix == "trivial":
             shelf = trivial.install(folder / "plugin")
             trivial.use(folder / "plugin")
-            arguments = ["run", *TRIVIAL, "--recordings", str(shelf)]
+            arguments = ["run", *TRIVIAL, "--repeats", str(asked.repeats), "--recordings", str(shelf)]
         arguments += ["--jobs", str(asked.jobs)]
         began = time.monotonic()
         whole = started([*arguments, "--out", "whole"], folder)

@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+from multiprocessing import forkserver
 from pathlib import Path
 
 import pytest
@@ -67,13 +68,21 @@ class Shell:
 
 
 class Verbs:
-    """Calls the command line in this process, for what needs no fresh interpreter: no plugin, no run of cells."""
+    """Calls the command line in this process, for what needs no fresh interpreter.
+
+    Cells have processes of their own all the same, forked by a server that knows no plugin of others: to compute with
+    one takes a `Shell`.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def __call__(self, *arguments: str, code: int | None = 0) -> subprocess.CompletedProcess[str]:
+    def __call__(
+        self, *arguments: str, plugins: tuple[str, ...] = (), code: int | None = 0
+    ) -> subprocess.CompletedProcess[str]:
         from tactbench.core.cli import main
+        from tactbench.core.matrix.engine import PRELOAD
+        from tactbench.core.plugins.registry import installed
 
         thresholds = gc.get_threshold()
         out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
@@ -86,11 +95,20 @@ class Verbs:
         ):
             patch.setenv("COLUMNS", "200")
             patch.setattr(sys, "stdin", nothing)
+            for name in plugins:
+                patch.syspath_prepend(THIRD_PARTY / name)
+            if plugins:
+                # A fork server imports what whoever starts it asks for: cells need more than the registry does.
+                forkserver.set_forkserver_preload(list(PRELOAD))
+                forkserver.ensure_running()
+                installed.cache_clear()
             try:
                 with pytest.raises(SystemExit) as ended:
                     main(list(arguments))
             finally:
                 gc.set_threshold(*thresholds)
+                if plugins:
+                    installed.cache_clear()
         said, told = (stream.buffer.getvalue().decode() for stream in (out, err))  # type: ignore[attr-defined]
         if code is not None:
             assert ended.value.code == code, f"exit {ended.value.code}\n{said}\n{told}"

@@ -228,8 +228,8 @@ class CellStopped(TactbenchError):  # noqa: N818  (a way to end, not one error)
         self.traceback_text = traceback_text
 
     def __reduce__(self) -> tuple[object, ...]:
-        told = (self.message, self.hint, self.signal, self.log, self.traceback_text, self.spent_s)
-        return (_stopped, (type(self), *told))
+        state = (self.message, self.hint, self.signal, self.log, self.traceback_text, self.spent_s)
+        return (_stopped, (type(self), *state))
 
 
 def _stopped(

@@ -46,8 +46,8 @@ def accept(draws: Sequence[Draw], targets: Sequence[PublishedNumber], tolerance:
     away = distances(draws, targets)
     near = int(np.sum(away <= tolerance))
     comparable = int(np.sum(np.isfinite(away)))
-    wanted = min(max(near, at_least), comparable)
-    places = sorted(np.argsort(away, kind="stable")[:wanted].tolist())
+    number = min(max(near, at_least), comparable)
+    places = sorted(np.argsort(away, kind="stable")[:number].tolist())
     return Accepted(tuple(draws[place] for place in places), near, float(max(away[places], default=0.0)))
 
 

@@ -30,7 +30,14 @@ def made_by() -> dict[str, str]:
 
 
 def carry_out_missing(
-    spec: CalibrationSpec, seed: int, draws: int, journal: Journal, *, jobs: int, told: Progress, work: Work = carry_out
+    spec: CalibrationSpec,
+    seed: int,
+    draws: int,
+    journal: Journal,
+    *,
+    jobs: int,
+    progress: Progress,
+    work: Work = carry_out,
 ) -> list[Draw]:
     """Carry out draws 0 … `draws` - 1 that `journal` does not hold; return all of them in order.
 
@@ -43,7 +50,7 @@ def carry_out_missing(
     """
     numbers = [number for number in range(draws) if number not in journal.draws]
     if numbers:
-        told.begin("drawing", len(numbers), alone=False)
+        progress.begin("drawing", len(numbers), alone=False)
         # One folder for all: workers that are ended in the middle cannot tidy up behind themselves, and one may still
         # be writing when it is emptied; that must not hide the interruption.
         with tempfile.TemporaryDirectory(prefix="tactbench-draws-", ignore_cleanup_errors=True) as scratch:
@@ -57,7 +64,7 @@ def carry_out_missing(
                     ) from outcome
                 draw, cpu_s = Draw(**outcome["draw"]), outcome["cpu_s"]
                 journal.append(draw, cpu_s)
-                told.advance(f"draw {trial.number}: {draw.status}, {cpu_s:.1f} s")
+                progress.advance(f"draw {trial.number}: {draw.status}, {cpu_s:.1f} s")
     return [journal.draws[number] for number in range(draws)]
 
 
@@ -74,7 +81,7 @@ def carry_out_variations(
     made_by: Mapping[str, str],
     *,
     jobs: int,
-    told: Progress,
+    progress: Progress,
     work: Work = carry_out,
 ) -> Varied:
     """Carry out what `folder` does not hold yet, and return all of it; each setting has a journal of its own there.
@@ -93,7 +100,11 @@ def carry_out_variations(
             procedure = as_procedure(spec, variation, setting)
             journal = Journal(folder / f"{variation.name}-{place}.jsonl", procedure, seed, made_by)
             own.append(
-                tuple(carry_out_missing(procedure, seed, variation.seeds, journal, jobs=jobs, told=told, work=work))
+                tuple(
+                    carry_out_missing(
+                        procedure, seed, variation.seeds, journal, jobs=jobs, progress=progress, work=work
+                    )
+                )
             )
         found[variation.name] = tuple(own)
     return found

@@ -46,8 +46,8 @@ def sensitivities(spec: CalibrationSpec, draws: Sequence[Draw], rng: np.random.G
     if not names or len(draws) < len(names) + 4:
         return []
     X = np.column_stack([parameter_values(draws, name) for name in names])
-    wanted = [output.name for output in spec.outputs if output.only_first is None]
-    Y = {name: output_values(draws, name) for name in wanted}
+    outputs = [output.name for output in spec.outputs if output.only_first is None]
+    Y = {name: output_values(draws, name) for name in outputs}
     Y = {name: column for name, column in Y.items() if not np.isnan(column).any() and np.ptp(column) > 0}
     if not Y:
         return []

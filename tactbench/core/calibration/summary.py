@@ -61,39 +61,39 @@ def summary(result: CalibrationResult) -> Summary:
     )
 
 
-def acceptance(spec: CalibrationSpec, told: Summary) -> str:
+def acceptance(spec: CalibrationSpec, stats: Summary) -> str:
     """Return how the accepted draws were chosen and how near they are, in two sentences."""
-    near = f"{told.n_near} of {len(told.draws)} draws lie within {spec.tolerance:g} scales of every fitted number"
-    chosen = "they are accepted" if told.n_accepted == told.n_near else f"the {told.n_accepted} nearest are accepted"
+    near = f"{stats.n_near} of {len(stats.draws)} draws lie within {spec.tolerance:g} scales of every fitted number"
+    chosen = "they are accepted" if stats.n_accepted == stats.n_near else f"the {stats.n_accepted} nearest are accepted"
     return (
-        f"{near}; {chosen} and reach {told.reach:.1f} scales. Within {spec.tolerance:g} scales of all "
-        f"{len(spec.published)} published numbers at once: {told.n_all}."
+        f"{near}; {chosen} and reach {stats.reach:.1f} scales. Within {spec.tolerance:g} scales of all "
+        f"{len(spec.published)} published numbers at once: {stats.n_all}."
     )
 
 
-def records(told: Summary) -> dict[str, list[dict[str, Any]]]:
+def records(stats: Summary) -> dict[str, list[dict[str, Any]]]:
     """Return the tables of a summary as flat records, by name of the table."""
     return {
         "parameters": [
             {"name": one.name, "sets": one.sets, "unit": one.unit, **_range(one.before, "prior"),
              **_range(one.after, "accepted")}
-            for one in told.parameters
+            for one in stats.parameters
         ],
         "published": [
             {"output": one.output, "title": one.title, "unit": one.unit, "use": one.use, "published": one.published,
              **_range(one.before, "prior"), **_range(one.after, "accepted"), "inside": one.inside,
              **_range(one.left_out, "by_all_others"), "by_all_others_reach": one.left_out_reach,
              "inside_by_all_others": one.inside_left_out}
-            for one in told.predictions
+            for one in stats.predictions
         ],
         "findings": [
             {"name": one.name, "statement": one.statement, "reason": one.reason, "reference": one.reference,
              **_share(one.prior, "prior"), **_share(one.accepted, "accepted")}
-            for one in told.findings
+            for one in stats.findings
         ],
-        "sensitivity": [one._asdict() for one in told.sensitivities],
-        "agreement": [one._asdict() for one in told.agreements],
-        "same_verdict": [{"finding": one.finding, **_share(one.alike, "alike")} for one in told.verdicts],
+        "sensitivity": [one._asdict() for one in stats.sensitivities],
+        "agreement": [one._asdict() for one in stats.agreements],
+        "same_verdict": [{"finding": one.finding, **_share(one.alike, "alike")} for one in stats.verdicts],
     }  # fmt: skip
 
 

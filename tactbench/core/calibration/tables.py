@@ -16,11 +16,11 @@ from tactbench.core.tables.text_table import TextTable, text_table
 Line = Mapping[str, Any]
 
 
-def text_tables(result: CalibrationResult, told: Summary) -> list[TextTable]:
+def text_tables(result: CalibrationResult, stats: Summary) -> list[TextTable]:
     """Return every table that has a row."""
-    lines = records(told)
+    lines = records(stats)
     tables = (
-        _published(result.spec, told, lines["published"]),
+        _published(result.spec, stats, lines["published"]),
         _nuisances(lines["parameters"]),
         _findings(lines["findings"]),
         _sensitivity(result.spec, lines["sensitivity"]),
@@ -31,16 +31,16 @@ def text_tables(result: CalibrationResult, told: Summary) -> list[TextTable]:
     return [table for table in tables if table.lines]
 
 
-def markdown(result: CalibrationResult, told: Summary) -> str:
+def markdown(result: CalibrationResult, stats: Summary) -> str:
     """Return the tables as Markdown, headings and who made the draws included."""
     makers = ", ".join(f"{name} {value}" for name, value in result.made_by.items())
-    failed = f", {told.failed} of them failed" if told.failed else ""
+    failed = f", {stats.failed} of them failed" if stats.failed else ""
     out = [
         f"## {result.spec.title}",
         f"SIM. {len(result.draws)} draws with seed {result.seed}{failed}; {result.cpu_s / 60:.0f} minutes of processor "
         f"time; {makers}.",
     ]
-    return "\n\n".join([*out, tables_as_markdown(text_tables(result, told))])
+    return "\n\n".join([*out, tables_as_markdown(text_tables(result, stats))])
 
 
 def _table(
@@ -51,9 +51,9 @@ def _table(
     return text_table(title, columns, lines, numeric=numeric, notes=notes)
 
 
-def _published(spec: CalibrationSpec, told: Summary, lines: Sequence[Line]) -> TextTable:
+def _published(spec: CalibrationSpec, stats: Summary, lines: Sequence[Line]) -> TextTable:
     return _table(
-        f"Published numbers: {len(told.draws)} draws from the prior, {told.n_accepted} accepted",
+        f"Published numbers: {len(stats.draws)} draws from the prior, {stats.n_accepted} accepted",
         ("number", "use", "published", "prior", "accepted", "inside", "by all others", "inside those", "their reach"),
         tuple(
             {
@@ -64,7 +64,7 @@ def _published(spec: CalibrationSpec, told: Summary, lines: Sequence[Line]) -> T
             }
             for line in lines
         ),
-        notes=(acceptance(spec, told),),
+        notes=(acceptance(spec, stats),),
     )  # fmt: skip
 
 
@@ -153,8 +153,8 @@ def _spread(one: tuple[float, float, float] | None) -> str:
 
 def _beside(result: CalibrationResult, lines: Mapping[str, Sequence[Line]], earlier: CalibrationResult) -> TextTable:
     """Return published numbers and findings beside those of an earlier calibration that had them too."""
-    told = summary(earlier)
-    before = records(told)
+    stats = summary(earlier)
+    before = records(stats)
     rows = [
         {"number or finding": line[title], "earlier prior": show(old, "prior"), "prior": show(line, "prior"),
          "earlier accepted": show(old, "accepted"), "accepted": show(line, "accepted")}
@@ -173,10 +173,10 @@ def _beside(result: CalibrationResult, lines: Mapping[str, Sequence[Line]], earl
         if then.get(name) != now.get(name)
     ]
     return _table(
-        f"Beside the earlier {len(told.draws)} draws",
+        f"Beside the earlier {len(stats.draws)} draws",
         ("number or finding", "earlier prior", "prior", "earlier accepted", "accepted"),
         tuple(rows),
-        notes=(f"Priors that differ: {'; '.join(other) or 'none'}. Earlier: {acceptance(earlier.spec, told)}",),
+        notes=(f"Priors that differ: {'; '.join(other) or 'none'}. Earlier: {acceptance(earlier.spec, stats)}",),
     )
 
 

@@ -45,24 +45,24 @@ def carry_out(trial: Trial) -> tuple[Draw, float]:
             warnings.simplefilter("ignore")  # estimators' are counted by the cell; nobody reads a thousand of them
             outputs = simulated_outputs(trial, seed, values)
     except Exception as error:
-        said = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
-        return Draw(trial.number, seed, values, {}, "failed", said), time.process_time() - began
+        reason = str(error) if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
+        return Draw(trial.number, seed, values, {}, "failed", reason), time.process_time() - began
     return Draw(trial.number, seed, values, outputs), time.process_time() - began
 
 
 def simulated_outputs(trial: Trial, seed: int, values: dict[str, float]) -> dict[str, float]:
     """Return every output of one draw; the recordings are gone afterwards."""
     registry, spec = installed(), trial.spec
-    wanted = [output for output in spec.outputs if output.only_first is None or trial.number < output.only_first]
+    outputs = [output for output in spec.outputs if output.only_first is None or trial.number < output.only_first]
     found: dict[str, float] = {}
-    for sensor, task_name in dict.fromkeys((output.sensor, output.task) for output in wanted):
+    for sensor, task_name in dict.fromkeys((output.sensor, output.task) for output in outputs):
         task = registry.tasks[task_name].spec
         with tempfile.TemporaryDirectory(dir=trial.scratch) as folder:
             paths = _record(trial, registry, sensor, task, seed, values, Path(folder))
             data = load_dataset(task, paths)
-        own = [output for output in wanted if (output.sensor, output.task) == (sensor, task_name)]
+        own = [output for output in outputs if (output.sensor, output.task) == (sensor, task_name)]
         found.update(_answer(own, spec.protocol, registry, task, data, seed))
-    return {output.name: found[output.name] for output in wanted}
+    return {output.name: found[output.name] for output in outputs}
 
 
 def scenes_of(
@@ -148,6 +148,7 @@ def _answer(
                     None,
                     seed=seed,
                     clock=time.perf_counter,
+                    latency=False,
                 ),
                 thinned(data, output.every),
             )

@@ -51,9 +51,9 @@ def command(
         print_calibration(found, summary(found), shape)
         return
     result = _drawn(_procedure(config), draws, seed, jobs, out)
-    told = summary(result)
-    print_calibration(result, told, shape)
-    _write(result, told, out / "calibration")
+    stats = summary(result)
+    print_calibration(result, stats, shape)
+    _write(result, stats, out / "calibration")
 
 
 def _procedure(config: Path | None) -> CalibrationSpec:
@@ -74,24 +74,24 @@ def _drawn(spec: CalibrationSpec, draws: int | None, seed: int | None, jobs: int
     from tactbench.core.errors import UnwritableError
 
     checked(spec)
-    wanted, chosen = draws or spec.draws, spec.seed if seed is None else seed
+    n_draws, chosen = draws or spec.draws, spec.seed if seed is None else seed
     makers = made_by()
     journal = Journal(out / "calibration" / "draws.jsonl", spec, chosen, makers)
     if journal.remark:
         remark(journal.remark)
     if journal.draws:
-        remark(f"{sum(number < wanted for number in journal.draws)} of {wanted} draws were found finished.")
+        remark(f"{sum(number < n_draws for number in journal.draws)} of {n_draws} draws were found finished.")
     try:
-        with progress() as told:
-            done = carry_out_missing(spec, chosen, wanted, journal, jobs=jobs, told=told)
+        with progress() as reporter:
+            done = carry_out_missing(spec, chosen, n_draws, journal, jobs=jobs, progress=reporter)
             beside = out / "calibration" / "variations"
-            varied = carry_out_variations(spec, chosen, beside, makers, jobs=jobs, told=told)
+            varied = carry_out_variations(spec, chosen, beside, makers, jobs=jobs, progress=reporter)
     except OSError as error:
         raise UnwritableError(f"{journal.path} cannot be written: {error}.", hint="Give another --out.") from error
     return CalibrationResult(spec, chosen, tuple(done), journal.made_by, journal.seconds, varied=varied)
 
 
-def _write(result: CalibrationResult, told: Summary, folder: Path) -> None:
+def _write(result: CalibrationResult, stats: Summary, folder: Path) -> None:
     import json
 
     from tactbench.core.calibration.figure import draws_figure, save, sensitivity_figure
@@ -101,11 +101,11 @@ def _write(result: CalibrationResult, told: Summary, folder: Path) -> None:
     from tactbench.core.errors import UnwritableError
     from tactbench.core.matrix.files import replace_file
 
-    tables = records(told)
+    tables = records(stats)
     about = {
-        "draws": len(told.draws), "failed": told.failed, "accepted": told.n_accepted, "near": told.n_near,
-        "reach": told.reach, "near_all": told.n_all, "tolerance": result.spec.tolerance,
-        "acceptance": acceptance(result.spec, told),
+        "draws": len(stats.draws), "failed": stats.failed, "accepted": stats.n_accepted, "near": stats.n_near,
+        "reach": stats.reach, "near_all": stats.n_all, "tolerance": result.spec.tolerance,
+        "acceptance": acceptance(result.spec, stats),
     }  # fmt: skip
     texts = {
         "ranges.json": {**about, "parameters": tables["parameters"], "published": tables["published"]},
@@ -118,8 +118,8 @@ def _write(result: CalibrationResult, told: Summary, folder: Path) -> None:
         for name, content in texts.items():
             replace_file(folder / name, (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode())
         figures = {
-            "sensitivity": sensitivity_figure(result.spec, told.sensitivities),
-            "draws": draws_figure(result.spec, told.draws),
+            "sensitivity": sensitivity_figure(result.spec, stats.sensitivities),
+            "draws": draws_figure(result.spec, stats.draws),
         }
         for name, figure in figures.items():
             save(figure, [folder / f"{name}.png", folder / f"{name}.pdf"])

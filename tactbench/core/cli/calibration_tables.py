@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 CALIBRATION_FORMATS = (*GRID_FORMATS, "md")
 
 
-def print_calibration(result: CalibrationResult, told: Summary, shape: str) -> None:
+def print_calibration(result: CalibrationResult, stats: Summary, shape: str) -> None:
     """Print what a calibration says in one of `CALIBRATION_FORMATS`."""
     from tactbench.core.calibration.summary import records
     from tactbench.core.calibration.tables import markdown, text_tables
@@ -24,15 +24,15 @@ def print_calibration(result: CalibrationResult, told: Summary, shape: str) -> N
     from tactbench.core.cli.screen import remark
 
     if shape == "md":
-        click.echo(markdown(result, told), nl=False)
+        click.echo(markdown(result, stats), nl=False)
     elif shape != "table":
-        print_records(_long(records(told)), shape)
+        print_records(_long(records(stats)), shape)
     else:
         click.echo(f"{result.spec.title} (SIM)\n")
-        print_tables(text_tables(result, told))
-    if told.failed:
+        print_tables(text_tables(result, stats))
+    if stats.failed:
         reasons = sorted({draw.reason for draw in result.draws if draw.status == "failed"})
-        remark(f"{told.failed} draws failed: {reasons[0]}" + (" …" if len(reasons) > 1 else ""))
+        remark(f"{stats.failed} draws failed: {reasons[0]}" + (" …" if len(reasons) > 1 else ""))
 
 
 def _long(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:

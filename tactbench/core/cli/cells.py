@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Subject:
+class StoredCell:
     """One cell, as it is asked now and as it was answered."""
 
     store: Store
@@ -43,7 +43,7 @@ class Subject:
         return explain(self.cell, self.paths, self.requests, self.keys, self.recorded, book, self.store, known)
 
 
-def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> Subject:
+def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -> StoredCell:
     """Return the cell that a person means.
 
     Parameters
@@ -84,26 +84,26 @@ def subject(out: Path, given: str, options: Mapping[str, Any] | None = None) -> 
                 raise
         else:
             cell = cell_of(row)
-            paths, requests = _material(cell, row, registry, keys, store)
-            return Subject(store, keys, recorded, cell, row, paths, requests)
-    asked = dict(options or {})
-    if not asked["config"] and any(given in name for name in rows):
+            paths, requests = _recordings_and_requests(cell, row, registry, keys, store)
+            return StoredCell(store, keys, recorded, cell, row, paths, requests)
+    selection = dict(options or {})
+    if not selection["config"] and any(given in name for name in rows):
         given = meant(given, list(rows), known)
         # The options change how the cell was asked; what they do not mention stays.
         was = {"sensors": (rows[given]["sensor"],), "tasks": (rows[given]["task"],), "rig": rows[given]["rig"]}
-        asked |= {name: value for name, value in was.items() if not asked[name]}
-    matrix, folder = matrix_asked(registry, **asked)
+        selection |= {name: value for name, value in was.items() if not selection[name]}
+    matrix, folder = matrix_asked(registry, **selection)
     cells, needed = plan_run(matrix, registry, keys, store, folder, recorded)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
     made = tuple(needed.requests.get(request_key(cell), ()))
-    return Subject(store, keys, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)
+    return StoredCell(store, keys, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)
 
 
 def _given(option: str, value: Any) -> bool:
     return bool(value) if option == "probe" else value is not None and value != ()
 
 
-def _material(
+def _recordings_and_requests(
     cell: Cell, row: Row, registry: Registry, keys: Keys, store: Store
 ) -> tuple[tuple[Path, ...], tuple[RecordingRequest, ...]]:
     """Return the recordings a row was answered from, and how to make them where a simulation did."""

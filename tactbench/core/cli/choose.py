@@ -67,9 +67,9 @@ def command(
     rows, heading = _selected(rows, task, protocol, split)
     choices = choose(rows, wish, task, {one.name: one.spec for one in registry.sensors})
     if shape == "json":
-        told = {"task": task.name, "wish": wish._asdict(), "results": origin, "protocol": rows[0]["protocol"],
+        content = {"task": task.name, "wish": wish._asdict(), "results": origin, "protocol": rows[0]["protocol"],
                 "split": rows[0]["split"], "choices": [choice.record() for choice in choices]}  # fmt: skip
-        click.echo(json_text(told, indent=1))
+        click.echo(json_text(content, indent=1))
         return
     for choice in choices:
         _print(choice, f"{heading} · {choice.hardware}")
@@ -179,10 +179,10 @@ def _table(choice: Choice) -> TextTable:
     head = ("sensor / estimator", "score, interval", *(wish for wish in wishes if wish != "score"))
     lines = []
     for one in choice.candidates:
-        told = {
+        entries = {
             criterion.wish: ": ".join(filter(None, (criterion.state, criterion.text))) for criterion in one.criteria
         }
         known = f"{score(one.score, choice.unit)}, {interval_text(one, choice.unit)}"
-        wished = f"; {told['score']}" if "score" in told else ""
-        lines.append((f"{one.sensor} / {one.estimator}", known + wished, *(told.get(wish, "") for wish in head[2:])))
+        wished = f"; {entries['score']}" if "score" in entries else ""
+        lines.append((f"{one.sensor} / {one.estimator}", known + wished, *(entries.get(wish, "") for wish in head[2:])))
     return TextTable(f"score: {choice.quantity}", head, tuple(lines))

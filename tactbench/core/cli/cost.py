@@ -46,7 +46,7 @@ from tactbench.core.cli.threads import keep_threads
 @click.option("--format", "shape", type=click.Choice(("table", "json", "csv")), default="table", show_default=True)
 def command(
     twin: bool, sensors: tuple[str, ...], task: str | None, rig: str | None, out: Path | None, shape: str, threads: int,
-    rungs: tuple[str, ...], score: bool, **asked: Any,
+    rungs: tuple[str, ...], score: bool, **options: Any,
 ) -> None:  # fmt: skip
     """Measure what accuracy costs in time, and draw it.
 
@@ -59,11 +59,11 @@ def command(
     if twin:
         from tactbench.core.cli.cost_twin import show_twin
 
-        if len(asked["estimators"]) > 1:
+        if len(options["estimators"]) > 1:
             raise UsageError("--twin has one estimator answer.", hint="Give --estimator once.")
         show_twin(
-            sensors, rig, out or Path("tactbench-results") / "cost", shape, rounds=asked["rounds"], task=task,
-            rungs=rungs, estimator=next(iter(asked["estimators"]), None), scoring=score, seed=asked["seed"],
+            sensors, rig, out or Path("tactbench-results") / "cost", shape, rounds=options["rounds"], task=task,
+            rungs=rungs, estimator=next(iter(options["estimators"]), None), scoring=score, seed=options["seed"],
         )  # fmt: skip
         return
     if rungs or not score:
@@ -75,4 +75,6 @@ def command(
         )
     from tactbench.core.cli.cost_ladder import show_ladder
 
-    show_ladder(sensors[0], task, rig=rig, threads=threads, out=out or Path("tactbench-results"), shape=shape, **asked)
+    show_ladder(
+        sensors[0], task, rig=rig, threads=threads, out=out or Path("tactbench-results"), shape=shape, **options
+    )

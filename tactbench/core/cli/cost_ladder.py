@@ -48,9 +48,9 @@ def show_ladder(
     rig = rig or ("twin" if recordings is None else "replay")
     matrix = _matrix(registry, sensor, task, rig, protocol, split, estimators or ("all",), seed, repeats)
     store = _store(out, sensor, task)
-    with progress() as told:
+    with progress() as display:
         ladder = climb(matrix, registry, store, rounds=rounds, budget_s=budget, threads=threads,
-                       clock=time.perf_counter, progress=told, recordings=recordings)  # fmt: skip
+                       clock=time.perf_counter, progress=display, recordings=recordings)  # fmt: skip
     if shape == "json":
         click.echo(json_text(ladder.rows, indent=1))
     elif shape == "csv":
@@ -72,8 +72,10 @@ def _store(out: Path, sensor: str, task: str) -> Store:
 
     store = Store(out / "cost")
     rows = Store(out).rows() if (out / "cells").is_dir() else []
-    asked = ("done", sensor, task)
-    finished = [row for row in rows if (row["status"], row["sensor"], row["task"]) == asked and is_key(row["key"])]
+    finished_of = ("done", sensor, task)
+    finished = [
+        row for row in rows if (row["status"], row["sensor"], row["task"]) == finished_of and is_key(row["key"])
+    ]
     cells = [Path("cells", f"{row['key']}.h5") for row in finished]
     recordings = [path.relative_to(out) for path in (out / "recordings" / sensor).glob("*.h5")]
     for path in (*cells, *recordings):

@@ -69,23 +69,23 @@ def show_twin(
             raise UnknownNameError(f"rung of {name}", rung, descriptor.rungs)
     tasks = [task] if task is not None else [choice.name for choice in default_matrix().tasks]
     answerers = _answerers(registry, tasks, estimator) if scoring else {}
-    asked = [registry.sensors[sensor] for sensor in sensors or default_matrix().sensors]
+    chosen = [registry.sensors[sensor] for sensor in sensors or default_matrix().sensors]
     points: list[CostPoint] = []
     skipped: list[Skipped] = []
     scores: dict[tuple[str, str], list[TaskScore]] = {}
     study: CostStudy | None = None
-    with progress() as told:
-        for sensor in asked:
+    with progress() as display:
+        for sensor in chosen:
             try:
                 study = load_object(descriptor.work_precision)(sensor, rounds=rounds)
             except TactbenchError as error:
                 skipped.append(Skipped(sensor.name, "every way", "", str(error)))
                 continue
-            found, without = measured(study, sensor.name, told)
+            found, without = measured(study, sensor.name, display)
             points += found
             skipped += without
             for rung in (rungs or descriptor.rungs[:-1]) if answerers else ():
-                scores[sensor.name, rung] = _scored(registry, name, sensor.name, rung, answerers, seed, told)
+                scores[sensor.name, rung] = _scored(registry, name, sensor.name, rung, answerers, seed, display)
     if study is None or not (points or skipped):
         raise UsageError("There is nothing to measure.", hint="Name a sensor that can be simulated with --sensor.")
     records = [record(point, scores) for point in points] + [_absent(one, scores) for one in skipped]
@@ -102,14 +102,14 @@ def _answerers(registry: Registry, tasks: Sequence[str], estimator: str | None) 
 
 
 def _scored(
-    registry: Registry, rig: str, sensor: str, rung: str, answerers: Mapping[str, str], seed: int, told: Progress
+    registry: Registry, rig: str, sensor: str, rung: str, answerers: Mapping[str, str], seed: int, progress: Progress
 ) -> list[TaskScore]:
     from tactbench.core.cost.task_score import task_score
     from tactbench.core.spec.scene import Simulation
 
-    asked = Simulation(rung=rung)
+    simulation = Simulation(rung=rung)
     return [
-        task_score(registry, rig, sensor, task, asked, estimator=answerer, seed=seed, progress=told)
+        task_score(registry, rig, sensor, task, simulation, estimator=answerer, seed=seed, progress=progress)
         for task, answerer in answerers.items()
     ]
 

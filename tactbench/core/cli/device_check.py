@@ -303,26 +303,26 @@ _MEANING = {
 
 
 def _problems(found: StreamCheck) -> list[str]:
-    said = []
+    sentences = []
     if found.rate_hz is not None and found.nominal_hz is not None:
         allowed = RATE_TOLERANCE + 2 / found.rows + 2 * HELD_S * found.rate_hz / found.rows
         if abs(found.rate_hz / found.nominal_hz - 1) > allowed:
-            said.append(
+            sentences.append(
                 f"Stream {found.stream} came at {found.rate_hz:.4g} Hz, stated are {found.nominal_hz:.4g} Hz. "
                 "Is the device set up for another rate, or the link too slow for it?"
             )
     if found.lost:
-        said.append(
+        sentences.append(
             f"Of stream {found.stream}, {found.lost} rows are lost by its numbers: is the host or the bus too busy?"
         )
     if found.unordered:
-        said.append(f"Of stream {found.stream}, {found.unordered} rows came twice or late: what lies between?")
-    said += [
+        sentences.append(f"Of stream {found.stream}, {found.unordered} rows came twice or late: what lies between?")
+    sentences += [
         f"Of stream {found.stream}, {number} of {found.rows} rows {_MEANING[mark]}"
         for mark, number in found.marks.items()
         if number and not (mark == "GAP" and found.lost)
     ]
-    return said
+    return sentences
 
 
 def as_plain(checks: Sequence[DeviceCheck]) -> list[dict[str, Any]]:

@@ -79,13 +79,13 @@ def _sensors(rig: RigFile | None, sensor: str | None, registry: Registry) -> tup
         return ()
     if sensor is not None and sensor not in rig.sensors:
         raise UnknownNameError("sensor in this rig file", sensor, rig.sensors)
-    asked = tuple(rig.sensors) if sensor is None else (sensor,)
-    for name in asked:
+    names = tuple(rig.sensors) if sensor is None else (sensor,)
+    for name in names:
         registry.sensors[name]
     for name, entry in rig.entries().items():
         if name not in rig.sensors:
             registry.devices[str(getattr(entry, "device", name))]
-    return asked
+    return names
 
 
 def _at_rest(rig: RigFile, sensors: Sequence[str], registry: Registry) -> Callable[[str], Senses]:
@@ -171,11 +171,11 @@ def _machine(host: Host) -> Iterator[tuple[str, ...]]:
 def _print_rig(checks: Sequence[DeviceCheck]) -> None:
     from tactbench.core.cli.screen import print_table
 
-    said = [
+    lines = [
         (check.name, check.device, check.link, _identity(check), "; ".join([*check.remarks, *_counts(check)]))
         for check in checks
     ]
-    print_table("the rig's devices", ("name", "device", "link", "says", "remarks"), said)
+    print_table("the rig's devices", ("name", "device", "link", "says", "remarks"), lines)
     streams = [(check.name, *_stream(stream)) for check in checks for stream in check.streams]
     if streams:
         print_table("streams", ("device", "stream", "rows", "Hz", "stated", "lost or marked"), streams)

@@ -104,17 +104,17 @@ def emulate(
     if out is not None and out.exists() and not out.read_text(encoding="utf-8", errors="replace").startswith(HEAD):
         raise UsageError(f"{out} is there already, and not from `tactbench emulate`.", hint="Give another name.")
     devices: dict[str, EmulatedDevice] = {}
-    said: dict[str, DeviceEntry] = {}
+    complete: dict[str, DeviceEntry] = {}
     for name, entry in entries.items():
         descriptor = descriptor_of(registry, name, entry)
-        said[name] = entry.model_copy(update={"options": options_of(descriptor, entry)})
+        complete[name] = entry.model_copy(update={"options": options_of(descriptor, entry)})
         if entry.emulated:
             devices[name] = emulated_device(descriptor, name, entry, presser.senses(name), presser.seed)
     if not devices:
         raise UsageError("No device in the rig file is emulated.", hint="Write `link: emulated` for one.")
     presser.draw(1)
     with EmulatedDevices(devices, time="real", can=can) as emulated:
-        _say_where(emulated, said, file, out)
+        _say_where(emulated, complete, file, out)
         for number in count(1) if presses is None else range(1, presses + 1):
             if number > 1:
                 presser.draw(number)

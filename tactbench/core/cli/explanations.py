@@ -37,7 +37,7 @@ def print_explanations(
     rig_name: str,
     sensor_name: str,
     task_name: str,
-    wanted: str | None,
+    scene_name: str | None,
     simulation: Simulation | None,
     rounds: int,
     shape: str,
@@ -69,7 +69,7 @@ def print_explanations(
     rig: Explaining = load_object(registry.rigs[rig_name].where)(RigContext(effects=tuple(registry.effects)))
     if not hasattr(rig, "explain"):
         raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Choose another with --rig.")
-    scenes = _scenes(registry, task_name, wanted, simulation)
+    scenes = _scenes(registry, task_name, scene_name, simulation)
     answerer = "" if scoring is False else estimator or quick_estimator(registry, task_name)
     records: list[dict[str, Any]] = []
     expected_s = left_out_s = 0.0
@@ -84,12 +84,12 @@ def print_explanations(
         remark(f"No score: recording the task with the effects chosen and with all would take about {expected_s:.0f} "
                "s. --score does it all the same.")  # fmt: skip
     elif scoring is not False:
-        with progress() as told:
+        with progress() as display:
             chosen, every = (
                 task_score(
-                    registry, rig_name, sensor_name, task_name, asked, estimator=answerer, seed=seed, progress=told
+                    registry, rig_name, sensor_name, task_name, variant, estimator=answerer, seed=seed, progress=display
                 )
-                for asked in (simulation or Simulation(), with_all_effects(simulation))
+                for variant in (simulation or Simulation(), with_all_effects(simulation))
             )
         if shape == "table":
             _print_scores(sensor_name, chosen, every)
@@ -139,16 +139,16 @@ def _score_fields(chosen: TaskScore, every: TaskScore) -> dict[str, Any]:
     }
 
 
-def _scenes(registry: Registry, task: str, wanted: str | None, simulation: Simulation | None) -> list[Scene]:
+def _scenes(registry: Registry, task: str, scene_name: str | None, simulation: Simulation | None) -> list[Scene]:
     planned = {item.scene.name: item.scene for item in registry.tasks[task].spec.scenes}
     if not planned:
         raise UsageError(
             f"Task {task!r} plans no scenes: only recordings made elsewhere can answer it.",
             hint="Choose another task; see `tactbench list tasks`.",
         )
-    if wanted is not None and wanted not in planned:
-        raise UnknownNameError(f"scene of task {task!r}", wanted, planned)
-    scenes = [planned[wanted]] if wanted is not None else list(planned.values())
+    if scene_name is not None and scene_name not in planned:
+        raise UnknownNameError(f"scene of task {task!r}", scene_name, planned)
+    scenes = [planned[scene_name]] if scene_name is not None else list(planned.values())
     return [scene.asked(simulation) if simulation else scene for scene in scenes]
 
 

@@ -74,15 +74,15 @@ def _import_tables(mapping: Path, root: Path | None, out: Path | None, replace: 
     from tactbench.core.recording.mapping import import_tables
 
     target = Path("recordings") / mapping.stem if out is None else out
-    with progress() as told:
+    with progress() as display:
         begun = False
 
         def tell(_done: int, total: int, what: str) -> None:
             nonlocal begun
             if not begun:
-                told.begin("importing", total)
+                display.begin("importing", total)
                 begun = True
-            told.advance(what)
+            display.advance(what)
 
         report = import_tables(mapping, root=root, out=target, progress=tell, replace=replace)
     for line in summary(report, target):
@@ -130,12 +130,12 @@ def summary(report: ImportReport, folder: Path) -> list[str]:
         names = [recording.name for recording in report.recordings if recording.excluded == reason]
         shown = ", ".join(names[:3]) + (" …" if count > 3 else "")
         lines.append(f"  {count} recordings are marked as excluded ({shown}): {reason}")
-    told = ("missing", "excluded")
+    expected = ("missing", "excluded")
     found = Counter(
         (finding.severity, finding.message)
         for recording in report.recordings
         for finding in recording.findings
-        if finding.check not in told
+        if finding.check not in expected
     )
     for (severity, message), count in found.most_common(12):
         where = f" (in {count} of {len(report.recordings)} recordings)" if len(report.recordings) > 1 else ""

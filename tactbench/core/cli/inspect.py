@@ -96,10 +96,10 @@ def _stream(recording: Recording, name: str) -> dict[str, Any]:
 def _print(about: dict[str, Any]) -> None:
     meta = about["meta"]
     click.secho(visible(about["file"]), bold=True)
-    said = [f"session {meta['session']}", f"clock {meta['clock']}"]
-    said += [f"{name} {meta[name]}" for name in ("trial", "role") if meta[name]]
+    texts = [f"session {meta['session']}", f"clock {meta['clock']}"]
+    texts += [f"{name} {meta[name]}" for name in ("trial", "role") if meta[name]]
     mark = " (EMULATED)" if meta["emulation"] else " (SIM)" if meta["simulated"] else ""
-    _say(f"  {about['sensor']} on {meta['rig']}{mark}; {'; '.join(said)}")
+    _say(f"  {about['sensor']} on {meta['rig']}{mark}; {'; '.join(texts)}")
     if meta["labels"]:
         _say("  labels: " + ", ".join(f"{name} = {value}" for name, value in meta["labels"].items()))
     for stream in about["streams"]:
@@ -141,29 +141,29 @@ def _say(text: str) -> None:
 
 def _clock(clock: dict[str, Any]) -> str:
     """Return one line: whose it is, how it was put on the host's, and how well."""
-    said = str(clock["source"])
+    text = str(clock["source"])
     lines = clock["segments"]
     if lines:
         drifts = [line["drift"] * 1e6 for line in lines]
         bounds = [line["bound_ns"] for line in lines]
         within = "no bound" if None in bounds else f"within {max(bounds) * 1e-6:.3g} ms"
-        said += (
+        text += (
             f", on the host's by {clock['method']} ({len(lines)} lines, drift {min(drifts):.3g} to {max(drifts):.3g} "
             f"ppm, {within})"
         )
     if any(clock["delay_ns"]):
         low, high = (edge * 1e-6 for edge in clock["delay_ns"])
-        said += f"; least delay {low:.3g} to {high:.3g} ms, not taken off"
-    said += "".join(f"; {name}: {clock[name]}" for name in ("wraps", "breaks") if clock[name])
-    return said
+        text += f"; least delay {low:.3g} to {high:.3g} ms, not taken off"
+    text += "".join(f"; {name}: {clock[name]}" for name in ("wraps", "breaks") if clock[name])
+    return text
 
 
 def _emulation(emulation: dict[str, Any]) -> str:
     factor = f" (factor {emulation['factor']:.3g})" if emulation["factor"] else ""
-    said = f"{', '.join(emulation['devices']) or 'devices'} in {emulation['time']} time{factor}"
+    text = f"{', '.join(emulation['devices']) or 'devices'} in {emulation['time']} time{factor}"
     if emulation["physics"]:
-        said += f", moved by {emulation['physics']}"
-    return said + f", seed {emulation['seed']}" + "".join(f"; fault {fault}" for fault in emulation["faults"])
+        text += f", moved by {emulation['physics']}"
+    return text + f", seed {emulation['seed']}" + "".join(f"; fault {fault}" for fault in emulation["faults"])
 
 
 def _ends(names: list[str]) -> str:

@@ -77,12 +77,12 @@ def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> l
     from tactbench.core.errors import UnknownNameError, UsageError
 
     kept = rows
-    for key, asked in filters.items():
+    for key, chosen in filters.items():
         known = {str(row[key]) for row in rows if row[key] is not None}
-        for name in asked:
+        for name in chosen:
             if name not in known:
                 raise UnknownNameError(f"{key} among these results", name, known)
-        kept = [row for row in kept if not asked or row[key] in asked]
+        kept = [row for row in kept if not chosen or row[key] in chosen]
     if not kept:
         raise UsageError(
             "No row is all that at once.", hint="Ask for less: see `tactbench leaderboard --columns cell`."

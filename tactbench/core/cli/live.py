@@ -184,10 +184,10 @@ class _Lines(_Drawing):
 def one_line(watched: Watched) -> str:
     """Return time, force, rates and losses in a line."""
     elapsed_s = watched.elapsed_s
-    said = ["no times yet" if elapsed_s is None else f"{elapsed_s:.1f} of {watched.duration_s:.1f} s"]
+    texts = ["no times yet" if elapsed_s is None else f"{elapsed_s:.1f} of {watched.duration_s:.1f} s"]
     if watched.force() is not None:
-        said.append(f"force {force_text(watched)}")
+        texts.append(f"force {force_text(watched)}")
     for state in watched.streams:
         lost = losses_of(state)
-        said.append(f"{state.spec.name} {rate_text(state)} Hz" + (f" ({lost})" if lost else ""))
-    return f"{watched.title}: {'; '.join(said)}"
+        texts.append(f"{state.spec.name} {rate_text(state)} Hz" + (f" ({lost})" if lost else ""))
+    return f"{watched.title}: {'; '.join(texts)}"

@@ -77,9 +77,9 @@ def _header(watched: Watched, width: int) -> Text:
     from rich.text import Text
 
     elapsed_s = watched.elapsed_s
-    said = "waiting for samples" if elapsed_s is None else f"{elapsed_s:.1f} of {watched.duration_s:.1f} s"
-    title = watched.title[: max(0, width - len(said) - 2)]
-    return Text.assemble((title, "bold"), " " * (width - len(title) - len(said)), said)
+    text = "waiting for samples" if elapsed_s is None else f"{elapsed_s:.1f} of {watched.duration_s:.1f} s"
+    title = watched.title[: max(0, width - len(text) - 2)]
+    return Text.assemble((title, "bold"), " " * (width - len(title) - len(text)), text)
 
 
 def _number(value: float | None, decimals: int) -> str:
@@ -140,32 +140,32 @@ def _force(watched: Watched, width: int, *, low: bool) -> list[Text]:
         (bad, BAD),
     )
     lines = []
-    for row, (said, style) in zip(drawn, beside, strict=True):
+    for row, (label, style) in zip(drawn, beside, strict=True):
         line = Text.assemble((f"  {row}", "bold"))
         line.pad_right(_DIGITS_WIDTH - line.cell_len)
-        line.append(f" {said}", style)
+        line.append(f" {label}", style)
         line.pad_right(_FORCE_WIDTH - line.cell_len)
         lines.append(line)
     largest = _in_unit(watched.scene.profile.largest_n, channel.unit)
     room = width - _FORCE_WIDTH
     if room >= 10 and largest > 0 and state.latest is not None:
         wanted_n = watched.wanted_n
-        wanted = None if wanted_n is None else _in_unit(wanted_n, channel.unit)
-        lines[1].append_text(_track(float(state.latest[place]), wanted, largest, room))
+        target = None if wanted_n is None else _in_unit(wanted_n, channel.unit)
+        lines[1].append_text(_track(float(state.latest[place]), target, largest, room))
         lines[2].append(f"0{f'{largest:g} {channel.unit}':>{room - 1}}", style="dim")
     return lines
 
 
-def _track(value: float, wanted: float | None, largest: float, room: int) -> Text:
-    """Return a bar from 0 to `largest`, the wanted place marked."""
+def _track(value: float, target: float | None, largest: float, room: int) -> Text:
+    """Return a bar from 0 to `largest`, the place of `target` marked."""
     from rich.text import Text
 
     share = value / largest if math.isfinite(value) else 0.0
     filled = round(min(1.0, max(0.0, share)) * room)
     line = Text("█" * filled + "·" * (room - filled))
     line.stylize("red" if share > 1 else UP, 0, filled)
-    if wanted is not None:
-        at = min(room - 1, max(0, round(wanted / largest * room)))
+    if target is not None:
+        at = min(room - 1, max(0, round(target / largest * room)))
         line = Text.assemble(line[:at], ("┃", "bold"), line[at + 1 :])
     return line
 
@@ -358,9 +358,9 @@ def rate_text(state: StreamState) -> str:
 
 def losses_of(state: StreamState) -> str:
     """Return what is lost or wrong in words; empty: nothing."""
-    said = [f"{state.lost} rows lost"] if state.lost else []
-    said += [f"{number} {flag.name}" for flag, number in state.counts.items() if number]
-    return ", ".join(said)
+    texts = [f"{state.lost} rows lost"] if state.lost else []
+    texts += [f"{number} {flag.name}" for flag, number in state.counts.items() if number]
+    return ", ".join(texts)
 
 
 def _rates(watched: Watched, now_s: float) -> list[Text]:

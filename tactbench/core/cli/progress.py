@@ -85,11 +85,11 @@ class Lines:
             remark(f"{self._stage}: {self._done}/{self._total} {what}{self._beside(now_s)}")
 
     def _beside(self, now_s: float) -> str:
-        said = [f"{self._stopped} stopped"] if self._stopped else []
+        texts = [f"{self._stopped} stopped"] if self._stopped else []
         left = self._total - self._done
         if left:
-            said.append(f"about {duration((now_s - self._began_s) / self._done * left)} to go")
-        return f" ({', '.join(said)})" if said else ""
+            texts.append(f"about {duration((now_s - self._began_s) / self._done * left)} to go")
+        return f" ({', '.join(texts)})" if texts else ""
 
     def working(self, what: str) -> None:
         """Say nothing: what is under way is no line."""
@@ -147,8 +147,8 @@ class _Bar:
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
         self._stopped += stopped
-        said = f"{self._stopped} stopped" if self._stopped else ""
-        self._shown.update(self._task, advance=1, now=what, stopped=said, refresh=True)
+        text = f"{self._stopped} stopped" if self._stopped else ""
+        self._shown.update(self._task, advance=1, now=what, stopped=text, refresh=True)
 
     def working(self, what: str) -> None:
         self._shown.update(self._task, now=what, refresh=True)

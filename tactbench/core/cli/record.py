@@ -123,9 +123,9 @@ def _sliding(scene: Scene, speed_mm_s: float, sensor: SensorDescriptor) -> Scene
     from tactbench.core.spec.quantity import sourced
     from tactbench.core.spec.scene import Slide
 
-    said = "the command line"
+    reference = "the command line"
     middle = scene.profile.duration.to("s") / 2
-    slide = Slide(speed=sourced(speed_mm_s, "mm/s", said), start=sourced(middle, "s", f"{said}: the middle"))
+    slide = Slide(speed=sourced(speed_mm_s, "mm/s", reference), start=sourced(middle, "s", f"{reference}: the middle"))
     hears = ("ac_pressure",) if sensor.spec.channels("ac_pressure") and "ac_pressure" not in scene.observe else ()
     return scene.model_copy(update={"slide": slide, "observe": (*scene.observe, *hears)})
 

@@ -63,8 +63,8 @@ def command(
     results = open_results(store, load_registry())
     for sentence in store.troubles:
         remark(f"{folder}: {sentence}")
-    with progress() as told:
-        made = make_report(results, out or folder / "report", told, draw=_drawer(), calibrated=_calibrated(folder))
+    with progress() as display:
+        made = make_report(results, out or folder / "report", display, draw=_drawer(), calibrated=_calibrated(folder))
     _print(made, shape)
     for sentence in made.missing:
         remark(f"Left out: {sentence}")

@@ -14,7 +14,7 @@ from tactbench.core.cli.threads import one_thread
 from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
-    from tactbench.core.cli.cells import Subject
+    from tactbench.core.cli.cells import StoredCell
     from tactbench.core.matrix.rerun import Again
 
 
@@ -33,10 +33,10 @@ def command(ctx: click.Context, cell: str, out: Path, shape: str) -> None:
     Exit code 0: identical; 1: something differs, or it fails; 2: usage.
     """
     one_thread()
-    from tactbench.core.cli.cells import subject
+    from tactbench.core.cli.cells import find_cell
     from tactbench.core.cli.screen import remark
 
-    found = subject(out, cell)
+    found = find_cell(out, cell)
     if found.row is not None and found.row.get("signal") is not None:
         remark(f"It was ended by signal {found.row['signal']} before; it is computed in this process now.")
     again = _compute(found)
@@ -56,7 +56,7 @@ def command(ctx: click.Context, cell: str, out: Path, shape: str) -> None:
     ctx.exit(0 if again.identical else 1)
 
 
-def _compute(found: Subject) -> Again:
+def _compute(found: StoredCell) -> Again:
     """Compute the cell; recordings of a simulation go where they are thrown away."""
     from tactbench.core.cli.cells import recordings_of
     from tactbench.core.cli.screen import remark

@@ -43,16 +43,16 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     from tactbench.core.tables.text import cut, visible
 
     rows, wrong = checked(store.rows())
-    told = [cut(visible(one), 300) for one in (*store.troubles, *wrong)]
+    messages = [cut(visible(one), 300) for one in (*store.troubles, *wrong)]
     if not rows:
         raise UsageError(
-            f"{store.folder} has no row that can be shown" + (f": {told[0]}." if told else "."),
+            f"{store.folder} has no row that can be shown" + (f": {messages[0]}." if messages else "."),
             hint="Run `tactbench run` again.",
         )
-    for one in told[:_MOST_TOLD]:
+    for one in messages[:_MOST_TOLD]:
         remark(f"Left out: {one}")
-    if len(told) > _MOST_TOLD:
-        remark(f"Left out: {len(told) - _MOST_TOLD} more rows.")
+    if len(messages) > _MOST_TOLD:
+        remark(f"Left out: {len(messages) - _MOST_TOLD} more rows.")
     return over_replicates(rows)
 
 

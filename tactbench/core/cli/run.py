@@ -48,7 +48,7 @@ def command(
     timeout: float | None,
     memory: int | None,
     scheduler: str | None,
-    **asked: Any,
+    **selection: Any,
 ) -> None:
     """Acquire, evaluate, rank.
 
@@ -66,14 +66,14 @@ def command(
     from tactbench.core.plugins.registry import installed
     from tactbench.core.statistics.replicates import over_replicates
 
-    matrix, folder = matrix_asked(installed(), **asked)
+    matrix, folder = matrix_asked(installed(), **selection)
     choice = choice_of(matrix, engine=engine, jobs=jobs, timeout=timeout, memory=memory, scheduler=scheduler)
     store = Store(out)
-    with progress() as told:
+    with progress() as display:
         outcome = run_matrix(
-            matrix, store, choice=choice, recordings=folder, progress=told,
-            operator=TerminalOperator(yes=yes, paused=told.paused) if matrix.rig_file else None,
-            shown=lambda rows: told.show(lambda: _so_far(rows)),
+            matrix, store, choice=choice, recordings=folder, progress=display,
+            operator=TerminalOperator(yes=yes, paused=display.paused) if matrix.rig_file else None,
+            shown=lambda rows: display.show(lambda: _so_far(rows)),
         )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
     rows = over_replicates(outcome.rows)

@@ -33,17 +33,17 @@ def scene_of(
     from tactbench.core.spec.quantity import sourced
     from tactbench.core.spec.scene import ForceRamp, Indenter, Scene
 
-    said = "the command line"
+    reference = "the command line"
     ramp = ForceRamp()
     change: dict[str, Any] = {}
     if force_n is not None:
-        change["end"] = sourced(force_n, "N", said)
+        change["end"] = sourced(force_n, "N", reference)
     if seconds is not None:
         share = seconds / ramp.duration.to("s")
-        change["duration"] = sourced(seconds, "s", said)
-        change["hold"] = sourced(ramp.hold.to("s") * share, "s", f"{said}: the same share of the duration")
+        change["duration"] = sourced(seconds, "s", reference)
+        change["hold"] = sourced(ramp.hold.to("s") * share, "s", f"{reference}: the same share of the duration")
         change["samples"] = max(1, round(ramp.samples * share))
-    indenter = Indenter() if cap_mm is None else Indenter(radius=sourced(cap_mm, "mm", said))
+    indenter = Indenter() if cap_mm is None else Indenter(radius=sourced(cap_mm, "mm", reference))
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels())) if sensor else ("taxel",)
     labels: dict[str, str | float | int] = {} if cap_mm is None else {"cap_radius_mm": cap_mm}
     observe = ("taxel",) if "taxel" in kinds else kinds

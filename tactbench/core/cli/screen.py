@@ -27,8 +27,8 @@ def console() -> Console:
 
 def width_without_terminal() -> int:
     """Return how wide a table may be in a file or a pipe, which have no edge; wider if ``COLUMNS`` says so."""
-    said = os.environ.get("COLUMNS", "")
-    return max(int(said) if said.isdecimal() else 0, WITHOUT_EDGE)
+    columns = os.environ.get("COLUMNS", "")
+    return max(int(columns) if columns.isdecimal() else 0, WITHOUT_EDGE)
 
 
 def remark(text: str) -> None:

@@ -57,7 +57,7 @@ def matrix_asked(
     scenario: str | None,
     nuisances: Sequence[str],
     latency: bool | None,
-    **asked: Any,
+    **selection: Any,
 ) -> tuple[MatrixSpec, Path | None]:
     """Return the matrix that the options ask for, and the folder of the recordings to replay if there is one.
 
@@ -66,7 +66,7 @@ def matrix_asked(
     UsageError
         If a file, a name or a combination of options is wrong.
     """
-    matrix = _matrix(**asked, replaying=recordings is not None)
+    matrix = _matrix(**selection, replaying=recordings is not None)
     simulation = simulation_of(
         registry, matrix.rig, matrix.sensors, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario,
         nuisances=nuisances, stated=matrix.simulation,

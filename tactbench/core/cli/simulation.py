@@ -87,9 +87,9 @@ def simulation_of(
             raise UsageError(f"--effects {word!r} lacks its sign.", hint=f"Write +{word} or -{word}.")
         if word[1:] not in known:
             raise UnknownNameError("effect", word[1:], sorted(known))
-    asked = Simulation.model_validate({**(stated or Simulation()).model_dump(), **change})
-    _check_nuisances(asked, [registry.sensors[name].spec for name in sensors])
-    return asked
+    simulation = Simulation.model_validate({**(stated or Simulation()).model_dump(), **change})
+    _check_nuisances(simulation, [registry.sensors[name].spec for name in sensors])
+    return simulation
 
 
 def _values_of(given: Sequence[str]) -> dict[str, float]:

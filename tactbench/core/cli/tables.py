@@ -56,9 +56,9 @@ def view_of(folder: Path, *, wide: bool, notes: bool, columns: str | None = None
         raise UsageError(
             f"--format {shape} always holds all columns.", hint=f"--columns is for {', '.join(FOR_PEOPLE)}."
         )
-    asked = [name.strip() for name in columns.split(",")] if columns is not None else []
+    names = [name.strip() for name in columns.split(",")] if columns is not None else []
     where = "" if folder == DEFAULT_FOLDER else str(folder)
-    return View(wide=wide, notes=notes, columns=known_columns(asked), folder=where)
+    return View(wide=wide, notes=notes, columns=known_columns(names), folder=where)
 
 
 def format_of(shape: str | None, to: Path | None) -> str:

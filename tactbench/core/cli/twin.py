@@ -23,7 +23,7 @@ def command() -> None:
 @command.command(name="explain")
 @click.option("--sensor", required=True, metavar="NAME", help="What is pressed on.")
 @click.option("--task", required=True, metavar="NAME", help="Whose scenes are planned.")
-@click.option("--scene", "wanted", metavar="NAME", help="One scene of the task; default: one of each kind of plan.")
+@click.option("--scene", "scene_name", metavar="NAME", help="One scene of the task; default: one of each kind of plan.")
 @click.option("--rig", metavar="NAME", help="Which simulated rig; default: the first.")
 @click.option("--rounds", type=click.IntRange(min=0), default=5, show_default=True, metavar="N",
               help="Recordings made to measure what each effect costs; 0: only the plan.")  # fmt: skip
@@ -38,7 +38,7 @@ def command() -> None:
 def explain(
     sensor: str,
     task: str,
-    wanted: str | None,
+    scene_name: str | None,
     rig: str | None,
     rounds: int,
     score: bool | None,
@@ -66,10 +66,11 @@ def explain(
         registry, name, [sensor], effects=effects, rung=rung, tolerance=tolerance, scenario=scenario,
         nuisances=nuisances,
     )  # fmt: skip
-    if score is None and (wanted is not None or not rounds):
+    if score is None and (scene_name is not None or not rounds):
         score = False
     print_explanations(
-        registry, name, sensor, task, wanted, simulation, rounds, shape, scoring=score, estimator=estimator, seed=seed
+        registry, name, sensor, task, scene_name, simulation, rounds, shape,
+        scoring=score, estimator=estimator, seed=seed,
     )  # fmt: skip
 
 

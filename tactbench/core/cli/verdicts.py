@@ -44,13 +44,13 @@ def likeness_checks(registry: Registry, rig: str, sensors: Sequence[str], record
     where = registry.rigs[rig].likeness
     if where is None:
         raise UsageError(f"The rig {rig!r} is not held against real sensors.", hint="Choose another with --rig.")
-    asked = [registry.sensors[name] for name in sensors] or [
+    chosen_sensors = [registry.sensors[name] for name in sensors] or [
         sensor for sensor in registry.sensors if getattr(sensor.spec, "likeness", ())
     ]
-    checks = [check for sensor in asked for check in load_object(where)(sensor, recordings)]
+    checks = [check for sensor in chosen_sensors for check in load_object(where)(sensor, recordings)]
     if not checks:
         raise UsageError(
-            f"There are no measured figures of {', '.join(sensor.name for sensor in asked) or 'any sensor'}.",
+            f"There are no measured figures of {', '.join(sensor.name for sensor in chosen_sensors) or 'any sensor'}.",
             hint="State them in the sensor's spec (SensorSpec.likeness).",
         )
     return checks
@@ -65,10 +65,10 @@ def carry_out(checks: Sequence[Check], only: Sequence[str]) -> list[Found]:
     chosen = [check for check in checks if not only or check.name in only or check.group in only]
     found: list[Found] = []
     unanswered: list[str] = []
-    with progress() as told:
-        told.begin("verify", len(chosen))
+    with progress() as display:
+        display.begin("verify", len(chosen))
         for check in chosen:
-            told.working(check.name)
+            display.working(check.name)
             began = time.perf_counter()
             try:
                 verdicts = list(check.run())
@@ -78,7 +78,7 @@ def carry_out(checks: Sequence[Check], only: Sequence[str]) -> list[Found]:
             found += [(check, verdict, spent) for verdict in verdicts]
             if not verdicts:
                 unanswered.append(f"No answer: {check.name}: {check.title}")
-            told.advance(check.name)
+            display.advance(check.name)
     for text in unanswered:
         remark(text)
     return found

@@ -12,7 +12,7 @@ from tactbench.core.cli.threads import one_thread
 from tactbench.core.tables.text import json_text, visible
 
 if TYPE_CHECKING:
-    from tactbench.core.cli.cells import Subject
+    from tactbench.core.cli.cells import StoredCell
     from tactbench.core.matrix.store import Row
     from tactbench.core.matrix.why import Explanation
 
@@ -34,14 +34,14 @@ def command(cell: str, out: Path, shape: str, **options: Any) -> None:
     cell the first is meant. Without options the cell is asked for as it was; with `run`'s options, as they ask for it.
     """
     one_thread()
-    from tactbench.core.cli.cells import subject
+    from tactbench.core.cli.cells import find_cell
 
-    found = subject(out, cell, options)
+    found = find_cell(out, cell, options)
     facts = _facts(found, found.explain())
     click.echo(json_text(facts, indent=1) if shape == "json" else _text(facts))
 
 
-def _facts(found: Subject, why: Explanation) -> dict[str, Any]:
+def _facts(found: StoredCell, why: Explanation) -> dict[str, Any]:
     row = found.row or {}
     folder = found.store.folder
     key = str(row.get("key") or "")
@@ -70,7 +70,7 @@ def _facts(found: Subject, why: Explanation) -> dict[str, Any]:
     }
 
 
-def _replicates(found: Subject) -> list[str]:
+def _replicates(found: StoredCell) -> list[str]:
     """Return what the cell came to over its replicates, and what each of them scored."""
     from tactbench.core.leaderboard.names import metric_name
     from tactbench.core.statistics.median import counted, percent
@@ -82,14 +82,14 @@ def _replicates(found: Subject) -> list[str]:
     unit, many = str(row["unit"]), row["n_replicates"]
     ends = interval(row["ci_low"], row["ci_high"], unit)
     over = counted(many, str(row["replicate_unit"]))
-    told = f"{metric_name(row)} {score(row['score'], unit)}"
-    told += (
+    text = f"{metric_name(row)} {score(row['score'], unit)}"
+    text += (
         f", {percent(many, row['replicate_unit'])} over {over}: {ends}" if ends != ABSENT else f" ({over}: no interval)"
     )
     if row["score_beyond_floor"] is not None:
         ends = interval(row["beyond_floor_ci_low"], row["beyond_floor_ci_high"], unit)
-        told += f"; beyond the floor {score(row['score_beyond_floor'], unit)}" + (f", {ends}" if ends != ABSENT else "")
-    parts = [told]
+        text += f"; beyond the floor {score(row['score_beyond_floor'], unit)}" + (f", {ends}" if ends != ABSENT else "")
+    parts = [text]
     if len(row["replicate_scores"]) > 1:
         each = zip(row["seeds"], row["replicate_scores"], strict=True)
         parts.append("each (seed: score): " + ", ".join(f"{seed}: {score(value, unit)}" for seed, value in each))
@@ -108,13 +108,13 @@ def _rests_on(row: Row) -> list[str]:
     from tactbench.core.tables.numbers import score, suffix
 
     unit = str(row["unit"])
-    told = [f"{metric_name(row)} {score(row['score'], unit)}"]
+    texts = [f"{metric_name(row)} {score(row['score'], unit)}"]
     if row.get("score_beyond_floor") is not None:
         floor = f"floor of the reference {score(row['reference_floor'], unit)}{suffix(unit)}"
-        told += [floor, f"beyond it {score(row['score_beyond_floor'], unit)}"]
+        texts += [floor, f"beyond it {score(row['score_beyond_floor'], unit)}"]
     if row.get("published") is not None:
-        told.append(f"published {score(row['published'], unit)} ({row['published_reference']})")
-    parts = [("score", "; ".join(told))]
+        texts.append(f"published {score(row['published'], unit)} ({row['published_reference']})")
+    parts = [("score", "; ".join(texts))]
     if row.get("scores"):
         parts.append(("other scores", ", ".join(f"{name} {value:.3g}" for name, value in row["scores"].items())))
     if row.get("chosen"):
@@ -130,14 +130,14 @@ def _rests_on(row: Row) -> list[str]:
     return [visible(f"{name}: {text}") for name, text in parts]
 
 
-def _provenance(found: Subject) -> list[str]:
+def _provenance(found: StoredCell) -> list[str]:
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.provenance.gather import foot
 
     return list(foot(provenance_of(found.store, [found.row or {}])))
 
 
-def _try(found: Subject, why: Explanation) -> str:
+def _try(found: StoredCell, why: Explanation) -> str:
     if found.row is None or (not why.hit and found.row["status"] == "done"):
         return "tactbench run: computes it"
     from tactbench.core.tables.text import command_line

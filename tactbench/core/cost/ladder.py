@@ -68,11 +68,11 @@ def climb(
     Ladder
         A row for every estimator, also for those that were skipped or failed; the best score first.
     """
-    asked = {(cell.protocol, cell.split) for cell in plan_cells(matrix, matrix.sensors, registry)}
-    if len(asked) > 1:
-        several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in asked))
+    ways = {(cell.protocol, cell.split) for cell in plan_cells(matrix, matrix.sensors, registry)}
+    if len(ways) > 1:
+        several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in ways))
         raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
-    outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress)
+    outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress, files=False)
     task = registry.tasks[matrix.tasks[0].name].spec
     done = [row for row in outcome.rows if row["status"] == "done" and row["seed"] == matrix.seed]
     data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None

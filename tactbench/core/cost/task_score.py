@@ -96,8 +96,8 @@ def task_score(
 
 def with_all_effects(simulation: Simulation | None) -> Simulation:
     """Return `simulation` with every installed effect asked for."""
-    asked = simulation or Simulation()
-    return asked.model_copy(update={"effects": (*asked.effects, "+all")})
+    chosen = simulation or Simulation()
+    return chosen.model_copy(update={"effects": (*chosen.effects, "+all")})
 
 
 def in_unit(score: float, unit: str) -> str:

@@ -192,16 +192,16 @@ class _Folds:
         self.folds += 1
         self.model, self.test, self.k = model, fold.test, k
 
-    def _keep(self, role: Role, asked: Part, given: npt.NDArray[Any], number: int) -> None:
+    def _keep(self, role: Role, part: Part, predicted: npt.NDArray[Any], number: int) -> None:
         """Keep what was answered, with time and reference force beside it."""
-        force = np.full(len(asked), np.nan)
-        for place in np.unique(asked.recording):
+        force = np.full(len(part), np.nan)
+        for place in np.unique(part.recording):
             table = self.data.tables[place]
             if table.force is not None:
-                mine = asked.recording == place
-                force[mine] = table.force[np.searchsorted(table.row, asked.row[mine])]
-        fold = np.full(len(asked), number, dtype=np.int64)
-        answered = Answers(asked.y, given, asked.recording, asked.row, fold, asked.time_s, force)
+                mine = part.recording == place
+                force[mine] = table.force[np.searchsorted(table.row, part.row[mine])]
+        fold = np.full(len(part), number, dtype=np.int64)
+        answered = Answers(part.y, predicted, part.recording, part.row, fold, part.time_s, force)
         self.sets.setdefault(role, []).append(answered)
 
 

@@ -98,8 +98,8 @@ def _row_interval_s(data: Dataset) -> float | None:
 
 
 def _step_s(table: Table) -> float | None:
-    told = table.meta.clock != "none" and len(table.time_s) > 1
-    return float(np.median(np.diff(table.time_s))) if told else None
+    timed = table.meta.clock != "none" and len(table.time_s) > 1
+    return float(np.median(np.diff(table.time_s))) if timed else None
 
 
 def _stated_s(stream: StreamSpec) -> float | None:

@@ -116,9 +116,9 @@ def summed_in_time(
 
 def _run(blocks_correlated: float, blocks: int) -> int:
     """Return how many neighbouring blocks to take together, a power of two, of which a recording has four or more."""
-    wanted = 1 << max(0, int(np.ceil(np.log2(max(blocks_correlated, 1.0)))))
+    length = 1 << max(0, int(np.ceil(np.log2(max(blocks_correlated, 1.0)))))
     most = 1 << max(0, int(np.floor(np.log2(max(blocks // FEWEST, 1)))))
-    return min(wanted, most)
+    return min(length, most)
 
 
 def _recording_names(data: Dataset) -> list[str]:

@@ -88,14 +88,14 @@ def select(
         return None
     pairs = _pairs(data, protocol, assignment, max(descriptor.window_grid))
     n_classes = len(data.classes)
-    told: Counter[str] = Counter() if counts is None else counts
+    counted: Counter[str] = Counter() if counts is None else counts
     tried: list[Candidate] = []
     sign = 1.0 if metric.higher_is_better else -1.0
     for k in descriptor.window_grid:
         filtered = [(part(a, scale_a, k), part(b, scale_b, k)) for a, scale_a, b, scale_b in pairs]
         for values in itertools.product(*grid.values()):
             params = {**given, **dict(zip(grid, values, strict=True))}
-            tried.append(Candidate(params, k, _score(descriptor, build, params, filtered, metric, n_classes, told)))
+            tried.append(Candidate(params, k, _score(descriptor, build, params, filtered, metric, n_classes, counted)))
     best = max(tried, key=lambda candidate: sign * candidate.score)  # of equals the first
     return Choice(best.params, best.k, best.score, tuple(tried))
 

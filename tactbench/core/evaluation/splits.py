@@ -42,27 +42,27 @@ class Assignment:
     """Name of the groups that training and test do not share; also those of an inner split."""
 
 
-def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: str | None) -> str:
-    """Return the split to use: the one asked for, or the task's first that the recordings can serve.
+def choose_split(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
+    """Return the split to use: the one that was requested, or the task's first that the recordings can serve.
 
     Raises
     ------
     UsageError
-        If the split asked for cannot be served; the message says which can.
+        If the requested split cannot be served; the message says which can.
     NotApplicable
-        If the protocol does not go with the split asked for, or it or every split of the task lacks what it needs.
+        If the protocol does not go with the requested split, or it or every split of the task lacks what it needs.
     """
-    split = _chosen(task, protocol, data, asked)
+    split = _chosen(task, protocol, data, requested)
     if protocol.first_row_only:
         require_first_rows(task, data, split)
     return split
 
 
-def _chosen(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: str | None) -> str:
+def _chosen(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: str | None) -> str:
     if protocol.roles_only:
-        if asked not in (None, "roles"):
+        if requested not in (None, "roles"):
             raise NotApplicable(
-                f"Protocol {protocol.name!r} splits by roles only; {asked!r} was asked for.",
+                f"Protocol {protocol.name!r} splits by roles only; {requested!r} was asked for.",
                 hint="Use --protocol deployable for other splits.",
             )
         if not {"train", "validation", "test"} <= {meta.role for meta in data.metas}:
@@ -72,13 +72,15 @@ def _chosen(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, asked: str | 
                 hint="Use --protocol deployable.",
             )
         return "roles"
-    if asked is not None:
-        if not _can(asked, data):
+    if requested is not None:
+        if not _can(requested, data):
             names = {name for table in data.tables for name in table.groups} | {"roles", "in-session", "shuffled"}
             names |= {name for name in task.splits if shots(name)}
             able = sorted(name for name in names if _can(name, data))
-            raise UsageError(f"These recordings cannot be split by {asked!r}.", hint=f"They can by: {', '.join(able)}.")
-        return asked
+            raise UsageError(
+                f"These recordings cannot be split by {requested!r}.", hint=f"They can by: {', '.join(able)}."
+            )
+        return requested
     for name in task.splits:
         if name != "shuffled" and _can(name, data):
             return name

@@ -59,11 +59,11 @@ def _timed(
     clock: Callable[[], float],
     at_most: int = AT_MOST,
 ) -> FloatArray:
-    wanted = np.linspace(0, rows - 1, at_most).astype(int)
-    for place in wanted[:WARM_UP]:
+    places = np.linspace(0, rows - 1, at_most).astype(int)
+    for place in places[:WARM_UP]:
         work(given(place))
     spent: list[float] = []
-    for place in np.random.default_rng(0).permutation(wanted):
+    for place in np.random.default_rng(0).permutation(places):
         row = given(place)
         began = clock()
         work(row)

@@ -71,8 +71,8 @@ def row_interval(row: Row) -> str:
 
 def _right(row: Row) -> str:
     """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
-    right, asked = row.get("recordings_right"), row.get("recordings_asked")
-    return ABSENT if right is None or asked is None else f"{right:.3g} of {asked:.3g}"
+    right, total = row.get("recordings_right"), row.get("recordings_asked")
+    return ABSENT if right is None or total is None else f"{right:.3g} of {total:.3g}"
 
 
 def _beyond(row: Row) -> str:

@@ -60,7 +60,7 @@ def parquet(table: Table) -> bytes:
 
 def kind(name: str) -> str:
     """Return what a column holds: whole, float, boolean or text; lists and tables are text."""
-    types = FORMAT[name].types if name in FORMAT else frozenset()
+    types = FORMAT.get(name, frozenset())
     for label, one in (("boolean", bool), ("float", float), ("whole", int)):
         if one in types:
             return label

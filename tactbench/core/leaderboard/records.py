@@ -40,7 +40,7 @@ OF_REPLICATES = (
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
-NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key].types.isdisjoint({list, dict}))
+NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key].isdisjoint({list, dict}))
 """Keys whose values are lists or tables: JSON inside a cell of CSV and Parquet."""
 
 OF_THE_MACHINE = frozenset({

@@ -79,9 +79,9 @@ def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> TextTab
     from tactbench.core.statistics.paired import difference  # numerics, for who compares
 
     lines: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
-    asked: dict[tuple[str, str, str], Row] = {}
+    by_way: dict[tuple[str, str, str], Row] = {}
     for row in members:
-        asked[sensor_name(row), answer_name(row), str(row.get(by))] = row
+        by_way[sensor_name(row), answer_name(row), str(row.get(by))] = row
         cells = lines.setdefault((sensor_name(row), answer_name(row)), {})
         if by == "fold":
             cells |= {way: _record(row, by, way, value) for way, value in _scores_of_folds(row)}
@@ -92,7 +92,7 @@ def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> TextTab
         for way, record in cells.items():
             if way != ways[0] and by != "fold" and start is not None and record["score"] is not None:
                 record["difference"] = record["score"] - start
-                found = difference(asked[(*names, way)], asked[(*names, ways[0])])
+                found = difference(by_way[(*names, way)], by_way[(*names, ways[0])])
                 if found.paired:
                     record["difference_low"], record["difference_high"] = found.low, found.high
     first = members[0]

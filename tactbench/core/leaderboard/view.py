@@ -49,7 +49,7 @@ DEFAULT_VIEW = View()
 WHOLE = View(wide=True, notes=True)
 
 
-def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
+def known_columns(names: Sequence[str]) -> tuple[str, ...]:
     """Return the names of columns that a person asks for by these or by their names for programs (``rank``).
 
     Raises
@@ -58,10 +58,10 @@ def known_columns(asked: Sequence[str]) -> tuple[str, ...]:
         If there is no such column.
     """
     known = {**{name: name for name in (*COLUMNS, CELL)}, **{shown: name for name, shown in SHOWN.items()}}
-    for name in asked:
+    for name in names:
         if name not in known:
             raise UnknownNameError("column", name, (*COLUMNS, CELL))
-    return tuple(dict.fromkeys(known[name] for name in asked))
+    return tuple(dict.fromkeys(known[name] for name in names))
 
 
 def document(table: Table, view: View) -> list[TextTable | tuple[str, ...]]:

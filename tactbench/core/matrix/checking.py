@@ -25,24 +25,24 @@ SAME_SCORE = 1e-9
 of processor, differ by less."""
 
 
-def fault_in(given: Any, asked: Row) -> str:
+def fault_in(given: Any, opened: Row) -> str:
     """Return what is wrong with what a cell gave, as a clause; "" if nothing is.
 
     Parameters
     ----------
     given
         What came; a row and the columns of its answers by role are wanted.
-    asked
+    opened
         The row as it was before anything was computed: it has every key, and says what was asked.
     """
     if not (isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], dict)):
         return f"it gave a {type(given).__name__} and not a row with its answers"
     row, sets = given
-    if row.keys() != asked.keys():
-        return f"its row has other keys: {', '.join(sorted(map(str, row.keys() ^ asked.keys())))}"
+    if row.keys() != opened.keys():
+        return f"its row has other keys: {', '.join(sorted(map(str, row.keys() ^ opened.keys())))}"
     for name in FIXED:
-        if row[name] != asked[name]:
-            return f"its row is that of another cell: its {name} is {row[name]!r}, not {asked[name]!r}"
+        if row[name] != opened[name]:
+            return f"its row is that of another cell: its {name} is {row[name]!r}, not {opened[name]!r}"
     if row["status"] != "done":
         return f"its status is {row['status']!r}"
     fault = fault_in_row(row)

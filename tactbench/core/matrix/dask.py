@@ -46,7 +46,6 @@ ALONE_S = 60.0
 MOST = 3
 """Differences between two environments that a message names."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-_LOUD = ("distributed", "distributed.client", "distributed.gc", "tornado", "tornado.application", "asyncio")
 
 
 class Dask:
@@ -168,13 +167,13 @@ def carry_out(request: bytes) -> bytes:
     key = worker.get_current_task()
     work, item, folder, limits, on_host = pickle.loads(request)
 
-    def wanted() -> bool:
+    def is_needed() -> bool:
         task = worker.state.tasks.get(key)
         at_work = worker.status in (Status.running, Status.paused)  # it closes when the scheduler has gone
         return at_work and task is not None and task.state != "cancelled"
 
     concurrency = on_host.get(worker.address, worker.state.nthreads)
-    pool = Pool(1, limits, preload=PRELOAD, wanted=wanted)
+    pool = Pool(1, limits, preload=PRELOAD, is_needed=is_needed)
     for _, outcome in pool.each(partial(_in_folder, folder, concurrency, work), [item]):
         if isinstance(outcome, BaseException):
             return pack({"error": dump_error(outcome)})
@@ -213,7 +212,7 @@ class SameEnvironment(WorkerPlugin):
         multiprocessing.current_process().daemon = False  # a daemon of `multiprocessing` may have no children
         os.environ.update(self._threads)
         multiprocessing.get_context("forkserver").set_forkserver_preload(list(PRELOAD))
-        forkserver.ensure_running()  # before the registry wants one for plugins
+        forkserver.ensure_running()  # before the registry starts one for plugins
         set_subreaper(True)  # what a crashed cell leaves behind becomes a child of this process, and is ended
         found = differences(self._expected, environment(installed()))
         self.differs = bool(found)
@@ -369,11 +368,8 @@ def _unreachable(address: str, why: str) -> UsageError:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep the library's log off the screen: what a user must know, rows and errors of ours say."""
-    before = {name: logging.getLogger(name).level for name in _LOUD}
-    for name in before:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    logging.disable()
     try:
         yield
     finally:
-        for name, level in before.items():
-            logging.getLogger(name).setLevel(level)
+        logging.disable(logging.NOTSET)

@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from tactbench.core.errors import UsageError
 from tactbench.core.matrix.evaluate_cell import PRELOAD
+from tactbench.core.pool.in_process import InProcess
 from tactbench.core.pool.limits import Limits
-from tactbench.core.pool.pool import Pool, R, T
+from tactbench.core.pool.pool import Pool
 from tactbench.core.pool.processes import can_fork
+
+if TYPE_CHECKING:
+    from tactbench.core.matrix.dask import Dask
 
 EngineName = Literal["in-process", "isolated", "dask"]
 ENGINES: tuple[EngineName, ...] = get_args(EngineName)
-
-
-class Engine(Protocol):
-    """Carries out work; what comes of an item does not depend on which engine it was."""
-
-    def each(self, work: Callable[..., R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
-        """Yield every item exactly once, as they end, with its result or the TactbenchError that stopped it.
-
-        Only a Ctrl-C by the user ends the iteration. Items may be taken one by one, or all at once.
-        """
 
 
 @dataclass(frozen=True)
@@ -79,18 +72,18 @@ class EngineChoice:
         """Return whether cells are really carried out in this process: one that aborts ends it."""
         return self.name == "in-process" and cells == 1
 
-    def engine(self, cells: int) -> Engine:
+    def engine(self, cells: int) -> Pool | InProcess | Dask:
         """Return the engine for so many cells.
 
-        In process, one cell is carried out here; of several, each in a child process, one at a time.
+        Its `each` yields every item exactly once, as they end, with its result or the TactbenchError that stopped it;
+        what comes of an item does not depend on the engine, and only a Ctrl-C by the user ends the iteration. In
+        process, one cell is carried out here; of several, each in a child process, one at a time.
         """
         if self.name == "dask":
             from tactbench.core.matrix.dask import Dask
 
             return Dask(self.jobs, self.limits, self.scheduler)
         if self.here(cells):
-            from tactbench.core.pool.in_process import InProcess
-
             return InProcess(self.limits)
         return Pool(self.concurrency(cells), self.limits, preload=preload())
 

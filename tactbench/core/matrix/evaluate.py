@@ -20,12 +20,14 @@ from tactbench.core.matrix.evaluate_cell import (
     this_host,
     unanswered,
 )
+from tactbench.core.matrix.key_book import KeyBook
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingPlan
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.recorded import Recorded, read_all, read_digest
 from tactbench.core.matrix.store import NotPlainError, Row, Store
-from tactbench.core.matrix.why import Book, beside
+from tactbench.core.matrix.why import beside, cell_entries
 from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Answers
 from tactbench.core.spec.status import STOPPED
@@ -34,7 +36,8 @@ from tactbench.core.spec.status import STOPPED
 def evaluate_all(
     cells: Sequence[Cell],
     recording_plan: RecordingPlan,
-    book: Book,
+    book: KeyBook,
+    keys: Keys,
     choice: EngineChoice,
     store: Store,
     made_by: str,
@@ -57,7 +60,7 @@ def evaluate_all(
     """
     recorded = recording_plan.recorded
     rows: dict[str, Row] = {}
-    keys: dict[str, str] = {}
+    key_of: dict[str, str] = {}
     jobs: list[Job] = []
     stopped: list[tuple[Cell, BaseException]] = []
     """Cells without their recordings."""
@@ -69,13 +72,13 @@ def evaluate_all(
         if trouble is None:
             try:
                 digests = tuple(recorded.digest(path) for path in paths)
-                keys[cell.name] = book.keys.of_cell(cell, digests)
+                key_of[cell.name] = keys.of_cell(cell, digests)
             except Exception as error:
                 trouble = error
         if trouble is not None:
             stopped.append((cell, trouble))
             continue
-        found = store.finished(keys[cell.name])
+        found = store.finished(key_of[cell.name])
         if found is not None:
             rows[cell.name] = reused(found, cell, installed().tasks[cell.task].spec)
             store.reuse(rows[cell.name])
@@ -84,7 +87,8 @@ def evaluate_all(
     computed = len(jobs) + len(stopped)
     if computed:
         progress.begin(stage, computed, alone=choice.here(len(jobs)))
-    book.note_cells(((job.cell, keys[job.cell.name], job.recordings) for job in jobs), recorded, store.folder)
+    keyed = ((job.cell, key_of[job.cell.name], job.recordings) for job in jobs)
+    book.write(cell_entries(keyed, keys, recorded, store.folder))
     for cell, trouble in stopped:
         known = {"key": "", "made_by": made_by, "host": this_host()}
         rows[cell.name] = store.note({**unanswered(cell, trouble), **known})
@@ -94,11 +98,11 @@ def evaluate_all(
         work = partial(solve, concurrency=choice.concurrency(len(jobs)), working=progress.working if here else None)
         with closing(choice.engine(len(jobs)).each(work, _ordered(jobs, choice))) as outcomes:
             for job, outcome in outcomes:
-                known = {"key": keys[job.cell.name], "made_by": made_by, "host": this_host()}
+                known = {"key": key_of[job.cell.name], "made_by": made_by, "host": this_host()}
                 rows[job.cell.name] = _kept(job.cell, outcome, known, recorded, store)
                 progress.advance(job.cell.name, stopped=rows[job.cell.name]["status"] in STOPPED)
         done = [job for job in jobs if rows[job.cell.name]["status"] == "done"]
-        jobs = [job for job in done if store.finished(keys[job.cell.name]) is None]
+        jobs = [job for job in done if store.finished(key_of[job.cell.name]) is None]
         if not jobs:
             break
     return rows, computed

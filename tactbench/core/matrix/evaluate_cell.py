@@ -267,12 +267,8 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-Groups = Mapping[tuple[str, tuple[Path, ...]], Sequence[Job]]
-"""Cells by task and recordings."""
-
-
-def shared(groups: Groups, pool: Pool) -> Iterator[Job]:
-    """Yield the cells group by group; before each group, read here what several of its cells need.
+def shared(groups: Mapping[tuple[str, tuple[Path, ...]], Sequence[Job]], pool: Pool) -> Iterator[Job]:
+    """Yield the cells group by task and recordings; before each group, read here what several of its cells need.
 
     A child process reads it first: what stops that is not read here, and stops each of the cells in its own process.
     """

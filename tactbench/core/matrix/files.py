@@ -31,10 +31,8 @@ def read_regular(path: Path, most: int, *, follow: bool = True) -> bytes:
         return file.read(most + 1)
 
 
-def replace_file(path: Path, content: bytes, *, sync: bool = True, mode: int = 0o666) -> None:
+def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:
     """Write `content` aside, sync it and rename it to `path`: a reader sees the old file or the new one.
-
-    A file that holds it already is left alone: syncing takes milliseconds, and a run in which nothing is new has none.
 
     Parameters
     ----------
@@ -44,31 +42,27 @@ def replace_file(path: Path, content: bytes, *, sync: bool = True, mode: int = 0
         What it is to hold.
     sync
         Whether it must survive a power cut, and not only the end of this process.
-    mode
-        Who may do what with a new file, before the process's mask.
 
     Raises
     ------
     OSError
         If the folder cannot be written; nothing is left behind.
     """
-    if content and _holds(path, content):
-        return
     aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        write_file(aside, content, sync=sync, mode=mode)
+        write_file(aside, content, sync=sync)
         aside.replace(path)
     except BaseException:
         aside.unlink(missing_ok=True)
         raise
 
 
-def write_file(path: Path, content: bytes, *, sync: bool, mode: int = 0o666) -> None:
-    """Write a file anew, without what Python's own files do besides; raises OSError if not all of it could be written.
+def write_file(path: Path, content: bytes, *, sync: bool) -> None:
+    """Write a file anew; raises OSError if not all of it could be written.
 
-    `sync` says whether it must survive a power cut; `mode`, who may do what with it, before the process's mask.
+    `sync` says whether it must survive a power cut.
     """
-    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), mode)
+    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
     try:
         write_all(file, content)
         if sync:
@@ -82,10 +76,3 @@ def write_all(file: int, content: bytes) -> None:
     written = os.write(file, content)
     while written < len(content):
         written += os.write(file, content[written:])
-
-
-def _holds(path: Path, content: bytes) -> bool:
-    try:
-        return path.stat().st_size == len(content) and path.read_bytes() == content
-    except OSError:
-        return False

@@ -15,6 +15,7 @@ import hashlib
 import json
 import os
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -124,12 +125,10 @@ class KeyBook:
 def recording_names(paths: Sequence[Path]) -> list[str]:
     """Return names of recordings that stay the same when they are made anew, each once."""
     above = Path(os.path.commonpath([path.parent for path in paths])) if paths else Path()
-    names: dict[str, None] = {}
-    for path in paths:
-        stem = re.sub(r"-[0-9a-f]{12}$", "", path.relative_to(above).with_suffix("").as_posix())
-        number, name = 1, stem
-        while name in names:
-            number += 1
-            name = f"{stem} ({number})"
-        names[name] = None
-    return list(names)
+    stems = [re.sub(r"-[0-9a-f]{12}$", "", path.relative_to(above).with_suffix("").as_posix()) for path in paths]
+    number: Counter[str] = Counter()
+    names = []
+    for stem in stems:
+        number[stem] += 1
+        names.append(stem if number[stem] == 1 else f"{stem} ({number[stem]})")
+    return names

@@ -55,9 +55,10 @@ class Keys:
         several = tuple(data)
         if several not in self._data:
             self._data[several] = _digest("\n".join(several))
-        return _digest(f"{self.answer(cell).digest} {self._data[several]} {_canonical(configuration_of(cell))}")
+        digests = f"{self.shared_by_cells(cell).digest} {self._data[several]}"
+        return _digest(f"{digests} {_canonical(configuration_of(cell))}")
 
-    def answer(self, cell: Cell) -> Fixed:
+    def shared_by_cells(self, cell: Cell) -> Fixed:
         """Return what all cells of one task and one estimator share."""
         pair = cell.task, cell.estimator
         if pair not in self._answers:

@@ -15,7 +15,6 @@ rule chooses the largest of an order or refuses, merging is idempotent, commutat
 
 from __future__ import annotations
 
-import glob
 import hashlib
 import os
 import shutil
@@ -28,7 +27,6 @@ from tactbench.core.errors import FolderError, FormatError, MissingRecordingErro
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.store.disk import sync_path, writing
 from tactbench.core.matrix.store.ledger import NAME, Entry, whole_text
-from tactbench.core.matrix.store.leftovers import alive
 from tactbench.core.matrix.store.rows import NAMING, named
 from tactbench.core.matrix.store.sharing import canonical
 from tactbench.core.matrix.summary import SEED_DECIDES
@@ -96,17 +94,17 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path, Sequence[
     for store in stores:
         entries = store.entries()
         if not entries:
-            said = f" ({'; '.join(store.troubles)})" if store.troubles else ""
-            raise FolderError(f"There are no results in {store.folder}{said}.", hint="Name what `run --out` wrote.")
+            troubles = f" ({'; '.join(store.troubles)})" if store.troubles else ""
+            raise FolderError(f"There are no results in {store.folder}{troubles}.", hint="Name what `run --out` wrote.")
         for entry in entries:
             _add(union, _Found(entry, store))
-        union.left_out += [f"{store.folder}: {said}" for said in store.troubles]
+        union.left_out += [f"{store.folder}: {trouble}" for trouble in store.troubles]
     recordings = _recordings(stores, union)
     if union.against:
         more = len(union.against) - _SHOWN
-        told = "; ".join(union.against[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+        listed = "; ".join(union.against[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
         raise FolderError(
-            f"The folders contradict each other: {told}.",
+            f"The folders contradict each other: {listed}.",
             hint="Nothing was written. Leave one of them out, or run the named cells again with the same version.",
         )
     entries = _lines(union)
@@ -197,9 +195,9 @@ def _provenances(stores: Iterable[Store]) -> dict[str, str]:
     for store in stores:
         with suppress(OSError):
             for path in sorted((store.folder / "provenance").iterdir()):
-                said = store.provenance(path.stem) if path.suffix == ".json" else {}
-                if said:
-                    found[path.name] = canonical(said) + "\n"
+                provenance = store.provenance(path.stem) if path.suffix == ".json" else {}
+                if provenance:
+                    found[path.name] = canonical(provenance) + "\n"
     return found
 
 
@@ -209,7 +207,9 @@ def _recordings(stores: Iterable[Store], union: _Union) -> dict[Path, tuple[str,
     contents: dict[Path, str] = {}
     for store in stores:
         root = store.folder / "recordings"
-        for path in _files(root):
+        for path in sorted(root.rglob("*.h5")):
+            if path.is_symlink() or not path.is_file():
+                continue
             relative = path.relative_to(root)
             try:
                 content = _verified(path)
@@ -223,15 +223,6 @@ def _recordings(stores: Iterable[Store], union: _Union) -> dict[Path, tuple[str,
             if relative not in found or bytes_digest < found[relative][0]:
                 found[relative] = (bytes_digest, path)
     return found
-
-
-def _files(root: Path) -> Iterator[Path]:
-    """Yield the recordings below a folder; links are not followed."""
-    for folder, _, names in os.walk(root, followlinks=False):
-        for name in sorted(names):
-            path = Path(folder) / name
-            if name.endswith(".h5") and not path.is_symlink() and path.is_file():
-                yield path
 
 
 def _verified(path: Path) -> str:
@@ -259,12 +250,9 @@ def _link(path: Path, target: Path) -> None:
 @contextmanager
 def _made(out: Path) -> Iterator[Path]:
     """Give a folder to fill, which becomes `out` when all went well and is removed when not."""
-    whole = out.absolute()
-    aside = whole.with_name(f".{whole.name}.{os.getpid()}.merging")
+    aside = out.absolute().with_name(f".{out.absolute().name}.merging")
     with writing(out):
-        for left in whole.parent.glob(f".{glob.escape(whole.name)}.*.merging"):
-            if left.suffixes[-2:-1] != [f".{os.getpid()}"] and not alive(left.suffixes[-2][1:]):
-                shutil.rmtree(left, ignore_errors=True)
+        shutil.rmtree(aside, ignore_errors=True)  # of a merge that was killed
         try:
             for part in ("cells", "provenance", "recordings", "cache"):
                 (aside / part).mkdir(parents=True, exist_ok=True)
@@ -272,7 +260,7 @@ def _made(out: Path) -> Iterator[Path]:
             for path in (*aside.rglob("*"), aside):
                 sync_path(path)
             aside.rename(out)
-            sync_path(whole.parent)
+            sync_path(aside.parent)
         except BaseException:
             shutil.rmtree(aside, ignore_errors=True)
             raise

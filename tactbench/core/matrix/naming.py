@@ -11,6 +11,8 @@ from tactbench.core.errors import UsageError, nearest
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.spec.scene import Simulation
 
+_SAME = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed")
+"""What a row and a cell call alike."""
 _SHOWN = 8
 """Cells named in a message."""
 
@@ -71,17 +73,9 @@ def cell_of(row: Mapping[str, Any]) -> Cell:
     """
     try:
         cell = Cell(
-            sensor=row["sensor"],
-            task=row["task"],
-            rig=row["rig"],
-            protocol=row["protocol"],
-            split=row["split"],
-            estimator=row["estimator"],
+            **{name: row[name] for name in _SAME},
             params=tuple(sorted(row["params"].items())),
             baseline=row["is_baseline"],
-            repeat=row["repeat"],
-            repeats=row["repeats"],
-            seed=row["seed"],
             latency=row["status"] != "done" or row.get("latency_n") is not None,
             simulation=Simulation.model_validate(row.get("simulation", {})),
         )

@@ -78,7 +78,7 @@ def plan_cells(
         question, or a parameter is not one of the estimator's.
     """
     cells: dict[Cell, None] = {}
-    said = rig_file.model_dump_json() if rig_file else ""
+    rig_file_text = rig_file.model_dump_json() if rig_file else ""
     repeats = matrix.repeats or (REPLICATES if registry.rigs[matrix.rig].simulated else 1)
     for repeat in range(1, repeats + 1):
         for choice in matrix.tasks:
@@ -86,22 +86,22 @@ def plan_cells(
             ways = _ways(task, choice)
             answers = _estimators(task, choice, registry)
             for sensor in sensors:
-                for (protocol, split), answer in product(ways, answers):
+                for (protocol, split), chosen in product(ways, answers):
                     cell = Cell(
                         sensor=sensor,
                         task=task.name,
                         rig=matrix.rig,
                         protocol=protocol,
                         split=split,
-                        estimator=answer.name,
-                        params=tuple(sorted(answer.params.items())),
-                        baseline=registry.estimators[answer.name].baseline,
+                        estimator=chosen.name,
+                        params=tuple(sorted(chosen.params.items())),
+                        baseline=registry.estimators[chosen.name].baseline,
                         repeat=repeat,
                         repeats=repeats,
                         seed=matrix.seed + repeat - 1,
                         latency=matrix.latency,
                         simulation=matrix.simulation,
-                        rig_file=said,
+                        rig_file=rig_file_text,
                     )
                     cells[cell] = None  # once, in the order in which they were asked for
     return with_probes(list(cells), registry) if matrix.probe else list(cells)
@@ -114,7 +114,7 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     apart, under `first-frame`, and with rows shuffled. A split in time keeps no recordings apart and is not probed.
     """
     every = dict.fromkeys(cells)
-    asked = frozenset(every)
+    planned = frozenset(every)
     for cell in cells:
         rules = protocol_called(cell.protocol)
         task = registry.tasks[cell.task].spec
@@ -122,7 +122,7 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
             continue
         if rules.roles_only and task.splits[:1] == ("roles",):
             same = replace(cell, protocol=DEPLOYABLE.name, split=None)
-            if same in asked:
+            if same in planned:
                 continue  # asked for already, and probed as such
         split = "roles" if rules.roles_only else None if cell.split == "shuffled" else cell.split
         honest = replace(cell, protocol=DEPLOYABLE.name, split=split)
@@ -161,25 +161,25 @@ def _expanded(task: TaskSpec, split: str) -> tuple[str, ...]:
 
 
 def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[EstimatorChoice]:
-    asked = list(choice.estimators) or [EstimatorChoice(name=name) for name in task.estimators]
-    whole = any(answer.name == "all" for answer in asked)
+    choices = list(choice.estimators) or [EstimatorChoice(name=name) for name in task.estimators]
+    whole = any(estimator.name == "all" for estimator in choices)
     fit = [other for other in registry.estimators if task.kind in other.kinds] if whole else []
-    asked = [answer for answer in asked if answer.name != "all"]
-    asked += [EstimatorChoice(name=other.name) for other in fit if not other.baseline]
+    choices = [estimator for estimator in choices if estimator.name != "all"]
+    choices += [EstimatorChoice(name=other.name) for other in fit if not other.baseline]
     # The task's own baselines come before any other: the first of them is the `baseline` column.
     trivial = [*task.baselines, *(other.name for other in fit if other.baseline)]
-    asked += [EstimatorChoice(name=name) for name in dict.fromkeys(trivial)]
-    for answer in asked:
-        descriptor = registry.estimators[answer.name]
+    choices += [EstimatorChoice(name=name) for name in dict.fromkeys(trivial)]
+    for estimator in choices:
+        descriptor = registry.estimators[estimator.name]
         if task.kind not in descriptor.kinds:
             fitting = [other.name for other in registry.estimators if task.kind in other.kinds]
             raise UsageError(
-                f"The estimator {answer.name!r} does {' and '.join(descriptor.kinds)}; task {task.name!r} is "
+                f"The estimator {estimator.name!r} does {' and '.join(descriptor.kinds)}; task {task.name!r} is "
                 f"{task.kind}.",
                 hint=f"Estimators for it: {', '.join(fitting)}.",
             )
-        _known_parameters(answer.name, answer.params, descriptor.params)
-    return asked
+        _known_parameters(estimator.name, estimator.params, descriptor.params)
+    return choices
 
 
 def _known_parameters(estimator: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> None:

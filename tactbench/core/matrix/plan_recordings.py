@@ -12,7 +12,7 @@ from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves
-from tactbench.core.matrix.recorded import Recorded, Subject, read_all, read_subject
+from tactbench.core.matrix.recorded import Recorded, read_all, read_sensor_and_scene
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.plugins.rig_files import load_rig_file
@@ -54,15 +54,15 @@ def requests_for(
     """
     requests: dict[RequestKey, list[RecordingRequest]] = {}
     for cell in cells:
-        wanted = request_key(cell)
-        if wanted in requests:
+        needed = request_key(cell)
+        if needed in requests:
             continue
-        requests[wanted] = []
-        for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(wanted[2]), cell.seed):
+        requests[needed] = []
+        for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(needed[2]), cell.seed):
             scene = planned.scene.asked(simulation)
             key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
-            path = store.recording_path(cell.sensor, scene.name, key)
-            requests[wanted].append(
+            path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
+            requests[needed].append(
                 RecordingRequest(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, cell.rig_file)
             )
     return requests
@@ -70,45 +70,6 @@ def requests_for(
 
 UNKNOWN = "unknown"
 """Sensor of recordings that cannot be read and lie where nothing tells whose they are."""
-
-
-@dataclass(frozen=True)
-class RecordingSource:
-    """What a rig that replays has."""
-
-    recordings: Mapping[str, Mapping[Path, Subject]]
-    """By name of sensor."""
-    unreadable: Mapping[str, Mapping[Path, BaseException]] = field(default_factory=dict)
-    """What could not be read, and why, by name of the sensor that it seems to be of."""
-
-    @property
-    def sensors(self) -> list[str]:
-        """Names of the sensors, in order."""
-        return sorted({*self.recordings, *self.unreadable})
-
-
-def recording_source(
-    paths: Sequence[Path], asked: Sequence[str], registry: Registry, recorded: Recorded, choice: EngineChoice
-) -> RecordingSource:
-    """Look at recordings that are replayed, in a process of its own: one that breaks the reader breaks nothing else.
-
-    Raises
-    ------
-    MissingRecordingError
-        If there are none.
-    """
-    if not paths:
-        raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
-    found: dict[str, dict[Path, Subject]] = {}
-    broken = read_all(read_subject, recorded.unread(paths, "sensor"), recorded, choice)
-    for path in paths:
-        if path not in broken:
-            subject = recorded.subject(path)
-            found.setdefault(subject.sensor, {})[path] = subject
-    unreadable: dict[str, dict[Path, BaseException]] = {}
-    for path, error in broken.items():
-        unreadable.setdefault(_owner(path, list(asked) or list(found), registry), {})[path] = error
-    return RecordingSource(found, unreadable)
 
 
 def _owner(path: Path, sensors: Sequence[str], registry: Registry) -> str:
@@ -119,38 +80,29 @@ def _owner(path: Path, sensors: Sequence[str], registry: Registry) -> str:
     return sensors[0] if len(sensors) == 1 else UNKNOWN
 
 
-def sensors_on(source: RecordingSource, asked: Iterable[str]) -> list[str]:
-    """Return the sensors to run: those asked for, or all that the rig has recordings of."""
-    names = list(asked)
-    for name in names:
-        if name not in source.sensors:
-            raise UnknownNameError("sensor in these recordings", name, source.sensors)
-    return names or source.sensors
-
-
-def serving(
-    task: TaskSpec, split: str | None, sensor: str, source: RecordingSource, registry: Registry
+def _serving(
+    task: TaskSpec,
+    split: str | None,
+    recordings: Mapping[Path, str | None],
+    unreadable: Mapping[Path, BaseException],
+    registry: Registry,
 ) -> tuple[list[Path], BaseException | None]:
     """Return the recordings of a sensor that belong to `task` under `split`, and why one of them cannot be read.
 
     A recording of a scene that some task planned serves the campaigns that plan a scene of this name; a recording whose
     scene nobody planned (an imported table) may serve any task. One that cannot be read is taken for a recording of the
     scene that its file is named after, and otherwise for one that would have served.
+
+    Parameters
+    ----------
+    recordings
+        The scene of each that can be read; None: nobody planned it.
     """
     names = {planned.scene.name for planned in task.scenes_for(split)}
-    readable = [
-        path
-        for path, (_, scene) in source.recordings.get(sensor, {}).items()
-        if scene is None or not names or scene in names
-    ]
-    broken = source.unreadable.get(sensor, {})
-    if not broken:
-        return readable, None
+    readable = [path for path, scene in recordings.items() if scene is None or not names or scene in names]
     others = {planned.scene.name for known in registry.tasks for planned in known.spec.scenes_for(split)} - names
-    for path, error in broken.items():
-        if not names or path.stem.rpartition("-")[0] not in others:
-            return readable, error
-    return readable, None
+    broken = (error for path, error in unreadable.items() if not names or path.stem.rpartition("-")[0] not in others)
+    return readable, next(broken, None)
 
 
 ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuffled")
@@ -174,14 +126,14 @@ class RecordingPlan:
 
     def paths(self, cell: Cell) -> list[Path]:
         """Return the recordings of a cell."""
-        wanted = request_key(cell)
-        return self.replayed.get(wanted) or [request.path for request in self.requests.get(wanted, ())]
+        key = request_key(cell)
+        return self.replayed.get(key) or [request.path for request in self.requests.get(key, ())]
 
     def trouble(self, cell: Cell) -> BaseException | None:
         """Return why a cell cannot have its recordings, if so."""
-        wanted = request_key(cell)
-        if wanted in self.troubles:
-            return self.troubles[wanted]
+        key = request_key(cell)
+        if key in self.troubles:
+            return self.troubles[key]
         paths = self.paths(cell)
         if not paths:
             return NotApplicable(
@@ -228,14 +180,31 @@ def plan_run(
 def _from_replay(
     matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], recorded: Recorded, choice: EngineChoice
 ) -> tuple[list[Cell], RecordingPlan]:
-    found = recording_source(paths, matrix.sensors, registry, recorded, choice)
-    cells = plan_cells(matrix, sensors_on(found, matrix.sensors), registry)
+    """Return the cells of recordings that exist; a child process reads them, so that a damaged one breaks nothing."""
+    if not paths:
+        raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
+    broken = read_all(read_sensor_and_scene, recorded.unread(paths, "sensor"), recorded, choice)
+    scenes: dict[str, dict[Path, str | None]] = {}
+    unreadable: dict[str, dict[Path, BaseException]] = {}
+    for path in paths:
+        if path not in broken:
+            sensor, scene = recorded.sensor_and_scene(path)
+            scenes.setdefault(sensor, {})[path] = scene
+    for path, error in broken.items():
+        unreadable.setdefault(_owner(path, matrix.sensors or list(scenes), registry), {})[path] = error
+    known = sorted({*scenes, *unreadable})
+    for name in matrix.sensors:
+        if name not in known:
+            raise UnknownNameError("sensor in these recordings", name, known)
+    cells = plan_cells(matrix, matrix.sensors or known, registry)
     recording_plan = RecordingPlan(recorded)
-    for wanted in dict.fromkeys(request_key(cell) for cell in cells):
-        sensor, task, split, _ = wanted
-        recording_plan.replayed[wanted], trouble = serving(registry.tasks[task].spec, split, sensor, found, registry)
+    for key in dict.fromkeys(request_key(cell) for cell in cells):
+        sensor, task, split, _ = key
+        recording_plan.replayed[key], trouble = _serving(
+            registry.tasks[task].spec, split, scenes.get(sensor, {}), unreadable.get(sensor, {}), registry
+        )
         if trouble is not None:
-            recording_plan.troubles[wanted] = trouble
+            recording_plan.troubles[key] = trouble
     return cells, recording_plan
 
 
@@ -249,9 +218,9 @@ def _without_rig(
     return cells, RecordingPlan(recorded, troubles={request_key(cell): trouble for cell in cells})
 
 
-def _replayed(asked: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
+def _replayed(arguments: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
     """Return the recordings of a rig that replays, None of one that records: in a child process, where it is built."""
-    name, recordings, rig_file = asked
+    name, recordings, rig_file = arguments
     rig = rig_of(name, installed(), recordings, rig_file)
     if not hasattr(rig, "recordings"):
         return None

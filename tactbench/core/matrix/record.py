@@ -11,10 +11,12 @@ from functools import lru_cache
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.installed import rig_of
+from tactbench.core.matrix.key_book import KeyBook
+from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, request_key
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.why import Book
+from tactbench.core.matrix.why import recording_entry
 from tactbench.core.plugins.interfaces import Operator, Rig
 from tactbench.core.plugins.registry import installed
 from tactbench.core.spec.rig_file import RigFile
@@ -26,7 +28,8 @@ GRACE_S = 5.0
 def acquire_missing(
     recording_plan: RecordingPlan,
     cells: Sequence[Cell],
-    book: Book,
+    book: KeyBook,
+    keys: Keys,
     choice: EngineChoice,
     progress: Progress,
     operator: Operator | None = None,
@@ -56,7 +59,7 @@ def acquire_missing(
     missing = [request for path, request in unique.items() if not path.exists()]
     if not missing:
         return
-    book.note_recordings(missing)
+    book.write(recording_entry(request, keys) for request in missing)
     simulated = all(_computed(request) for request in missing)
     hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     progress.begin(stage, len(missing), alone=False)

@@ -7,18 +7,9 @@ import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.remembered import Facts, FileMemory
-
-
-class Subject(NamedTuple):
-    """What a recording is a recording of."""
-
-    sensor: str
-    scene: str | None
-    """None: nobody planned its scene, for example that of an imported table."""
 
 
 class Recorded:
@@ -39,36 +30,33 @@ class Recorded:
 
     def unread(self, paths: Iterable[Path], fact: str) -> list[Path]:
         """Return those of `paths` that would have to be opened for the `fact`: ``digest`` or ``sensor``."""
-        return [path for path in paths if path not in self._digests and fact not in self._facts(path)]
+        return [path for path in paths if path not in self._digests and fact not in self._memory.facts(stat_of(path))]
 
     def learn(self, path: Path, facts: Facts, before: os.stat_result | None) -> None:
         """Take in what was read of a recording, perhaps in another process, which looked like `before` until then."""
-        digest = facts.get("digest")
-        if digest is not None:
-            self._digests[path] = digest
-        after = stat_of(path)
-        if before is not None and after is not None:
-            self._memory.learn(before, after, facts)
+        if facts.get("digest"):
+            self._digests[path] = str(facts["digest"])
+        self._memory.learn(before, stat_of(path), facts)
 
     def digest(self, path: Path) -> str:
         """Return the content digest of a recording; raises RecordingError if it cannot be read."""
         if path not in self._digests:
-            known = self._facts(path).get("digest")
-            if known is None:
-                before = stat_of(path)
-                self.learn(path, read_digest(path), before)
-            else:
-                self._digests[path] = known
+            before = stat_of(path)
+            facts = self._memory.facts(before)
+            self.learn(path, facts if facts.get("digest") else read_digest(path), before)
         return self._digests[path]
 
-    def subject(self, path: Path) -> Subject:
-        """Return what a recording is of; raises RecordingError if it cannot be read."""
-        facts = self._facts(path)
+    def sensor_and_scene(self, path: Path) -> tuple[str, str | None]:
+        """Return sensor and scene of a recording; raises RecordingError if it cannot be read.
+
+        There is no scene where nobody planned it, for example that of an imported table.
+        """
+        facts = self._memory.facts(stat_of(path))
         if facts.get("sensor") is None:
             before = stat_of(path)
-            facts = read_subject(path)
+            facts = read_sensor_and_scene(path)
             self.learn(path, facts, before)
-        return Subject(str(facts["sensor"]), facts["scene"])
+        return str(facts["sensor"]), facts["scene"]
 
     def made(self, path: Path, digest: str) -> None:
         """Note the digest of a recording that was made now, as its writer computed it."""
@@ -83,14 +71,8 @@ class Recorded:
     def save(self) -> None:
         """Write what was learned; a folder that cannot be written only costs time."""
         for path, before in self._made.items():
-            now = stat_of(path)
-            if before is not None and now is not None:
-                self._memory.learn(before, now, {"digest": self._digests[path]})
+            self._memory.learn(before, stat_of(path), {"digest": self._digests[path]})
         self._memory.save()
-
-    def _facts(self, path: Path) -> Facts:
-        stat = stat_of(path)
-        return {} if stat is None else self._memory.facts(stat)  # where there is none, reading says what is wrong
 
 
 def read_digest(path: Path) -> Facts:
@@ -100,7 +82,7 @@ def read_digest(path: Path) -> Facts:
     return {"digest": content_digest(path)}
 
 
-def read_subject(path: Path) -> Facts:
+def read_sensor_and_scene(path: Path) -> Facts:
     """Read what a recording is of; raises RecordingError if it cannot be read."""
     from tactbench.core.recording.reader import read_meta
 

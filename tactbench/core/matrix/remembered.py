@@ -47,15 +47,17 @@ class FileMemory:
         self._files = _entries(path)
         self._fresh = False
 
-    def facts(self, stat: os.stat_result) -> Facts:
-        """Return what is known about the file that looks like `stat`; nothing if it looks otherwise now."""
+    def facts(self, stat: os.stat_result | None) -> Facts:
+        """Return what is known about the file that looks like `stat`; nothing if it looks otherwise now, or is none."""
+        if stat is None:
+            return {}
         name, *looks = _looks(stat)
         entry = self._files.get(name)
         return entry[3] if entry is not None and entry[:3] == looks else {}
 
-    def learn(self, before: os.stat_result, after: os.stat_result, facts: Facts) -> None:
+    def learn(self, before: os.stat_result | None, after: os.stat_result | None, facts: Facts) -> None:
         """Remember `facts`, read between `before` and `after`, if the file did not change and was at rest."""
-        if _looks(before) != _looks(after) or not self._at_rest(before):
+        if before is None or after is None or _looks(before) != _looks(after) or not self._at_rest(before):
             return
         name, *looks = _looks(before)
         self._files[name] = [*looks, {**self.facts(before), **facts}]

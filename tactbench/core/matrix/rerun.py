@@ -43,7 +43,7 @@ def compute_again(
     store: Store,
     paths: Sequence[Path],
     requests: Sequence[RecordingRequest],
-    told: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> Again:
     """Compute `cell` again; nothing in the result folder changes.
 
@@ -55,8 +55,8 @@ def compute_again(
         The recordings it was answered from.
     requests
         How to make them anew, into another place; none where they cannot be made anew.
-    told
-        Told what is being done.
+    report
+        Called with what is being done.
     """
     found: list[str] = []
     trouble: BaseException | None = None
@@ -64,7 +64,7 @@ def compute_again(
     for request in requests:
         if request.path in made:
             continue
-        told(f"recording {request.sensor} {request.scene.name}")
+        report(f"recording {request.sensor} {request.scene.name}")
         try:
             made[request.path] = record(request)
         except Exception as error:
@@ -72,7 +72,7 @@ def compute_again(
             break
     if requests and trouble is None:
         found += _recordings(paths, [(request.scene.name, made[request.path]) for request in requests])
-    told(f"evaluating {cell.name}")
+    report(f"evaluating {cell.name}")
     outcome: Any = trouble
     if trouble is None:
         job = Job(cell, tuple(request.path for request in requests) or tuple(paths))
@@ -116,14 +116,12 @@ def _answers(before: Mapping[str, Answers], now: Mapping[str, Answers]) -> list[
         return ["the answers in the folder cannot be read"]
     found = []
     for role in sorted({*before, *now}):
-        if role not in before or role not in now:
-            found.append(f"answers on {role}: {'none before' if role not in before else 'none now'}")
+        if role not in before or role not in now or len(before[role]) != len(now[role]):
+            rows = [str(len(side[role])) if role in side else "no" for side in (before, now)]
+            found.append(f"answers on {role}: {rows[0]} rows before, {rows[1]} now")
             continue
         for column in fields(Answers):
             old, new = getattr(before[role], column.name), getattr(now[role], column.name)
-            if len(old) != len(new):
-                found.append(f"answers on {role}: {len(old)} rows before, {len(new)} now")
-                break
             if old.astype(new.dtype).tobytes() != new.tobytes():
                 other = sum(a.tobytes() != b.tobytes() for a, b in zip(old.astype(new.dtype), new, strict=True))
                 found.append(f"answers on {role}: {other} of {len(new)} values of {column.name} differ")

@@ -19,7 +19,6 @@ from tactbench.core.matrix.record import acquire_missing
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import fill_baselines, scores_text
-from tactbench.core.matrix.why import Book
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import installed
 from tactbench.core.provenance.gather import gather
@@ -55,6 +54,7 @@ def run_matrix(
     operator: Operator | None = None,
     progress: Progress | None = None,
     shown: Callable[[Sequence[Row]], None] | None = None,
+    files: bool = True,
 ) -> Outcome:
     """Record and evaluate `matrix`, reusing what `store` already has.
 
@@ -74,6 +74,8 @@ def run_matrix(
         Receives what happens.
     shown
         Called with all rows so far after each replicate but the last.
+    files
+        Whether to write ``run.json`` and ``scores.json``; else those of the last run stay as they are.
 
     Raises
     ------
@@ -89,7 +91,7 @@ def run_matrix(
         registry = installed()
         keys = Keys(registry)
         recorded = Recorded(store.folder / "cache" / "recordings.json")
-        book = Book(KeyBook(store.folder / "cache" / "keys"), keys)
+        book = KeyBook(store.folder / "cache" / "keys")
         cells, recording_plan = plan_run(matrix, registry, keys, store, recordings, recorded, choice)
         provenance = gather(keys.sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
         made_by = store.begin(provenance)
@@ -98,9 +100,9 @@ def run_matrix(
         rounds = _rounds(cells, choice, recording_plan)
         for number, some in enumerate(rounds, 1):
             prefix = f"replicate {number} of {len(rounds)}: " if len(rounds) > 1 else ""
-            acquire_missing(recording_plan, some, book, choice, progress, operator, stage=f"{prefix}recording")
+            acquire_missing(recording_plan, some, book, keys, choice, progress, operator, stage=f"{prefix}recording")
             found, now = evaluate_all(
-                some, recording_plan, book, choice, store, made_by, progress, stage=f"{prefix}evaluating"
+                some, recording_plan, book, keys, choice, store, made_by, progress, stage=f"{prefix}evaluating"
             )
             rows += [found[cell.name] for cell in some]
             computed += now
@@ -108,8 +110,9 @@ def run_matrix(
                 shown(tuple(rows))
         fill_baselines(rows)
         recorded.save()
-        store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
-        store.write("scores.json", scores_text(rows))
+        if files:
+            store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
+            store.write("scores.json", scores_text(rows))
     used = {cell.name: tuple(recording_plan.paths(cell)) for cell in cells}
     return Outcome(tuple(rows), provenance, computed, recorded.number_made, used)
 
@@ -118,10 +121,11 @@ def _rounds(cells: Sequence[Cell], choice: EngineChoice, recording_plan: Recordi
     """Return the cells of each replicate that has to be recorded; all at once where recordings exist already.
 
     Between rounds nothing is under way, so that a table can be shown. On a cluster, which takes seconds to start, all
-    replicates after the first are one round.
+    replicates are one round.
     """
+    if choice.name == "dask" or not recording_plan.requests:
+        return [list(cells)]
     rounds: dict[int, list[Cell]] = {}
     for cell in cells:
-        number = cell.repeat if recording_plan.requests else 1
-        rounds.setdefault(min(number, 2) if choice.name == "dask" else number, []).append(cell)
+        rounds.setdefault(cell.repeat, []).append(cell)
     return list(rounds.values())

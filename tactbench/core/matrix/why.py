@@ -38,30 +38,16 @@ def recording_entry(request: RecordingRequest, keys: Keys) -> Entry:
     )
 
 
-@dataclass(frozen=True)
-class Book:
-    """Where a run notes what goes into the keys it makes."""
-
-    pages: KeyBook
-    keys: Keys
-
-    def note_recordings(self, requests: Sequence[RecordingRequest]) -> None:
-        """Note what goes into the keys of recordings that are to be made."""
-        self.pages.write(recording_entry(request, self.keys) for request in requests)
-
-    def note_cells(self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path) -> None:
-        """Note what goes into the keys of cells that are to be computed: each with its key and its recordings."""
-        self.pages.write(self._entries(cells, recorded, folder))
-
-    def _entries(
-        self, cells: Iterable[tuple[Cell, str, Sequence[Path]]], recorded: Recorded, folder: Path
-    ) -> Iterator[Entry]:
-        data: dict[tuple[Path, ...], dict[str, dict[str, str]]] = {}
-        for cell, key, paths in cells:
-            several = tuple(paths)
-            if several not in data:  # one object for all cells of the same recordings: the book writes it once
-                data[several] = _data(paths, recorded, folder)
-            yield Entry(cell.name, key, _configuration(cell), self.keys.answer(cell), data[several])
+def cell_entries(
+    cells: Iterable[tuple[Cell, str, Sequence[Path]]], keys: Keys, recorded: Recorded, folder: Path
+) -> Iterator[Entry]:
+    """Yield what went into the keys of cells, for the book: each cell with its key and its recordings."""
+    data: dict[tuple[Path, ...], dict[str, dict[str, str]]] = {}
+    for cell, key, paths in cells:
+        several = tuple(paths)
+        if several not in data:  # one object for all cells of the same recordings: the book writes it once
+            data[several] = _data(paths, recorded, folder)
+        yield Entry(cell.name, key, _configuration(cell), keys.shared_by_cells(cell), data[several])
 
 
 def explain(
@@ -85,7 +71,7 @@ def explain(
     known
         Key of the latest result of that name, or nothing.
     """
-    now = _sections(keys.answer(cell), _configuration(cell))
+    now = _sections(keys.shared_by_cells(cell), _configuration(cell))
     missing = [path for path in paths if not path.exists()]
     before = book.sections(cell.name, known) if known else book.sections(cell.name)
     if missing or not paths:
@@ -100,8 +86,8 @@ def explain(
     if key == known or store.finished(key) is not None:
         return Explanation(key, True, ())
     if before is None:
-        said = "" if not known else "What the result that is there was made of is not recorded in this folder."
-        return Explanation(key, False, ("It was never computed into this folder.",) if not known else (), said)
+        unknown = "" if not known else "What the result that is there was made of is not recorded in this folder."
+        return Explanation(key, False, ("It was never computed into this folder.",) if not known else (), unknown)
     return Explanation(key, False, tuple(differences(before, now)))
 
 
@@ -125,8 +111,8 @@ def _unmade(
             continue
         found = differences(before, _sections(entry.fixed, entry.configuration))
         reasons.update(dict.fromkeys(found or [f"recording {request.scene.name} was removed"]))
-    said = [f"{len(never)} of {len(requests)} recordings were never made, {never[0]} first"] if never else []
-    return [*said, *reasons]
+    unmade = [f"{len(never)} of {len(requests)} recordings were never made, {never[0]} first"] if never else []
+    return [*unmade, *reasons]
 
 
 def _name(request: RecordingRequest) -> str:

@@ -202,13 +202,13 @@ def _is_ours(module: str) -> bool:
     return module.partition(".")[0] == __name__.partition(".")[0]
 
 
-def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], answer: Any) -> None:
-    """Add what a plugin brings: `answer` of a child process, or what it answers here if it is one of ours."""
+def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: Any) -> None:
+    """Add what a plugin brings: `reply` of a child process, or what it answers here if it is one of ours."""
     distribution, version = owner
     try:
-        if isinstance(answer, BaseException):
-            raise answer
-        offered = _ask(point) if answer is None else _described(answer)
+        if isinstance(reply, BaseException):
+            raise reply
+        offered = _ask(point) if reply is None else _described(reply)
     except Exception as error:
         reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", None)
         reason = reason or f"{type(error).__name__}: {error}"
@@ -253,8 +253,8 @@ def _plain(descriptor: Any) -> dict[str, Any]:
     return plain
 
 
-def _described(answer: Mapping[str, Any]) -> dict[str, list[Any]]:
-    return {family: [_KINDS[family].model_validate(one) for one in several] for family, several in answer.items()}
+def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
+    return {family: [_KINDS[family].model_validate(one) for one in several] for family, several in reply.items()}
 
 
 def _ask(point: EntryPoint) -> dict[str, list[Any]]:

@@ -20,11 +20,11 @@ def too_slow(limits: Limits) -> TimedOut:
 
 def out_of_memory(limits: Limits, error: MemoryError | None = None, traceback_text: str = "") -> OutOfMemory:
     """Say that it took more memory than it may, or that there was none left."""
-    said = f" ({error})" if error is not None and str(error) else ""
+    why = f" ({error})" if error is not None and str(error) else ""
     if limits.memory_mb is None:
-        return OutOfMemory(f"Memory ran out{said}.", hint="Run fewer at once (--jobs).", traceback_text=traceback_text)
+        return OutOfMemory(f"Memory ran out{why}.", hint="Run fewer at once (--jobs).", traceback_text=traceback_text)
     return OutOfMemory(
-        f"It was stopped: it asked for more than {limits.memory_mb} MB of memory{said}.",
+        f"It was stopped: it asked for more than {limits.memory_mb} MB of memory{why}.",
         hint="Allow more with --memory MB.",
         traceback_text=traceback_text,
     )

@@ -61,12 +61,12 @@ class InProcess:
                 outcome = load_error(dump_error(error))
             if os.getpid() != here:
                 os._exit(0)  # a child that the work forked, and that returned from it: it has nothing to say here
-        said = tail(log)
+        log_text = tail(log)
         os.close(log)
         if interrupted:
             raise KeyboardInterrupt
         if isinstance(outcome, CellStopped):
-            outcome.log, outcome.spent_s = said, time.monotonic() - began_s
+            outcome.log, outcome.spent_s = log_text, time.monotonic() - began_s
         return outcome
 
 

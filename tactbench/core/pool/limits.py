@@ -14,7 +14,7 @@ class Limits:
     memory_mb: int | None = None
     """MB (2**20 bytes) beyond what all items share: libraries and recordings that were read before it began."""
     grace_s: float = 0.0
-    """Seconds between being asked to end and being ended: a real device wants to be closed."""
+    """Seconds between being asked to end and being ended: a real device has to be closed."""
 
     def exceeded(self, spent_s: float) -> bool:
         """Return whether so many seconds are more than allowed."""

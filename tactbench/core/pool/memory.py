@@ -47,8 +47,8 @@ def data_limit(memory_mb: int | None) -> Iterator[None]:
     import resource
 
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    wanted = _data_bytes() + memory_mb * MB
-    allowed = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+    limit = _data_bytes() + memory_mb * MB
+    allowed = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
     resource.setrlimit(resource.RLIMIT_DATA, (allowed, hard))
     try:
         yield

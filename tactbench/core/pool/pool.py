@@ -34,7 +34,7 @@ class Pool:
     preload
         None: this process forks, which must have one thread. Else a fork server of `multiprocessing` does, which first
         imports these modules; work and items are pickled.
-    wanted
+    is_needed
         Asked while items are at work whether anybody still waits for them; the iteration ends where nobody does.
 
     Notes
@@ -50,13 +50,13 @@ class Pool:
         *,
         reuse: bool = False,
         preload: Sequence[str] | None = None,
-        wanted: Callable[[], bool] = lambda: True,
+        is_needed: Callable[[], bool] = lambda: True,
     ) -> None:
         self._jobs = jobs
         self._limits = limits
         self._reuse = reuse
         self._preload = preload
-        self._wanted = wanted
+        self._is_needed = is_needed
 
     def each(self, work: Callable[[T], R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
         """Yield every item with its result or what stopped it, in the order in which they end.
@@ -85,7 +85,7 @@ class Pool:
                             worker.begin(index, second)
                     except Exception as error:  # it cannot be pickled, or the system starts no more processes
                         yield item, error  # type: ignore[misc]
-                if not busy or not self._wanted():
+                if not busy or not self._is_needed():
                     return
                 wait([one for worker in busy for one in worker.waits_on], min(worker.wait_s() for worker in busy))
                 for worker in list(busy):
@@ -120,7 +120,7 @@ def _children_of_items(busy: list[Worker], idle: list[Worker]) -> Iterator[set[i
     Yields the children that were there before.
     """
     if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGCHLD) == signal.SIG_IGN:
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else the system reaps children, and nobody hears how they ended
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else the system reaps children, and their exit codes are lost
     before: bool | None = None
     spared: set[int] = set()
     try:

@@ -23,7 +23,7 @@ STACK_S = 0.1
 """Seconds that a process which is about to be ended has to write where it is."""
 CLOSED_S = 2.0
 """Seconds that a process may still be there once its pipe is closed: one that dies closes it first, and a busy machine
-tells of its end some tenths of a second later."""
+reports its end some tenths of a second later."""
 START_S = 60.0
 """Seconds that a process may take to begin with its item: a fork server imports libraries first."""
 
@@ -201,8 +201,8 @@ class Worker:
         while time.monotonic() < until and not (length == len(self._printed()) > before):
             length = len(self._printed())
             wait([self._process.sentinel], STACK_S / 20)
-        said = self._printed()[before:]
-        return said if "most recent call first" in said else ""
+        printed = self._printed()[before:]
+        return printed if "most recent call first" in printed else ""
 
     def _printed(self) -> str:
         return tail(self._log.fileno())

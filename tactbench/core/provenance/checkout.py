@@ -38,12 +38,12 @@ def checkout_of(folder: Path) -> Checkout | None:
     if not any((place / ".git").exists() for place in (folder, *folder.parents)):
         return None
     try:
-        (told,) = _asked(folder, ("status", "--porcelain=v2", "--branch", "--untracked-files=all", "--", "."))
-        head = re.search(rb"^# branch\.oid ([0-9a-f]{12})", told, re.MULTILINE)
+        (status,) = _asked(folder, ("status", "--porcelain=v2", "--branch", "--untracked-files=all", "--", "."))
+        head = re.search(rb"^# branch\.oid ([0-9a-f]{12})", status, re.MULTILINE)
         if head is None:
             return None  # nothing was ever committed
         commit = head[1].decode()
-        if all(line.startswith(b"#") for line in told.splitlines()):
+        if all(line.startswith(b"#") for line in status.splitlines()):
             return Checkout(commit, "")
         diff, unknown = _asked(
             folder,
@@ -69,7 +69,7 @@ def _asked(folder: Path, *several: Sequence[str]) -> list[bytes]:
         for arguments in several
     ]  # fmt: skip
     try:
-        said = [process.communicate(timeout=_PATIENCE_S)[0] for process in running]
+        outputs = [process.communicate(timeout=_PATIENCE_S)[0] for process in running]
         for process in running:
             if process.returncode:
                 raise subprocess.CalledProcessError(process.returncode, process.args)
@@ -78,4 +78,4 @@ def _asked(folder: Path, *several: Sequence[str]) -> list[bytes]:
             if process.poll() is None:
                 process.kill()
             process.wait()
-    return said
+    return outputs

@@ -90,11 +90,11 @@ def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     several
         What `gather` returned for each of the runs that the rows come from; keys may be missing.
     """
-    said = [*map(_software, several), *(text for one in several for text in _strangers(one)), *map(_place, several)]
+    texts = [*map(_software, several), *(text for one in several for text in _strangers(one)), *map(_place, several)]
     hosts = {str(one["host"]) for one in several if one.get("host")}
     if len(hosts) > 1:
-        said.append(f"{len(hosts)} hosts: times of one are not to be compared with times of another.")
-    return tuple(dict.fromkeys(text for text in said if text))
+        texts.append(f"{len(hosts)} hosts: times of one are not to be compared with times of another.")
+    return tuple(dict.fromkeys(text for text in texts if text))
 
 
 def _software(one: Mapping[str, Any]) -> str:

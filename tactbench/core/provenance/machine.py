@@ -39,9 +39,9 @@ def system() -> str:
 
     What `platform.platform` says of a Linux, without the kind of processor, for which Python starts a program.
     """
-    said = "-".join(filter(None, (platform.system(), platform.release(), platform.machine())))
+    system = "-".join(filter(None, (platform.system(), platform.release(), platform.machine())))
     library = "".join(platform.libc_ver())
-    return f"{said}-with-{library}" if library else said
+    return f"{system}-with-{library}" if library else system
 
 
 def memory_mb() -> int | None:
@@ -57,9 +57,9 @@ def container() -> str:
     for mark, kind in (("/run/.containerenv", "podman"), ("/.dockerenv", "docker")):
         if Path(mark).exists():
             return kind
-    told = os.environ.get("container")  # noqa: SIM112  (systemd's name for it)
-    if told:
-        return told
+    container = os.environ.get("container")  # noqa: SIM112  (systemd's name for it)
+    if container:
+        return container
     try:
         groups = Path("/proc/1/cgroup").read_text()
     except OSError:
@@ -80,5 +80,5 @@ def blas() -> dict[str, str]:
         text = (Path(spec.origin).parent / "__config__.py").read_text() if spec and spec.origin else ""
         found = re.search(r'"blas": \{\s*"name": "([^"]*)".*?"version": "([^"]*)"', text, re.DOTALL)
     name, version = found.groups() if found else ("unknown", "")
-    asked = next((os.environ[variable] for variable in _THREADS if variable in os.environ), "as many as cores")
-    return {"name": name, "version": version, "threads": asked}
+    threads = next((os.environ[variable] for variable in _THREADS if variable in os.environ), "as many as cores")
+    return {"name": name, "version": version, "threads": threads}

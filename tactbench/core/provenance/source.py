@@ -68,10 +68,10 @@ class SourceDigests:
 
         A package that nobody can find has a digest that never comes twice: what it makes is not used again.
         """
-        asked = frozenset(modules)
-        if (purpose, asked) not in self._behind:
-            self._behind[purpose, asked] = self._follow(asked, purpose)
-        return self._behind[purpose, asked]
+        roots = frozenset(modules)
+        if (purpose, roots) not in self._behind:
+            self._behind[purpose, roots] = self._follow(roots, purpose)
+        return self._behind[purpose, roots]
 
     def _follow(self, modules: frozenset[str], purpose: Purpose) -> Source:
         packages: dict[str, Mapping[str, str]] = {}
@@ -280,10 +280,10 @@ def _in(place: Path) -> Iterator[tuple[str, str, Path]]:
             yield normal(name), version, folder
     for folder in place.glob("*.egg-info"):
         try:
-            said = (folder / "PKG-INFO").read_text(encoding="utf-8")
+            text = (folder / "PKG-INFO").read_text(encoding="utf-8")
         except (OSError, ValueError):
             continue
-        found = dict(re.findall(r"^(Name|Version): *(\S+)$", said, re.MULTILINE))
+        found = dict(re.findall(r"^(Name|Version): *(\S+)$", text, re.MULTILINE))
         if len(found) == 2:
             yield normal(found["Name"]), found["Version"], folder
 

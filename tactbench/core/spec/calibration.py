@@ -244,13 +244,13 @@ class CalibrationSpec(Frozen):
         _once("published number", (one.output for one in self.published))
         known = [output.name for output in self.outputs]
         compared = (comparison for finding in self.findings for comparison in finding.all_of)
-        asked = [
+        names = [
             *(one.output for one in self.published),
             *(name for comparison in compared for name in (comparison.above, comparison.below)),
             *(output.stands_for for output in self.outputs if output.stands_for is not None),
             *(name for variation in self.variations for name in variation.outputs),
         ]
-        for name in asked:
+        for name in names:
             if name not in known:
                 close = nearest(name, known)
                 meant = f" (did you mean {close[0]!r}?)" if close else ""

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from types import NoneType
+from collections.abc import Mapping
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ConfigDict
@@ -157,29 +155,6 @@ def fault_in_scores(row: Mapping[str, Any]) -> str:
     return ""
 
 
-@dataclass(frozen=True)
-class Held:
-    """What may stand under a key."""
-
-    types: frozenset[type]
-    inside: frozenset[type] = frozenset()
-    """Types of what a list, or the values of a mapping, may hold; empty: any."""
-
-
-_WORDS = {
-    str: "text", float: "a number", int: "a whole number", bool: "yes or no", list: "a list", dict: "a mapping",
-    NoneType: "nothing",
-}  # fmt: skip
-
-
-def in_words(types: Iterable[type]) -> str:
-    """Return types in words: ``a number or nothing``."""
-    given = set(types)
-    if float in given:  # any whole number is a number
-        given.discard(int)
-    return " or ".join([word for one, word in _WORDS.items() if one in given])
-
-
 def _members(annotation: Any) -> list[Any]:
     """Return the members of a union; of anything else, itself."""
     is_union = get_origin(annotation) not in (None, list, dict, Literal)
@@ -191,12 +166,6 @@ def _types(annotation: Any) -> frozenset[type]:
     return frozenset(found | {int} if float in found else found)
 
 
-def _held(annotation: Any) -> Held:
-    inner = [get_args(one)[-1] for one in _members(annotation) if get_origin(one) in (list, dict)]
-    inside = _types(inner[0]) if inner and inner[0] is not Any else frozenset()
-    return Held(_types(annotation), inside)
-
-
-FORMAT: Mapping[str, Held] = {name: _held(kind) for name, kind in get_type_hints(ReplicatedRow).items()
-                              if name in ReplicatedRow.model_fields}  # fmt: skip
-"""By key. A row may have other keys, of which nothing is asked."""
+FORMAT: Mapping[str, frozenset[type]] = {name: _types(kind) for name, kind in get_type_hints(ReplicatedRow).items()
+                                         if name in ReplicatedRow.model_fields}  # fmt: skip
+"""Types of what may stand under a key. A row may have other keys, of which nothing is asked."""

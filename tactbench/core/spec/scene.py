@@ -290,8 +290,8 @@ def _with(model: M, way: tuple[str, ...], given: Mapping[str, float]) -> M:
     try:
         return type(model).model_validate({**dict(model), **change})
     except ValidationError as error:
-        told = ", ".join(f"{name} = {value:g}" for name, value in given.items())
-        raise UsageError(f"{told}: {error.errors()[0]['msg']}.", hint="Give another value.") from error
+        listed = ", ".join(f"{name} = {value:g}" for name, value in given.items())
+        raise UsageError(f"{listed}: {error.errors()[0]['msg']}.", hint="Give another value.") from error
 
 
 _PARTS: tuple[tuple[tuple[str, ...], type[Frozen]], ...] = (

@@ -92,22 +92,22 @@ def parse(unit: str) -> tuple[float, Dimension]:
 
 def with_unit(name: str, unit: str) -> str:
     """Return a name with its unit: ``force_noise_n``, ``drive_integral_mm_per_n_s``; the name of a pure number."""
-    told = unit.lower().replace("*", "_").replace("/", "_per_", 1).replace("/", "_")
-    return name if unit == "1" else f"{name}_{told}"
+    unit_text = unit.lower().replace("*", "_").replace("/", "_per_", 1).replace("/", "_")
+    return name if unit == "1" else f"{name}_{unit_text}"
 
 
-def conversion(given: str, wanted: str) -> float:
-    """Return the factor that turns a number in `given` into one in `wanted`.
+def conversion(given: str, target_unit: str) -> float:
+    """Return the factor that turns a number in `given` into one in `target_unit`.
 
     Raises
     ------
     UsageError
         If either unit is unknown or the two measure different things.
     """
-    (size, dimension), (target, wanted_dimension) = parse(given), parse(wanted)
+    (size, dimension), (target, wanted_dimension) = parse(given), parse(target_unit)
     if dimension != wanted_dimension:
         raise UsageError(
-            f"The unit {given!r} cannot be turned into {wanted!r}: they measure different things.",
+            f"The unit {given!r} cannot be turned into {target_unit!r}: they measure different things.",
             hint="Correct the unit, or state the conversion explicitly.",
         )
     return size / target

@@ -197,9 +197,9 @@ def _remarks(members: Sequence[Row], done: Sequence[Row]) -> list[str]:
     """Return what rows remark, those of a part of the replicates with their number, and which were stopped."""
     many = len(done)
     counts = Counter(remark for row in done for remark in dict.fromkeys(row["remarks"]))
-    told = [remark if n == many else f"in {n} of {many} replicates: {remark}" for remark, n in counts.items()]
+    texts = [remark if n == many else f"in {n} of {many} replicates: {remark}" for remark, n in counts.items()]
     stopped = [row for row in members if row["status"] != "done"]
-    return [*told, *(f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped)]
+    return [*texts, *(f"replicate with seed {row['seed']}: {row['status']}: {row['reason']}" for row in stopped)]
 
 
 def _right(done: Sequence[Row]) -> dict[str, Any]:
@@ -209,7 +209,7 @@ def _right(done: Sequence[Row]) -> dict[str, Any]:
         return {"recordings_right": None, "recordings_asked": None}
     return {
         "recordings_right": sum(right for right, _ in each) / len(each),
-        "recordings_asked": sum(asked for _, asked in each) / len(each),
+        "recordings_asked": sum(total for _, total in each) / len(each),
     }
 
 

@@ -18,7 +18,7 @@ MADE_BY = {"tactbench": "0", "commit": "c"}
 def _run(path, *, n=30, jobs=1, spec=None, seed=5, work=work, made_by=MADE_BY):
     spec = spec or procedure()
     journal = Journal(path, spec, seed, made_by)
-    return carry_out_missing(spec, seed, n, journal, jobs=jobs, told=Silence(), work=work), journal
+    return carry_out_missing(spec, seed, n, journal, jobs=jobs, progress=Silence(), work=work), journal
 
 
 class Ended(BaseException):

@@ -46,17 +46,17 @@ def refusing(trial: Trial):
 
 def _varied(folder, work=seeing):
     spec = procedure(variations=VARIATIONS)
-    return spec, carry_out_variations(spec, 5, folder, {"commit": "c"}, jobs=1, told=Silence(), work=work)
+    return spec, carry_out_variations(spec, 5, folder, {"commit": "c"}, jobs=1, progress=Silence(), work=work)
 
 
-def _result(folder, n=40):
-    spec, varied = _varied(folder)
-    return CalibrationResult(spec, 5, tuple(draws(n, spec)), {"commit": "c"}, 90.0, varied=varied)
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    spec, varied = _varied(tmp_path_factory.mktemp("varied"))
+    return CalibrationResult(spec, 5, tuple(draws(40, spec)), {"commit": "c"}, 90.0, varied=varied)
 
 
-def test_settings_have_the_same_seeds_and_differ_by_what_they_give(tmp_path):
-    _, varied = _varied(tmp_path)
-    first, second = varied["width"]
+def test_settings_have_the_same_seeds_and_differ_by_what_they_give(result):
+    first, second = result.varied["width"]
     assert [draw.seed for draw in first] == [draw.seed for draw in second]
     assert len({draw.seed for draw in first}) == 5
     for width, own in zip(WIDTHS, (first, second), strict=True):
@@ -77,11 +77,10 @@ def test_a_changed_setting_is_another_procedure(tmp_path):
     other = [{**VARIATIONS[0], "settings": VARIATIONS[0]["settings"][::-1]}]
     spec = procedure(variations=other)
     with pytest.raises(UsageError, match="another procedure"):
-        carry_out_variations(spec, 5, tmp_path, {}, jobs=1, told=Silence(), work=seeing)
+        carry_out_variations(spec, 5, tmp_path, {}, jobs=1, progress=Silence(), work=seeing)
 
 
-def test_they_are_written_and_read_back(tmp_path):
-    result = _result(tmp_path / "journals")
+def test_they_are_written_and_read_back(result, tmp_path):
     write_result(result, tmp_path / "calibration")
     found = load_result(tmp_path)
     bare = {
@@ -95,8 +94,8 @@ def test_they_are_written_and_read_back(tmp_path):
 @pytest.mark.parametrize(
     "line", ["width,3,0,1,done,,narrow,1.0", "height,1,0,1,done,,narrow,1.0", "width,1,0,1,odd,,,"]
 )
-def test_settings_that_are_none_are_refused(tmp_path, line):
-    write_result(_result(tmp_path / "journals"), tmp_path / "calibration")
+def test_settings_that_are_none_are_refused(result, tmp_path, line):
+    write_result(result, tmp_path / "calibration")
     path = tmp_path / "calibration" / "variations.csv"
     path.write_text(path.read_text() + line + "\n")
     with pytest.raises(FormatError, match="not a finished calibration"):
@@ -107,8 +106,7 @@ def _rows(table):
     return [dict(zip(table.columns, line, strict=True)) for line in table.lines]
 
 
-def test_a_table_has_a_row_for_each_setting(tmp_path):
-    result = _result(tmp_path)
+def test_a_table_has_a_row_for_each_setting(result):
     (table,) = [one for one in text_tables(result, summary(result)) if one.title.startswith("Some widths")]
     assert [row["setting"] for row in _rows(table)] == ["width 0.1", "width 0.5"]
     assert [row["seeds"] for row in _rows(table)] == ["4", "4"]
@@ -117,8 +115,7 @@ def test_a_table_has_a_row_for_each_setting(tmp_path):
     assert not [one for one in text_tables(without, summary(without)) if one.title.startswith("Some widths")]
 
 
-def test_an_earlier_calibration_stands_beside(tmp_path):
-    result = _result(tmp_path / "journals")
+def test_an_earlier_calibration_stands_beside(result, tmp_path):
     wider = procedure(nuisances=[
         {**one.model_dump(), "prior": {"kind": "uniform", "low": 0.0, "high": 2.0}} if one.name == "width"
         else one.model_dump()

@@ -8,24 +8,24 @@ import sys
 
 import pytest
 
-from tests.conftest import Shell, Verbs
+from tests.conftest import Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
 from tests.core.pool.patience import ending
 
 PROCEDURE = """
 title: Small
 seed: 3
-draws: 14
+draws: 11
 rig: twin
 protocol: karl2016
 nuisances:
   - {name: force_noise_n, reason: r, source: assumed,
      prior: {kind: uniform, low: 0.2, high: 1.0}}
-  - {name: noise, sets: noise_scale, sensors: [icub], reason: r, source: assumed,
+  - {name: noise, sets: noise_scale, sensors: [ideal], reason: r, source: assumed,
      prior: {kind: log-uniform, low: 0.1, high: 10}}
 outputs:
-  - {name: ramp, title: Time index, sensor: icub, task: force, unit: N, estimator: {name: time-index}}
-  - {name: ridge, title: Ridge, sensor: icub, task: force, unit: N, estimator: {name: ridge}}
+  - {name: ramp, title: Time index, sensor: ideal, task: force, unit: N, estimator: {name: time-index}}
+  - {name: ridge, title: Ridge, sensor: ideal, task: force, unit: N, estimator: {name: ridge}}
 published:
   - {output: ramp, value: 0.6, scale: 0.15, scale_reason: s, use: fitted, source: {tag: assumed, reference: x}}
   - {output: ridge, value: 0.6, scale: 0.15, scale_reason: s, use: held out, source: {tag: assumed, reference: x}}
@@ -39,9 +39,9 @@ CALIBRATE = ("calibrate", "--config", "small.yaml", "--format", "json")
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
-    shell = Shell(tmp_path_factory.mktemp("calibrate"))
-    (shell.folder / "small.yaml").write_text(PROCEDURE)
-    return shell, shell(*CALIBRATE, "--out", "whole", "--jobs", "2")
+    verbs = Verbs(tmp_path_factory.mktemp("calibrate"))
+    (verbs.folder / "small.yaml").write_text(PROCEDURE)
+    return verbs, verbs(*CALIBRATE, "--out", "whole", "--jobs", "2")
 
 
 def test_tables_on_stdout_progress_on_stderr(calibrated):
@@ -57,46 +57,46 @@ def test_tables_on_stdout_progress_on_stderr(calibrated):
 
 
 def test_the_files_of_a_calibration(calibrated):
-    shell, _ = calibrated
-    folder = shell.folder / "whole" / "calibration"
+    verbs, _ = calibrated
+    folder = verbs.folder / "whole" / "calibration"
     assert {path.name for path in folder.iterdir()} == {
         *("draws.jsonl", "draws.csv", "run.json", "ranges.json", "findings.json", "sensitivity.json"),
         *("draws.png", "draws.pdf", "sensitivity.png", "sensitivity.pdf"),
     }
-    assert json.loads((folder / "ranges.json").read_text())["draws"] == 14
-    assert len((folder / "draws.csv").read_text().splitlines()) == 15
+    assert json.loads((folder / "ranges.json").read_text())["draws"] == 11
+    assert len((folder / "draws.csv").read_text().splitlines()) == 12
     assert json.loads((folder / "run.json").read_text())["made_by"]["numpy"]
 
 
 def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
-    shell, _ = calibrated
+    verbs, _ = calibrated
     env = {**os.environ, "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}
-    journal = shell.folder / "cut" / "calibration" / "draws.jsonl"
+    journal = verbs.folder / "cut" / "calibration" / "draws.jsonl"
     with ending(
         [sys.executable, "-m", "tactbench", *CALIBRATE, "--out", "cut", "--jobs", "2"],
-        cwd=shell.folder, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        cwd=verbs.folder, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as running:  # fmt: skip
         # Its progress tells when the first draws are down: no clock and no busy waiting.
-        first = next(line for line in running.stderr if "/14" in line)
+        first = next(line for line in running.stderr if "/11" in line)
         assert "done" in first
         running.send_signal(signal.SIGINT)
         _, said = running.communicate(timeout=60)
     assert running.returncode == 130, said
     assert "goes on from there" in said
     kept = journal.read_text().count("\n") - 1
-    assert 1 <= kept < 14
-    rest = shell(*CALIBRATE, "--out", "cut")
-    assert f"{kept} of 14 draws were found finished" in rest.stderr
-    whole = shell.folder / "whole" / "calibration"
+    assert 1 <= kept < 11
+    rest = verbs(*CALIBRATE, "--out", "cut")
+    assert f"{kept} of 11 draws were found finished" in rest.stderr
+    whole = verbs.folder / "whole" / "calibration"
     for name in ("draws.csv", "ranges.json", "findings.json", "sensitivity.json"):
         assert (journal.parent / name).read_bytes() == (whole / name).read_bytes()
 
 
 def test_what_is_there_is_shown_again_as_a_table(calibrated):
-    shell, _ = calibrated
-    shown = Verbs(shell.folder)("calibrate", "--show", "--out", "whole")
+    verbs, _ = calibrated
+    shown = verbs("calibrate", "--show", "--out", "whole")
     assert "the calibration in whole/calibration" in shown.stderr
-    for text in ("Small (SIM)", "held out", "Time is the bound", "Partial rank correlations", "14 draws"):
+    for text in ("Small (SIM)", "held out", "Time is the bound", "Partial rank correlations", "11 draws"):
         assert text in shown.stdout
 
 
@@ -109,11 +109,11 @@ def test_what_is_there_is_shown_again_as_a_table(calibrated):
     ],
 )
 def test_wrong_words_are_answered_with_the_next_step(calibrated, arguments, says):
-    shell, _ = calibrated
-    assert_one_clear_screen(Verbs(shell.folder)("calibrate", *arguments, code=2), says)
+    verbs, _ = calibrated
+    assert_one_clear_screen(verbs("calibrate", *arguments, code=2), says)
 
 
 def test_a_misspelt_procedure_is_answered_with_its_line(calibrated):
-    shell, _ = calibrated
-    (shell.folder / "wrong.yaml").write_text(PROCEDURE.replace("below: ramp", "below: rampe"))
-    assert_one_clear_screen(Verbs(shell.folder)("calibrate", "--config", "wrong.yaml", code=2), "did you mean 'ramp'")
+    verbs, _ = calibrated
+    (verbs.folder / "wrong.yaml").write_text(PROCEDURE.replace("below: ramp", "below: rampe"))
+    assert_one_clear_screen(verbs("calibrate", "--config", "wrong.yaml", code=2), "did you mean 'ramp'")

@@ -16,7 +16,7 @@ from tactbench.core.cli.config import shipped_results
 from tactbench.core.report.datasheet import OF_DEVICES
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.plugin import DataSheet, PhysicalRange, Source, UsageError, load_registry, sourced
-from tests.conftest import Shell, Verbs
+from tests.conftest import Verbs
 
 ROOT = Path(__file__).parents[3]
 WISH = ("--task", "force", "--max-delay-ms", "2", "--range-n", "5", "--rate-hz", "10")
@@ -24,10 +24,10 @@ WISH = ("--task", "force", "--max-delay-ms", "2", "--range-n", "5", "--rate-hz",
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    shell = Shell(tmp_path_factory.mktemp("ran"))
+    verbs = Verbs(tmp_path_factory.mktemp("ran"))
     asked = ("--sensor", "icub", "--task", "force", "--estimator", "ols", "--protocol", "karl2016")
-    shell("run", *asked, "--repeats", "5")
-    return Verbs(shell.folder)
+    verbs("run", *asked, "--repeats", "5")
+    return verbs
 
 
 def on_a_terminal(folder, *arguments, columns=80):

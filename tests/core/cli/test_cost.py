@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from tests.conftest import Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
 from tests.core.cost.test_ladder import presses
 
@@ -26,22 +27,22 @@ def test_whoever_breaks_costs_its_own_row_only(shell):
     assert "the timed model scores" in rows["wavers"]["notes"][0]
     assert json.loads((shell.folder / "tactbench-results/cost/made-force.json").read_text())["rows"]
     assert "timing: " in done.stderr
-    again = shell(*ASKED, "--estimator", "ols", "--rounds", "1", "--format", "csv")
+    again = Verbs(shell.folder)(*ASKED, "--estimator", "ols", "--rounds", "1", "--format", "csv")
     listed = list(csv.DictReader(io.StringIO(again.stdout)))
     assert {row["estimator"] for row in listed} == {"ols", "mean", "time-index"}
     assert all(float(row["answer_delay_ms"]) > 0 for row in listed)
 
 
-def test_what_is_timed_adds_no_row_to_a_leaderboard_and_what_a_run_has_finished_is_not_done_again(shell):
-    presses(shell.folder / "shelf")
+def test_what_is_timed_adds_no_row_to_a_leaderboard_and_what_a_run_has_finished_is_not_done_again(verbs):
+    presses(verbs.folder / "shelf")
     asked = ("--sensor", "made", "--task", "force", "--recordings", "shelf", "--split", "session", "--out", "out")
-    shell("run", *asked, "--estimator", "ols")
-    before = shell("leaderboard", "out", "--format", "json").stdout
-    ledger = (shell.folder / "out" / "index.jsonl").read_bytes()
-    shell("cost", *asked, "--rounds", "1", "--estimator", "ols", "--estimator", "knn")
-    assert shell("leaderboard", "out", "--format", "json").stdout == before
-    assert (shell.folder / "out" / "index.jsonl").read_bytes() == ledger
-    rows = json.loads(shell("leaderboard", "out/cost", "--format", "json").stdout)
+    verbs("run", *asked, "--estimator", "ols")
+    before = verbs("leaderboard", "out", "--format", "json").stdout
+    ledger = (verbs.folder / "out" / "index.jsonl").read_bytes()
+    verbs("cost", *asked, "--rounds", "1", "--estimator", "ols", "--estimator", "knn")
+    assert verbs("leaderboard", "out", "--format", "json").stdout == before
+    assert (verbs.folder / "out" / "index.jsonl").read_bytes() == ledger
+    rows = json.loads(verbs("leaderboard", "out/cost", "--format", "json").stdout)
     assert {row["estimator"] for row in rows} == {"ols", "knn", "mean", "time-index"}
     made_by = {row["estimator"]: row["made_by"] for row in json.loads(before)}
     wall = {row["estimator"]: row["wall_s"] for row in json.loads(before)}
@@ -50,9 +51,9 @@ def test_what_is_timed_adds_no_row_to_a_leaderboard_and_what_a_run_has_finished_
             assert (row["made_by"], row["wall_s"]) == (made_by[row["estimator"]], wall[row["estimator"]])
 
 
-def test_the_table_states_what_its_times_mean(shell):
-    presses(shell.folder / "shelf")
-    done = shell(*ASKED, "--estimator", "ols", "--estimator", "knn", "--out", "there")
+def test_the_table_states_what_its_times_mean(verbs):
+    presses(verbs.folder / "shelf")
+    done = verbs(*ASKED, "--estimator", "ols", "--estimator", "knn", "--out", "there")
     assert "made, force: RMSE, lower is better · deployable · split session · 2 rounds, 1 thread" in done.stdout
     (line,) = [line for line in done.stdout.splitlines() if line.strip().startswith("ols")]
     assert "fit, delay" in line
@@ -62,7 +63,7 @@ def test_the_table_states_what_its_times_mean(shell):
     assert "mean (trivial)" in done.stdout
     assert "its delay is below the loop's period" in done.stderr
     assert all(
-        (shell.folder / "there" / "cost" / f"made-force.{end}").exists() for end in ("json", "csv", "png", "pdf")
+        (verbs.folder / "there" / "cost" / f"made-force.{end}").exists() for end in ("json", "csv", "png", "pdf")
     )
 
 

@@ -7,7 +7,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from tactbench.core.cli import VERBS, _exit_code
+from tactbench.core.cli import VERBS, main
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.yaml_file import load_yaml
 from tactbench.plugin.devices import RigFile, drivers_of
@@ -27,7 +27,9 @@ def emulate(monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
 
     def call(*words):
-        code = _exit_code(["emulate", *words])
+        with pytest.raises(SystemExit) as ended:
+            main(["emulate", *words])
+        code = ended.value.code
         said = capsys.readouterr()
         return code, said.out, said.err
 

@@ -33,16 +33,15 @@ VERBS = {
     ),
 }
 """What is asked of each verb that knows the format."""
-COMPUTE = ("run", "rerun", "cost")
-"""Verbs that start processes for their cells."""
 
 
 @pytest.fixture(scope="module")
-def shell(tmp_path_factory):
-    shell = Shell(tmp_path_factory.mktemp("json"))
-    shell("run", *VERBS["run"])
-    shell("record", "--sensor", "ideal", "--seconds", "1", "--out", "ideal.h5")
-    return shell
+def there(tmp_path_factory):
+    """The verbs in the folder of a run and of a recording."""
+    verbs = Verbs(tmp_path_factory.mktemp("json"))
+    verbs("run", *VERBS["run"])
+    verbs("record", "--sensor", "ideal", "--seconds", "1", "--out", "ideal.h5")
+    return verbs
 
 
 def test_every_verb_that_knows_the_format_is_asked():
@@ -64,9 +63,9 @@ def _verbs(command, words):
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_what_is_printed_is_json(shell, verb):
+def test_what_is_printed_is_json(there, verb):
     code = None if verb == "doctor" else 0  # something may be wrong with this machine's ports
-    ask = shell if verb in COMPUTE else Verbs(shell.folder)
+    ask = Shell(there.folder) if verb == "run" else there
     found = json.loads(ask(*verb.split(), *VERBS[verb], "--format", "json", code=code).stdout)
     assert found, "and it says something"
 

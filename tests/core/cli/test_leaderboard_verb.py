@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from tests.conftest import Shell, Verbs
+from tests.conftest import Verbs
 
 RUN = ("run", "--repeats", "5", "--sensor", "ideal", "--task", "force", "--estimator", "lasso", "--out", "out")
 
@@ -18,13 +18,13 @@ RUN = ("run", "--repeats", "5", "--sensor", "ideal", "--task", "force", "--estim
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     """The verbs in the folder of a run."""
-    shell = Shell(tmp_path_factory.mktemp("ran"))
-    shell(*RUN)
-    return Verbs(shell.folder)
+    verbs = Verbs(tmp_path_factory.mktemp("ran"))
+    verbs(*RUN)
+    return verbs
 
 
 def test_a_folder_shows_the_same_table_as_its_run(ran):
-    again = Shell(ran.folder)(*RUN, "--format", "json").stdout
+    again = ran(*RUN, "--format", "json").stdout
     assert ran("leaderboard", "out", "--format", "json").stdout == again
     assert json.loads(again) == json.loads((ran.folder / "out" / "leaderboard.json").read_text())
 
@@ -32,7 +32,7 @@ def test_a_folder_shows_the_same_table_as_its_run(ran):
 def test_what_was_just_computed_and_what_is_read_again_give_the_same_files(ran):
     kept = [ran.folder / "out" / f"leaderboard.{ending}" for ending in ("md", "csv", "json", "html")]
     before = [path.read_bytes() for path in kept]
-    Shell(ran.folder)(*RUN)
+    ran(*RUN)
     assert [path.read_bytes() for path in kept] == before
 
 
@@ -109,7 +109,7 @@ def test_more_is_shown_on_request(ran):
     assert "more note" not in many
     assert "Published figures" in many
     assert "numpy" in many
-    again = Shell(ran.folder)(*RUN, "--wide", "--notes").stdout
+    again = ran(*RUN, "--wide", "--notes").stdout
     assert "latency p50" in again
     assert "latency p50" in (ran.folder / "out" / "leaderboard.md").read_text()
 

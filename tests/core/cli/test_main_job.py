@@ -10,6 +10,7 @@ import time
 
 import pytest
 
+from tests.conftest import Shell, Verbs
 from tests.core.pool.patience import ending
 
 FORCE = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force")
@@ -17,8 +18,6 @@ FORCE = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force")
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    from tests.conftest import Shell
-
     shell = Shell(tmp_path_factory.mktemp("run"))
     done = shell(*FORCE, "--format", "json")
     return shell, json.loads(done.stdout), done
@@ -74,7 +73,7 @@ def test_the_files_of_a_run(ran):
 
 def test_a_second_run_computes_nothing_and_says_the_same(ran):
     shell, rows, _ = ran
-    again = shell(*FORCE, "--format", "json")
+    again = Verbs(shell.folder)(*FORCE, "--format", "json")
     assert "6 of 6 answers were found finished, 0 computed now" in again.stderr
     assert json.loads(again.stdout) == rows
 
@@ -82,17 +81,18 @@ def test_a_second_run_computes_nothing_and_says_the_same(ran):
 def test_the_same_seed_gives_the_same_bytes_serially_and_with_two_jobs(ran):
     shell, _, _ = ran
     serial = (shell.folder / "tactbench-results" / "scores.json").read_bytes()
-    shell(*FORCE, "--jobs", "2", "--out", "parallel")
+    verbs = Verbs(shell.folder)
+    verbs(*FORCE, "--jobs", "2", "--out", "parallel")
     assert (shell.folder / "parallel" / "scores.json").read_bytes() == serial
-    shell(*FORCE, "--seed", "2", "--out", "other")
+    verbs(*FORCE, "--seed", "2", "--out", "other")
     assert (shell.folder / "other" / "scores.json").read_bytes() != serial
 
 
 def test_recordings_of_a_run_can_be_replayed_with_the_same_scores(ran):
     shell, rows, _ = ran
     replayed = json.loads(
-        shell("run", "--rig", "replay", "--recordings", "tactbench-results/recordings", "--task", "force",
-              "--protocol", "karl2016", "--format", "json", "--out", "replayed").stdout
+        Verbs(shell.folder)("run", "--rig", "replay", "--recordings", "tactbench-results/recordings", "--task", "force",
+                            "--protocol", "karl2016", "--format", "json", "--out", "replayed").stdout
     )  # fmt: skip
     assert [row["score"] for row in replayed] == [row["score"] for row in rows]
     assert all(row["simulated"] for row in replayed)
@@ -105,9 +105,8 @@ def test_a_cell_that_fails_is_a_row_and_stops_nobody(ran):
         damaged = path.read_bytes()[:2000]
         path.unlink()
         path.write_bytes(damaged)
-    done = shell(
-        "run", "--repeats", "1", "--sensor", "icub", "--sensor", "ideal", "--task", "force", "--format", "json", code=1
-    )
+    asked = ("--sensor", "icub", "--sensor", "ideal", "--task", "force", "--estimator", "ols")
+    done = Verbs(shell.folder)("run", "--repeats", "1", *asked, "--format", "json", code=1)
     rows = json.loads(done.stdout)
     assert {row["status"] for row in rows if row["sensor"] == "icub"} == {"failed"}
     assert {row["status"] for row in rows if row["sensor"] == "ideal"} == {"done"}
@@ -123,6 +122,8 @@ def test_a_strangers_sensor_runs(shell):
         "acme-pad",
         "--task",
         "force",
+        "--estimator",
+        "lasso",
         "--format",
         "json",
         plugins=("good", "broken"),
@@ -133,13 +134,8 @@ def test_a_strangers_sensor_runs(shell):
     assert lasso["score"] < lasso["baseline"]
 
 
-CURVATURE = [
-    *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "icub", "--task", "curvature"),
-    *("--estimator", "logistic", "--estimator", "forest"),
-]
-
-
-RUNS = {"recording": [sys.executable, "-m", "tactbench", *FORCE], "evaluating": CURVATURE}
+RUN = [sys.executable, "-m", "tactbench", *FORCE]
+RUNS = {"recording": RUN, "evaluating": [*RUN, "--estimator", "ols", "--estimator", "forest"]}
 """A run that is long in the stage: of three recordings, and with a large forest."""
 
 
@@ -183,10 +179,10 @@ def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path,
         assert path.read_bytes() == content, "what was finished is reused, not made again"
 
 
-def test_a_row_over_several_places_states_all_of_them(shell):
+def test_a_row_over_several_places_states_all_of_them(verbs):
     asked = ("--sensor", "icub", "--task", "force", "--split", "placement", "--protocol", "deployable")
     rows = json.loads(
-        shell("run", "--repeats", "1", *asked, "--estimator", "ols", "--no-latency", "--format", "json").stdout
+        verbs("run", "--repeats", "1", *asked, "--estimator", "ols", "--no-latency", "--format", "json").stdout
     )
     (row,) = [row for row in rows if row["estimator"] == "ols"]
     # Nominal at (-0.3, 0), and 1.5 mm either way along and across.

@@ -23,26 +23,26 @@ def grasps(folder, offset):
 
 
 @pytest.mark.parametrize(("offset", "leaks"), [(3.0, True), (0.0, False)])
-def test_the_table_the_files_and_the_verb_leaderboard_say_whether_the_first_frame_tells(shell, offset, leaks):
-    grasps(shell.folder / "grasps", offset)
+def test_the_table_the_files_and_the_verb_leaderboard_say_whether_the_first_frame_tells(verbs, offset, leaks):
+    grasps(verbs.folder / "grasps", offset)
     run = ("run", "--recordings", "grasps", "--task", "object-identity", "--estimator", "logistic", "--probe")
-    shown = shell(*run).stdout
-    written = (shell.folder / "tactbench-results" / "leaderboard.md").read_text()
-    for text in (shown, written, shell("leaderboard").stdout):
+    shown = verbs(*run).stdout
+    written = (verbs.folder / "tactbench-results" / "leaderboard.md").read_text()
+    for text in (shown, written, verbs("leaderboard").stdout):
         assert "does the score come from the contact?" in text
         assert ("LEAK: the first frame alone scores 1.000" in text) == leaks
         assert ("no leak shown" in text) != leaks
-    rows = json.loads((shell.folder / "tactbench-results" / "leaderboard.json").read_text())
+    rows = json.loads((verbs.folder / "tactbench-results" / "leaderboard.json").read_text())
     ways = [(row["protocol"], row["split"]) for row in rows if row["estimator"] == "logistic"]
     assert ways == [("deployable", "trial"), ("first-frame", "trial"), ("deployable", "shuffled")]
 
 
-def test_from_foreign_tables_to_the_probe_without_a_script(shell, shared_data):
+def test_from_foreign_tables_to_the_probe_without_a_script(verbs, shared_data):
     for name in ("eflesh-normal", "eflesh-normal-raw"):
         mapping = ROOT / "examples" / "mappings" / f"{name}.yaml"
-        shell("import", str(mapping), "--root", str(shared_data / "eflesh"), "--out", f"recordings/eflesh/{name}")
+        verbs("import", str(mapping), "--root", str(shared_data / "eflesh"), "--out", f"recordings/eflesh/{name}")
     # The forest of the matrix takes a minute; how a matrix is run does not depend on what answers.
-    done = shell("run", "--config", "real-eflesh", "--probe", "--estimator", "ridge", "--format", "json")
+    done = verbs("run", "--config", "real-eflesh", "--probe", "--estimator", "ridge", "--format", "json")
     rows = [row for row in json.loads(done.stdout) if row["estimator"] == "ridge"]
     by_split = {(row["sensor"], row["split"]): row for row in rows if row["protocol"] == "deployable"}
     assert {split for _, split in by_split} == {"session", "press", "in-session", "shuffled"}

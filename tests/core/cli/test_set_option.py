@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.conftest import Shell
+from tests.conftest import Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
 
 RUN = ("run", "--sensor", "icub", "--task", "force", "--estimator", "ols", "--repeats", "1", "--no-latency")
@@ -19,10 +19,10 @@ def rows_of(done):
 @pytest.fixture(scope="module")
 def here(tmp_path_factory):
     """A folder with the same cells as they are, and with two nuisances set."""
-    shell = Shell(tmp_path_factory.mktemp("set"))
-    shell.usual = rows_of(shell(*RUN, "--format", "json"))
-    shell.set = rows_of(shell(*RUN, *SET, "--format", "json"))
-    return shell
+    verbs = Verbs(tmp_path_factory.mktemp("set"))
+    verbs.usual = rows_of(verbs(*RUN, "--format", "json"))
+    verbs.set = rows_of(verbs(*RUN, *SET, "--format", "json"))
+    return verbs
 
 
 def test_what_was_set_is_in_the_row_and_nothing_else_is_otherwise(here):

@@ -35,13 +35,13 @@ def test_a_file_is_taken_before_a_name_and_a_missing_one_is_named(tmp_path, monk
         matrix_called("nowhere.yaml")
 
 
-def test_protocols_and_splits_side_by_side(shell):
+def test_protocols_and_splits_side_by_side(verbs):
     asked = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force", "--estimator", "lasso", "--out", "out")
     asked += ("--protocol", "karl2016", "--protocol", "deployable", "--split", "roles", "--split", "unit")
-    done = shell(*asked)
+    done = verbs(*asked)
     assert "by protocol" in done.stdout
     assert "by split" in done.stdout
-    rows = json.loads((shell.folder / "out" / "leaderboard.json").read_text())
+    rows = json.loads((verbs.folder / "out" / "leaderboard.json").read_text())
     by_way = {(row["protocol"], row["split"]): row for row in rows if row["estimator"] == "lasso"}
     assert {way: row["status"] for way, row in by_way.items()} == {
         ("karl2016", "roles"): "done", ("karl2016", "unit"): "skipped",
@@ -56,15 +56,15 @@ def test_protocols_and_splits_side_by_side(shell):
     rate = "taxels sampled at {} Hz; its own rate is 50 Hz"
     assert by_way["deployable", "roles"]["remarks"] == [rate.format("83.33")]
     assert rate.format("16.67") in unit["remarks"]
-    assert len(list((shell.folder / "out" / "recordings" / "icub").glob("*.h5"))) == 3 + 5
+    assert len(list((verbs.folder / "out" / "recordings" / "icub").glob("*.h5"))) == 3 + 5
 
-    records = json.loads(shell("leaderboard", "out", "--compare", "split", "--format", "json").stdout)
+    records = json.loads(verbs("leaderboard", "out", "--compare", "split", "--format", "json").stdout)
     (found,) = [r for r in records if r["estimator"] == "lasso" and r["difference"] is not None]
     assert found["difference"] == unit["score"] - by_way["deployable", "roles"]["score"]
-    refused = shell("leaderboard", "out", "--compare", "split", "--format", "latex", code=2)
+    refused = verbs("leaderboard", "out", "--compare", "split", "--format", "latex", code=2)
     assert "md" in refused.stderr
 
-    replayed = shell("run", "--rig", "replay", "--recordings", "out/recordings", "--task", "force", "--split", "unit",
+    replayed = verbs("run", "--rig", "replay", "--recordings", "out/recordings", "--task", "force", "--split", "unit",
                      "--estimator", "lasso", "--format", "json", "--out", "again")  # fmt: skip
     again = [row for row in json.loads(replayed.stdout) if row["estimator"] == "lasso"]
     assert [row["score"] for row in again] == [unit["score"]]

@@ -9,8 +9,8 @@ from tactbench.core.plugins.registry import load_registry
 from tests.core.cli.test_screens import assert_one_clear_screen
 
 
-def test_a_plan_is_explained_with_reasons_costs_and_bounds(shell):
-    done = shell("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1", "--format", "json")
+def test_a_plan_is_explained_with_reasons_costs_and_bounds(verbs):
+    done = verbs("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1", "--format", "json")
     rows = {row["effect"]: row for row in json.loads(done.stdout)}
     assert rows["contact"]["included"]
     assert rows["contact"]["cost_s"] > 0
@@ -20,8 +20,8 @@ def test_a_plan_is_explained_with_reasons_costs_and_bounds(shell):
     assert rows["creep"]["scenes"] == 3
 
 
-def test_it_ends_with_the_score_with_all_effects_beside_that_with_those_chosen(shell):
-    done = shell("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1")
+def test_it_ends_with_the_score_with_all_effects_beside_that_with_those_chosen(verbs):
+    done = verbs("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1")
     said = done.stdout[done.stdout.index("RMSE by ols (SIM)") :]
     assert "chosen" in said
     assert "all" in said
@@ -31,14 +31,14 @@ def test_it_ends_with_the_score_with_all_effects_beside_that_with_those_chosen(s
     assert "recording: " in done.stderr
 
 
-def test_what_an_effect_that_is_left_out_does_to_the_score_shows(shell):
+def test_what_an_effect_that_is_left_out_does_to_the_score_shows(verbs):
     words = ("twin", "explain", "--sensor", "icub", "--task", "force", "--effects=-force-noise", "--rounds", "0")
-    (row, *_) = json.loads(shell(*words, "--score", "--estimator", "ols", "--format", "json").stdout)
+    (row, *_) = json.loads(verbs(*words, "--score", "--estimator", "ols", "--format", "json").stdout)
     # Its 0.69 N are most of the error.
     assert row["score"] < 0.3 < 0.6 < row["score_all_effects"]
     assert row["sim_s"] > 0
     assert row["sim_s_all_effects"] > 0
-    (row, *_) = json.loads(shell(*words, "--format", "json").stdout)
+    (row, *_) = json.loads(verbs(*words, "--format", "json").stdout)
     assert "score" not in row
 
 
@@ -83,13 +83,13 @@ def test_a_scenario_is_listed_and_kept_with_the_recording(verbs):
     assert "scenario = hard-handled" in verbs("inspect", "a.h5").stdout
 
 
-def test_a_scenario_is_asked_for_by_a_matrix_file(shell):
+def test_a_scenario_is_asked_for_by_a_matrix_file(verbs):
     matrix = {
         "sensors": ["biotac", "icub"], "tasks": [{"name": "force", "estimators": ["ols"]}], "latency": False,
         "repeats": 1, "simulation": {"scenario": "hard-handled"},
     }  # fmt: skip
-    (shell.folder / "hard.yaml").write_text(json.dumps(matrix))
-    rows = json.loads(shell("run", "--config", "hard.yaml", "--format", "json").stdout)
+    (verbs.folder / "hard.yaml").write_text(json.dumps(matrix))
+    rows = json.loads(verbs("run", "--config", "hard.yaml", "--format", "json").stdout)
     of = {row["sensor"]: row for row in rows if row["estimator"] == "ols"}
     assert of["biotac"]["assumptions"]["scenario"] == "hard-handled"
     # Nobody has handled an iCub's fingertip hard and watched it: no row, and the reason.

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from tests.conftest import Shell
+from tests.conftest import Shell, Verbs
 from tests.core.matrix.plugin_packages import write_acme
 
 RUN = (
@@ -35,15 +35,16 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def here(made, tmp_path):
-    """A copy to be changed, and its shell with the plugin on the path."""
+    """A copy to be changed, and the command line in it with the plugin on the path."""
     shutil.copytree(made, tmp_path / "copy")
-    shell = Shell(tmp_path / "copy")
+    folder = tmp_path / "copy"
 
     def call(*arguments, code=0):
-        return shell(*arguments, "--out", "results", plugins=(str(shell.folder / "site"),), code=code)
+        ask = Shell(folder) if arguments[0] == "run" else Verbs(folder)  # it computes with a plugin
+        return ask(*arguments, "--out", "results", plugins=(str(folder / "site"),), code=code)
 
-    call.folder = shell.folder
-    call.acme = shell.folder / "site" / "acme"
+    call.folder = folder
+    call.acme = folder / "site" / "acme"
     return call
 
 
@@ -147,7 +148,7 @@ def test_without_the_book_nothing_is_made_up(here):
 
 
 def test_a_folder_that_is_not_there_is_refused(here):
-    assert "There is no folder" in Shell(here.folder)("why", "acme", "--out", "nowhere", code=2).stderr
+    assert "There is no folder" in Verbs(here.folder)("why", "acme", "--out", "nowhere", code=2).stderr
     assert not (here.folder / "nowhere").exists()
 
 

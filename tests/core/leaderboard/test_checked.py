@@ -46,14 +46,14 @@ def test_whatever_passes_can_be_shown_in_every_format(rows, data):
     [
         (3, "no row"),
         ({"cell": "x"}, "x: its row is of another version"),
-        (row() | {"score": "good"}, "'score' is text, not a number"),
+        (row() | {"score": "good"}, "its score: Input should be a valid number"),
         (row(score=None), "it is done and has no score"),
-        (row(status="fine"), "a cell cannot be 'fine'"),
+        (row(status="fine"), "its status: Input should be 'done', 'failed'"),
         (row(n_test=10**400), "n_test"),
         (row() | {"fit_s": 10**400}, "fit_s"),
         (row(counts={"a": "b"}), "counts"),
         (row(confusion=[[1, 2]]), "confusion"),
-        (row() | {"score": True}, "'score' is yes or no"),
+        (row() | {"score": True}, "its score: Input should be a valid number"),
     ],
 )
 def test_what_cannot_be_a_row_is_told(entry, says):

@@ -13,7 +13,8 @@ from tests.conftest import Shell
 from tests.core.matrix.started import started
 from tests.core.pool.patience import ending, until
 
-RUN = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "ols", "--estimator", "lasso")
+ASKED = ("--sensor", "ideal", "--task", "force", "--estimator", "ols", "--estimator", "forest-10")
+RUN = ("run", "--repeats", "1", *ASKED)
 
 
 @pytest.fixture(scope="module")

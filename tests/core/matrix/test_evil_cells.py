@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -11,17 +12,19 @@ import h5py
 import pytest
 
 from tactbench.core.matrix.store import Store
-from tests.conftest import Shell
+from tests.conftest import Shell, Verbs
 from tests.core.cost.test_ladder import presses
 from tests.core.pool.patience import ending, until
 
 ENGINES = {
     "in-process": ("--engine", "in-process"),
-    "isolated": ("--engine", "isolated"),
     "isolated-2": ("--engine", "isolated", "--jobs", "2"),
     "dask": ("--engine", "dask", "--jobs", "2"),
 }
-"""Every engine that the evil cells must survive under: one place for all of them."""
+"""Every engine that the evil cells must survive under: one place for all of them. Of several cells the engine
+in-process carries out each in a child process, as isolated does with one job."""
+LEFT_OUT = {"in-process": {"evil-hang", "evil-deaf"}, "dask": {"evil-scribble"}}
+"""What takes long to show again what two jobs show: time-outs one after the other, and a second cluster."""
 
 LIMITS = ("--timeout", "3", "--memory", "120")
 """The memory is for what a cell imports, too; the one that eats has no end."""
@@ -100,52 +103,41 @@ def test_every_evil_cell_has_one_row_and_the_others_are_right(engine, alone, tmp
     shell = Shell(tmp_path)
     honest, shelf = alone
     (tmp_path / "shelf").symlink_to(shelf)
-    estimators = ["ols", *ENDS]
-    asked = [word for name in estimators for word in ("--estimator", name)]
+    ends = {name: end for name, end in ENDS.items() if name not in LEFT_OUT.get(engine, ())}
+    asked = [word for name in (*ends, "ols") for word in ("--estimator", name)]  # the honest ones come last
     rows, done = run(shell, *asked, *LIMITS, *ENGINES[engine])
-    assert set(rows) == {*HONEST, *ENDS}
-    for name, (status, _, says) in ENDS.items():
+    assert set(rows) == {*HONEST, *ends}
+    for name, (status, _, says) in ends.items():
         assert rows[name]["status"] == status, (rows[name]["reason"], done.stderr[-3000:])
         assert says in rows[name]["reason"]
     kept = whole_rows(tmp_path / "out")
     assert set(kept) == set(rows), "what was written over is computed again"
     stopped = {name: row for name, row in kept.items() if row["status"] != "done"}
-    assert set(stopped) == {name for name, end in ENDS.items() if end[0] != "done"}
+    assert set(stopped) == {name for name, end in ends.items() if end[0] != "done"}
     for name, row in stopped.items():
         assert row["signal"] == ENDS[name][1]
         assert f"  {row['status']:<13}  {row['cell']}: " in done.stderr
     assert "in _raise" in stopped["evil-raise"]["traceback"]
-    assert "in _hang" in stopped["evil-hang"]["traceback"]
+    if "evil-hang" in ends:
+        assert "in _hang" in stopped["evil-hang"]["traceback"]
+    for said in ("said by print", "said to stderr", "to descriptor 1", "said by a child"):
+        assert said in kept["evil-print"]["log"]
+    beside = [kept[name] for name in HONEST]
+    assert {row["concurrency"] for row in beside} == {2 if "--jobs" in ENGINES[engine] else 1}
+    assert len({row["host"] for row in beside}) == 1
+    assert all(row["wall_s"] >= row["fit_s"] > 0 for row in beside)
     assert "tactbench why " in done.stderr
-    beside = [line for line in lines_of(tmp_path / "out") if not any(f"/{name}/" in line for name in ENDS)]
-    assert beside == honest, "not a byte of an honest score has changed"
+    lines = [line for line in lines_of(tmp_path / "out") if not any(f"/{name}/" in line for name in ENDS)]
+    assert lines == honest, "not a byte of an honest score has changed"
     assert "said" not in done.stdout + done.stderr
     assert "Traceback" not in done.stderr
     assert until(lambda: not processes_in(tmp_path)), processes_in(tmp_path)
 
 
-@pytest.mark.parametrize("engine", ["in-process", "isolated", "dask"])
-def test_a_library_that_a_strangers_estimator_patches_is_patched_for_no_other_cell(engine, alone, tmp_path):
-    honest, shelf = alone
-    (tmp_path / "shelf").symlink_to(shelf)
-    run(Shell(tmp_path), "--estimator", "evil-patch", "--estimator", "ols", *ENGINES[engine], code=0)
-    assert [line for line in lines_of(tmp_path / "out") if "/evil-patch/" not in line] == honest
-
-
-def test_what_a_cell_prints_is_in_its_row(alone, tmp_path):
-    (tmp_path / "shelf").symlink_to(alone[1])
-    for engine in ("in-process", "isolated"):
-        rows, _ = run(Shell(tmp_path), "--estimator", "evil-print", "--engine", engine, out=engine, code=0)
-        assert rows["evil-print"]["status"] == "done"
-        log = whole_rows(tmp_path / engine)["evil-print"]["log"]
-        for said in ("said by print", "said to stderr", "to descriptor 1", "said by a child"):
-            assert said in log
-
-
 def test_a_single_cell_has_a_process_of_its_own_unless_it_is_asked_to_have_none(alone, tmp_path):
     (tmp_path / "shelf").symlink_to(alone[1])
+    shutil.copytree(alone[1].parent / "out", tmp_path / "out")  # the baselines are there: one cell is left
     shell = Shell(tmp_path)
-    run(shell, "--estimator", "ols", code=0)  # the baselines are there: one cell is left
     rows, _ = run(shell, "--estimator", "evil-abort")
     assert (rows["evil-abort"]["status"], rows["mean"]["status"]) == ("crashed", "done")
     asked = (*ASKED, "--estimator", "evil-abort", "--engine", "in-process", "--out", "out", "--format", "json")
@@ -155,11 +147,11 @@ def test_a_single_cell_has_a_process_of_its_own_unless_it_is_asked_to_have_none(
 
 
 def test_a_file_that_cannot_be_read_costs_its_own_cells_only(tmp_path):
-    shell = Shell(tmp_path)
     presses(tmp_path / "shelf")
     (tmp_path / "shelf" / "icub").mkdir()
     (tmp_path / "shelf" / "icub" / "flat.h5").write_bytes(b"no recording at all")
-    done = shell(*ASKED[:5], "--task", "force", "--estimator", "ols", "--split", "session", "--format", "json", code=1)
+    asked = (*ASKED[:5], "--task", "force", "--estimator", "ols", "--split", "session", "--format", "json")
+    done = Verbs(tmp_path)(*asked, code=1)
     rows = json.loads(done.stdout)
     assert {row["status"] for row in rows if row["sensor"] == "made"} == {"done"}
     assert {(row["status"], "flat.h5" in row["reason"]) for row in rows if row["sensor"] == "icub"} == {
@@ -173,7 +165,7 @@ def test_a_recording_that_lacks_its_streams_is_told_by_its_cells(tmp_path):
     with h5py.File(damaged, "a") as file:
         del file["streams"]
     asked = (*ASKED, "--estimator", "ols", "--estimator", "ridge", "--format", "json")
-    rows = json.loads(Shell(tmp_path)(*asked, code=1).stdout)
+    rows = json.loads(Verbs(tmp_path)(*asked, code=1).stdout)
     assert all(row["status"] == "failed" and damaged.name in row["reason"] for row in rows)
 
 
@@ -181,7 +173,7 @@ def test_a_recording_that_lacks_its_streams_is_told_by_its_cells(tmp_path):
 def test_a_shelf_that_cannot_be_read_at_all_has_rows_as_well(tmp_path, asked):
     (tmp_path / "shelf").mkdir()
     (tmp_path / "shelf" / "a.h5").write_bytes(b"no recording at all")
-    done = Shell(tmp_path)(*ASKED[:5], *asked, "--task", "force", "--estimator", "ols", "--format", "json", code=1)
+    done = Verbs(tmp_path)(*ASKED[:5], *asked, "--task", "force", "--estimator", "ols", "--format", "json", code=1)
     rows = json.loads(done.stdout)
     assert len(rows) == 3
     assert all(row["status"] == "failed" and "a.h5" in row["reason"] for row in rows)
@@ -234,37 +226,26 @@ def test_a_rig_that_cannot_record_gives_rows_that_say_so(tmp_path, rig, says):
 
 def test_a_misspelt_split_is_refused_before_anything_is_recorded(tmp_path):
     asked = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force", "--protocol", "deployable")
-    done = Shell(tmp_path)(*asked, "--split", "sesion", code=2)
+    done = Verbs(tmp_path)(*asked, "--split", "sesion", code=2)
     assert "Did you mean 'session'" in done.stderr
     assert not list(tmp_path.rglob("*.h5"))
 
 
 def test_options_that_do_not_go_together_are_refused(tmp_path):
-    shell = Shell(tmp_path)
-    assert "--jobs" in shell(*ASKED, "--engine", "in-process", "--jobs", "2", code=2).stderr
-    assert "--engine dask" in shell(*ASKED, "--scheduler", "tcp://127.0.0.1:1", code=2).stderr
+    verbs = Verbs(tmp_path)
+    assert "--jobs" in verbs(*ASKED, "--engine", "in-process", "--jobs", "2", code=2).stderr
+    assert "--engine dask" in verbs(*ASKED, "--scheduler", "tcp://127.0.0.1:1", code=2).stderr
 
 
-def test_engine_and_number_of_jobs_and_order_change_no_byte(alone, tmp_path):
+def test_number_of_jobs_and_order_change_no_score(alone, tmp_path):
     (tmp_path / "shelf").symlink_to(alone[1])
     shell = Shell(tmp_path)
-    texts = {}
-    for name, options in ENGINES.items():
-        run(shell, "--estimator", "forest-10", "--estimator", "ridge", "--repeats", "2", *options, out=name, code=0)
-        texts[name] = (tmp_path / name / "scores.json").read_text()
-    assert len(set(texts.values())) == 1
-    run(shell, "--estimator", "ridge", "--estimator", "forest-10", "--repeats", "2", out="turned", code=0)
-    turned = json.loads((tmp_path / "turned" / "scores.json").read_text())
-    assert {row["cell"]: row for row in turned} == {row["cell"]: row for row in json.loads(texts["isolated"])}
-
-
-def test_the_time_of_a_cell_says_where_and_beside_how_many(alone, tmp_path):
-    (tmp_path / "shelf").symlink_to(alone[1])
-    run(Shell(tmp_path), "--estimator", "ols", "--jobs", "2", code=0)
-    rows = whole_rows(tmp_path / "out").values()
-    assert {row["concurrency"] for row in rows} == {2}
-    assert len({row["host"] for row in rows}) == 1
-    assert all(row["wall_s"] >= row["fit_s"] > 0 for row in rows)
+    texts = {}  # of Dask: tests.core.matrix.test_dask_runs
+    for name, first, last in (("in-process", "forest-10", "ridge"), ("isolated-2", "ridge", "forest-10")):
+        run(shell, "--estimator", first, "--estimator", last, "--repeats", "2", *ENGINES[name], out=name, code=0)
+        texts[name] = json.loads((tmp_path / name / "scores.json").read_text())
+    in_order, turned = ({row["cell"]: row for row in rows} for rows in texts.values())
+    assert in_order == turned
 
 
 def test_a_parent_that_is_killed_takes_its_cells_with_it(alone, tmp_path):

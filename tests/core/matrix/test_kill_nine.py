@@ -10,7 +10,8 @@ from tests.conftest import ROOT
 
 def test_killed_runs_lose_nothing_and_end_with_the_same_bytes():
     done = subprocess.run(
-        [sys.executable, str(ROOT / "benchmarks" / "kill_nine.py"), "--kills", "5", "--matrix", "trivial"],
+        [sys.executable, str(ROOT / "benchmarks" / "kill_nine.py"), "--kills", "5", "--matrix", "trivial",
+         "--repeats", "30"],
         capture_output=True, text=True, cwd=ROOT,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import FormatError, MissingRecordingError
-from tactbench.core.matrix.recorded import Recorded, Subject
+from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.recording.reader import content_digest
 from tests.core.evaluation.made import record
 
@@ -28,15 +28,15 @@ def rested(memory):
 def test_the_digest_is_the_recordings_own_and_stays_when_it_is_remembered(tmp_path, recording):
     first = rested(tmp_path / "memory")
     assert first.digest(recording) == content_digest(recording)
-    assert first.subject(recording) == Subject("made", None)
+    assert first.sensor_and_scene(recording) == ("made", None)
     first.save()
     again = Recorded(tmp_path / "memory")
-    assert (again.digest(recording), again.subject(recording)) == (content_digest(recording), Subject("made", None))
+    assert (again.digest(recording), again.sensor_and_scene(recording)) == (content_digest(recording), ("made", None))
 
 
 def test_what_is_remembered_opens_no_file(tmp_path, recording):
     first = rested(tmp_path / "memory")
-    before = first.digest(recording), first.subject(recording)
+    before = first.digest(recording), first.sensor_and_scene(recording)
     first.save()
     text = f"""
 import sys
@@ -44,7 +44,7 @@ from pathlib import Path
 from tactbench.core.matrix.recorded import Recorded
 recorded = Recorded(Path({str(tmp_path / "memory")!r}))
 path = Path({str(recording)!r})
-print((recorded.digest(path), recorded.subject(path)))
+print((recorded.digest(path), recorded.sensor_and_scene(path)))
 assert not {{"h5py", "numpy"}} & set(sys.modules), "a library was loaded"
 """
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
@@ -88,7 +88,7 @@ def test_one_that_is_gone_or_damaged_says_so(tmp_path, recording):
     with pytest.raises(MissingRecordingError):
         Recorded(tmp_path / "memory").digest(recording)
     with pytest.raises(MissingRecordingError):
-        Recorded(tmp_path / "memory").subject(recording)
+        Recorded(tmp_path / "memory").sensor_and_scene(recording)
 
 
 def test_one_that_was_altered_is_refused_and_not_remembered(tmp_path, recording):

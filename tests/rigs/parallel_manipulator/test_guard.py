@@ -202,6 +202,7 @@ class TestInEitherProcess:
     def test_a_rig_that_takes_no_samples_still_gets_its_reports(self, in_process):
         guard = in_process.guard
         guard._selector.unregister(guard._data)
+        guard.force_blocks()  # those that were taken before
         try:
             guard.arm(in_process.setting.limits)
             for number in range(1, 20):

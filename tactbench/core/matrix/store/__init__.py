@@ -10,7 +10,7 @@
       scores.json                        what a seed decides in the last run: compare it byte by byte
       leaderboard.md, .csv, .json        the last run's table
       run.json                           the provenance of the last run
-      cache/                             what only saves time, and who holds the folder
+      cache/                             what only saves time, and which run holds the folder
 
 Rooms: `folder` is the whole (:class:`Store`), `ledger` the lines, `sharing` what lines have in common, `rows` what a
 row may hold, `shard` the answers of one cell, `lock` one run at a time, `leftovers` what a killed run leaves, `disk`

@@ -15,8 +15,7 @@ _FULL = {
     errno.EDQUOT: "the quota is used up",
     errno.EFBIG: "a file would be larger than this process may write",
 }
-_GONE = {errno.ENOENT, errno.ESTALE, errno.ENOTDIR}
-KEPT = "What was finished before is kept"
+_GONE = {errno.ENOENT, errno.ESTALE}
 
 
 @contextmanager
@@ -31,38 +30,16 @@ def writing(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise refusal(folder, error) from error
-
-
-def refusal(folder: Path, error: OSError, *, begun: bool = True) -> FolderError:
-    """Return the error to raise when the system refuses to write into a result folder.
-
-    Parameters
-    ----------
-    begun
-        Whether it could be written before.
-    """
-    number = error.errno or 0
-    if number in _FULL:
-        return FolderError(
-            f"The folder {folder} cannot be written: {_FULL[number]}.",
-            hint=f"{KEPT}: make room, and the same command goes on from there.",
-        )
-    if begun and number in _GONE:
-        return removed(folder)
-    return FolderError(
-        f"The folder {folder} cannot be written: {error.strerror or error}.",
-        hint=f"{KEPT}: check its permissions, or give another one with --out DIR.",
-    )
-
-
-def removed(folder: Path) -> FolderError:
-    """Return the error to raise when a folder is not where it was."""
-    return FolderError(
-        f"The folder {folder} was removed or moved while it was being written.",
-        hint="What was finished before lies where it was moved to; run the same command again, or with its new place "
-        "as --out DIR.",
-    )
+        kept = "What was finished before is kept"
+        what = f"cannot be written: {_FULL.get(error.errno or 0) or error.strerror or error}"
+        hint = f"{kept}: check its permissions, or give another one with --out DIR."
+        if error.errno in _FULL:
+            hint = f"{kept}: make room, and the same command goes on from there."
+        elif error.errno in _GONE:
+            what = "was removed or moved while it was being written"
+            hint = "What was finished before lies where it was moved to; run the same command again, or with its new "
+            hint += "place as --out DIR."
+        raise FolderError(f"The folder {folder} {what}.", hint=hint) from error
 
 
 def sync_path(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -12,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.errors import FormatError, RecordingError
 from tactbench.core.matrix.files import read_regular, replace_file, write_file
 from tactbench.core.matrix.store import leftovers, limits
-from tactbench.core.matrix.store.disk import refusal, removed, sync_path, writing
+from tactbench.core.matrix.store.disk import sync_path, writing
+from tactbench.core.matrix.store.image import digest_of, read_image
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
-from tactbench.core.matrix.store.rows import NAMING, Row, plain
+from tactbench.core.matrix.store.rows import NAMING, NotPlainError, Row, named, plain
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
 
 if TYPE_CHECKING:
@@ -64,12 +66,10 @@ class Store:
         if self._lock is not None:
             yield self
             return
-        try:
+        with writing(self.folder):
             for part in _PARTS:
                 (self.folder / part).mkdir(parents=True, exist_ok=True)
             self._lock = Lock(self.folder)
-        except OSError as error:
-            raise refusal(self.folder, error, begun=False) from error
         try:
             leftovers.sweep(self.folder)
             yield self
@@ -78,10 +78,6 @@ class Store:
             self._lock = None
 
     # What a run asks and writes
-
-    def recording_path(self, sensor: str, scene: str, key: str) -> Path:
-        """Return where the recording with this key lies, or will lie."""
-        return self.folder / "recordings" / sensor / f"{scene}-{key[:12]}.h5"
 
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Keep who computes from now on, with what, and return its id: equal provenances have equal ones."""
@@ -124,14 +120,12 @@ class Store:
         if not limits.is_key(key) or row.get("status") != "done":
             raise ValueError(f"a finished cell has the status 'done' and a key of 32 hexadecimal digits, not {key!r}")
         ledger = self._read()
-        told, text = plain({**row, "key": key})
+        written, text = plain({**row, "key": key})
         image = shard.build(text, self._provenance[1], sets)
-        entry = Entry(told, (shard.digest_of(image), len(image)))
+        entry = Entry(written, (digest_of(image), len(image)))
         path = self._shard(key)
         aside = self._cells / f".{key}.h5.{os.getpid()}.partial"
         with self._written():
-            if self._lock is None:
-                self._cells.mkdir(parents=True, exist_ok=True)
             try:
                 write_file(aside, image, sync=True)
                 ledger.append(entry)
@@ -142,7 +136,7 @@ class Store:
                 raise
             sync_path(self._cells)
         self._place(entry)
-        return dict(told)
+        return dict(written)
 
     def note(self, row: Mapping[str, Any]) -> Row:
         """Write how a cell ended that did not finish: failed, crashed, skipped.
@@ -162,15 +156,13 @@ class Store:
         texts = ("log", "traceback", "reason")
         row = {"key": "", **{name: _clipped(value) if name in texts else value for name, value in row.items()}}
         ledger = self._read()
-        told: Row = json.loads(canonical(row))
-        before = self._latest.get(str(told.get("cell")))
-        if before is None or before.row != told:
+        written: Row = json.loads(canonical(row))
+        before = self._latest.get(str(written.get("cell")))
+        if before is None or before.row != written:
             with self._written():
-                if self._lock is None:
-                    self.folder.mkdir(parents=True, exist_ok=True)
-                ledger.append(Entry(told))
-            self._place(Entry(told))
-        return dict(told)
+                ledger.append(Entry(written))
+            self._place(Entry(written))
+        return dict(written)
 
     def reuse(self, row: Row) -> None:
         """Say that a finished cell was found again, under the name it has in `row`.
@@ -198,11 +190,6 @@ class Store:
     # What is read
 
     @property
-    def blank(self) -> bool:
-        """Whether no cell has ever ended here."""
-        return not self._read().entries and not self._orphans
-
-    @property
     def troubles(self) -> tuple[str, ...]:
         """What of this folder could not be used, in sentences."""
         return tuple(self._read().troubles)
@@ -223,8 +210,10 @@ class Store:
                 holes.add(entry.row["cell"])
         known = set(ledger.troubles)
         lost = sorted(holes - set(latest))
-        told = [f"{name!r} is left out: its shard is missing, cut or not of this row; run it again" for name in lost]
-        ledger.troubles += [one for one in told if one not in known]
+        messages = [
+            f"{name!r} is left out: its shard is missing, cut or not of this row; run it again" for name in lost
+        ]
+        ledger.troubles += [one for one in messages if one not in known]
         return list(latest.values())
 
     def answers(self, key: str) -> dict[str, Answers]:
@@ -236,8 +225,8 @@ class Store:
             return {}
         path = self._shard(key)
         try:
-            image = shard.read_image(path)
-            if (shard.digest_of(image), len(image)) != entry.shard:
+            image = self.image(entry)
+            if image is None:
                 raise FormatError(f"The shard {path} is not the one that was written.", hint="Run the cell again.")
             return shard.answers_in(path, image)
         except FormatError as error:
@@ -247,32 +236,38 @@ class Store:
 
     def _is_sound(self, entry: Entry) -> bool:
         """Return whether a cell's shard is the one that its line tells of, and holds the line's row."""
-        from tactbench.core.matrix.store import shard
-
         image = self.image(entry)
-        return image is not None and shard.holds_row(self._shard(entry.key), image, entry.row)
+        if image is None:
+            return False
+        try:
+            text = plain(entry.row)[1]
+            if text.encode() in image:  # texts are stored as they are: no need to look where
+                return True
+            from tactbench.core.matrix.store import shard
+
+            return plain(named(shard.row_in(self._shard(entry.key), image), entry.row))[1] == text
+        except (FormatError, NotPlainError):
+            return False
 
     def image(self, entry: Entry) -> bytes | None:
         """Return the bytes of a cell's shard, or None if they are not those that the ledger tells of."""
-        from tactbench.core.matrix.store import shard
-
         try:
-            image = shard.read_image(self._shard(entry.key))
+            image = read_image(self._shard(entry.key))
         except FormatError:
             return None
-        return image if (shard.digest_of(image), len(image)) == entry.shard else None
+        return image if (digest_of(image), len(image)) == entry.shard else None
 
     def provenance(self, name: str) -> dict[str, Any]:
         """Return who computed a cell, with what, by the id in ``row["made_by"]``; empty if not known."""
-        if not limits.is_provenance(name):
+        if len(name) != 16 or not name.isalnum():  # it becomes the name of a file
             return {}
         try:
             content = read_regular(self.folder / "provenance" / f"{name}.json", limits.PROVENANCE_BYTES).strip()
-            said = json.loads(content)
+            provenance = json.loads(content)
         except (OSError, ValueError, RecursionError):
             return {}
-        whole = provenance_id(content) == name and isinstance(said, dict)
-        return said if whole else {}
+        whole = provenance_id(content) == name and isinstance(provenance, dict)
+        return provenance if whole else {}
 
     def recording(self, path: str, digest: str = "") -> Path | None:
         """Return the file of a recording that a row names, or None if it may not be opened.
@@ -323,8 +318,8 @@ class Store:
         if not limits.is_key(key) or self._ledger is None:
             return
         try:
-            image = shard.read_image(self._shard(key))
-            entry = Entry(shard.row_in(self._shard(key), image), (shard.digest_of(image), len(image)))
+            image = read_image(self._shard(key))
+            entry = Entry(shard.row_in(self._shard(key), image), (digest_of(image), len(image)))
         except FormatError as error:
             self._ledger.troubles.append(str(error))
             return
@@ -347,9 +342,11 @@ class Store:
 
     @contextmanager
     def _written(self) -> Iterator[None]:
-        if self._lock is not None and not self._lock.in_place():
-            raise removed(self.folder)
         with writing(self.folder):
+            if self._lock is None:
+                self._cells.mkdir(parents=True, exist_ok=True)
+            elif not self._lock.in_place():
+                raise FileNotFoundError(errno.ENOENT, "not where it was")
             yield
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,7 @@ from tactbench.core.errors import FolderError
 from tactbench.core.matrix.files import read_regular, write_all
 from tactbench.core.matrix.store import limits
 from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
-from tactbench.core.matrix.store.sharing import canonical, definition, joined, parted, shared_lines
+from tactbench.core.matrix.store.sharing import canonical, definition, digest_of, joined, parted, shared_lines
 
 NAME = "index.jsonl"
 
@@ -100,7 +101,7 @@ def read_ledger(folder: Path) -> Ledger:
 
 def _take_in(ledger: Ledger, content: bytes) -> None:
     """Turn the bytes of a ledger into entries."""
-    broken, lost, over, characters = 0, 0, 0, 0
+    broken, altered, lost, over, characters = 0, 0, 0, 0, 0
     shared: dict[str, Any] = {}
     sizes: dict[str, int] = {}
     for line, record in _parsed(content):
@@ -113,6 +114,8 @@ def _take_in(ledger: Ledger, content: bytes) -> None:
             else:
                 shared.setdefault(digest, record["value"])
                 sizes[digest] = len(line)
+        elif _is_altered(line):
+            altered += 1
         elif isinstance(record.get("row"), dict):
             references, shard = record.get("refs", {}), record.get("shard")
             try:
@@ -135,6 +138,7 @@ def _take_in(ledger: Ledger, content: bytes) -> None:
     ledger.known = set(shared)
     for count, what in (
         (broken, "could not be read"),
+        (altered, "do not hold what was written"),
         (lost, "refer to what is not there"),
         (over, "are left out: written out, they would fill the memory"),
     ):
@@ -164,12 +168,23 @@ def whole_text(entries: Sequence[Entry]) -> str:
 def _lines(entry: Entry, known: set[str]) -> tuple[list[str], set[str]]:
     slim, references, texts = parted(entry.row)
     fresh = {digest: text for digest, text in texts.items() if digest not in known}
-    said: dict[str, Any] = {"row": slim}
+    record: dict[str, Any] = {"row": slim}
     if references:
-        said["refs"] = references
+        record["refs"] = references
     if entry.shard is not None:
-        said["shard"] = list(entry.shard)
-    return [*shared_lines(fresh), canonical(said)], set(fresh)
+        record["shard"] = list(entry.shard)
+    text = canonical(record)
+    return [*shared_lines(fresh), f'{text[:-1]}{_DIGEST}{digest_of(text)}"}}'], set(fresh)
+
+
+_DIGEST = ', "sha256": "'
+"""Ends a line, with the digest of what it would be without: earlier versions wrote none."""
+_ITS_DIGEST = re.compile(r'(.*), "sha256": "([0-9a-f]{32})"}')
+
+
+def _is_altered(line: str) -> bool:
+    found = _ITS_DIGEST.fullmatch(line)
+    return found is not None and digest_of(f"{found[1]}}}") != found[2]
 
 
 def _parsed(content: bytes) -> Iterator[tuple[str, Any]]:
@@ -204,10 +219,10 @@ def _is_monstrous(line: str, record: Any) -> bool:
     return False
 
 
-def _is_shard(said: Any) -> bool:
+def _is_shard(shard: Any) -> bool:
     return (
-        isinstance(said, list) and len(said) == 2 and isinstance(said[0], str) and len(said[0]) == 64
-        and type(said[1]) is int and 0 < said[1] <= limits.SHARD_BYTES
+        isinstance(shard, list) and len(shard) == 2 and isinstance(shard[0], str) and len(shard[0]) == 64
+        and type(shard[1]) is int and 0 < shard[1] <= limits.SHARD_BYTES
     )  # fmt: skip
 
 

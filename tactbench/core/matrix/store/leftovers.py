@@ -20,7 +20,7 @@ def sweep(folder: Path) -> None:
     for place in (folder, folder / "cells", folder / "provenance", folder / "cache"):
         for path in place.glob(".*.partial"):
             named = _ASIDE.fullmatch(path.name)
-            if named and not alive(named[1]):
+            if named and not _alive(int(named[1])):
                 _remove(path)
     for path in (folder / "recordings").glob("*/*"):
         if path.suffix != ".h5" and not path.parent.is_symlink() and _is_over(path):
@@ -43,15 +43,12 @@ def _remove(path: Path) -> None:
             path.unlink()
 
 
-def alive(process: str) -> bool:
-    """Return whether the process of this number lives; text that is no number is taken for one that does."""
-    if not process.isdecimal() or int(process) > 2**31:
-        return True
+def _alive(process: int) -> bool:
     try:
-        os.kill(int(process), 0)
+        os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except OSError:
+    except (OSError, OverflowError):  # somebody else's, or no number of a process
         pass
     return True
 

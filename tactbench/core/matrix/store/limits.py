@@ -18,14 +18,8 @@ TEXT_CHARACTERS = 2**16
 """Of a log or a traceback, when it is written."""
 
 _KEY = re.compile(r"[0-9a-f]{32}")
-_PROVENANCE = re.compile(r"[0-9a-f]{16}")
 
 
 def is_key(text: object) -> bool:
     """Return whether `text` is the key of a cell: keys are names of files."""
     return isinstance(text, str) and _KEY.fullmatch(text) is not None
-
-
-def is_provenance(text: object) -> bool:
-    """Return whether `text` is the id of a provenance."""
-    return isinstance(text, str) and _PROVENANCE.fullmatch(text) is not None

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from tactbench.core.matrix.store.limits import DEPTH
-from tactbench.core.spec.row import FORMAT, ReplicatedRow, fault_in_scores, in_words
+from tactbench.core.spec.row import ReplicatedRow, fault_in_scores
 
 Row = dict[str, Any]
 """One cell, as `tactbench.core.spec.row.RowModel` describes it. What comes from a ledger shares its big values
@@ -48,19 +48,10 @@ def fault_in_row(row: Row) -> str:
     try:
         ReplicatedRow.model_validate(row)
     except ValidationError as error:
-        name = str(error.errors(include_url=False)[0]["loc"][0])
-    else:
-        return fault_in_scores(row)
-    if name not in row:
-        return f"it has no {name!r}"
-    held, given = FORMAT[name], row[name]
-    if type(given) not in held.types:
-        return f"{name!r} is {in_words([type(given)])}, not {in_words(held.types)}"
-    return (
-        f"a cell cannot be {given!r}"
-        if name == "status"
-        else f"{name!r} holds something else than {in_words(held.inside)}"
-    )
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        return f"its {place}: {first['msg']}"
+    return fault_in_scores(row)
 
 
 def too_deep(value: Any) -> bool:

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 from collections.abc import Mapping
 from dataclasses import fields
-from functools import lru_cache
-from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
+
+import h5py  # noqa: TID253  (this module is imported where a shard is opened)
+import numpy as np
+import numpy.typing as npt
 
 from tactbench.core.errors import FormatError
-from tactbench.core.matrix.files import read_regular
 from tactbench.core.matrix.store import limits
-from tactbench.core.matrix.store.rows import NotPlainError, Row, fault_in_row, named, plain, too_deep
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from tactbench.core.samples import Answers
-    from tactbench.core.spec.scene import Role
+from tactbench.core.matrix.store.image import SEE
+from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
+from tactbench.core.recording import trust
+from tactbench.core.samples import Answers
+from tactbench.core.spec.scene import Role
 
 FORMAT = "tactbench-cell"
 VERSION = 3
@@ -28,12 +28,9 @@ ENDING = ".h5"
 _COMPRESSED_BYTES = 2**15
 """Tables of fewer bytes are stored as they are: compressing them takes longer than they take room."""
 _CHUNK_ROWS = 4096
-_GROWTH_BYTES = 2**14
-"""By how much the memory of a growing file grows."""
 _ATTRIBUTE_BYTES = 60_000
 """An attribute of HDF5 holds 64 KiB with its name and type."""
-_NUMBERS = count(1)
-_SEE = "Delete it, and the next run computes the cell again."
+_COLUMNS = tuple(column.name for column in fields(Answers))
 
 
 def build(row: str, provenance: str, sets: Mapping[Role, Answers]) -> bytes:
@@ -44,30 +41,27 @@ def build(row: str, provenance: str, sets: Mapping[Role, Answers]) -> bytes:
     Built in memory: HDF5 cannot give up a file on a full disk without crashing the process, and what is written is
     known, byte by byte, before any of it is.
     """
-    import h5py
-
-    content = _Content(row, provenance)
-    # The name is nobody's, but must be unique in the process.
-    with h5py.File(f"cell-{next(_NUMBERS)}", "w", driver="core", backing_store=False, block_size=_GROWTH_BYTES) as file:
-        for role in sorted(sets):
-            table = _table(sets[role])
-            content.add(role, table)
+    tables = {str(role): _table(sets[role]) for role in sorted(sets)}
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        for role, table in tables.items():
             stored: dict[str, Any] = {}
             if table.nbytes >= _COMPRESSED_BYTES:
                 stored = {"chunks": (min(len(table), _CHUNK_ROWS),), "shuffle": True, "compression": 4}
             file.create_dataset(role, data=table, **stored)
-        facts = {"format": f"{FORMAT} {VERSION}", "row": row, "provenance": provenance, "sha256": content.hexdigest()}
+        facts = {
+            "format": f"{FORMAT} {VERSION}",
+            "row": row,
+            "provenance": provenance,
+            "sha256": _digest(row, provenance, tables),
+        }
         for name, fact in facts.items():
             _write_text(file, name, fact)
-        file.flush()
-        image: bytes = file.id.get_file_image()
-    return image
+    return image.getvalue()
 
 
 def _write_text(file: Any, name: str, text: str) -> None:
     """Write a text as an attribute, or as a dataset where it is longer than attributes of HDF5 may be."""
-    import numpy as np
-
     value = np.bytes_(text.encode())
     if len(value) <= _ATTRIBUTE_BYTES:
         file.attrs[name] = value
@@ -77,36 +71,12 @@ def _write_text(file: Any, name: str, text: str) -> None:
 
 def _table(answers: Answers) -> npt.NDArray[Any]:
     """Return (n,) answers, a field for each column."""
-    import numpy as np
-
-    columns = {name: getattr(answers, name) for name in _columns()}
+    columns = {name: getattr(answers, name) for name in _COLUMNS}
     types = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
     table = np.empty(len(answers), dtype=types)
     for name, values in columns.items():
         table[name] = values
     return table
-
-
-def digest_of(image: bytes) -> str:
-    """Return the digest under which the ledger knows a shard."""
-    return hashlib.sha256(image).hexdigest()
-
-
-def read_image(path: Path) -> bytes:
-    """Return the bytes of a shard.
-
-    Raises
-    ------
-    FormatError
-        If there is no such file, it is a link or no file at all, or larger than any shard of ours.
-    """
-    try:
-        image = read_regular(path, limits.SHARD_BYTES, follow=False)  # links may lead anywhere
-    except OSError as error:
-        raise FormatError(f"The shard {path} cannot be read: {error}.", hint=_SEE) from error
-    if len(image) > limits.SHARD_BYTES:
-        raise FormatError(f"The shard {path} is larger than {limits.SHARD_BYTES // 2**20} MiB.", hint=_SEE)
-    return image
 
 
 def answers_in(path: Path, image: bytes) -> dict[str, Answers]:
@@ -141,67 +111,34 @@ def row_in(path: Path, image: bytes) -> Row:
     return dict(row)
 
 
-def holds_row(path: Path, image: bytes, row: Row) -> bool:
-    """Return whether a shard holds the row that a ledger tells of it; it may have another name there."""
-    try:
-        text = plain(row)[1]
-        if text.encode() in image:  # texts are stored as they are: no need to look where
-            return True
-        return plain(named(row_in(path, image), row))[1] == text
-    except (FormatError, NotPlainError):
-        return False
-
-
-class _Content:
-    """Digest of what a shard says, whatever bytes HDF5 made of it."""
-
-    def __init__(self, row: str, provenance: str) -> None:
-        self._sha = hashlib.sha256(f"{FORMAT} {VERSION}\n{row}\n{provenance}\n".encode())
-
-    def add(self, role: str, table: npt.NDArray[Any]) -> None:
-        """Add a table by name, types, length and bytes."""
-        self._sha.update(f"{role} {table.dtype.descr} {table.shape}\n".encode())
-        self._sha.update(table.tobytes())
-
-    def hexdigest(self) -> str:
-        """Return the digest so far."""
-        return self._sha.hexdigest()
+def _digest(row: str, provenance: str, tables: Mapping[str, npt.NDArray[Any]]) -> str:
+    """Return the digest of what a shard says, whatever bytes HDF5 made of it; `tables` in the order of their names."""
+    sha = hashlib.sha256(f"{FORMAT} {VERSION}\n{row}\n{provenance}\n".encode())
+    for role, table in tables.items():
+        sha.update(f"{role} {table.dtype.descr} {table.shape}\n".encode())
+        sha.update(table.tobytes())
+    return sha.hexdigest()
 
 
 def _opened(path: Path, image: bytes) -> tuple[str, dict[str, Answers]]:
     """Return the text of the row, and the answers, after comparing them with the shard's own digest."""
-    import io
-
-    import h5py
-
-    from tactbench.core.recording.trust import READ_FAILURES
-    from tactbench.core.samples import Answers
-    from tactbench.core.spec.scene import Role
-
     try:
         with h5py.File(io.BytesIO(image), "r") as file:
             if _text(path, file, "format") != f"{FORMAT} {VERSION}":
-                raise FormatError(f"{path} is no shard of this version.", hint=_SEE)
+                raise FormatError(f"{path} is no shard of this version.", hint=SEE)
             row = _text(path, file, "row")
-            content = _Content(row, _text(path, file, "provenance"))
-            found = {}
-            for role in sorted(set(get_args(Role)) & set(file)):
-                table = _read(path, file, role)
-                content.add(role, table)
-                found[role] = Answers(**{name: table[name].copy() for name in _columns()})
-            if content.hexdigest() != _text(path, file, "sha256"):
-                raise FormatError(f"{path} does not hold what was written: its digest differs.", hint=_SEE)
+            tables = {str(role): _read(path, file, role) for role in sorted(set(get_args(Role)) & set(file))}
+            if _digest(row, _text(path, file, "provenance"), tables) != _text(path, file, "sha256"):
+                raise FormatError(f"{path} does not hold what was written: its digest differs.", hint=SEE)
     except FormatError:
         raise
-    except (*READ_FAILURES, MemoryError) as error:
+    except (*trust.READ_FAILURES, MemoryError) as error:
         raise _damaged(path, error) from error
-    return row, found
+    return row, {role: Answers(**{name: table[name].copy() for name in _COLUMNS}) for role, table in tables.items()}
 
 
 def _text(path: Path, file: Any, name: str) -> str:
     """Return what `_write_text` wrote; empty if it is not there."""
-    from tactbench.core.recording import trust
-
     value = file.attrs.get(name)
     if value is None:
         dataset = trust.numbers(path, file, name, "S", 0, strict=True)
@@ -211,11 +148,9 @@ def _text(path: Path, file: Any, name: str) -> str:
 
 def _read(path: Path, file: Any, role: str) -> npt.NDArray[Any]:
     """Return the table of a role, looked at before it is read."""
-    from tactbench.core.recording import trust
-
     dataset = trust.numbers(path, file, role, "V", 1, strict=True)
     kinds = {dataset.dtype[name].kind for name in dataset.dtype.names or ()}
-    if dataset.dtype.names != _columns() or not kinds <= set("iuf"):
+    if dataset.dtype.names != _COLUMNS or not kinds <= set("iuf"):
         raise _damaged(path, f"{role} holds {dataset.dtype}")
     most = max(limits.FEW_BYTES, limits.LARGEST_RATIO * dataset.file.id.get_filesize())
     if dataset.size * dataset.dtype.itemsize > most:
@@ -224,12 +159,5 @@ def _read(path: Path, file: Any, role: str) -> npt.NDArray[Any]:
     return table
 
 
-@lru_cache(maxsize=1)
-def _columns() -> tuple[str, ...]:
-    from tactbench.core.samples import Answers
-
-    return tuple(column.name for column in fields(Answers))
-
-
 def _damaged(path: Path, why: object) -> FormatError:
-    return FormatError(f"The shard {path} is damaged: {why}.", hint=_SEE)
+    return FormatError(f"The shard {path} is damaged: {why}.", hint=SEE)

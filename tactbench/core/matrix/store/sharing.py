@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from tactbench.core.matrix.store.rows import Row
 
 SHARED = (
     "plan", "assumptions", "remarks", "counts", "recordings", "digests", "classes", "stamps", "search", "params",
-    "published_remark", "replicates/names", "replicates/strata",
+    "published_remark",
 )  # fmt: skip
-"""Where big values that many rows share lie: a key of the row, or a key in one of its mappings."""
+"""Keys of big values that many rows share."""
 WORTH_CHARACTERS = 120
 """Shorter ones stay where they are: a reference has sixty."""
-
-_SPLIT = tuple((place, *place.partition("/")[::2]) for place in SHARED)
-
 
 canonical = json.JSONEncoder(sort_keys=True).encode
 """Return plain data as one line of JSON: the same text for the same data."""
@@ -35,50 +32,38 @@ def digest_of(text: str) -> str:
 
 
 def parted(row: Row) -> tuple[Row, dict[str, str], dict[str, str]]:
-    """Return what a row has for itself, where its shared values belong, and their texts.
+    """Return what a row has for itself, what it refers to, and the texts of that.
 
     Returns
     -------
     slim, references, texts
-        The row without its big values; digest by place; canonical text by digest.
+        The row without its big values; digest by key; canonical text by digest.
     """
     slim, references, texts = dict(row), {}, {}
-    for place, outer, inner in _SPLIT:
-        holder = slim.get(outer)
-        value = holder.get(inner) if inner and isinstance(holder, dict) else None if inner else holder
-        if not value or not isinstance(value, str | list | dict):
-            continue
-        text = canonical(value)
-        if len(text) < WORTH_CHARACTERS:
-            continue
-        references[place] = digest_of(text)
-        texts[references[place]] = text
-        if inner and isinstance(holder, dict):
-            slim[outer] = {name: one for name, one in holder.items() if name != inner}
-        else:
-            del slim[outer]
+    for key in SHARED:
+        value = row.get(key)
+        text = canonical(value) if isinstance(value, str | list | dict) else ""
+        if len(text) >= WORTH_CHARACTERS:
+            references[key] = digest_of(text)
+            texts[references[key]] = text
+            del slim[key]
     return slim, references, texts
 
 
 def joined(slim: Row, references: Mapping[str, str], shared: Mapping[str, Any]) -> Row:
-    """Put the shared values back; KeyError if one is not there."""
-    for place, digest in references.items():
-        outer, _, inner = place.partition("/")
-        if inner:
-            slim[outer][inner] = shared[digest]
-        else:
-            slim[outer] = shared[digest]
-    return slim
+    """Put the shared values back; KeyError if one is not there, or its key is none of `SHARED`."""
+    if not references.keys() <= set(SHARED):
+        raise KeyError(*references)
+    return {**slim, **{key: shared[digest] for key, digest in references.items()}}
 
 
 _HEAD = '{"shared": "'
 _MIDDLE = '", "value": '
 
 
-def shared_lines(texts: dict[str, str]) -> Iterator[str]:
-    """Yield the lines that define shared values."""
-    for digest, text in texts.items():
-        yield f"{_HEAD}{digest}{_MIDDLE}{text}}}"
+def shared_lines(texts: dict[str, str]) -> list[str]:
+    """Return the lines that define shared values."""
+    return [f"{_HEAD}{digest}{_MIDDLE}{text}}}" for digest, text in texts.items()]
 
 
 def definition(line: str) -> str | None:

@@ -93,19 +93,19 @@ def test_the_command_line_stops_with_a_clear_message_and_goes_on_later(tmp_path,
     import trivial
 
     shelf = trivial.install(tmp_path / "plugin")
-    asked = ("run", "--task", "nothing-asked", "--estimator", "nothing", "--recordings", str(shelf), "--repeats", "60",
+    asked = ("run", "--task", "nothing-asked", "--estimator", "nothing", "--recordings", str(shelf), "--repeats", "30",
              "--no-latency")  # fmt: skip
     plain, plugin = Shell(tmp_path), (str(tmp_path / "plugin"),)
     plain(*asked, "--out", "plain", plugins=plugin)
     with small_disk(tmp_path / "disk") as disk:
-        (disk / "filler").write_bytes(b"x" * 240 * 1024)
+        (disk / "filler").write_bytes(b"x" * 400 * 1024)
         stopped = plain(*asked, "--out", str(disk / "out"), plugins=plugin, code=2)
         assert "the disk is full" in stopped.stderr
         assert str(disk / "out") in stopped.stderr
         assert "the same command goes on" in stopped.stderr
         assert "Traceback" not in stopped.stderr
         before = {row["cell"]: row for row in Store(disk / "out").rows()}
-        assert 5 < len(before) < 60
+        assert 5 < len(before) < 30
         (disk / "filler").unlink()
         subprocess.run(["mount", "-o", "remount,size=4000k", str(disk)], check=True)
         plain(*asked, "--out", str(disk / "out"), plugins=plugin)
