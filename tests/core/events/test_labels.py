@@ -1,0 +1,131 @@
+"""Labels of a made drag whose truth is known, and of the twin's own closed forms."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from tactbench.core.errors import DataError
+from tactbench.core.events.labels import (
+    GROSS,
+    INCIPIENT,
+    STICK,
+    THRESHOLDS,
+    UNDECIDED,
+    SlipThresholds,
+    labels_at_scales,
+    slip_labels,
+    stick_ratio,
+)
+from tactbench.rigs.twin.effects import partial_slip
+from tests.core.events.made import seconds
+
+MU, P = 0.8, 2.0
+SPEED = 0.01
+"""Of the drag [m/s]."""
+
+
+def drag(step_s=0.001):
+    """Return a press, a hold, a rising pull, a slip from 1.0 s to 1.5 s, a hold, and a lift at 2.0 s."""
+    t = step_s * np.arange(round(2.5 / step_s))
+    displacement = SPEED * np.clip(t - 1.0, 0.0, 0.5)
+    normal = np.where(t < 2.0, P, 0.0)
+    pull = np.interp(t, [0.0, 0.5, 1.0, 1.5, 1.55, 2.5], [0.0, 0.0, MU * P, MU * P, 0.0, 0.0])
+    return t, displacement, pull, normal
+
+
+def labelled(shift_s=0):
+    t, displacement, pull, normal = drag()
+    return t, slip_labels(seconds(*t) + shift_s * 10**9, displacement, pull, normal, MU, THRESHOLDS)
+
+
+def test_a_drag_has_one_slip_whose_onset_is_the_threshold_over_the_speed_late():
+    t, labels = labelled()
+    late = THRESHOLDS.gross_displacement_m / SPEED
+    # Two samples: "more than" on a grid of 1 ms, and the rounding of a multiple of it.
+    assert labels.gross_ns[:, 0] / 1e9 == pytest.approx([1.0 + late], abs=2.1e-3)
+    assert labels.gross_ns[:, 1] / 1e9 == pytest.approx([1.5 - late], abs=2.1e-3)
+    assert np.all(labels.state[t < 0.5] == STICK)
+    assert np.all(labels.state[(t > 1.0 + late + 2e-3) & (t < 1.5 - late - 2e-3)] == GROSS)
+    assert np.all(labels.state[t > 2.0] == UNDECIDED)
+
+
+def test_incipient_slip_lies_between_its_two_stick_ratios():
+    t, labels = labelled()
+    begins = 1.0 - (1.0 - THRESHOLDS.incipient_slip_share) ** 3  # Q/(mu P) where c/a is that
+    ends = 1.0 - THRESHOLDS.gross_stick_ratio**3
+    share = np.interp(t, [0.5, 1.0], [0.0, 1.0])
+    rising = (t > 0.5) & (t < 1.0)
+    clear = rising & (np.abs(share - begins) > 1e-9) & (np.abs(share - ends) > 1e-9)
+    expected = np.where(share <= begins, STICK, np.where(share < ends, INCIPIENT, UNDECIDED))
+    assert np.array_equal(labels.state[clear], expected[clear])
+    assert labels.incipient_ns[0] / 1e9 == pytest.approx([0.5 + begins / 2, 0.5 + ends / 2], abs=1.1e-3)
+
+
+def test_the_stick_ratio_is_the_twins():
+    way = np.linspace(0.0, 1.0, 101)  # in displacement, of the way to full slip
+    found = stick_ratio(MU * P * partial_slip.share_of_force(way), np.full(101, P), MU)
+    # c/a is the root of the third root: rounding of Q near mu P grows to its cube root.
+    assert found == pytest.approx(partial_slip.stick_ratio(way), abs=1e-5)
+
+
+def test_the_stick_ratio_by_hand():
+    pull = np.array([0.0, 7 / 8 * MU * P, -7 / 8 * MU * P, MU * P, 2 * MU * P, 1.0])
+    normal = np.array([P, P, P, P, P, 0.0])
+    assert stick_ratio(pull, normal, MU) == pytest.approx([1.0, 0.5, 0.5, 0.0, 0.0, np.nan], nan_ok=True, abs=1e-5)
+
+
+def test_displacement_decides_over_forces():
+    """A coefficient stated too high or too low moves no onset: it only costs incipient frames."""
+    t, displacement, pull, normal = drag()
+    found = [slip_labels(seconds(*t), displacement, pull, normal, mu, THRESHOLDS) for mu in (0.5 * MU, MU, 2 * MU)]
+    assert all(np.array_equal(found[0].gross_ns, other.gross_ns) for other in found[1:])
+    low = found[0].state[(t > 0.76) & (t < 1.0)]  # the pull is over half: by its forces everything slips
+    assert np.all(low == UNDECIDED)
+
+
+def test_motion_in_the_air_and_motion_from_the_first_sample_are_no_events():
+    t, displacement, pull, normal = drag()
+    aloft = slip_labels(seconds(*t), displacement, pull, np.zeros_like(normal), MU, THRESHOLDS)
+    assert aloft.gross_ns.shape == (0, 2)
+    assert np.all(aloft.state == UNDECIDED)
+    late = t >= 1.2
+    moving = slip_labels(seconds(*t[late]), displacement[late], pull[late], normal[late], MU, THRESHOLDS)
+    assert moving.gross_ns.shape == (0, 2)
+    assert np.any(moving.state == GROSS)
+
+
+def test_a_surface_that_never_rests_is_refused():
+    t, displacement, pull, normal = drag()
+    middle = (t > 1.1) & (t < 1.4)
+    with pytest.raises(DataError, match="never rests"):
+        slip_labels(seconds(*t[middle]), displacement[middle], pull[middle], normal[middle], MU, THRESHOLDS)
+    with pytest.raises(DataError, match="normal force"):
+        slip_labels(seconds(*t), displacement, pull, np.where(t > 1, np.nan, normal), MU, THRESHOLDS)
+
+
+def test_halved_and_doubled_thresholds_move_the_labels_the_way_they_say():
+    t, displacement, pull, normal = drag()
+    scales = labels_at_scales(seconds(*t), displacement, pull, normal, MU, THRESHOLDS)
+    onsets = [scales[factor].gross_ns[0, 0] / 1e9 for factor in (0.5, 1.0, 2.0)]
+    late = THRESHOLDS.gross_displacement_m / SPEED
+    assert onsets == pytest.approx([1.0 + late / 2, 1.0 + late, 1.0 + 2 * late], abs=2.1e-3)
+    begins = [scales[factor].incipient_ns[0, 0] for factor in (0.5, 1.0, 2.0)]
+    assert begins == sorted(begins)
+    assert np.array_equal(scales[1.0].state, labelled()[1].state)
+
+
+def test_thresholds_are_stated_whole_and_in_order():
+    assert all(field.is_required() for field in SlipThresholds.model_fields.values())
+    with pytest.raises(ValidationError, match="comes first"):
+        SlipThresholds.model_validate({**THRESHOLDS.model_dump(), "incipient_slip_share": 0.95})
+    with pytest.raises(ValidationError):
+        THRESHOLDS.hold_s = 1.0
+
+
+@given(st.integers(-(10**6), 10**6))
+def test_a_shift_of_the_clock_shifts_the_events_alone(shift_s):
+    here, there = labelled()[1], labelled(shift_s)[1]
+    assert np.array_equal(here.state, there.state)
+    assert np.array_equal(here.gross_ns + shift_s * 10**9, there.gross_ns)
