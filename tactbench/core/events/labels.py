@@ -161,17 +161,18 @@ def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThreshol
     The first sample after a hold is therefore the first that has moved by more than the threshold within `hold_s`.
     """
     n, hold = t_ns.size, nanoseconds(thresholds.hold_s)
-    begin = np.flatnonzero(t_ns + hold <= t_ns[-1]) if n else np.zeros(0, dtype=np.int64)
-    end = np.searchsorted(t_ns, t_ns[begin] + hold, side="left") + 1  # as short as a hold may be
-    pairs = np.column_stack([begin, end]).ravel()
-    if pairs.size == 0:
+    # The shortest stretches of enough length, from each sample on and up to each: longer ones consist of them.
+    last, first = np.searchsorted(t_ns, t_ns + hold, side="left"), np.searchsorted(t_ns, t_ns - hold, side="right") - 1
+    stretches = np.concatenate([np.column_stack([np.arange(n), last]), np.column_stack([first, np.arange(n)])])
+    stretches = stretches[(stretches[:, 0] >= 0) & (stretches[:, 1] < n)]
+    if stretches.size == 0:
         return np.zeros(n, dtype=np.bool_)
+    begin, end = stretches[:, 0], stretches[:, 1] + 1
+    pairs = np.column_stack([begin, end]).ravel()
     padded = np.append(displacement_m, displacement_m[-1])  # reduceat wants every place to exist
     spread = np.maximum.reduceat(padded, pairs)[::2] - np.minimum.reduceat(padded, pairs)[::2]
     still = spread <= thresholds.gross_displacement_m
-    edges = np.zeros(n + 1, dtype=np.int64)
-    np.add.at(edges, begin[still], 1)
-    np.add.at(edges, end[still], -1)
+    edges = np.bincount(begin[still], minlength=n + 1) - np.bincount(end[still], minlength=n + 1)
     return np.asarray(np.cumsum(edges)[:-1] > 0)
 
 

@@ -14,12 +14,13 @@ from tactbench.core.events.labels import (
     THRESHOLDS,
     UNDECIDED,
     SlipThresholds,
+    at_rest,
     labels_at_scales,
     slip_labels,
     stick_ratio,
 )
 from tactbench.rigs.twin.effects import partial_slip
-from tests.core.events.made import seconds
+from tests.core.events.made import MS, clocks, seconds
 
 MU, P = 0.8, 2.0
 SPEED = 0.01
@@ -94,6 +95,29 @@ def test_motion_in_the_air_and_motion_from_the_first_sample_are_no_events():
     moving = slip_labels(seconds(*t[late]), displacement[late], pull[late], normal[late], MU, THRESHOLDS)
     assert moving.gross_ns.shape == (0, 2)
     assert np.any(moving.state == GROSS)
+
+
+def test_a_contact_made_as_the_motion_begins_was_held_by_nothing():
+    t, displacement, pull, _ = drag()
+    first = int(np.flatnonzero(labelled()[1].state == GROSS)[0])
+    normal = np.where(np.arange(t.size) >= first, P, 0.0)
+    labels = slip_labels(seconds(*t), displacement, pull, normal, MU, THRESHOLDS)
+    assert labels.state[first - 1 : first + 1].tolist() == [UNDECIDED, GROSS]
+    assert labels.gross_ns.shape == (0, 2)
+
+
+@given(clocks, st.data(), st.integers(1, 6), st.integers(1, 3))
+def test_a_hold_is_what_its_definition_says(clock, data, hold_ms, allowed):
+    """In whole metres, so that displacement is compared exactly."""
+    moved = data.draw(st.lists(st.integers(-3, 3), min_size=clock.size, max_size=clock.size))
+    displacement = np.asarray(moved, dtype=np.float64)
+    expected = np.zeros(clock.size, dtype=np.bool_)
+    for begin in range(clock.size):
+        for end in range(begin, clock.size):
+            if clock[end] - clock[begin] >= hold_ms * MS and np.ptp(displacement[begin : end + 1]) <= allowed:
+                expected[begin : end + 1] = True
+    rules = THRESHOLDS.model_copy(update={"hold_s": hold_ms / 1000, "gross_displacement_m": float(allowed)})
+    assert np.array_equal(at_rest(clock, displacement, rules), expected)
 
 
 def test_a_surface_that_never_rests_is_refused():
