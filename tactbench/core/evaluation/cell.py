@@ -25,11 +25,14 @@ from tactbench.core.evaluation.reference_floor import BeyondFloor, beyond_floor,
 from tactbench.core.evaluation.replicate_sums import summed
 from tactbench.core.evaluation.replication import ReplicateUnits, replicates
 from tactbench.core.evaluation.selection import Build, Choice, features_of, select
+from tactbench.core.evaluation.sets import not_asked_for
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
     Assignment,
     assert_disjoint,
     choose_split,
+    used_rows,
+    without_part,
 )
 from tactbench.core.evaluation.timing import (
     AT_LEAST,
@@ -41,6 +44,7 @@ from tactbench.core.evaluation.timing import (
 from tactbench.core.evaluation.unloaded import tare_s
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import Answers, FloatArray, Fold, Part
+from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
@@ -67,6 +71,7 @@ class CellResult:
     split: str
     folds: int
     n_recordings: int
+    """that some fold uses; n_sessions alike"""
     n_sessions: int
     n_train: int
     n_test: int
@@ -144,12 +149,22 @@ class _Folds:
         self.fold_sizes: dict[str, tuple[int, int]] = {}
         self.chosen: list[Choice] = []
         self.names: list[str] = []
+        self.took_part: list[RecordingMeta] = []
         self.folds = self.n_train = self.k = 0
         self.stamps: tuple[str, ...] = data.stamps
         self.untrained: dict[str, list[str]] = {}
         self.search_s = self.fit_s = self.predict_s = 0.0
         self.model: Estimator | None = None
         self.test: Any = None
+
+    def look_over(self, assignments: Sequence[Assignment]) -> None:
+        """Count what the folds together use, and what they do not."""
+        used = used_rows(assignments)
+        self.counts.update(without_part(self.data, self.split, used))
+        self.counts.update(not_asked_for(self.data, self.rules, used))
+        self.took_part = [
+            table.meta for table, mask in zip(self.data.tables, used, strict=True) if (mask & table.labelled).any()
+        ]
 
     def add(self, number: int, assignment: Assignment, build: Build, *, alone: bool) -> None:
         """Choose, fit and test on one fold; `alone`: it is the only one."""
@@ -232,6 +247,7 @@ def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> Cell
         tare_s(data)  # refuses recordings of which only some can be tared
     assignments = assigned(context.task, estimator, data, folds.split, context.seed)
     assert_disjoint(assignments)
+    folds.look_over(assignments)
     folds.stamps += (SHUFFLED_STAMP,) if folds.split == "shuffled" else leak_stamps(data, assignments)
     build = builder(estimator, context.params, context.task, context.seed, context.threads)
     with thread_limit(context.threads):
@@ -336,15 +352,15 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
         ci_low=interval.low,
         ci_high=interval.high,
         ci_level=LEVEL,
-        ci_method=interval.method,
+        ci_method=interval.method + unit.caveat,
         scores=scores,
         fold_sizes=folds.fold_sizes,
         confusion=table,
         classes=data.classes,
         split=split,
         folds=folds.folds,
-        n_recordings=len(data.tables),
-        n_sessions=len({meta.session for meta in data.metas}),
+        n_recordings=len(folds.took_part),
+        n_sessions=len({meta.session for meta in folds.took_part}),
         n_train=folds.n_train,
         n_test=len(y),
         counts=dict(folds.counts),
