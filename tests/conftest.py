@@ -15,6 +15,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tactbench.core.matrix.engine import PRELOAD
+
 # A shared machine is slow at times: a deadline would test the machine. Continuous integration draws the same examples
 # every time, so that a red run means a change; people's own runs keep exploring.
 settings.register_profile("here", deadline=None)
@@ -24,6 +26,10 @@ settings.load_profile("ci" if os.environ.get("CI") else "here")
 # Threads of numerical libraries wait for each other in a loop: beside other work each wait costs a time slice. Set
 # before any of them is loaded; tests of several threads ask for them.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# A fork server imports what whoever starts it asks for, and cells need more than a pool does on its own: whichever test
+# comes first, the children of all are spared their imports.
+forkserver.set_forkserver_preload(list(PRELOAD))
 
 # A shell's background jobs are deaf to Ctrl-C, and so is all that they start: tests that send one would wait for ever.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
@@ -81,7 +87,6 @@ class Verbs:
         self, *arguments: str, plugins: tuple[str, ...] = (), code: int | None = 0
     ) -> subprocess.CompletedProcess[str]:
         from tactbench.core.cli import main
-        from tactbench.core.matrix.engine import PRELOAD
         from tactbench.core.plugins.registry import installed
 
         thresholds = gc.get_threshold()
@@ -98,8 +103,6 @@ class Verbs:
             for name in plugins:
                 patch.syspath_prepend(THIRD_PARTY / name)
             if plugins:
-                # A fork server imports what whoever starts it asks for: cells need more than the registry does.
-                forkserver.set_forkserver_preload(list(PRELOAD))
                 forkserver.ensure_running()
                 installed.cache_clear()
             try:

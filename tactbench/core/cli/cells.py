@@ -79,7 +79,10 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
     if options is None or not any(_given(name, value) for name, value in options.items()):
         try:
             row = rows[meant(given, list(rows), known)]
-        except UsageError:
+        except UsageError as error:
+            lost = [text for text in store.troubles if given in text]
+            if lost:
+                raise UsageError(f"{lost[0]}.", hint="The next run of its matrix computes it again.") from error
             if options is None or any(given in name for name in rows):
                 raise
         else:

@@ -117,7 +117,7 @@ def summary(report: ImportReport, folder: Path) -> list[str]:
     from collections import Counter
 
     lines = [
-        f"{report.title}: {len(report.recordings)} recordings of {report.sensor}, {report.rows} rows, "
+        f"{report.title}: {len(report.recordings)} recordings of {', '.join(report.sensors)}, {report.rows} rows, "
         f"from {report.files_read} files, in {folder}"
     ]
     for recording in report.recordings:

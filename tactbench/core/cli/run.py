@@ -125,6 +125,7 @@ def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path,
 def _suggest(rows: Sequence[Mapping[str, Any]]) -> None:
     """Say what to try next, fitting to what was just run."""
     from tactbench.core.cli.screen import remark
+    from tactbench.core.evaluation.protocols import is_probe
     from tactbench.core.tables.text import command_line
 
     row = rows[0]
@@ -141,8 +142,9 @@ def _suggest(rows: Sequence[Mapping[str, Any]]) -> None:
             command_line("tactbench", "show", row["sensor"]): "what the sensor is, and who says so",
         }
     else:
-        tries = {
-            "tactbench run … --probe": "what the recordings give away: first frame alone, shuffled rows",
+        probe = {"tactbench run … --probe": "what the recordings give away: first frame alone, shuffled rows"}
+        probed = any(is_probe(row["protocol"]) for row in rows)
+        tries = ({} if probed else probe) | {
             "tactbench run … --estimator forest": "another answer (see tactbench list estimators)",
             "tactbench inspect FILE": "what is in a recording, and whether it is healthy",
         }

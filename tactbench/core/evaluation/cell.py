@@ -25,6 +25,7 @@ from tactbench.core.evaluation.reference_floor import BeyondFloor, beyond_floor,
 from tactbench.core.evaluation.replicate_sums import summed
 from tactbench.core.evaluation.replication import ReplicateUnits, replicates
 from tactbench.core.evaluation.selection import Build, Choice, features_of, select
+from tactbench.core.evaluation.sets import not_asked_for
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
     SHUFFLED_WHOLE_STAMP,
@@ -32,6 +33,8 @@ from tactbench.core.evaluation.splits import (
     assert_disjoint,
     choose_split,
     over_rows,
+    used_rows,
+    without_part,
 )
 from tactbench.core.evaluation.summaries import (
     is_summarised,
@@ -52,6 +55,7 @@ from tactbench.core.evaluation.unloaded import tare_s
 from tactbench.core.evaluation.vote import require_answers, voted
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import Answers, FloatArray, Fold, Part
+from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
@@ -78,6 +82,7 @@ class CellResult:
     split: str
     folds: int
     n_recordings: int
+    """that some fold uses; n_sessions alike"""
     n_sessions: int
     n_train: int
     n_test: int
@@ -158,6 +163,7 @@ class _Folds:
         self.fold_sizes: dict[str, tuple[int, int]] = {}
         self.chosen: list[Choice] = []
         self.names: list[str] = []
+        self.took_part: list[RecordingMeta] = []
         self.folds = self.n_train = self.k = 0
         self.stamps: tuple[str, ...] = data.stamps
         self.untrained: dict[str, list[str]] = {}
@@ -165,6 +171,15 @@ class _Folds:
         self.batch_rows = 0
         self.model: Estimator | None = None
         self.test: Any = None
+
+    def look_over(self, assignments: Sequence[Assignment]) -> None:
+        """Count which recorded rows the folds together use, and which they do not."""
+        used = used_rows(assignments)
+        self.counts.update(without_part(self.recorded, self.split, used))
+        self.counts.update(not_asked_for(self.recorded, self.rules, used))
+        self.took_part = [
+            table.meta for table, mask in zip(self.recorded.tables, used, strict=True) if (mask & table.labelled).any()
+        ]
 
     def add(self, number: int, assignment: Assignment, build: Build, *, alone: bool) -> None:
         """Choose, fit and test on one fold; `alone`: it is the only one."""
@@ -257,10 +272,12 @@ def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> Cell
     data = folds.data
     assignments = assigned(context.task, estimator, data, folds.split, context.seed)
     assert_disjoint(assignments)
+    over_recorded = [over_rows(one, recorded) for one in assignments]
+    folds.look_over(over_recorded)
     if folds.split == "shuffled":
         folds.stamps += (SHUFFLED_WHOLE_STAMP if data.whole else SHUFFLED_STAMP,)
     else:
-        folds.stamps += leak_stamps(recorded, [over_rows(one, recorded) for one in assignments])
+        folds.stamps += leak_stamps(recorded, over_recorded)
     build = builder(estimator, context.params, context.task, context.seed, context.threads)
     with thread_limit(context.threads):
         for number, assignment in enumerate(assignments):
@@ -369,15 +386,15 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
         ci_low=interval.low,
         ci_high=interval.high,
         ci_level=LEVEL,
-        ci_method=interval.method,
+        ci_method=interval.method + unit.caveat,
         scores=scores,
         fold_sizes=folds.fold_sizes,
         confusion=table,
         classes=data.classes,
         split=split,
         folds=folds.folds,
-        n_recordings=len(data.tables),
-        n_sessions=len({meta.session for meta in data.metas}),
+        n_recordings=len(folds.took_part),
+        n_sessions=len({meta.session for meta in folds.took_part}),
         n_train=folds.n_train,
         n_test=len(y),
         counts=dict(folds.counts),

@@ -114,8 +114,9 @@ def _of_clusters(
     without = scale.there(metric.score(sums.sum(axis=0) - sums, n_classes))
     without = np.where(np.isfinite(without), without, scale.there(score))  # R² of labels that are all alike
     freedom = len(sums) - len(strata)
-    plural = cluster_name + ("es" if cluster_name.endswith("s") else "s")
-    method = f"jackknife over {len(sums)} {plural} (Student's t, {freedom} degrees of freedom, {scale.name})"
+    method = (
+        f"jackknife over {len(sums)} {plural(cluster_name)} (Student's t, {freedom} degrees of freedom, {scale.name})"
+    )
     deviation = float(np.sqrt((influences(without, code) ** 2).sum()))
     return _student(metric, score, deviation, freedom, scale, method)
 
@@ -152,6 +153,11 @@ def enough(y: npt.NDArray[Any], cluster: npt.NDArray[Any], n_classes: int) -> bo
     if len(np.unique(cluster)) < ENOUGH_CLUSTERS:
         return False
     return all(len(np.unique(cluster[y == one])) >= ENOUGH_CLUSTERS for one in range(n_classes) if (y == one).any())
+
+
+def plural(name: str) -> str:
+    """Return the name of several units."""
+    return name + ("es" if name.endswith("s") else "s")
 
 
 def strata_of(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> list[IntArray]:

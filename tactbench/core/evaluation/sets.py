@@ -73,7 +73,7 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     what
         Name of the set, for messages.
     counts
-        Told how many rows were dropped, and why.
+        Told how many rows the three-sigma rule drops, which depends on the set.
 
     Raises
     ------
@@ -82,10 +82,6 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     """
     chosen = [mask & _asked_for(table, protocol) for table, mask in zip(data.tables, masks, strict=True)]
     sizes = [int(mask.sum()) for mask in chosen]
-    others = sum(int(mask.sum()) for mask in masks) - sum(sizes)
-    if others:
-        which = "after the first of a recording" if protocol.first_row_only else "before the press begins"
-        counts[f"{what} rows {which}"] += others
     if sum(sizes) == 0:
         raise DataError(f"The {what} set has no rows.", hint="Check roles, sessions and the length of the recordings.")
     tables = data.tables
@@ -117,6 +113,21 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
         cluster=cluster[good],
         segment=_segments(recording[good], place[good], consecutive=consecutive),
     )
+
+
+def not_asked_for(data: Dataset, protocol: ProtocolSpec, used: Sequence[Mask]) -> dict[str, int]:
+    """Return how many of the rows that some fold uses the protocol does not look at, by reason.
+
+    Parameters
+    ----------
+    used
+        One (n,) mask a recording.
+    """
+    others = sum(
+        int((mask & ~_asked_for(table, protocol)).sum()) for table, mask in zip(data.tables, used, strict=True)
+    )
+    which = "after the first of a recording" if protocol.first_row_only else "before the press begins"
+    return {f"rows {which}": others} if others else {}
 
 
 def _asked_for(table: Table, protocol: ProtocolSpec) -> Mask:

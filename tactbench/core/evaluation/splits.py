@@ -110,6 +110,23 @@ def _can(name: str, data: Dataset) -> bool:
     return len({value for table in tables for value in np.unique(table.groups[name][table.labelled])}) >= 2
 
 
+def used_rows(assignments: Sequence[Assignment]) -> tuple[Mask, ...]:
+    """Return one (n,) mask a recording: the rows that some fold trains, validates or tests on."""
+    sets = [masks for one in assignments for masks in (one.train, one.test, one.validation) if masks is not None]
+    return tuple(np.logical_or.reduce(masks) for masks in zip(*sets, strict=True))
+
+
+def without_part(data: Dataset, split: str, used: Sequence[Mask]) -> dict[str, int]:
+    """Return how many recordings no fold uses, by their role; few shots leave recordings out by design."""
+    if shots(split) is not None:
+        return {}
+    unused = [meta.role for meta, mask in zip(data.metas, used, strict=True) if not mask.any()]
+    return {
+        f"recordings {f'of role {role}' if role else 'without a role'} that take no part in split {split}": count
+        for role, count in Counter(unused).items()
+    }
+
+
 def training_sessions(data: Dataset) -> list[str]:
     """Return the sessions to train on, those first that few shots take first.
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.names import answer_name, asked_of, question_name
-from tactbench.core.leaderboard.verdict import may_be_trivial
+from tactbench.core.leaderboard.verdict import against_trivial, asked_in, best_trivials
 from tactbench.core.spec.status import STATUSES, STOPPED
 from tactbench.core.tables.numbers import score, suffix
 from tactbench.core.tables.text import command_line, cut, visible
@@ -51,8 +51,8 @@ def notes_of(rows: Sequence[Row], blocks: Sequence[Block]) -> list[str]:
     return [
         *_stopped_notes(rows, STOPPED),
         *_mark_notes(rows),
-        *_floor_notes(rows),
         *_no_better_notes(rows),
+        *_floor_notes(rows),
         *_tare_notes(rows),
         *_rank_notes(blocks),
         *_true_error_notes(rows),
@@ -97,9 +97,10 @@ def _tare_notes(rows: Sequence[Row]) -> list[str]:
 def _floor_notes(rows: Sequence[Row]) -> list[str]:
     """Return the floors of the references, once each, and what stands beyond them."""
     floors: dict[tuple[str, str], dict[float, None]] = {}
+    named = _namer(rows)
     for row in rows:
         if row.get("reference_floor") is not None:
-            floors.setdefault((question_name(row), str(row["unit"])), {})[row["reference_floor"]] = None
+            floors.setdefault((named(row), str(row["unit"])), {})[row["reference_floor"]] = None
     sentences = []
     if floors:
         each = "; ".join(f"{where} {_floor(list(found), unit)}" for (where, unit), found in floors.items())
@@ -126,20 +127,48 @@ def _floor(found: Sequence[float], unit: str) -> str:
 
 def interval_notes(rows: Sequence[Row]) -> list[str]:
     """Return one sentence a task and kind of interval; what is in brackets only where it is the same for all."""
-    kinds: dict[str, dict[str, None]] = {}
-    for task, method in dict.fromkeys((row["task"], row["ci_method"]) for row in rows if not row["is_baseline"]):
-        if method:
-            sentence = visible(f"{task}: interval by {method}.")
-            kinds.setdefault(re.sub(r" \([^)]*\)", "", sentence), {})[sentence] = None
-    return [next(iter(texts)) if len(texts) == 1 else short for short, texts in kinds.items()]
+    every = _splits(rows)
+    kinds: dict[tuple[str, str], dict[str, None]] = {}
+    splits: dict[tuple[str, str], dict[str, None]] = {}
+    for row in rows:
+        task, method = row["task"], row["ci_method"]
+        if method and not row["is_baseline"]:
+            sentence = visible(f"interval by {method}.")
+            key = task, re.sub(r" \([^)]*\)", "", sentence)
+            kinds.setdefault(key, {})[sentence] = None
+            splits.setdefault(key, {})[str(row.get("split"))] = None
+    return [
+        f"{visible(task)}{_among(splits[task, short], every[task])}: {next(iter(texts)) if len(texts) == 1 else short}"
+        for (task, short), texts in kinds.items()
+    ]
+
+
+def _splits(rows: Iterable[Row]) -> dict[str, dict[str, None]]:
+    """Return the splits that each task was asked under."""
+    found: dict[str, dict[str, None]] = {}
+    for row in rows:
+        found.setdefault(row["task"], {})[str(row.get("split"))] = None
+    return found
+
+
+def _among(splits: Collection[str], every: Collection[str]) -> str:
+    """Return which splits are meant, if not all there are."""
+    return "" if len(splits) == len(every) else visible(f" (split {', '.join(splits)})")
+
+
+def _namer(rows: Sequence[Row]) -> Callable[[Row], str]:
+    """Return what names sensor and task, with the split where the task was asked under several."""
+    every = _splits(rows)
+    return lambda row: question_name(row) + _among([str(row.get("split"))], every[row["task"]])
 
 
 def _chosen_notes(rows: Sequence[Row]) -> list[str]:
     """Return one sentence for all answers that chose the same on validation data."""
     names: dict[str, dict[str, None]] = {}
+    named = _namer(rows)
     for row in rows:
         if row["chosen"]:
-            names.setdefault(visible(picked(row)), {})[f"{question_name(row)}/{answer_name(row)}"] = None
+            names.setdefault(visible(picked(row)), {})[f"{named(row)}/{answer_name(row)}"] = None
     return [f"{', '.join(who)}: chosen on validation data: {what}." for what, who in names.items()]
 
 
@@ -162,19 +191,43 @@ def _told(value: object) -> str:
 
 
 def _no_better_notes(rows: Sequence[Row]) -> list[str]:
-    """Return one sentence a sensor and task on the answers that are not clearly better than the trivial one."""
-    names: dict[tuple[str, str], dict[str, None]] = {}
+    """Return one sentence a question and trivial answer on the answers that are not shown to be better than it."""
+    names: dict[tuple[str, ...], dict[str, None]] = {}
+    probed = {question_name(row) for row in rows if is_probe(row["protocol"])}
+    best = best_trivials(rows)
     for row in rows:
-        answer = row["status"] == "done" and not row["is_baseline"]
-        if answer and may_be_trivial(row) and not is_probe(row["protocol"]):  # a probe should be no better than trivial
-            names.setdefault((question_name(row), _probing(row)), {})[f"{answer_name(row)} ({row['protocol']})"] = None
+        if row["status"] != "done" or row["is_baseline"] or is_probe(row["protocol"]):
+            continue  # a probe should be no better than trivial
+        trivial = best.get(asked_in(row))
+        bar = row["baseline"] if trivial is None else trivial["score"]
+        shown = "" if bar is None else against_trivial(row, bar)
+        if not shown:
+            continue
+        where = question_name(row)
+        look = "" if where in probed else f": `{_probing(row)}`"
+        key = (where, shown, _trivial_name(trivial), score(bar, row["unit"]) + suffix(row["unit"]), look)
+        names.setdefault(key, {})[f"{answer_name(row)} ({row['protocol']}, split {row['split']})"] = None
     return [
         visible(
-            f"{where}/{', '.join(who)} cannot be told from the trivial baseline: "
-            f"see how the recordings differ before blaming the sensor: `{command}`."
+            f"{where}/{', '.join(who)} {_is_are(who)} {_SHOWN[shown]} than {trivial}, {value}; see how the recordings "
+            f"differ before blaming the sensor{look}."
         )
-        for (where, command), who in names.items()
+        for (where, shown, trivial, value, look), who in names.items()
     ]
+
+
+_SHOWN = {"no better": "no better", "not shown": "not shown to be better"}
+
+
+def _is_are(who: Collection[str]) -> str:
+    return "is" if len(who) == 1 else "are"
+
+
+def _trivial_name(trivial: Row | None) -> str:
+    if trivial is None:
+        return "the trivial baseline"
+    reads = ", which reads no sensor, only the time" if trivial.get("looks_at") == "time" else ""
+    return f"the trivial {answer_name(trivial)}{reads}"
 
 
 def _probing(row: Row) -> str:
@@ -186,23 +239,27 @@ def _probing(row: Row) -> str:
 def _other_knowledge_notes(rows: Sequence[Row]) -> list[str]:
     """Return which trivial answers knew more than readings tell."""
     names: dict[str, dict[str, None]] = {}
+    named = _namer(rows)
     for row in rows:
         if row.get("looks_at") == "time" and row["is_baseline"] and row["status"] == "done":
-            names.setdefault(answer_name(row), {})[f"{question_name(row)} {score(row['score'], row['unit'])}"] = None
+            names.setdefault(answer_name(row), {})[f"{named(row)} {score(row['score'], row['unit'])}"] = None
     return [
-        f"{who} looks at the time of a sample and at no reading: it knows that every recording is pressed alike, and "
-        f"is no bar for answers from readings: {', '.join(where)}."
+        f"{who} looks at the time of a sample and at no reading: it knows that every recording is pressed alike. The "
+        f"baseline column leaves it out where answers read the sensor: {', '.join(where)}."
         for who, where in names.items()
     ]
 
 
 def _left_out_notes(rows: Sequence[Row]) -> list[str]:
     """Return what was left out of the data, and what their recordings remark; each once."""
-    counted = {(row["sensor"], row["task"], *(row["counts"] or {}).items()): row for row in rows}
+    every = _splits(rows)
+    counted: dict[tuple[str, str, str], dict[str, None]] = {}
+    for row in rows:
+        for count in count_texts(row["counts"] or {}):
+            counted.setdefault((question_name(row), row["task"], count), {})[str(row.get("split"))] = None
     notes = [
-        visible(f"{question_name(row)}: {count}.")
-        for row in counted.values()
-        for count in count_texts(row["counts"] or {})
+        visible(f"{question}{_among(splits, every[task])}: {count}.")
+        for (question, task, count), splits in counted.items()
     ]
     notes += [visible(f"{row['sensor']}: {remark}") for row in rows for remark in row["remarks"] or ()]
     return list(dict.fromkeys(notes))

@@ -9,6 +9,7 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, sensor_name
+from tactbench.core.leaderboard.verdict import against_trivial, asked_in, best_trivials
 from tactbench.core.tables.numbers import interval, score, suffix
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
@@ -35,6 +36,7 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
     probes = _Probes(rows)
     if not probes:
         return None
+    best = best_trivials(rows)
     lines: list[tuple[str, ...]] = []
     skipped: list[str] = []
     for row in rows:
@@ -46,7 +48,7 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
         shuffled = probes.of(row, DEPLOYABLE.name, "shuffled")
         if first is None and shuffled is None:
             continue
-        lines.append(tuple(map(visible, _line(row, shuffled, first))))
+        lines.append(tuple(map(visible, _line(row, shuffled, first, best.get(asked_in(row))))))
         if first is not None and first["status"] == "skipped":
             skipped.append(visible(f"{row['sensor']}/{row['task']}: {first['reason']}"))
     if not lines:
@@ -59,10 +61,11 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
         lines=tuple(tuple(line[place] for place in used) for line in lines),
         notes=(
             f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer). "
-            "Optimistic: shuffled rows score beyond the interval of the split. See docs/real-recordings.md.",
+            "Optimistic: shuffled rows score beyond the interval of the split. TRIVIAL: an answer that reads no sensor "
+            "scores as well. See docs/real-recordings.md.",
             *dict.fromkeys(skipped),
         ),
-        kinds=tuple("alarm" if line[-1].startswith("LEAK") else "plain" for line in lines),
+        kinds=tuple("alarm" if line[-1].startswith(("LEAK", "TRIVIAL")) else "plain" for line in lines),
     )
 
 
@@ -91,8 +94,9 @@ class _Probes:
         return (protocol, *same, json.dumps(row["params"], sort_keys=True))
 
 
-def _line(row: Row, shuffled: Row | None, first: Row | None) -> tuple[str, ...]:
+def _line(row: Row, shuffled: Row | None, first: Row | None, trivial: Row | None) -> tuple[str, ...]:
     unit = row["unit"]
+    found = [*_about_trivial(row, trivial), *_about_first(row, first), *_about_shuffled(row, shuffled)]
     return (
         sensor_name(row),
         row["task"],
@@ -102,9 +106,20 @@ def _line(row: Row, shuffled: Row | None, first: Row | None) -> tuple[str, ...]:
         interval(row["ci_low"], row["ci_high"], unit),
         _shown(shuffled),
         _shown(first),
-        score(row["baseline"], unit),
-        "; ".join([*_about_first(row, first), *_about_shuffled(row, shuffled)]) or "no leak shown",
+        score(row["baseline"], unit) if trivial is None else f"{score(trivial['score'], unit)} {answer_name(trivial)}",
+        "; ".join(found) or "no leak shown",
     )
+
+
+def _about_trivial(row: Row, trivial: Row | None) -> list[str]:
+    """Return that the best trivial answer scores as well, or that the interval does not exclude it."""
+    if trivial is None:
+        return []
+    values = f"{score(trivial['score'], row['unit'])} of {score(row['score'], row['unit'])}{suffix(row['unit'])}"
+    if _skill(trivial["score"], row["score"], row) >= 0:
+        return [f"TRIVIAL: {answer_name(trivial)} scores {values}"]
+    shown = against_trivial(row, trivial["score"])
+    return [f"not shown to be better than {answer_name(trivial)}: {values}"] if shown else []
 
 
 def _shown(row: Row | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name
@@ -48,12 +48,12 @@ def verdict_of(
         single ones lie; then answers that need no touch, and where published figures lie.
     """
     if not ranked:
-        return (f"None of {below} answers is better than the trivial one.",) if below else ()
+        return (_none_better(below, trivial),) if below else ()
     rows = [row for row, _ in ranked]
     names = _names(rows)
     replicates = [row.get("n_replicates") for row in rows]
     if any(n is not None and n < FEWEST for n in replicates) or ranked[0][1].low is None:
-        return (_too_few(rows, names),)
+        return (_too_few(rows, names), *_without_touch(rows, trivial))
     leaders = [place for place, (_, one) in enumerate(ranked) if not one.behind]
     best = rows[0]
     if may_be_trivial(best):
@@ -161,11 +161,56 @@ def _replicates(row: Row) -> str:
 
 def may_be_trivial(row: Row) -> bool:
     """Return whether the interval of a row holds its trivial answer's score, or lies beyond it on the worse side."""
+    return _reaches(row, "ci_high", "ci_low", row["baseline"])
+
+
+def best_trivials(rows: Iterable[Row]) -> dict[tuple[Any, ...], Row]:
+    """Return the best of all finished trivial answers, whatever they look at, by what :func:`asked_in` says of them."""
+    best: dict[tuple[Any, ...], Row] = {}
+    for row in rows:
+        if row["is_baseline"] and row["status"] == "done":
+            sign = 1.0 if row["metric"] in LOWER_IS_BETTER else -1.0
+            known = best.setdefault(asked_in(row), row)
+            if sign * row["score"] < sign * known["score"]:
+                best[asked_in(row)] = row
+    return best
+
+
+def asked_in(row: Row) -> tuple[Any, ...]:
+    """Return what answers must share to be held against a trivial one."""
+    return tuple(row[key] for key in ("sensor", "task", "rig", "protocol", "split"))
+
+
+def against_trivial(row: Row, trivial: float) -> str:
+    """Return what is shown of a row beside the score of a trivial answer.
+
+    Returns
+    -------
+    str
+        ``no better`` where its whole interval lies at or beyond that score; ``not shown`` where its interval, or
+        without one its score, reaches it; else nothing.
+    """
+    if _reaches(row, "ci_low", "ci_high", trivial):
+        return "no better"
+    return (
+        "not shown" if _reaches(row, "ci_high", "ci_low", trivial) or _reaches(row, "score", "score", trivial) else ""
+    )
+
+
+def _reaches(row: Row, of_errors: str, of_shares: str, trivial: float | None) -> bool:
+    """Return whether a figure of the row is as bad as `trivial`, or worse."""
     lower = row["metric"] in LOWER_IS_BETTER
-    end = row["ci_high" if lower else "ci_low"]
-    if row["baseline"] is None or end is None:
+    figure = row[of_errors if lower else of_shares]
+    if figure is None or trivial is None:
         return False
-    return bool(end >= row["baseline"] if lower else end <= row["baseline"])
+    return bool(figure >= trivial if lower else figure <= trivial)
+
+
+def _none_better(below: int, trivial: Sequence[Row]) -> str:
+    """Return that no answer scores better than the trivial ones that look at as much."""
+    rows = list(best_trivials(row for row in trivial if row.get("looks_at") != "time").values())
+    bars = [f"{name} {_score(row)}" for name, row in zip(_names(rows), rows, strict=True)]
+    return f"None of {below} answers scores better than the trivial one{': ' * bool(bars)}{', '.join(bars)}."
 
 
 def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:

@@ -110,15 +110,16 @@ def plan_cells(
 def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     """Return `cells` and, after them, those that show what their recordings give away.
 
-    For every answer, and for its task's first baseline: the same under `deployable` with kept apart what the cell keeps
-    apart, under `first-frame`, and with rows shuffled. A split in time keeps no recordings apart and is not probed.
+    For every answer, and for its task's own trivial ones: the same under `deployable` with kept apart what the cell
+    keeps apart, under `first-frame`, and with rows shuffled. A split in time keeps no recordings apart and is not
+    probed.
     """
     every = dict.fromkeys(cells)
     planned = frozenset(every)
     for cell in cells:
         rules = protocol_called(cell.protocol)
         task = registry.tasks[cell.task].spec
-        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator != task.baselines[0]):
+        if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator not in task.baselines):
             continue
         if rules.roles_only and task.splits[:1] == ("roles",):
             same = replace(cell, protocol=DEPLOYABLE.name, split=None)
@@ -166,7 +167,7 @@ def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[
     fit = [other for other in registry.estimators if task.kind in other.kinds] if whole else []
     choices = [estimator for estimator in choices if estimator.name != "all"]
     choices += [EstimatorChoice(name=other.name) for other in fit if not other.baseline]
-    # The task's own baselines come before any other: the first of them is the `baseline` column.
+    # The task's own baselines come before any other.
     trivial = [*task.baselines, *(other.name for other in fit if other.baseline)]
     choices += [EstimatorChoice(name=name) for name in dict.fromkeys(trivial)]
     for estimator in choices:

@@ -83,8 +83,12 @@ class Pool:
                             worker = idle.pop() if idle else Worker(work, every or [item], self._limits, self._preload)
                             busy.append(worker)
                             worker.begin(index, second)
-                    except Exception as error:  # it cannot be pickled, or the system starts no more processes
-                        yield item, error  # type: ignore[misc]
+                    except Exception as error:
+                        if isinstance(error, ConnectionError | EOFError) and not second:
+                            # The fork server has just ended: the next start makes another.
+                            again.append((index, item))  # type: ignore[arg-type]
+                        else:  # it cannot be pickled, or the system starts no more processes
+                            yield item, error  # type: ignore[misc]
                 if not busy or not self._is_needed():
                     return
                 wait([one for worker in busy for one in worker.waits_on], min(worker.wait_s() for worker in busy))

@@ -20,6 +20,8 @@ ChannelKind = Literal[
 ]  # fmt: skip
 """What a channel measures. Tasks ask for kinds, never for a sensor's own names."""
 
+SENSOR_NAME = r"^[a-z][a-z0-9_-]*$"
+
 Vector = tuple[float, float, float]
 
 
@@ -250,7 +252,7 @@ class DataSheet(Frozen):
 class SensorSpec(Frozen):
     """A tactile sensor. See ``docs/plugins.md`` for a worked example."""
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    name: str = Field(pattern=SENSOR_NAME)
     title: str
     principle: str
     """How a taxel measures: resistive, capacitive, magnetic …"""

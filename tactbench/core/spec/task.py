@@ -131,7 +131,7 @@ class TaskSpec(Frozen):
     estimators: tuple[str, ...]
     """What answers when nobody asks for another."""
     baselines: tuple[str, ...]
-    """Trivial answers that stand in every table; the first is the `baseline` column."""
+    """Trivial answers that stand in every table and are probed; the best of them is the bar."""
     published: tuple[Published, ...] = ()
 
     @model_validator(mode="after")

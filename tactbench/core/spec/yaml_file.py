@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,6 +20,9 @@ MOST_DEPTH = 32
 MOST_ALIASES = 100
 MOST_VALUES = 20_000
 """With every alias written out: nine lines of nine aliases each are a third of a billion values."""
+_NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+_ODD_NUMBER = re.compile(r"[-+]?(0[0-9_]|[0-9][0-9_.]*[_:])")
+"""Notations of YAML 1.1 that hardly anybody means: 010 is 8, 2025_04 is 202504, 1:30 is 90."""
 
 
 def load_yaml(path: Path, model: type[M]) -> M:
@@ -60,7 +64,7 @@ def load_yaml(path: Path, model: type[M]) -> M:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise _explain(error, str(path), lines, data, model) from error
+        raise _explain(error, str(path), lines, node, model) from error
 
 
 def plain_value(text: str) -> Any:
@@ -100,9 +104,7 @@ def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -
         built: dict[str | int, Any] = {}
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
-            key = _scalar(key_node, file) if isinstance(key_node, yaml.ScalarNode) else None
-            if not isinstance(key, str | int):
-                raise ConfigError(file, line, "a key must be a word or a number.", hint="Quote it.")
+            key = _key(key_node, file)
             if key in built:
                 raise ConfigError(file, line, f"the key {key!r} stands here twice.", hint="Remove one of them.")
             lines[(*at, key)] = line
@@ -110,21 +112,41 @@ def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -
         return built
     if isinstance(node, yaml.SequenceNode):
         return [_construct(item, (*at, place), lines, file) for place, item in enumerate(node.value)]
-    return _scalar(node, file)
+    return _scalar(node, file) if isinstance(node, yaml.ScalarNode) else None
 
 
-def _scalar(node: yaml.Node, file: str) -> Any:
+def _key(node: yaml.Node, file: str) -> str | int:
+    """Return a key that YAML reads as it is written: ``yes`` would become True, ``0x1f`` 31."""
+    line = node.start_mark.line + 1
+    if not isinstance(node, yaml.ScalarNode):
+        raise ConfigError(file, line, "a key must be a word or a whole number.", hint="Quote it.")
+    key, written = _scalar(node, file), node.value[:80]
+    if isinstance(key, str | int) and str(key) == node.value:
+        return key
+    raise ConfigError(
+        file, line, f"the key {written} is neither a word nor a whole number: it would be read as {key!r}.",
+        hint=f"Quote it: '{written}'.",
+    )  # fmt: skip
+
+
+def _scalar(node: yaml.ScalarNode, file: str) -> Any:
+    line, written = node.start_mark.line + 1, str(node.value)[:80]
+    if node.tag in _NUMBERS and _ODD_NUMBER.match(node.value):
+        raise ConfigError(
+            file, line, f"{written} would be read as another number than is written.",
+            hint=f"Quote it if it is a word: '{written}'; else leave out leading zeros, _ and :.",
+        )  # fmt: skip
     try:
         return yaml.constructor.SafeConstructor().construct_object(node)
     except (yaml.YAMLError, ValueError) as error:
         raise ConfigError(
-            file, node.start_mark.line + 1, f"{str(node.value)[:80]!r} cannot be read as a plain value.",
+            file, line, f"{written!r} cannot be read as a plain value.",
             hint="Only plain YAML is read: no tags that build objects.",
         ) from error  # fmt: skip
 
 
 def _explain(
-    error: ValidationError, file: str, lines: dict[Path_, int], data: Any, model: type[BaseModel]
+    error: ValidationError, file: str, lines: dict[Path_, int], root: yaml.Node, model: type[BaseModel]
 ) -> ConfigError:
     """Turn the first complaint of pydantic into one sentence with a line."""
     complaints = error.errors(include_url=False)
@@ -141,8 +163,7 @@ def _explain(
         return ConfigError(file, line, f"the key {str(loc[-1])!r} is not known.", hint=f"{meant}{listing}".strip())
     if first["type"] == "missing":
         return ConfigError(file, line, f"the key {str(loc[-1])!r} is missing in {name}.", hint="Add it.")
-    given = first.get("input")
-    text = repr(given) if isinstance(given, str | int | float | bool) else ""
+    text = _written(root, at)
     shown = f" (given: {text if len(text) <= 80 else text[:79] + '…'})" if text else ""
     message = first["msg"].removeprefix("Value error, ")
     return ConfigError(file, line, f"{name}: {message}{shown}.", hint="Correct the value.")
@@ -155,6 +176,20 @@ def _deepest(loc: Path_, lines: dict[Path_, int]) -> tuple[Path_, int | None]:
         if (*at, part) in lines:
             at = (*at, part)
     return at, lines.get(at)
+
+
+def _written(node: yaml.Node, at: Path_) -> str:
+    """Return what stands in the file at a path if that is one value: ``yes``, not True; texts in quotes."""
+    for part in at:
+        children = node.value
+        if isinstance(node, yaml.MappingNode):
+            node = next(value for key, value in children if key.value == str(part))
+        else:
+            node = children[part]
+    if not isinstance(node, yaml.ScalarNode):
+        return ""
+    is_text = node.tag == "tag:yaml.org,2002:str"
+    return repr(node.value) if is_text else str(node.value)
 
 
 def _siblings(error: ValidationError, loc: Path_, model: type[BaseModel]) -> set[str]:

@@ -43,7 +43,8 @@ def test_wrong_words_are_answered_with_the_next_step(verbs, arguments, says):
 
 def test_a_wrong_word_leaves_no_result_behind(shell):
     shell("run", "--sensor", "biotak", code=2)
-    assert [path for path in shell.folder.rglob("*") if path.is_file() and "cache" not in path.parts] == []
+    files = {path.name for path in shell.folder.rglob("*") if path.is_file() and "cache" not in path.parts}
+    assert files <= {".lock"}
 
 
 @pytest.mark.parametrize(

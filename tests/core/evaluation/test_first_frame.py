@@ -50,7 +50,11 @@ def test_one_row_a_recording_is_tested_and_the_others_are_counted(tmp_path):
     assert result.n_test == 36
     assert sorted(result.sets["test"].recording.tolist()) == list(range(36))
     assert set(result.sets["test"].row.tolist()) == {0}
-    assert result.counts["test rows after the first of a recording"] == 36 * 19
+    # Once, whatever the number of folds and sets that use the recording.
+    assert result.folds == 5
+    assert {what: n for what, n in result.counts.items() if "first of" in what} == {
+        "rows after the first of a recording": 36 * 19
+    }
     assert result.split == run(sorted(tmp_path.glob("*.h5")), "deployable").split == "recording"
 
 

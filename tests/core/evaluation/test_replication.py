@@ -22,12 +22,31 @@ def test_trials_of_one_session_stand_in_for_each_other(tmp_path):
         for place in range(9)
     ]
     task = force_task(protocols=("deployable",))
-    assert run(paths, "roles", task, "mean", params={}).ci_method.startswith("jackknife over 7 recordings ")
+    method = run(paths, "roles", task, "mean", params={}).ci_method
+    assert method.startswith("jackknife over 7 recordings ")
+    assert method.endswith("): spread between sessions is not in it")
+
+
+def test_a_group_that_some_classes_do_not_have_is_said_not_to_be_in_the_interval(tmp_path):
+    """Recordings stand in for objects where the recordings of one class have none."""
+    rng = np.random.default_rng(4)
+    paths = [
+        record(
+            tmp_path / f"{number}.h5", rng.normal(size=(20, 2)), role="train" if number < 4 else "test", session="one",
+            labels={"kind": number % 2, **({"object": number // 4} if number % 2 else {})},
+        )
+        for number in range(16)
+    ]  # fmt: skip
+    method = run(paths, "roles", label_task()).ci_method
+    assert method.startswith("jackknife over 12 recordings ")
+    assert method.endswith(": spread between sessions and objects is not in it; some test rows have no object")
 
 
 def test_sessions_come_before_recordings(tmp_path):
     paths = sessions(tmp_path, tuple("abcdef"), n=40)
-    assert run(paths, "session", estimator="mean", params={}).ci_method.startswith("jackknife over 6 sessions ")
+    method = run(paths, "session", estimator="mean", params={}).ci_method
+    assert method.startswith("jackknife over 6 sessions ")
+    assert "not in it" not in method
 
 
 def test_five_caps_of_one_session_each_recorded_once_are_not_replicates(tmp_path):

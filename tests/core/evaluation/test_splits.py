@@ -142,6 +142,20 @@ def test_an_official_test_set_is_touched_by_split_roles_only(tmp_path):
     assert set(by_roles.sets["test"].recording.tolist()) == {1}
 
 
+def test_recordings_that_take_no_part_are_no_sessions_of_the_row_and_are_mentioned(tmp_path):
+    roles = ("train", "train", "test", None, None, "validation")
+    for place, role in enumerate(roles):
+        record(tmp_path / f"{place}.h5", *ramp(place, n=60), session=str(place), role=role)
+    paths = sorted(tmp_path.glob("*.h5"))
+    by_role = run(paths, "roles", estimator="mean", params={})
+    assert (by_role.n_recordings, by_role.n_sessions) == (4, 4)
+    assert by_role.counts["recordings without a role that take no part in split roles"] == 2
+    by_session = run(paths, "session", estimator="mean", params={})
+    assert (by_session.n_recordings, by_session.n_sessions) == (5, 5)
+    assert by_session.counts["recordings of role test that take no part in split session"] == 1
+    assert "recordings" not in " ".join(run(paths[:2], "session", estimator="mean", params={}).counts)
+
+
 def test_a_split_that_cannot_be_served_is_refused_with_those_that_can(tmp_path):
     with pytest.raises(UsageError, match="in-session"):
         run(sessions(tmp_path), "object")

@@ -122,7 +122,32 @@ def test_a_probe_that_makes_no_sense_says_why():
 
 def test_a_first_frame_that_tells_nothing_is_not_held_against_the_sensor():
     notes = build_table([classed(0.2, "first-frame"), classed(0.2)]).notes
-    assert sum("cannot be told from the trivial baseline" in note for note in notes) == 1
+    (note,) = [note for note in notes if "the trivial baseline" in note]
+    assert note.startswith("a/question/lasso (deployable, split recording) is no better than")
+    assert "--probe" not in note, "these rows are probed"
+
+
+@pytest.mark.parametrize(
+    ("scores", "says"),
+    [
+        ({"mean": 10.0, "time-index": 0.9}, "TRIVIAL: time-index scores 0.9000 of 1.0000 N"),
+        ({"time-index": 1.1, "mean": 10.0}, "not shown to be better than time-index: 1.1000 of 1.0000 N"),
+        ({"mean": 0.5, "time-index": 0.9}, "TRIVIAL: mean scores 0.5000 of 1.0000 N"),
+        ({"mean": 10.0, "time-index": 3.0}, "no leak shown"),
+    ],
+)
+def test_the_best_of_all_trivial_answers_is_looked_at(scores, says):
+    trivial = [
+        erring(value, estimator=name, is_baseline=True, looks_at="time" if name == "time-index" else "nothing")
+        for name, value in scores.items()
+    ]
+    elsewhere = erring(0.1, estimator="mean", is_baseline=True, split="press")
+    table = build_probe([erring(1.0), erring(1.2, split="shuffled"), *trivial, elsewhere])
+    (line,) = table.lines
+    assert line[-1] == says
+    assert table.kinds == ("alarm" if says.startswith("TRIVIAL") else "plain",)
+    best = min(scores, key=scores.get)
+    assert line[table.columns.index("trivial")] == f"{scores[best]:.4f} {best}"
 
 
 def test_simulated_rows_say_so_and_every_text_format_has_the_table():

@@ -46,8 +46,43 @@ def test_a_failed_row_stands_in_the_table_with_its_reason():
 
 
 def test_an_answer_no_better_than_the_trivial_one_is_called_that():
-    notes = build_table([row(score=1.35, baseline=1.4), row("b", score=0.5, baseline=1.4)]).notes
-    assert [note.split()[0] for note in notes if "cannot be told from the trivial" in note] == ["a/question/lasso"]
+    """Only where its whole interval says so; where that holds the trivial score, it is not shown to be better."""
+    rows = [row(score=1.35, baseline=1.4), row("b", score=0.5, baseline=1.4), row("c", score=1.6, baseline=1.4)]
+    notes = [note for note in build_table(rows).notes if "trivial" in note]
+    assert [note.split(", 1.4")[0] for note in notes] == [
+        "a/question/lasso (deployable, split session) is not shown to be better than the trivial baseline",
+        "c/question/lasso (deployable, split session) is no better than the trivial baseline",
+    ]
+
+
+def test_the_trivial_answer_that_wins_is_named_whatever_it_looks_at():
+    common = {"baseline": 1.4, "simulated": False, "rig": "replay"}
+    trivial = [
+        row(estimator="mean", score=1.4, is_baseline=True, looks_at="nothing", **common),
+        row(estimator="time-index", score=0.17, is_baseline=True, looks_at="time", **common | {"baseline": 0.17}),
+    ]
+    notes = build_table([row(estimator="forest", score=0.5, **common), *trivial]).notes
+    (note,) = [note for note in notes if "no better" in note]
+    assert note == (
+        "a/question/forest (deployable, split session) is no better than the trivial time-index, which reads no "
+        "sensor, only the time, 0.1700 N; see how the recordings differ before blaming the sensor: "
+        "`tactbench run --sensor a --task question --rig replay --recordings DIR --probe`."
+    )
+
+
+def test_notes_name_the_split_they_speak_of_where_there_are_several():
+    known = {"counts": {"rows lost": 3}, "ci_method": "jackknife", "looks_at": "features", "reference_floor": 0.1}
+    one, other = row(**known), row(split="press", **known | {"counts": {"rows lost": 4}, "ci_method": "blocks"})
+    notes = build_table([one, other, row("b", split="press", **known)]).notes
+    for text in (
+        "a/question (split session): rows lost: 3.", "a/question (split press): rows lost: 4.",
+        "question (split press): interval by blocks.", "question: interval by jackknife.",
+    ):  # fmt: skip
+        assert text in notes
+    (floor,) = [note for note in notes if note.startswith("Floor")]
+    assert "a/question (split session) 0.1000 N" in floor
+    assert "a/question (split press) 0.1000 N" in floor
+    assert not any("(split" in note for note in build_table([one]).notes)
 
 
 def test_marks_are_explained():

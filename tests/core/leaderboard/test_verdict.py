@@ -57,13 +57,22 @@ def test_a_missing_interval_counts_as_not_separable():
 
 def test_nobody_better_than_trivial_is_said():
     rows = over_replicates([*replicates([0.3] * 8), *replicates([0.1] * 8, estimator="mean")])
-    assert build_table(rows).blocks[0].verdict == ("None of 1 answers is better than the trivial one.",)
+    assert build_table(rows).blocks[0].verdict == (
+        "None of 1 answers scores better than the trivial one: mean 0.1000 N.",
+    )
 
 
 def test_an_answer_without_touch_that_is_as_good_is_named():
     timed = [one | {"looks_at": "time"} for one in replicates([0.3] * 8, estimator="mean")]
     rows = over_replicates([*replicates([0.4] * 8), *timed])
     assert build_table(rows).blocks[0].verdict[-1].startswith("mean reads no sensor, only the time since the press")
+
+
+def test_an_answer_without_touch_is_named_where_there_are_few_replicates_too():
+    timed = [one | {"looks_at": "time"} for one in replicates([0.3], estimator="mean")]
+    said = build_table(over_replicates([*replicates([0.4]), *timed])).blocks[0].verdict
+    assert said[0].startswith("Not enough to tell: one replicate")
+    assert said[1].startswith("mean reads no sensor, only the time since the press began, and scores 0.3000 N")
 
 
 def test_a_first_place_that_hangs_on_one_replicate_is_said():

@@ -53,6 +53,6 @@ def test_nobody_who_is_no_better_has_a_place(metric, good, bad):
     assert kinds["b-lasso"] == "result"
     order = [line.row["cell"] for line in block.lines]
     assert order[:2] == ["a-lasso", "b-lasso"]
-    (note,) = [note for note in table.notes if "cannot be told from the trivial baseline" in note]
-    assert note.startswith("b/question/lasso (deployable) cannot")
+    (note,) = [note for note in table.notes if "before blaming the sensor" in note]
+    assert note.startswith("b/question/lasso (deployable, split session) is no")
     assert "`tactbench run --sensor b --task question --probe`" in note

@@ -20,7 +20,7 @@ def answers(n=5):
 
 
 def row(**changes):
-    return {**OPENED, "status": "done", "score": 0.0, "ci_low": 0.4, "ci_high": 0.6, "n_test": 5, **changes}
+    return {**OPENED, "status": "done", "score": 0.0, "ci_low": 0.0, "ci_high": 0.6, "n_test": 5, **changes}
 
 
 def test_an_honest_result_has_no_fault():
@@ -37,7 +37,7 @@ def test_an_honest_result_has_no_fault():
         ((row(cell="another"), {"test": answers()}), "another cell"),
         ((row(status="splendid"), {"test": answers()}), "'splendid'"),
         ((row(status="failed"), {}), "'failed'"),
-        ((row(score=float("nan")), {"test": answers()}), "score is nan"),
+        ((row(score=float("nan")), {"test": answers()}), "is nan"),
         ((row(score=0.25), {"test": answers()}), "its score is 0.25, and its answers give 0.0"),
         ((row(sensor="another"), {"test": answers()}), "its sensor is 'another', not 'made'"),
         ((row(score="high"), {"test": answers()}), "its score: Input should be a valid number"),

@@ -49,7 +49,7 @@ ENDS = {
     "evil-kill": ("crashed", 9, "SIGKILL"),
     "evil-import": ("crashed", 6, "SIGABRT"),
     "evil-patch": ("done", None, ""),
-    "evil-lie": ("failed", None, "its score is 0.125, and its answers give"),
+    "evil-lie": ("failed", None, "'score' is 0.125, outside its own interval"),
     "evil-promise": ("crashed", None, "do not begin with the length of a result"),
     "evil-built-elsewhere": ("done", None, ""),
     "evil-built-deaf": ("done", None, ""),

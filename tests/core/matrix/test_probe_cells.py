@@ -32,8 +32,8 @@ def test_three_more_ways_after_those_asked_for(registry):
     assert ways(probed) == [
         ("karl2016", None), ("deployable", "roles"), ("first-frame", "roles"), ("deployable", "shuffled"),
     ]  # fmt: skip
-    assert ways(probed, "chance") == ways(probed), "the trivial answer stands beside each"
-    assert ways(probed, "majority") == [("karl2016", None)]
+    assert ways(probed, "chance") == ways(probed), "the trivial answers stand beside each"
+    assert ways(probed, "majority") == ways(probed)
     assert len({cell.name for cell in probed}) == len(probed)
 
 

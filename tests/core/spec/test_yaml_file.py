@@ -45,6 +45,28 @@ def test_complaints_name_file_and_line(tmp_path, text, line, says):
     assert says in str(caught.value)
 
 
+@pytest.mark.parametrize("key", ["010", "yes", "off", "20250401_014340", "1.5", "12:30", "2025-04-01", "~", "0x1f"])
+def test_a_key_that_yaml_would_change_is_refused_as_it_is_written(tmp_path, key):
+    with pytest.raises(ConfigError, match=rf"matrix.yaml:2: (the key )?{key} ") as caught:
+        load(tmp_path, f"tasks: [force]\n{key}: 1\n")
+    assert f"'{key}'" in caught.value.hint
+    with pytest.raises(ConfigError, match=f"the key '{key}' is not known"):
+        load(tmp_path, f"tasks: [force]\n'{key}': 1\n")
+
+
+@pytest.mark.parametrize("value", ["010", "1_000", "12:30"])
+def test_a_number_in_an_odd_notation_is_refused(tmp_path, value):
+    with pytest.raises(ConfigError, match=f"matrix.yaml:2: {value} would be read as another"):
+        load(tmp_path, f"tasks: [force]\nrepeats: {value}\n")
+    assert plain_value(value) == value
+
+
+@pytest.mark.parametrize("value", ["yes", "2025-04-01", "1.50"])
+def test_a_refused_value_is_shown_as_it_is_written(tmp_path, value):
+    with pytest.raises(ConfigError, match=rf"sensors.0: .* \(given: {value}\)"):
+        load(tmp_path, f"tasks: [force]\nsensors: [{value}]\n")
+
+
 def test_a_missing_file_and_an_empty_one_are_config_errors(tmp_path):
     with pytest.raises(ConfigError, match="cannot be read"):
         load_yaml(tmp_path / "none.yaml", MatrixSpec)

@@ -1,9 +1,11 @@
-"""Reading NumPy archives into tables; pickled objects are refused."""
+"""Reading NumPy archives and MATLAB files into tables; pickled objects are refused."""
 
 from __future__ import annotations
 
+import importlib
+import math
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,24 +13,33 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import MappingError, nearest
-from tactbench.core.recording.mapping.model import Npz
+from tactbench.core.recording.mapping.model import Arrays, Mat
 from tactbench.core.recording.mapping.table import ArrayTable, plain
 
 MAX_BYTES = 4 * 2**30
 """An archive that unpacks to more is refused: a small file can claim any size."""
 
+_MAT_BYTES = 16
+"""Of a complex number, the largest that an array of MATLAB holds."""
+
 Words = dict[str, str]
 
 
-def read_npz(path: Path, shown: str, how: Npz) -> Iterator[tuple[Words, ArrayTable]]:
+def read_arrays(path: Path, shown: str, how: Arrays) -> Iterator[tuple[Words, ArrayTable]]:
     """Yield one table a recording, with its words: ``index`` (from 0, with leading zeros) and `per_recording`.
 
     Raises
     ------
     MappingError
-        If the file is no archive, lacks an array, or an array has the wrong shape or type.
+        If the file is none of its kind, lacks an array, or an array has the wrong shape or type.
     """
-    arrays = _load(path, shown, {how.array, *how.per_recording.values()})
+    names = {how.array, *how.per_recording.values()}
+    if isinstance(how, Mat):
+        # MATLAB has no vectors, and no axis of length 1 at the end: n values are (n, 1) or (1, n).
+        arrays = {name: _shaped(values, len(how.axes) if name == how.array else 1)
+                  for name, values in _load_mat(path, shown, names).items()}  # fmt: skip
+    else:
+        arrays = _load_npz(path, shown, names)
     values = arrays[how.array]
     if values.ndim != len(how.axes):
         raise MappingError(
@@ -56,20 +67,30 @@ def read_npz(path: Path, shown: str, how: Npz) -> Iterator[tuple[Words, ArrayTab
         yield {"index": f"{index:0{wide}d}", **words}, ArrayTable(f"{shown}[{how.array}, {index}]", rows)
 
 
-def _load(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:
+def require_small(path: Path, shown: str) -> None:
+    """Refuse an archive that unpacks to more than is read; MappingError, zipfile.BadZipFile."""
+    with zipfile.ZipFile(path) as archive:
+        _require_small(shown, sum(member.file_size for member in archive.infolist()))
+
+
+def _require_small(shown: str, size: int) -> None:
+    if size > MAX_BYTES:
+        raise MappingError(f"{shown} unpacks to {size} bytes; at most {MAX_BYTES} are read.", hint="Split it.")
+
+
+def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:
+    for name in sorted(names):
+        if name not in there:
+            close = nearest(name, there)
+            meant = f"Did you mean {close[0]!r}? " if close else ""
+            raise MappingError(f"{shown} has no array {name!r}.", hint=f"{meant}It has: {', '.join(sorted(there))}.")
+
+
+def _load_npz(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:
     try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-        if size > MAX_BYTES:
-            raise MappingError(f"{shown} unpacks to {size} bytes; at most {MAX_BYTES} are read.", hint="Split it.")
+        require_small(path, shown)
         with np.load(path, allow_pickle=False) as archive:
-            for name in sorted(names):
-                if name not in archive.files:
-                    close = nearest(name, archive.files)
-                    meant = f"Did you mean {close[0]!r}? " if close else ""
-                    raise MappingError(
-                        f"{shown} has no array {name!r}.", hint=f"{meant}It has: {', '.join(sorted(archive.files))}."
-                    )
+            _require_there(shown, names, archive.files)
             return {name: archive[name] for name in names}
     except MappingError:
         raise
@@ -78,3 +99,25 @@ def _load(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]
             f"{shown} cannot be read as a NumPy archive: {error}.",
             hint="Pickled objects are refused; store plain arrays with numpy.savez_compressed.",
         ) from error
+
+
+def _load_mat(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[Any]]:
+    io: Any = importlib.import_module("scipy.io")
+    try:
+        sizes = {name: math.prod(shape) * _MAT_BYTES for name, shape, _ in io.whosmat(path)}
+        _require_there(shown, names, sizes)
+        _require_small(shown, sum(sizes[name] for name in names))
+        found = io.loadmat(path, variable_names=sorted(names))
+    except MappingError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of the library
+        raise MappingError(
+            f"{shown} cannot be read as a MATLAB file: {error}.", hint="Save it with -v7, or the table as CSV."
+        ) from error
+    return {name: found[name] for name in names}
+
+
+def _shaped(values: npt.NDArray[Any], axes: int) -> npt.NDArray[Any]:
+    if axes == 1 and values.ndim == 2 and 1 in values.shape:
+        return values.reshape(-1)
+    return values.reshape(values.shape + (1,) * (axes - values.ndim))

@@ -14,7 +14,7 @@ from tactbench.core.recording.mapping.model import ChannelGroup, Column, StreamS
 from tactbench.core.recording.mapping.model import Mapping as MappingFile
 from tactbench.core.spec.quantity import Quantity
 from tactbench.core.spec.recording import Scalar
-from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
+from tactbench.core.spec.sensor import SENSOR_NAME, ChannelSpec, SensorSpec, StreamSpec
 
 _RANGE = re.compile(r"^(?P<before>.*?)(?P<first>\d+)\.\.(?P<last>\d+)$")
 _WORD = re.compile(r"\{([^{}]*)\}")
@@ -67,7 +67,7 @@ def expand(text: Scalar) -> Iterator[Scalar]:
 
 
 def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...], dict[str, MappedStream]]:
-    """Return the sensor, the reference streams, and all streams with their columns.
+    """Return the sensor, the reference streams, and all streams with their columns; see :func:`device`.
 
     Raises
     ------
@@ -84,8 +84,9 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...],
             )  # fmt: skip
             streams[name] = MappedStream(spec, source, channels)
         _unique([channel.spec.name for stream in streams.values() for channel in stream.channels])
+        said = mapping.sensor.model_dump()
         sensor = SensorSpec(
-            **mapping.sensor.model_dump(),
+            **said | {"name": _WORD.sub("x", said["name"])},  # until its words are known
             streams=tuple(stream.spec for stream in streams.values() if stream.source.of == "sensor"),
         )
     except ValidationError as error:
@@ -97,6 +98,23 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...],
         ) from error
     reference = tuple(stream.spec for stream in streams.values() if stream.source.of == "reference")
     return sensor, reference, streams
+
+
+def device(sensor: SensorSpec, mapping: MappingFile, words: Mapping[str, Scalar], origin: str) -> SensorSpec:
+    """Return the sensor with the name and title that a recording's words give it.
+
+    Raises
+    ------
+    MappingError
+        If the name is none that a sensor may have.
+    """
+    name = fill(mapping.sensor.name, words, "sensor.name")
+    if not re.fullmatch(SENSOR_NAME, name):
+        raise MappingError(
+            f"The sensor of {origin} would be called {name!r}.",
+            hint="Use lower case, digits, - and _; translate words under `words`.",
+        )
+    return sensor.model_copy(update={"name": name, "title": fill(mapping.sensor.title, words, "sensor.title")})
 
 
 def _channels(stream: str, group: ChannelGroup) -> Iterator[MappedChannel]:

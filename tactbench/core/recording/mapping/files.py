@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tactbench.core.errors import MappingError
-from tactbench.core.recording.mapping.arrays import read_npz
-from tactbench.core.recording.mapping.model import Mapping, Npz, TableSource
+from tactbench.core.recording.mapping.arrays import read_arrays
+from tactbench.core.recording.mapping.model import Arrays, Mapping, TableSource, Xlsx
+from tactbench.core.recording.mapping.sheets import read_sheet
 from tactbench.core.recording.mapping.table import Table
 from tactbench.core.recording.mapping.text import read_text
 
@@ -79,16 +80,19 @@ def read(mapping: Mapping, files: FileSet) -> Iterator[RawRecording]:
     """Read what belongs together; an archive may hold several recordings."""
     shown = tuple(dict.fromkeys(file.shown for file in files.files.values()))
     (first, source), *_ = mapping.tables.items()
-    if isinstance(source.read, Npz):
+    if isinstance(source.read, Arrays):
         file = files.files[first]
-        for words, array in read_npz(file.path, file.shown, source.read):
+        for words, array in read_arrays(file.path, file.shown, source.read):
             yield RawRecording({first: array}, {**files.words, **words}, shown)
         return
     tables: dict[str, Table] = {}
     for name, file in files.files.items():
         how = mapping.tables[name].read
-        assert not isinstance(how, Npz)  # the model refuses an archive beside other tables
-        tables[name] = read_text(file.path, file.shown, how)
+        assert not isinstance(how, Arrays)  # the model refuses an archive beside other tables
+        if isinstance(how, Xlsx):
+            tables[name] = read_sheet(file.path, file.shown, how)
+        else:
+            tables[name] = read_text(file.path, file.shown, how)
     yield from _split(mapping, RawRecording(tables, files.words, shown))
 
 
@@ -100,8 +104,14 @@ def _matching(name: str, source: TableSource, root: Path) -> list[FoundFile]:
             hint="Check --root: the pattern starts below it.",
         )
     found = []
+    inside = root.resolve()
     for path in sorted(paths, key=lambda one: one.relative_to(root).parts):
         shown = path.relative_to(root).as_posix()
+        if not path.resolve().is_relative_to(inside):
+            raise MappingError(
+                f"{shown} leads out of {root}, to {path.resolve()}.",
+                hint="Links are followed below the root only: copy what it leads to, or name a --root that holds both.",
+            )
         match = re.search(source.path, shown)
         if match is None:
             raise MappingError(

@@ -10,12 +10,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from dataclasses import replace as replaced
 from pathlib import Path
 from typing import cast, get_args
 
 from tactbench.core.errors import MappingError, RecordingError, UnwritableError
 from tactbench.core.recording.health import Finding, examine
-from tactbench.core.recording.mapping.channels import MappedStream, fill, sensor_of
+from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
 from tactbench.core.recording.mapping.model import Mapping, Word
 from tactbench.core.recording.mapping.samples import check_join, labels, samples, times
@@ -47,6 +48,7 @@ class Imported:
     name: str
     rows: int
     """Rows of its longest stream"""
+    sensor: str
     missing: dict[str, int] = field(default_factory=dict)
     """Samples marked as missing, by channel"""
     excluded: str = ""
@@ -59,9 +61,13 @@ class ImportReport:
     """What an import did."""
 
     title: str
-    sensor: str
     recordings: tuple[Imported, ...]
     files_read: int
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the sensors, in order of appearance."""
+        return tuple(dict.fromkeys(recording.sensor for recording in self.recordings))
 
     @property
     def rows(self) -> int:
@@ -123,7 +129,7 @@ def import_tables(
             if progress is not None:
                 progress(done, len(sets), next(iter(files.files.values())).shown)
         placed = _place(made, out, replace=replace)
-    return ImportReport(wanted.title, sensor.name, tuple(placed), _count_files(sets))
+    return ImportReport(wanted.title, tuple(placed), _count_files(sets))
 
 
 @contextmanager
@@ -200,7 +206,7 @@ def _write(
     with open_recording(path) as written:
         findings = tuple(examine(written))
     rows = max(len(table) for table in raw.tables.values())
-    return Imported(path, meta.name, rows, missing, meta.excluded, meta.origin, findings)
+    return Imported(path, meta.name, rows, meta.sensor.name, missing, meta.excluded, meta.origin, findings)
 
 
 def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tuple[StreamSpec, ...]) -> RecordingMeta:
@@ -222,7 +228,7 @@ def _meta(mapping: Mapping, raw: RawRecording, sensor: SensorSpec, reference: tu
         )
     return RecordingMeta(
         name=name,
-        sensor=sensor,
+        sensor=device(sensor, mapping, words, origin),
         reference=reference,
         rig=RIG,
         simulated=False,
@@ -301,8 +307,7 @@ def _place(made: Sequence[Imported], out: Path, *, replace: bool) -> list[Import
             path.replace(target)
     except OSError as error:
         raise UnwritableError(f"{out} cannot be written: {error.strerror}.", hint="Give another with --out.") from error
-    return [Imported(out / one.path.name, one.name, one.rows, one.missing, one.excluded, one.origin, one.findings)
-            for one in made]  # fmt: skip
+    return [replaced(one, path=out / one.path.name) for one in made]
 
 
 def _holds_the_same(target: Path, path: Path) -> bool:

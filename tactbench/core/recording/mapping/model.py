@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
@@ -16,9 +17,13 @@ from tactbench.core.spec.sensor import ChannelKind, Vector
 Column = int | str
 """A column by its place (from 0) or by its name in the header."""
 
+_regular: Any = importlib.import_module("re._parser")
+"""How the standard library reads regular expressions; it says so nowhere else."""
+_REPEATS = (_regular.MAX_REPEAT, _regular.MIN_REPEAT, _regular.POSSESSIVE_REPEAT)
+
 WORD = r"^[a-z][a-z0-9_]*$"
-MUST_NAME_SENTINELS = ("force", "torque")
-"""Kinds that are targets: a number that means "no sample" would be learnt as if it were one."""
+MUST_NAME_SENTINELS = {"force": "N", "torque": "N*m"}
+"""Kinds that are targets, and what their units are converted to; a number that means "no sample" would be learnt."""
 
 
 class Csv(Frozen):
@@ -53,10 +58,20 @@ class Records(Frozen):
     no_sample: tuple[str, ...] = ()
 
 
-class Npz(Frozen):
-    """Arrays in one NumPy archive, never pickled ones."""
+class Xlsx(Frozen):
+    """A sheet of an Excel workbook; the extra ``[xlsx]``."""
 
-    format: Literal["npz"] = "npz"
+    format: Literal["xlsx"] = "xlsx"
+    sheet: str | None = None
+    """None: the only one."""
+    header: bool
+    skip_lines: int = Field(default=0, ge=0)
+    no_sample: tuple[str, ...] = ()
+
+
+class Arrays(Frozen):
+    """Arrays in one file."""
+
     array: str
     axes: tuple[Literal["recording", "row", "channel"], ...] = Field(min_length=1, max_length=3)
     """What each axis of the array counts; an axis that is left out has length 1."""
@@ -64,12 +79,24 @@ class Npz(Frozen):
     """Words taken from arrays with one value a recording: word -> array."""
 
     @model_validator(mode="after")
-    def _axes_differ(self) -> Npz:
+    def _axes_differ(self) -> Arrays:
         if len(set(self.axes)) != len(self.axes):
             raise ValueError("an axis is named twice")
         if self.per_recording and "recording" not in self.axes:
             raise ValueError("per_recording needs an axis called recording")
         return self
+
+
+class Npz(Arrays):
+    """Arrays in one NumPy archive, never pickled ones."""
+
+    format: Literal["npz"] = "npz"
+
+
+class Mat(Arrays):
+    """Arrays in one MATLAB file of version 7 or before, never in structures or cells."""
+
+    format: Literal["mat"] = "mat"
 
 
 class Time(Frozen):
@@ -94,7 +121,7 @@ class TableSource(Frozen):
     """Which: a pattern below the root, with ``*`` within a folder and ``**`` across folders."""
     path: str = ""
     """Regular expression searched in each path; its named groups become words."""
-    read: Annotated[Csv | Text | Records | Npz, Field(discriminator="format")]
+    read: Annotated[Csv | Text | Records | Xlsx | Npz | Mat, Field(discriminator="format")]
     time: Time | None = None
 
     @field_validator("files")
@@ -114,6 +141,11 @@ class TableSource(Frozen):
         for name in groups:
             if not re.match(WORD, name):
                 raise ValueError(f"the group {name!r} must be a word in lower case")
+        if _nests(_regular.parse(path), repeated=False):
+            raise ValueError(
+                "a repeated group has a repetition or alternatives inside, which may take for ever; write it flat: "
+                "[a-z_]+ for ([a-z]+_?)+, or a fixed number of times {8} inside"
+            )
         return path
 
 
@@ -167,6 +199,20 @@ class ChannelGroup(Frozen):
     rest_source: Source | None = None
     positions_m: tuple[Vector, ...] = ()
     position_source: Source | None = None
+
+    @field_validator("unit")
+    @classmethod
+    def _measures_its_kind(cls, unit: str, info: ValidationInfo) -> str:
+        kind = info.data.get("kind")
+        if kind in MUST_NAME_SENTINELS:
+            try:
+                _convertible(unit, MUST_NAME_SENTINELS[kind])
+            except ValueError as error:
+                raise ValueError(
+                    f"a {kind} is in {MUST_NAME_SENTINELS[kind]} or what converts to it ({error}); a scale's kg is "
+                    "`given_in: kgf`, a raw reading is `kind: taxel` or `other`"
+                ) from error
+        return unit
 
     @model_validator(mode="after")
     def _consistent(self) -> ChannelGroup:
@@ -223,7 +269,8 @@ class StreamSource(Frozen):
 class SensorDeclaration(Frozen):
     """The sensor, as far as its source describes it."""
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    name: str = Field(pattern=r"^[a-z{][a-z0-9_{}-]*$")
+    """A text with ``{word}`` in it where one mapping covers several devices; title alike."""
     title: str
     principle: str
     principle_source: Source
@@ -290,10 +337,31 @@ class Mapping(Frozen):
             raise ValueError("tables with a clock each, joined by rows, need `times_within_ms`")
         if self.join is not None and self.join.by == "clock" and (self.clock == "none" or self.split_by):
             raise ValueError("a join by clock needs a clock, and rows that need not be split")
-        arrays = [name for name, table in self.tables.items() if isinstance(table.read, Npz)]
+        arrays = [name for name, table in self.tables.items() if isinstance(table.read, Arrays)]
         if arrays and len(self.tables) > 1:
             raise ValueError(f"table {arrays[0]} is an archive and cannot be joined with others")
         return self
+
+
+def _nests(parsed: Any, *, repeated: bool) -> bool:
+    """Return whether a part of a parsed regular expression that is repeated can itself be matched in several lengths.
+
+    Such an expression may try as many ways as there are subsets of the letters before it gives up.
+    """
+    for name, argument in parsed:
+        again = repeated
+        if name in _REPEATS:
+            least, most, _ = argument
+            if repeated and least != most:
+                return True
+            again = repeated or most > 1
+        elif name is _regular.BRANCH and repeated:
+            return True
+        for part in argument if isinstance(argument, tuple) else (argument,):
+            inside = part if isinstance(part, list) else [part]
+            if any(isinstance(one, _regular.SubPattern) and _nests(one, repeated=again) for one in inside):
+                return True
+    return False
 
 
 def _convertible(given: str, wanted: str) -> None:

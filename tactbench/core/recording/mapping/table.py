@@ -90,7 +90,14 @@ class TextTable:
     def _place(self, column: Column) -> int:
         if isinstance(column, int):
             wide = len(self.cells[0]) if self.cells else len(self.header or ())
-            return _checked(self.shown, column, wide)
+            place = _checked(self.shown, column, wide)
+            if self.header is not None and _is_number(self.header[place]):
+                raise MappingError(
+                    f"{self.shown}: its header row has the number {self.header[place]!r} in column {column}: that looks"
+                    " like a row of data, which `header: true` would drop.",
+                    hint="Write `header: false`; and `skip_lines: 1` if that row is none of the data.",
+                )
+            return place
         if self.header is None:
             raise MappingError(
                 f"{self.shown} has no header row, so there is no column {column!r}.",
@@ -163,6 +170,13 @@ def plain(value: Any) -> str:
 
 Table = TextTable | ArrayTable
 """Rows and columns of one recording."""
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return math.isfinite(float(cell))
+    except ValueError:
+        return False
 
 
 def _checked(shown: str, place: int, wide: int) -> int:

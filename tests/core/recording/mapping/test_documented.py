@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from tactbench.core.recording.mapping import import_tables
 from tactbench.core.recording.mapping.channels import sensor_of
 from tactbench.core.recording.mapping.model import Mapping
+from tactbench.core.recording.reader import open_recording
 from tactbench.core.spec.yaml_file import load_yaml
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -30,6 +32,29 @@ def test_an_example(path):
     assert sensor.channels("taxel")
     assert f"tactbench import examples/mappings/{path.name} --root" in path.read_text(encoding="utf-8")
     assert mapping.remarks
+    text = path.read_text(encoding="utf-8")
+    assert re.search(r"^# Source: github.com/[\w.-]+/[\w.-]+ @ [0-9a-f]{40} ", text, flags=re.MULTILINE)
+    assert "\n# Files: " in text
+
+
+def test_the_six_files_of_the_grasps_have_the_roles_that_their_authors_give_them(tmp_path):
+    """Three of them are not among the public data of the other tests; these are made up."""
+    columns = [f"{finger}_biotac_{place}" for finger in ("ff", "mf", "th") for place in range(1, 25)]
+    for way in ("down", "side", "45"):
+        for name in (f"bts3v2_palm_{way}.csv", f"bts3v2_palm_{way}_test.csv"):
+            lines = [",".join(["object", "slipped", *columns])]
+            lines += [",".join(["cup", str(row % 2), *(str(100 + row) for _ in columns)]) for row in range(3)]
+            (tmp_path / name).write_text("\n".join(lines))
+    path = ROOT / "examples" / "mappings" / "biotacsp-stability.yaml"
+    report = import_tables(path, root=tmp_path, out=tmp_path / "out")
+    roles = {}
+    for one in report.recordings:
+        with open_recording(one.path) as recording:
+            roles[recording.meta.session] = recording.meta.role
+    assert roles == {
+        **dict.fromkeys(("palm_down", "palm_side", "palm_45"), "train"),
+        **dict.fromkeys(("palm_down_test", "palm_side_test", "palm_45_test"), "test"),
+    }
 
 
 def test_every_key_is_explained():

@@ -1,10 +1,14 @@
 """Foreign tables of every shape become recordings; every misfit is refused with its place, and nothing is left."""
 
+import copy
+import re
 import subprocess
 import sys
 
 import numpy as np
+import openpyxl
 import pytest
+import scipy.io
 import yaml
 
 from tactbench.core.errors import ConfigError, MappingError, TactbenchError
@@ -44,7 +48,7 @@ def mapping(**change):
         if value is None:
             inside.pop(last)
         else:
-            inside[last] = value
+            inside[last] = copy.deepcopy(value)
     return said
 
 
@@ -220,6 +224,121 @@ def test_an_archive_that_is_none(run, put, tmp_path):
     refused(run, tmp_path, "x.npz", **NPZ)
 
 
+MAT = {**NPZ, "tables__table": {"files": "*.mat", "read": {**NPZ["tables__table"]["read"], "format": "mat"}}}
+
+
+def test_a_matlab_file_of_arrays(run, tmp_path):
+    X = np.random.default_rng(0).normal(size=(11, 5, 3))
+    scipy.io.savemat(tmp_path / "data" / "x.mat", {"X": X, "y": np.arange(11) % 2}, do_compression=True)
+    report = run(**MAT)
+    with open_recording(report.recordings[7].path) as recording:
+        np.testing.assert_allclose(recording.read("taxels").data, X[7], rtol=1e-6)  # stored as float32
+        assert recording.meta.labels == {"slip": "yes", "block": "1"}
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"MATLAB 5.0 MAT-file, cut short" + bytes(9), "cannot be read as a MATLAB file"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(200), "cannot be read as a MATLAB file"),
+        ({"x": np.zeros(3)}, "Did you mean 'x'"),
+        ({"X": {"inside": np.zeros(3)}, "y": np.zeros(2)}, "holds [('inside', 'O')], not numbers"),
+        ({"X": np.zeros((2, 3)), "y": np.zeros(2)}, "no column 1"),
+    ],
+)
+def test_matlab_files_that_do_not_fit(run, tmp_path, content, says):
+    path = tmp_path / "data" / "x.mat"
+    if not isinstance(content, bytes):
+        scipy.io.savemat(path, {"y": np.zeros(1), **content})
+    else:
+        path.write_bytes(content)
+    refused(run, tmp_path, says, **MAT)
+
+
+def workbook(path, table, sheets=("press",), above=0):
+    book = openpyxl.Workbook()
+    book.active.title = sheets[0]
+    for name in sheets[1:]:
+        book.create_sheet(name)
+    for _ in range(above):
+        book.active.append(["measured on a Monday"])
+    for line in table:
+        book.active.append(line)
+    book.save(path)
+
+
+XLSX = {
+    "tables__table__files": "*.xlsx",
+    "tables__table__read": {"format": "xlsx", "header": True, "skip_lines": 2, "no_sample": [""]},
+}
+
+
+def test_a_sheet_of_an_excel_workbook(run, tmp_path):
+    table = [["t", "a", "b", "c", "f"], *([row * 0.01, row, row / 3, None if row == 3 else 1, row * 1.5]
+                                          for row in range(20))]  # fmt: skip
+    workbook(tmp_path / "data" / "press.xlsx", table, above=2)
+    report = run(**XLSX, streams__taxels__channels=[{**TAXELS, "columns": ["a", "b", "c"]}])
+    taxels, _ = one(report)
+    assert np.array_equal(taxels.data[:, 0], np.arange(20))
+    np.testing.assert_allclose(taxels.data[:, 1], np.arange(20) / 3, rtol=1e-14)  # openpyxl writes 15 digits
+    assert report.missing == {"tc": 1}
+
+
+@pytest.mark.parametrize(
+    ("table", "more", "says"),
+    [
+        ([["t", "a"], [1, "x"]], {}, "column 1: 'x' is not a number"),
+        ([["t", "a", "b", "c", "f"]], {}, "no rows"),
+        ([[0, 1, 2, 3, 4], [1, 1, 2, 3, 4]], {}, "header row has the number '0' in column 0"),
+        ([["t"], [1]], {"tables__table__read__sheet": "none"}, "no sheet 'none'"),
+    ],
+)
+def test_sheets_that_do_not_fit(run, tmp_path, table, more, says):
+    workbook(tmp_path / "data" / "press.xlsx", table, above=2)
+    refused(run, tmp_path, says, "press.xlsx", **XLSX, **more)
+
+
+def test_one_of_several_sheets_must_be_named_and_a_damaged_workbook_is_refused(run, tmp_path):
+    workbook(tmp_path / "data" / "press.xlsx", [], sheets=("one", "two"))
+    assert "one, two" in refused(run, tmp_path, "several sheets", **XLSX).hint
+    (tmp_path / "data" / "press.xlsx").write_bytes(b"PK\x03\x04")
+    refused(run, tmp_path, "cannot be read as an Excel workbook", **XLSX)
+
+
+def test_a_sheet_that_claims_too_many_cells_is_refused(run, tmp_path):
+    book = openpyxl.Workbook()
+    book.active["XFD40000"] = 1
+    book.save(tmp_path / "data" / "press.xlsx")
+    refused(run, tmp_path, "more than 20000000 cells", **XLSX)
+
+
+@pytest.mark.parametrize(("name", "hint"), [("a.xlsx", "format: xlsx"), ("a.mat", "format: mat"), ("a.xls", "CSV")])
+def test_a_file_of_another_kind_is_told_how_to_read_it(run, tmp_path, name, hint):
+    (tmp_path / "data" / name).write_bytes(b"\xd0\xcf\x11\xe0")
+    assert hint in refused(run, tmp_path, "is not UTF-8 text", tables__table__files="a.*").hint
+
+
+def test_one_mapping_covers_several_devices(run, put):
+    for device in ("a", "b"):
+        put(f"{device}/press.csv", rows())
+    said = mapping(
+        tables__table__files="*/press.csv",
+        tables__table__path="(?P<device>[a-z])/",
+        recording={"name": "press-{device}", "session": "{device}"},
+    )
+    said["sensor"] |= {"name": "pad-{device}", "title": "pad {device}"}
+    report = run(said)
+    assert report.sensors == ("pad-a", "pad-b")
+    with open_recording(report.recordings[1].path) as recording:
+        assert (recording.meta.sensor.name, recording.meta.sensor.title) == ("pad-b", "pad b")
+
+
+@pytest.mark.parametrize(("name", "says"), [("pad-{where}", "'where'"), ("pad-{file}", "'pad-Press'")])
+def test_a_device_without_a_name_is_refused(run, put, tmp_path, name, says):
+    put("Press.csv", rows())
+    refused(run, tmp_path, says, sensor={**mapping()["sensor"], "name": name})
+
+
 PROBE = {"path": "(?P<start>[0-9]+)_probe", "read": {"format": "csv", "header": False}}
 JOINED = {
     "tables": {
@@ -316,6 +435,53 @@ def test_a_sentinel_that_nobody_named_is_refused(run, put, tmp_path):
 def test_a_rare_extreme_is_a_reading(run, put, odd):
     put("press.csv", rows(100, force=lambda row: odd if row < 5 else row))  # 5 %: the bound itself is not above it
     assert one(run(streams__force__channels=[{**FORCE, "sentinels": []}]), "force")[0].quality is None
+
+
+@pytest.mark.parametrize("name", ["csv", "text"])
+def test_a_header_of_numbers_is_a_row(run, put, tmp_path, name):
+    put("press.csv", rows() if name == "csv" else rows().replace(",", " "))
+    refused(run, tmp_path, "press.csv: its header row has the number '0.00' in column 0",
+            tables__table__read={"format": name, "header": True})  # fmt: skip
+    assert run(tables__table__read={"format": name, "header": False}).rows == 40
+
+
+def test_named_columns_are_read_by_place_too(run, put):
+    put("press.csv", "t,a,b,c,f\n" + rows())
+    assert run(tables__table__read={"format": "csv", "header": True}).rows == 40
+
+
+def test_a_link_out_of_the_root_is_refused(run, put, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "secret.csv").write_text(rows())
+    put("a/press.csv", rows())
+    (tmp_path / "data" / "b").symlink_to(tmp_path / "elsewhere")
+    refused(run, tmp_path, "b/secret.csv leads out of", "elsewhere", tables__table__files="*/*.csv")
+    (tmp_path / "data" / "b").unlink()
+    (tmp_path / "data" / "b").symlink_to("a")
+    assert run(tables__table__files="b/*.csv").rows == 40
+
+
+@pytest.mark.parametrize(
+    "path", ["(a+)+$", "([a-z]*_?)*x", "(?:a|ab)*$", "(?:(?:a?){9}){9}", "(?=(a+)+b)", "(?>(a+)*)b"]
+)
+def test_an_expression_that_may_take_for_ever_is_refused(run, put, tmp_path, path):
+    put("a" * 60 + ".csv", rows())
+    refused(run, tmp_path, "mapping.yaml:", "tables.table.path", "for ever", tables__table__path=path)
+
+
+@pytest.mark.parametrize("path", ["^(?P<a>[a-z]+)_?(?:x|y)?", "(?:[a-z]{2}){2}", "a+(?:b+)?", "[^/]+$", "(?:[ab]|c)+"])
+def test_an_expression_without_nested_repetitions_is_taken(run, put, path):
+    put("aaaa.csv", rows())
+    assert run(tables__table__path=path).rows == 40
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("force", "kg"), ("force", "mm"), ("force", "count"), ("torque", "N")])
+def test_a_target_in_a_unit_of_something_else_is_refused(run, put, tmp_path, kind, unit):
+    put("press.csv", rows())
+    channel = {"columns": 4, "name": "fz", "kind": kind, "unit": unit, "sentinels": []}
+    error = refused(run, tmp_path, f"'{unit}'", f"a {kind} is in", streams__force__channels=[channel])
+    line = int(re.search(r"mapping.yaml:(\d+):", str(error))[1])
+    assert (tmp_path / "mapping.yaml").read_text().splitlines()[line - 1].strip() == f"unit: {unit}"
 
 
 def test_words_for_no_sample(run, put):

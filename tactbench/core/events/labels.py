@@ -1,0 +1,201 @@
+"""Whether a contact sticks, slips in part or slips as a whole: from displacement and forces, never from the sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, model_validator
+
+from tactbench.core.errors import DataError
+from tactbench.core.events.alarms import check_times
+from tactbench.core.events.policy import Seconds, nanoseconds
+from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.spec.quantity import Frozen
+
+UNDECIDED, STICK, INCIPIENT, GROSS = -1, 0, 1, 2
+"""States of a frame. Undecided frames have no contact, or displacement and forces contradict each other."""
+
+
+class SlipThresholds(Frozen):
+    """Where stick, incipient and gross slip part. No field has a default."""
+
+    hold_s: Seconds = Field(gt=0)
+    """A contact rests where its displacements of this long [s] differ by no more than `gross_displacement_m`."""
+    gross_displacement_m: float = Field(gt=0, allow_inf_nan=False)
+    """Gross slip is displacement of more than this after such a hold [m]."""
+    incipient_slip_share: float = Field(gt=0, lt=1)
+    """Incipient slip begins where ``1 - c/a`` exceeds this [1]."""
+    gross_stick_ratio: float = Field(gt=0, lt=1)
+    """It ends where c/a is at or below this: by its forces the contact slips as a whole [1]."""
+    contact_force_n: float = Field(gt=0, allow_inf_nan=False)
+    """With less normal force there is no contact worth a label [N]."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> SlipThresholds:
+        if 1.0 - self.incipient_slip_share <= self.gross_stick_ratio:
+            raise ValueError("1 - incipient_slip_share must exceed gross_stick_ratio: incipient slip comes first")
+        return self
+
+    def scaled(self, factor: float) -> SlipThresholds:
+        """Return the same with displacement, slip share and stick ratio times `factor`.
+
+        How long a hold lasts and what a contact is are not scaled: they say where labels exist, not where they part.
+        """
+        names = ("gross_displacement_m", "incipient_slip_share", "gross_stick_ratio")
+        changed = {name: factor * getattr(self, name) for name in names}
+        return SlipThresholds.model_validate({**self.model_dump(), **changed})
+
+
+THRESHOLDS = SlipThresholds(
+    hold_s=0.1, gross_displacement_m=1e-4, incipient_slip_share=0.1, gross_stick_ratio=0.1, contact_force_n=0.05
+)
+"""The published ones. All five are assumed: no source was found that states them for a whole contact. They see slip
+faster than 1 mm/s, or by steps of more than 0.1 mm. What a score owes to them is shown by halving and doubling them
+(:func:`labels_at_scales`)."""
+
+
+@dataclass(frozen=True)
+class SlipLabels:
+    """What the reference says of one recording."""
+
+    state: IntArray
+    """(n,) :data:`STICK`, :data:`INCIPIENT`, :data:`GROSS` or :data:`UNDECIDED` of each sample of the reference."""
+    gross_ns: IntArray
+    """(e, 2) onset and end of each gross slip that a hold in contact precedes [ns]."""
+    incipient_ns: IntArray
+    """(i, 2) beginning and end of each stretch of incipient slip [ns]."""
+
+
+def stick_ratio(tangential_n: FloatArray, normal_n: FloatArray, friction: float) -> FloatArray:
+    """Return c/a, the radius that sticks over the contact's: ``(1 - Q/(mu P))^(1/3)``.
+
+    Parameters
+    ----------
+    tangential_n, normal_n
+        (n,) tangential force Q (its sign does not matter) and normal force P [N].
+    friction
+        Static coefficient of friction mu [1], known or measured on the reference alone.
+
+    Notes
+    -----
+    Cattaneo 1938 and Mindlin 1949 (Johnson 1985, Contact Mechanics, eq. 7.39): two spheres, alike or incompressible,
+    Q growing from zero at constant P. Zero where Q is mu P or more; NaN without normal force. After unloading and for
+    other shapes it is a measure of the force ratio, not a radius.
+    """
+    share = np.full(normal_n.shape, np.nan)
+    np.divide(np.abs(tangential_n), friction * normal_n, out=share, where=normal_n > 0)
+    return np.asarray(np.cbrt(1.0 - np.minimum(share, 1.0)))
+
+
+def slip_labels(
+    t_ns: IntArray,
+    displacement_m: FloatArray,
+    tangential_n: FloatArray,
+    normal_n: FloatArray,
+    friction: float,
+    thresholds: SlipThresholds,
+) -> SlipLabels:
+    """Label one recording by its reference: the definitions stand in docs/events.md.
+
+    Parameters
+    ----------
+    t_ns
+        (n,) times of the reference, strictly rising [ns].
+    displacement_m
+        (n,) displacement of the surface relative to the skin's carrier, along the motion: encoder and fixture [m].
+    tangential_n, normal_n, friction
+        See :func:`stick_ratio`.
+    thresholds
+        Where the states part.
+
+    Notes
+    -----
+    Labels look ahead, unlike detectors: a hold is known when it is over. Gross slip is displacement that is no rest,
+    whatever the forces say. A contact at rest whose forces say gross is undecided: it has just let go, or mu is too
+    low. A slip that the recording begins with has no onset and is no event, though its frames are gross.
+    """
+    check_times(t_ns, displacement_m.shape)
+    given = {"displacement": displacement_m, "tangential force": tangential_n, "normal force": normal_n}
+    for name, values in given.items():
+        if values.shape != t_ns.shape or not np.all(np.isfinite(values)):
+            raise DataError(f"The {name} is not one finite number a sample.", hint="Leave out samples without one.")
+    if not 0 < friction < np.inf:
+        raise DataError(f"{friction} is no coefficient of friction.", hint="Give the surface's own, above 0.")
+    rest = at_rest(t_ns, displacement_m, thresholds)
+    if not rest.any():
+        raise DataError(
+            f"The surface never rests within {thresholds.gross_displacement_m:g} m for {thresholds.hold_s:g} s.",
+            hint="Slip is displacement after a hold: record one, or state a shorter one.",
+        )
+    contact = normal_n >= thresholds.contact_force_n
+    ratio = np.where(contact, stick_ratio(tangential_n, normal_n, friction), np.nan)
+    state = np.select(
+        [~contact, ~rest, ratio <= thresholds.gross_stick_ratio, 1.0 - ratio > thresholds.incipient_slip_share],
+        [UNDECIDED, GROSS, UNDECIDED, INCIPIENT],
+        STICK,
+    ).astype(np.int64)
+    gross, incipient = (_stretches(state == which) for which in (GROSS, INCIPIENT))
+    held = np.concatenate([[False], (rest & contact)[:-1]])[gross[:, 0]]
+    return SlipLabels(state, *(_times(t_ns, stretch) for stretch in (gross[held], incipient)))
+
+
+def labels_at_scales(
+    t_ns: IntArray,
+    displacement_m: FloatArray,
+    tangential_n: FloatArray,
+    normal_n: FloatArray,
+    friction: float,
+    thresholds: SlipThresholds,
+) -> dict[float, SlipLabels]:
+    """Return :func:`slip_labels` under halved, stated and doubled thresholds: what a statement of sensitivity needs."""
+    return {
+        factor: slip_labels(t_ns, displacement_m, tangential_n, normal_n, friction, thresholds.scaled(factor))
+        for factor in (0.5, 1.0, 2.0)
+    }
+
+
+def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThresholds) -> npt.NDArray[np.bool_]:
+    """Return (n,) whether a sample lies in a hold.
+
+    Notes
+    -----
+    A hold begins at the first sample from which on no two displacements of `hold_s` differ by more than
+    `gross_displacement_m`. It ends before the first later sample where two of the last `hold_s` do: that sample is the
+    onset, even if another hold begins there, as after a slip that is shorter than a sample.
+    """
+    n, hold = t_ns.size, nanoseconds(thresholds.hold_s)
+    rest = np.zeros(n, dtype=np.bool_)
+    last, first = np.searchsorted(t_ns, t_ns + hold, side="left"), np.searchsorted(t_ns, t_ns - hold, side="right") - 1
+    ahead, behind = last < n, first >= 0  # where there is so much time
+    place = np.arange(n)
+    still = place[ahead][_spread(displacement_m, place[ahead], last[ahead]) <= thresholds.gross_displacement_m]
+    moved = place[behind][_spread(displacement_m, first[behind], place[behind]) > thresholds.gross_displacement_m]
+    onset = -1
+    while (following := np.searchsorted(still, onset)) < still.size:
+        begin = still[following]
+        later = np.searchsorted(moved, last[begin], side="right")
+        end = moved[later] if later < moved.size else n
+        rest[max(begin, onset + 1) : end] = True
+        onset = end
+    return rest
+
+
+def _spread(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
+    """Return (k,) largest minus smallest of ``values[first..last]``, both ends included."""
+    if first.size == 0:
+        return np.zeros(0)
+    pairs = np.column_stack([first, last + 1]).ravel()
+    padded = np.append(values, values[-1])  # reduceat wants every place to exist
+    return np.asarray(np.maximum.reduceat(padded, pairs)[::2] - np.minimum.reduceat(padded, pairs)[::2])
+
+
+def _stretches(mask: npt.NDArray[np.bool_]) -> IntArray:
+    """Return (k, 2) first and last place of each run of True."""
+    edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int64))
+    return np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1])
+
+
+def _times(t_ns: IntArray, places: IntArray) -> IntArray:
+    return np.asarray(t_ns[places].reshape(-1, 2))

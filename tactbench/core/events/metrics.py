@@ -1,0 +1,205 @@
+"""What alarms are worth: hits, misses, latency, and false alarms over stated seconds.
+
+Frames have their metrics in :mod:`tactbench.core.evaluation.metrics` (``balanced_accuracy``, ``macro_f1``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactbench.core.errors import DataError
+from tactbench.core.events.matching import match
+from tactbench.core.events.policy import AlarmPolicy, nanoseconds
+from tactbench.core.samples import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class GroundTruth:
+    """What happened in one recording."""
+
+    event_ns: IntArray
+    """(e, 2) onset and end of each event [ns]."""
+    disturbance_ns: IntArray
+    """(d, 2) beginning and end of each disturbance: a press, a tap, a motor that starts [ns]. They may overlap."""
+    span_ns: tuple[int, int]
+    """From when until when (excluded) the detector could raise alarms [ns]."""
+
+    def __post_init__(self) -> None:
+        for name, stretches in (("events", self.event_ns), ("disturbances", self.disturbance_ns)):
+            if stretches.ndim != 2 or stretches.shape[1] != 2 or np.any(stretches[:, 1] < stretches[:, 0]):
+                raise DataError(f"The {name} are not pairs of a beginning and an end.", hint="Give (n, 2) nanoseconds.")
+        if self.span_ns[1] < self.span_ns[0]:
+            raise DataError(f"The span {self.span_ns} ends before it begins.", hint="Give beginning and end.")
+
+
+@dataclass(frozen=True)
+class EventScores:
+    """Counts and latencies over all events of some recordings, and what follows from them.
+
+    The shape (...) is () for one set of alarms and (k,) for k thresholds. NaN is "cannot be said": precision without an
+    alarm, recall without an event, a rate without seconds, a latency without a hit.
+    """
+
+    n_alarms: IntArray
+    """(...) alarms, those outside the time base of false alarms included."""
+    n_false_alarms: IntArray
+    """(...) alarms within that time base."""
+    base_s: float
+    """Length of that time base [s]."""
+    latency_s: FloatArray
+    """(..., e) alarm minus onset of each event [s], negative is early; NaN is a miss."""
+
+    @property
+    def n_hits(self) -> IntArray:
+        """Return (...) how many events were hit."""
+        return np.asarray(np.isfinite(self.latency_s).sum(axis=-1), dtype=np.int64)
+
+    @property
+    def n_misses(self) -> IntArray:
+        """Return (...) how many were not."""
+        return np.asarray(self.latency_s.shape[-1] - self.n_hits)
+
+    @property
+    def recall(self) -> FloatArray:
+        """Return (...) hits of events."""
+        return _ratio(self.n_hits, np.full_like(self.n_hits, self.latency_s.shape[-1]))
+
+    @property
+    def precision(self) -> FloatArray:
+        """Return (...) hits of alarms; a second alarm on one event is no hit."""
+        return _ratio(self.n_hits, self.n_alarms)
+
+    @property
+    def f1(self) -> FloatArray:
+        """Return (...) twice the hits of alarms and events together."""
+        return _ratio(2 * self.n_hits, self.n_alarms + self.latency_s.shape[-1])
+
+    @property
+    def false_alarms_per_minute(self) -> FloatArray:
+        """Return (...) false alarms per minute of the time base [1/min]."""
+        return _ratio(self.n_false_alarms, np.full(self.n_false_alarms.shape, self.base_s / 60.0))
+
+    def latency_percentile_s(self, percent: float) -> FloatArray:
+        """Return (...) a percentile of the latency over hits, linear between order statistics [s].
+
+        Never to be shown without :attr:`n_misses`: a detector that hits only the easy events looks quick.
+        """
+        missed = np.full((*self.latency_s.shape[:-1], 1), np.nan)
+        ordered = np.sort(np.concatenate([self.latency_s, missed], axis=-1), axis=-1)  # NaN come last
+        last = np.maximum(self.n_hits - 1, 0)
+        place = percent / 100.0 * last
+        low = np.floor(place).astype(np.int64)
+        below, above = (
+            np.take_along_axis(ordered, which[..., None], axis=-1)[..., 0] for which in (low, np.minimum(low + 1, last))
+        )
+        return np.asarray(below + (above - below) * (place - low))
+
+    def row(self, place: int) -> EventScores:
+        """Return one threshold's scores, of shape ()."""
+        alarms, false = np.asarray(self.n_alarms[place]), np.asarray(self.n_false_alarms[place])
+        return EventScores(alarms, false, self.base_s, self.latency_s[place])
+
+
+def score_events(truths: Sequence[GroundTruth], alarms_ns: Sequence[IntArray], policy: AlarmPolicy) -> EventScores:
+    """Score the alarms [ns] of each recording; nothing is matched across recordings.
+
+    Notes
+    -----
+    Precision, recall and F1 are those of onset detection [1]_: matched pairs of all alarms and of all events. The
+    latency is the signed offset of [2]_; unlike there, further alarms within one window are false positives. Alarms
+    outside the time base (a second one in a window, one late in an event) lower the precision, not the rate of false
+    alarms.
+
+    References
+    ----------
+    .. [1] Raffel et al. 2014, mir_eval: a transparent implementation of common MIR metrics, ISMIR.
+    .. [2] sktime, detection metrics: EventTPR, FalseAlarmRate, MeanDetectionOffset.
+    """
+    latencies, n_alarms, n_false, base_ns = [], 0, 0, 0
+    for truth, alarm_ns in zip(truths, alarms_ns, strict=True):
+        base = TimeBase.of(truth, policy)
+        latencies.append(latency_s(truth.event_ns[:, 0], alarm_ns, policy))
+        n_alarms += alarm_ns.size
+        n_false += int(base.holds(alarm_ns).sum())
+        base_ns += base.length_ns
+    latency = np.concatenate(latencies) if latencies else np.zeros(0)
+    return EventScores(np.asarray(n_alarms), np.asarray(n_false), base_ns / 1e9, latency)
+
+
+def latency_s(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> FloatArray:
+    """Return (e,) the matched alarm minus the onset of each event [s]; NaN is a miss."""
+    latency = np.full(onset_ns.size, np.nan)
+    event, alarm = match(onset_ns, alarm_ns, policy)
+    latency[event] = (alarm_ns[alarm] - onset_ns[event]) / 1e9
+    return latency
+
+
+def displacement_at_detection(
+    onset_ns: IntArray, latency_s: FloatArray, t_ns: IntArray, displacement_m: FloatArray
+) -> FloatArray:
+    """Return (e,) how far the surface moved from each onset to its alarm [m].
+
+    Parameters
+    ----------
+    onset_ns, latency_s
+        (e,) as of the truth and the scores.
+    t_ns, displacement_m
+        (n,) relative displacement over time, of the reference; straight between its samples.
+
+    Notes
+    -----
+    Zero or the other sign where the alarm came before the onset. NaN for a miss, and where onset or alarm lies outside
+    the stream: nothing is extrapolated.
+    """
+    start = t_ns[0]
+    clock, onset = (t_ns - start) / 1e9, (onset_ns - start) / 1e9
+    moved = [np.interp(at, clock, displacement_m, left=np.nan, right=np.nan) for at in (onset, onset + latency_s)]
+    return np.asarray(moved[1] - moved[0])
+
+
+@dataclass(frozen=True)
+class TimeBase:
+    """The seconds that false alarms are counted on: half-open stretches between neighbouring edges."""
+
+    edge_ns: IntArray
+    """(k,) in order of time."""
+    counted: IntArray
+    """(k + 1,) whether the stretch before, between, and after the edges counts: 0 or 1."""
+
+    @classmethod
+    def of(cls, truth: GroundTruth, policy: AlarmPolicy) -> TimeBase:
+        """Return the base of one recording: what the policy names, without every event and its window."""
+        if policy.false_alarm_time == "disturbances":
+            named = np.clip(truth.disturbance_ns, *truth.span_ns)
+        else:
+            named = np.asarray([truth.span_ns], dtype=np.int64)
+        onset, end = truth.event_ns[:, 0], truth.event_ns[:, 1]
+        until = np.maximum(onset + nanoseconds(policy.window_after_s), end) + 1  # the window holds its own end
+        events = np.column_stack([onset - nanoseconds(policy.window_before_s), until])
+        edge = np.unique(np.concatenate([named.ravel(), events.ravel()]))
+        counted = (_depth(edge, named) > 0) & (_depth(edge, events) == 0)
+        return cls(edge, np.concatenate([[False], counted]).astype(np.int64))
+
+    @property
+    def length_ns(self) -> int:
+        """Return its length [ns]."""
+        return int((np.diff(self.edge_ns) * self.counted[1:-1]).sum())
+
+    def holds(self, t_ns: IntArray) -> IntArray:
+        """Return (n,) whether each time lies in it: 0 or 1."""
+        return np.asarray(self.counted[np.searchsorted(self.edge_ns, t_ns, side="right")])
+
+
+def _depth(t_ns: IntArray, stretches: IntArray) -> IntArray:
+    """Return (n,) how many half-open stretches (k, 2) each time lies in."""
+    begun, ended = (np.searchsorted(np.sort(edge), t_ns, side="right") for edge in stretches.T)
+    return np.asarray(begun - ended)
+
+
+def _ratio(part: FloatArray | IntArray, whole: FloatArray | IntArray) -> FloatArray:
+    """Return part of whole; NaN where the whole is nothing."""
+    nothing = np.full(np.shape(part), np.nan)
+    return np.asarray(np.divide(part, whole, out=nothing, where=np.asarray(whole) > 0))

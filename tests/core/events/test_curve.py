@@ -1,0 +1,126 @@
+"""The curve over all thresholds against each threshold on its own, and the operating point."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tactbench.core.errors import DataError
+from tactbench.core.events.alarms import alarms
+from tactbench.core.events.curve import ScoredRecording, threshold_curve
+from tactbench.core.events.metrics import score_events
+from tests.core.events.made import policies, policy, scored_recordings, seconds, truth
+
+
+def at_one(recordings, threshold, rules):
+    """Return the scores at one threshold, by way of its alarms."""
+    raised = [alarms(one.t_ns, one.score >= threshold, rules) for one in recordings]
+    return score_events([one.truth for one in recordings], raised, rules)
+
+
+def assert_same(one, other):
+    assert (one.n_alarms, one.n_false_alarms, one.base_s) == (other.n_alarms, other.n_false_alarms, other.base_s)
+    assert np.array_equal(one.latency_s, other.latency_s, equal_nan=True)
+
+
+@given(st.lists(scored_recordings(), max_size=3), policies)
+def test_the_curve_is_each_threshold_on_its_own(recordings, rules):
+    curve = threshold_curve(recordings, rules)
+    # Every score that occurs, between them, below and above all; the rows of the curve themselves.
+    for threshold in (-1.0, 0.0, 0.5, 1.0, 1.5, 2.0, 2.25, 2.5, 2.75, 3.0, 5.0, 7.0, 8.0, np.inf, *curve.threshold):
+        assert_same(curve.at(threshold), at_one(recordings, threshold, rules))
+
+
+def walk(seed, n=2000, step_s=0.01, jitter=0.0):
+    """Return a score that wanders and rises after each of three onsets, on a clock that need not be even."""
+    rng = np.random.default_rng(seed)
+    clock = seconds(*(step_s * (np.arange(n) + jitter * rng.uniform(0.0, 1.0, n))))
+    score = np.convolve(rng.normal(0.0, 1.0, n), np.ones(5) / 5, "same")
+    events = [(onset, onset + 0.5) for onset in (4.0, 9.0, 15.0)]
+    for onset, end in events:
+        score[round(onset / step_s) + 3 : round(end / step_s)] += 1.5
+    return ScoredRecording(clock, score, truth(events, disturbances=[(1.0, 2.0), (12.0, 13.0)], span=(0.0, 20.0)))
+
+
+@pytest.mark.parametrize(
+    "rules",
+    [
+        policy(),
+        policy(merge=0.1, minimum=0.03, refractory=0.5),
+        policy(minimum=0.05, time="disturbances"),
+        policy(merge=30.0),
+    ],
+    ids=["plain", "all", "disturbances", "merged-into-one"],
+)
+def test_the_curve_of_real_valued_scores_is_each_threshold_on_its_own(rules):
+    recordings = [walk(1), walk(2, jitter=0.9)]
+    curve = threshold_curve(recordings, rules)
+    seen = np.unique(np.concatenate([one.score for one in recordings]))
+    rng = np.random.default_rng(3)
+    for threshold in [*rng.choice(seen, 100), *rng.uniform(seen[0] - 1, seen[-1] + 1, 100), seen[0], seen[-1]]:
+        assert_same(curve.at(threshold), at_one(recordings, threshold, rules))
+
+
+def test_every_row_but_the_last_has_alarms_of_its_own():
+    rules = policy(merge=0.1)
+    curve = threshold_curve([walk(1)], rules)
+    raised = [alarms(walk(1).t_ns, walk(1).score >= threshold, rules).tolist() for threshold in curve.threshold]
+    assert raised[-1] == []
+    assert all(one != following for one, following in pairwise(raised))
+
+
+def test_the_operating_point_keeps_its_bound_on_validation_and_is_only_applied_to_the_test():
+    rules = policy(merge=0.1, refractory=0.5)
+    validation, test = threshold_curve([walk(1)], rules), threshold_curve([walk(2)], rules)
+    threshold = validation.operating_point(1.0)
+    chosen = validation.at(threshold)
+    assert chosen.false_alarms_per_minute <= 1.0
+    allowed = validation.scores.recall[validation.scores.false_alarms_per_minute <= 1.0]
+    assert chosen.recall == allowed.max() > 0
+    assert_same(test.at(threshold), at_one([walk(2)], threshold, rules))
+
+
+@given(st.lists(scored_recordings(), min_size=1, max_size=2), policies, st.sampled_from([0.0, 500.0, 1e6]))
+def test_the_operating_point_is_the_best_that_is_allowed(recordings, rules, bound):
+    curve = threshold_curve(recordings, rules)
+    rate = curve.scores.false_alarms_per_minute
+    if np.isnan(rate).any() or curve.scores.latency_s.shape[1] == 0:
+        with pytest.raises(DataError, match="operating point"):
+            curve.operating_point(bound)
+        return
+    chosen = curve.at(curve.operating_point(bound))
+    assert chosen.false_alarms_per_minute <= bound
+    best = max(
+        zip(curve.scores.recall, np.nan_to_num(curve.scores.f1), curve.threshold, rate <= bound, strict=True),
+        key=lambda row: (row[3], *row[:3]),
+    )
+    assert curve.operating_point(bound) == best[2]
+    assert chosen.recall == best[0]
+
+
+def test_of_thresholds_of_equal_recall_the_fewest_false_positives_decide_and_then_the_highest():
+    # An event at 1 s and a false rise at 5 s, outside the disturbance: each threshold up to 4 keeps the bound.
+    clock, score = seconds(*range(10)), np.array([0.0, 4.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0])
+    one = ScoredRecording(clock, score, truth([(1.0, 1.5)], disturbances=[(7.0, 8.0)], span=(0.0, 10.0)))
+    assert threshold_curve([one], policy(time="disturbances")).operating_point(1.0) == 4.0
+    # A second rise in the window of the event at every threshold above 2: the lower threshold has the better F1.
+    score = np.array([0.0, 4.0, 2.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    one = ScoredRecording(clock, score, one.truth)
+    assert threshold_curve([one], policy(after=3.0, time="disturbances")).operating_point(1.0) == 2.0
+
+
+def test_a_detector_that_hits_nothing_within_the_bound_never_raises_an_alarm():
+    worthless = walk(1)
+    score = np.where((worthless.t_ns // 10**9) % 2 == 1, 1.0, 0.0)
+    curve = threshold_curve([ScoredRecording(worthless.t_ns, score, worthless.truth)], policy(before=0.0, after=0.01))
+    assert curve.operating_point(0.0) == np.inf
+
+
+def test_scores_and_thresholds_that_are_none_are_refused():
+    flat = walk(1)
+    with pytest.raises(DataError, match="infinite"):
+        threshold_curve([ScoredRecording(flat.t_ns, np.full(flat.score.size, np.inf), flat.truth)], policy())
+    with pytest.raises(DataError, match="no threshold"):
+        threshold_curve([flat], policy()).at(np.nan)

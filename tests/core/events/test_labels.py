@@ -1,0 +1,202 @@
+"""Labels of a made drag whose truth is known, and of the twin's own closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from tactbench.core.errors import DataError
+from tactbench.core.events.labels import (
+    GROSS,
+    INCIPIENT,
+    STICK,
+    THRESHOLDS,
+    UNDECIDED,
+    SlipThresholds,
+    at_rest,
+    labels_at_scales,
+    slip_labels,
+    stick_ratio,
+)
+from tactbench.rigs.twin.effects import partial_slip
+from tactbench.rigs.twin.effects.slip_event import Mode
+from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
+from tests.core.events.made import MS, clocks, seconds
+
+MU, P = 0.8, 2.0
+SPEED = 0.01
+"""Of the drag [m/s]."""
+
+
+def drag(step_s=0.001):
+    """Return a press, a hold, a rising pull, a slip from 1.0 s to 1.5 s, a hold, and a lift at 2.0 s."""
+    t = step_s * np.arange(round(2.5 / step_s))
+    displacement = SPEED * np.clip(t - 1.0, 0.0, 0.5)
+    normal = np.where(t < 2.0, P, 0.0)
+    pull = np.interp(t, [0.0, 0.5, 1.0, 1.5, 1.55, 2.5], [0.0, 0.0, MU * P, MU * P, 0.0, 0.0])
+    return t, displacement, pull, normal
+
+
+def labelled(shift_s=0):
+    t, displacement, pull, normal = drag()
+    return t, slip_labels(seconds(*t) + shift_s * 10**9, displacement, pull, normal, MU, THRESHOLDS)
+
+
+def test_a_drag_has_one_slip_whose_onset_is_the_threshold_over_the_speed_late():
+    t, labels = labelled()
+    late = THRESHOLDS.gross_displacement_m / SPEED
+    # Two samples: "more than" on a grid of 1 ms, and the rounding of a multiple of it.
+    assert labels.gross_ns[:, 0] / 1e9 == pytest.approx([1.0 + late], abs=2.1e-3)
+    assert labels.gross_ns[:, 1] / 1e9 == pytest.approx([1.5 - late], abs=2.1e-3)
+    assert np.all(labels.state[t < 0.5] == STICK)
+    assert np.all(labels.state[(t > 1.0 + late + 2e-3) & (t < 1.5 - late - 2e-3)] == GROSS)
+    assert np.all(labels.state[t > 2.0] == UNDECIDED)
+
+
+def test_incipient_slip_lies_between_its_two_stick_ratios():
+    t, labels = labelled()
+    begins = 1.0 - (1.0 - THRESHOLDS.incipient_slip_share) ** 3  # Q/(mu P) where c/a is that
+    ends = 1.0 - THRESHOLDS.gross_stick_ratio**3
+    share = np.interp(t, [0.5, 1.0], [0.0, 1.0])
+    rising = (t > 0.5) & (t < 1.0)
+    clear = rising & (np.abs(share - begins) > 1e-9) & (np.abs(share - ends) > 1e-9)
+    expected = np.where(share <= begins, STICK, np.where(share < ends, INCIPIENT, UNDECIDED))
+    assert np.array_equal(labels.state[clear], expected[clear])
+    assert labels.incipient_ns[0] / 1e9 == pytest.approx([0.5 + begins / 2, 0.5 + ends / 2], abs=1.1e-3)
+
+
+def test_the_stick_ratio_is_the_twins():
+    way = np.linspace(0.0, 1.0, 101)  # in displacement, of the way to full slip
+    found = stick_ratio(MU * P * partial_slip.share_of_force(way), np.full(101, P), MU)
+    # c/a is the root of the third root: rounding of Q near mu P grows to its cube root.
+    assert found == pytest.approx(partial_slip.stick_ratio(way), abs=1e-5)
+
+
+def test_the_stick_ratio_by_hand():
+    pull = np.array([0.0, 7 / 8 * MU * P, -7 / 8 * MU * P, MU * P, 2 * MU * P, 1.0])
+    normal = np.array([P, P, P, P, P, 0.0])
+    assert stick_ratio(pull, normal, MU) == pytest.approx([1.0, 0.5, 0.5, 0.0, 0.0, np.nan], nan_ok=True, abs=1e-5)
+
+
+def test_displacement_decides_over_forces():
+    """A coefficient stated too high or too low moves no onset: it only costs incipient frames."""
+    t, displacement, pull, normal = drag()
+    found = [slip_labels(seconds(*t), displacement, pull, normal, mu, THRESHOLDS) for mu in (0.5 * MU, MU, 2 * MU)]
+    assert all(np.array_equal(found[0].gross_ns, other.gross_ns) for other in found[1:])
+    low = found[0].state[(t > 0.76) & (t < 1.0)]  # the pull is over half: by its forces everything slips
+    assert np.all(low == UNDECIDED)
+
+
+def test_motion_in_the_air_and_motion_from_the_first_sample_are_no_events():
+    t, displacement, pull, normal = drag()
+    aloft = slip_labels(seconds(*t), displacement, pull, np.zeros_like(normal), MU, THRESHOLDS)
+    assert aloft.gross_ns.shape == (0, 2)
+    assert np.all(aloft.state == UNDECIDED)
+    late = t >= 1.2
+    moving = slip_labels(seconds(*t[late]), displacement[late], pull[late], normal[late], MU, THRESHOLDS)
+    assert moving.gross_ns.shape == (0, 2)
+    assert np.any(moving.state == GROSS)
+
+
+def test_a_contact_made_as_the_motion_begins_was_held_by_nothing():
+    t, displacement, pull, _ = drag()
+    first = int(np.flatnonzero(labelled()[1].state == GROSS)[0])
+    normal = np.where(np.arange(t.size) >= first, P, 0.0)
+    labels = slip_labels(seconds(*t), displacement, pull, normal, MU, THRESHOLDS)
+    assert labels.state[first - 1 : first + 1].tolist() == [UNDECIDED, GROSS]
+    assert labels.gross_ns.shape == (0, 2)
+
+
+def holds_one_by_one(t, moved, hold, allowed):
+    """Return which samples lie in a hold, as the definition says it, sample by sample."""
+
+    def ahead(at):
+        inside = [k for k in range(at, t.size) if k == at or t[k - 1] - t[at] < hold]
+        return t[-1] - t[at] >= hold and np.ptp(moved[inside]) <= allowed
+
+    def behind(at, begin):
+        inside = [k for k in range(begin, at + 1) if k == at or t[at] - t[k + 1] < hold]
+        return np.ptp(moved[inside]) <= allowed
+
+    rest, begin, onset = np.zeros(t.size, dtype=np.bool_), None, None
+    for at in range(t.size):
+        if begin is not None and not behind(at, begin):
+            begin, onset = None, at
+        if begin is None and ahead(at):
+            begin = at
+        rest[at] = begin is not None and at != onset
+    return rest
+
+
+@given(clocks, st.data(), st.integers(1, 6), st.integers(1, 3))
+def test_a_hold_is_what_its_definition_says(clock, data, hold_ms, allowed):
+    """In whole metres, so that displacement is compared exactly."""
+    steps = data.draw(st.lists(st.sampled_from([0, 0, 0, 1, -1, 3, 9]), min_size=clock.size, max_size=clock.size))
+    moved = np.cumsum(np.asarray(steps, dtype=np.float64))
+    rules = THRESHOLDS.model_copy(update={"hold_s": hold_ms / 1000, "gross_displacement_m": float(allowed)})
+    assert np.array_equal(at_rest(clock, moved, rules), holds_one_by_one(clock, moved, hold_ms * MS, allowed))
+
+
+@pytest.mark.parametrize("samples", [1, 2, 5])
+def test_a_slip_as_short_as_a_sample_is_a_slip(samples):
+    t = 0.001 * np.arange(1000)
+    jump = 1.5 * THRESHOLDS.gross_displacement_m * np.clip((np.arange(1000) - 500) / samples, 0.0, 1.0)
+    pull = np.full(1000, 0.5 * MU * P)
+    labels = slip_labels(seconds(*t), jump, pull, np.full(1000, P), MU, THRESHOLDS)
+    assert labels.gross_ns[:, 0].tolist() == seconds(t[500 + math.ceil(samples / 1.5)]).tolist()
+
+
+def test_slow_stick_slip_on_the_twin_is_an_event_a_slip():
+    grid = np.linspace(0.0, 4.0, 801)
+    load = np.full(801, 2.0)
+    drive = Drive(
+        speed_mm_s=2.0, start_s=0.5, end_s=math.inf, static=0.8, kinetic=0.6, stribeck_mm_s=5.0, mode=Mode(2000.0, 0.1),
+        t_s=grid, load_n=load, stiffness=2.0 * np.cbrt(load),
+    )  # fmt: skip
+    dragged, t = Dragged(drive), 0.001 * np.arange(4000)
+    seen = dragged(t)
+    labels = slip_labels(seconds(*t), 1e-3 * seen.slip_mm, seen.force_n, np.full(4000, 2.0), 0.8, THRESHOLDS)
+    # A swing lasts pi/omega = 1.6 ms, then comes the next sample.
+    assert labels.gross_ns[:, 0] / 1e9 - dragged.let_go_s[dragged.let_go_s < t[-1]] == pytest.approx(0.0013, abs=0.0013)
+    sticking = (t > 0.5) & (t < dragged.let_go_s[0])
+    found = stick_ratio(seen.force_n, np.full(4000, 2.0), 0.8)[sticking]
+    # The twin's forces have a viscous part beside friction's: 2 % at most.
+    assert found == pytest.approx(seen.stick_ratio[sticking], abs=0.02)
+
+
+def test_a_surface_that_never_rests_is_refused():
+    t, displacement, pull, normal = drag()
+    middle = (t > 1.1) & (t < 1.4)
+    with pytest.raises(DataError, match="never rests"):
+        slip_labels(seconds(*t[middle]), displacement[middle], pull[middle], normal[middle], MU, THRESHOLDS)
+    with pytest.raises(DataError, match="normal force"):
+        slip_labels(seconds(*t), displacement, pull, np.where(t > 1, np.nan, normal), MU, THRESHOLDS)
+
+
+def test_halved_and_doubled_thresholds_move_the_labels_the_way_they_say():
+    t, displacement, pull, normal = drag()
+    scales = labels_at_scales(seconds(*t), displacement, pull, normal, MU, THRESHOLDS)
+    onsets = [scales[factor].gross_ns[0, 0] / 1e9 for factor in (0.5, 1.0, 2.0)]
+    late = THRESHOLDS.gross_displacement_m / SPEED
+    assert onsets == pytest.approx([1.0 + late / 2, 1.0 + late, 1.0 + 2 * late], abs=2.1e-3)
+    begins = [scales[factor].incipient_ns[0, 0] for factor in (0.5, 1.0, 2.0)]
+    assert begins == sorted(begins)
+    assert np.array_equal(scales[1.0].state, labelled()[1].state)
+
+
+def test_thresholds_are_stated_whole_and_in_order():
+    assert all(field.is_required() for field in SlipThresholds.model_fields.values())
+    with pytest.raises(ValidationError, match="comes first"):
+        SlipThresholds.model_validate({**THRESHOLDS.model_dump(), "incipient_slip_share": 0.95})
+    with pytest.raises(ValidationError):
+        THRESHOLDS.hold_s = 1.0
+
+
+@given(st.integers(-(10**6), 10**6))
+def test_a_shift_of_the_clock_shifts_the_events_alone(shift_s):
+    here, there = labelled()[1], labelled(shift_s)[1]
+    assert np.array_equal(here.state, there.state)
+    assert np.array_equal(here.gross_ns + shift_s * 10**9, there.gross_ns)
