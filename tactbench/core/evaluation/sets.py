@@ -80,7 +80,7 @@ def keep(data: Dataset, protocol: ProtocolSpec, masks: Sequence[Mask], what: str
     DataError
         If no row is left.
     """
-    chosen = [mask & _asked_for(table, protocol) for table, mask in zip(data.tables, masks, strict=True)]
+    chosen = [mask & asked_for(table, protocol) for table, mask in zip(data.tables, masks, strict=True)]
     sizes = [int(mask.sum()) for mask in chosen]
     if sum(sizes) == 0:
         raise DataError(f"The {what} set has no rows.", hint="Check roles, sessions and the length of the recordings.")
@@ -123,14 +123,12 @@ def not_asked_for(data: Dataset, protocol: ProtocolSpec, used: Sequence[Mask]) -
     used
         One (n,) mask a recording.
     """
-    others = sum(
-        int((mask & ~_asked_for(table, protocol)).sum()) for table, mask in zip(data.tables, used, strict=True)
-    )
+    others = sum(int((mask & ~asked_for(table, protocol)).sum()) for table, mask in zip(data.tables, used, strict=True))
     which = "after the first of a recording" if protocol.first_row_only else "before the press begins"
     return {f"rows {which}": others} if others else {}
 
 
-def _asked_for(table: Table, protocol: ProtocolSpec) -> Mask:
+def asked_for(table: Table, protocol: ProtocolSpec) -> Mask:
     """Return (n,) which rows the protocol looks at, by their place in the recording."""
     if protocol.first_row_only:
         return np.asarray(np.arange(len(table.row)) == 0)

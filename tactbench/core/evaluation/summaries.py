@@ -13,7 +13,7 @@ from tactbench.core.errors import DataError, NotApplicable, PluginContractError
 from tactbench.core.evaluation.dataset import LARGEST, Dataset, Table
 from tactbench.core.evaluation.delay import row_interval_s
 from tactbench.core.evaluation.protocols import ProtocolSpec
-from tactbench.core.evaluation.sets import moments
+from tactbench.core.evaluation.sets import asked_for, moments
 from tactbench.core.evaluation.unloaded import hold_s
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, StreamReadings
@@ -169,12 +169,11 @@ def answer_span_s(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> float |
 
 def _span_s(data: Dataset, table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
     if task.vote:
+        times_s = table.time_s[asked_for(table, rules)]
         if table.meta.clock == "none":
             interval_s = row_interval_s(data)
-            return None if interval_s is None else len(table.row) * interval_s
-        scene = table.meta.scene
-        hold = scene.profile.hold.to("s") if rules.discard_hold and scene is not None else 0.0
-        return max(float(table.time_s[-1]) - hold, 0.0)
+            return None if interval_s is None else len(times_s) * interval_s
+        return float(np.ptp(times_s)) if len(times_s) else 0.0
     lengths = [_length_s(stream) for stream in kept(table, rules)]
     if any(length is None for length in lengths):
         return None

@@ -47,7 +47,8 @@ def costs_section(subject: ReportData) -> Section:
 
 
 def _command(subject: ReportData) -> str:
-    some = next((row for row in subject.rows if row["status"] == "done"), None)
+    timed = (row for row in subject.rows if row["status"] == "done" and row.get("answer_per") != "recording")
+    some = next(timed, None)
     words = ("--sensor", some["sensor"], "--task", some["task"]) if some else ()
     command = command_line("tactbench", "cost", *words)
     return f"What an answer costs in time beside its score: `{command}`; of the simulation: `tactbench cost --twin`."

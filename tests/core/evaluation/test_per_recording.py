@@ -342,6 +342,7 @@ def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_pa
     result = run(vote(), paths, estimator="logistic", protocol="karl2016")
     assert result.n_test == 2
     assert result.counts["rows before the press begins"] == 6 * 600
+    assert result.delay_parts_ms["window"] == pytest.approx(990.0), "100 of 700 rows are kept"
     short = record(tmp_path / "short.h5", rng.normal(size=(500, 1)), np.full(500, 1.0), role="test", labels={"slip": 0})
     with pytest.raises(DataError, match="leaves no row of recording 'short'"):
         run(vote(), [*paths, short], estimator="logistic", protocol="karl2016")
