@@ -88,6 +88,22 @@ class StreamData:
 
 
 @dataclass(frozen=True)
+class StreamReadings:
+    """One stream of one recording on the stream's own clock: what features of a whole recording are made of."""
+
+    stream: str
+    channels: tuple[str, ...]
+    kinds: tuple[str, ...]
+    """of each channel"""
+    data: FloatArray
+    """(n, channels); rows in which a channel has no sample are not in it"""
+    time_s: FloatArray | None
+    """(n,) seconds since the first sample that the protocol keeps; None where the recording has no clock"""
+    rate_hz: float | None
+    """one over the median step of the clock, or else as stated; None where neither is known"""
+
+
+@dataclass(frozen=True)
 class SkinGrid:
     """Cell centres of the unrolled skin, millimetres."""
 

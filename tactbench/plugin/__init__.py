@@ -20,7 +20,7 @@ from tactbench.core.errors import (
 from tactbench.core.plugins.hookspecs import hookimpl
 from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import load_object, load_registry
-from tactbench.core.samples import Block, Quality
+from tactbench.core.samples import Block, Quality, StreamReadings
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
@@ -35,6 +35,7 @@ from tactbench.core.spec.sensor import (
     Statement,
     StreamSpec,
 )
+from tactbench.core.spec.summary import Summary
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
 from tactbench.plugin.on_demand import on_demand
 
@@ -78,7 +79,9 @@ __all__ = [
     "SensorSpec",
     "Source",
     "Statement",
+    "StreamReadings",
     "StreamSpec",
+    "Summary",
     "TactbenchError",
     "TaskDescriptor",
     "TaskSpec",

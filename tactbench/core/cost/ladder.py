@@ -61,7 +61,7 @@ def climb(
     Raises
     ------
     UsageError
-        If something is asked for that is not there, or more than one protocol or split.
+        If something is asked for that is not there, more than one protocol or split, or a task of whole recordings.
 
     Returns
     -------
@@ -72,8 +72,13 @@ def climb(
     if len(ways) > 1:
         several = ", ".join(sorted(f"{protocol} {split or ''}".strip() for protocol, split in ways))
         raise UsageError(f"One ladder is for one protocol and one split, not {several}.", hint="Ask for one of them.")
-    outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress, files=False)
     task = registry.tasks[matrix.tasks[0].name].spec
+    if task.answer_per == "recording":
+        raise UsageError(
+            f"A ladder times answers to single rows; task {task.name!r} asks one of each recording.",
+            hint="`tactbench run` tells fit time, latency and answer delay of its estimators.",
+        )
+    outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress, files=False)
     done = [row for row in outcome.rows if row["status"] == "done" and row["seed"] == matrix.seed]
     data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None
     answers = over_replicates(outcome.rows)

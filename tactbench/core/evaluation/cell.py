@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,20 +28,31 @@ from tactbench.core.evaluation.selection import Build, Choice, features_of, sele
 from tactbench.core.evaluation.sets import not_asked_for
 from tactbench.core.evaluation.splits import (
     SHUFFLED_STAMP,
+    SHUFFLED_WHOLE_STAMP,
     Assignment,
     assert_disjoint,
     choose_split,
+    over_rows,
     used_rows,
     without_part,
 )
+from tactbench.core.evaluation.summaries import (
+    is_summarised,
+    recording_features,
+    summarised,
+    waiting_for_the_whole,
+    without_windows,
+)
 from tactbench.core.evaluation.timing import (
     AT_LEAST,
+    calls_s,
     peak_rss_mb,
     single_row_latency_s,
     single_row_preparation_s,
     tail_ms,
 )
 from tactbench.core.evaluation.unloaded import tare_s
+from tactbench.core.evaluation.vote import require_answers, voted
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import Answers, FloatArray, Fold, Part
 from tactbench.core.spec.recording import RecordingMeta
@@ -138,11 +149,14 @@ class CellContext:
 class _Folds:
     """The folds of one cell, and what they add up to."""
 
-    def __init__(self, context: CellContext, data: Dataset) -> None:
-        self.context, self.data = context, data
+    def __init__(self, context: CellContext, recorded: Dataset) -> None:
+        self.context, self.recorded = context, recorded
         self.rules: ProtocolSpec = protocol_called(context.protocol)
         self.metric: Metric = metric_called(context.task.metric)
-        self.split: str = choose_split(context.task, self.rules, data, context.split)
+        self.split: str = choose_split(context.task, self.rules, recorded, context.split)
+        self.held_s = tare_s(recorded) if self.rules.tare else 0.0
+        data = summarised(recorded, context.task, self.rules)
+        self.data = data
         self.counts: Counter[str] = Counter(data.counts)
         self.sets: dict[Role, list[Answers]] = {}
         self.scores: dict[str, float] = {}
@@ -154,6 +168,7 @@ class _Folds:
         self.stamps: tuple[str, ...] = data.stamps
         self.untrained: dict[str, list[str]] = {}
         self.search_s = self.fit_s = self.predict_s = 0.0
+        self.batch_rows = 0
         self.model: Estimator | None = None
         self.test: Any = None
 
@@ -188,17 +203,23 @@ class _Folds:
         began = clock()
         predicted = answers_of(model, X_test, estimator.name, n_classes)
         self.predict_s += clock() - began
-        self.scores[f"fold {fold.name}"] = metric.of(fold.test.y, predicted, n_classes)
-        self.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(fold.test))
-        self._keep("test", fold.test, predicted, number)
+        self.batch_rows += len(fold.test)
+        if data.vote:
+            require_answers(data, assignment.test, fold.test)
+        asked, combined = self._combined(fold.test, predicted)
+        self.scores[f"fold {fold.name}"] = metric.of(asked.y, combined, n_classes)
+        self.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(asked))
+        self._keep("test", asked, combined, number)
         if alone and not n_classes:
-            self._keep("train", fold.train, answers_of(model, X_train, estimator.name, n_classes), number)
+            again = self._combined(fold.train, answers_of(model, X_train, estimator.name, n_classes))
+            self._keep("train", *again, number)
         if fold.validation is not None and len(fold.validation):
             on_validation = answers_of(model, features_of(fold.validation, estimator), estimator.name, n_classes)
+            held_back, on_validation = self._combined(fold.validation, on_validation)
             if not choice:
-                self.scores["validation"] = metric.of(fold.validation.y, on_validation, n_classes)
+                self.scores["validation"] = metric.of(held_back.y, on_validation, n_classes)
             if alone:
-                self._keep("validation", fold.validation, on_validation, number)
+                self._keep("validation", held_back, on_validation, number)
         if choice:
             self.chosen.append(choice)
             self.names.append(fold.name)
@@ -206,6 +227,10 @@ class _Folds:
         self.n_train += len(fold.train)
         self.folds += 1
         self.model, self.test, self.k = model, fold.test, k
+
+    def _combined(self, part: Part, predicted: npt.NDArray[Any]) -> tuple[Part, npt.NDArray[Any]]:
+        """Return what is scored: rows and their answers, or recordings and what their rows' answers come to."""
+        return voted(part, predicted, len(self.data.classes)) if self.data.vote else (part, predicted)
 
     def _keep(self, role: Role, part: Part, predicted: npt.NDArray[Any], number: int) -> None:
         """Keep what was answered, with time and reference force beside it."""
@@ -240,15 +265,18 @@ def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> Cell
         If a set is empty, has one class only, or its labels never change.
     """
     say = context.progress or (lambda _: None)
-    data = recordings if isinstance(recordings, Dataset) else load_dataset(context.task, recordings)
-    estimator = context.estimator
-    folds = _Folds(context, data)
-    if folds.rules.tare:
-        tare_s(data)  # refuses recordings of which only some can be tared
+    recorded = recordings if isinstance(recordings, Dataset) else load_dataset(context.task, recordings)
+    estimator = without_windows(context.estimator, context.task)
+    context = replace(context, estimator=estimator)
+    folds = _Folds(context, recorded)
+    data = folds.data
     assignments = assigned(context.task, estimator, data, folds.split, context.seed)
     assert_disjoint(assignments)
     folds.look_over(assignments)
-    folds.stamps += (SHUFFLED_STAMP,) if folds.split == "shuffled" else leak_stamps(data, assignments)
+    if folds.split == "shuffled":
+        folds.stamps += (SHUFFLED_WHOLE_STAMP if data.whole else SHUFFLED_STAMP,)
+    else:
+        folds.stamps += leak_stamps(recorded, [over_rows(one, recorded) for one in assignments])
     build = builder(estimator, context.params, context.task, context.seed, context.threads)
     with thread_limit(context.threads):
         for number, assignment in enumerate(assignments):
@@ -282,12 +310,17 @@ def _delay(folds: _Folds, latency: Mapping[str, Any]) -> _Delay:
     parts: dict[str, float] = {}
     remarks: tuple[str, ...] = ()
     if looks_at == "features":
-        parts, remarks = reading_delay_ms(folds.data, folds.rules, folds.k)
+        parts, remarks = reading_delay_ms(folds.recorded, folds.rules, folds.k)
+        parts = waiting_for_the_whole(parts, folds.recorded, folds.context.task, folds.rules)
         if latency:
             # A median needs no more calls, and a row keeps nothing else of them.
-            ready_s = single_row_preparation_s(
-                folds.test.X, folds.k, folds.context.clock, tared=tared, at_most=AT_LEAST
-            )
+            if is_summarised(folds.context.task, folds.rules):
+                tables, compute = folds.recorded.tables, recording_features(folds.context.task, folds.rules)
+                ready_s = calls_s(len(tables), tables.__getitem__, compute, folds.context.clock, AT_LEAST)
+            else:
+                ready_s = single_row_preparation_s(
+                    folds.test.X, folds.k, folds.context.clock, tared=tared, at_most=AT_LEAST
+                )
             parts["features"] = float(1e3 * np.median(ready_s))
     if latency:
         parts["prediction"] = latency["latency_ms_p50"]
@@ -323,7 +356,7 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
     tested = sets["test"]
     y, predicted, recording, row = tested.y_true, tested.y_pred, tested.recording, tested.row
     n_classes = len(data.classes)
-    held = tare_s(data) if rules.tare else 0.0
+    held = folds.held_s
     floor, no_floor = reference_floor(task, metric, data, tested)
     truth = true_force(task, data, tested) if metric.kind == "regression" else None
     unit = replicates(data, task, split, y, recording, row)
@@ -370,7 +403,7 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
         search_s=folds.search_s,
         fit_s=folds.fit_s,
         predict_s=folds.predict_s,
-        batch_rows=len(y),
+        batch_rows=folds.batch_rows,
         latency_ms_p50=latency.get("latency_ms_p50"),
         latency_ms_p95=latency.get("latency_ms_p95"),
         latency_ms_max=latency.get("latency_ms_max"),
@@ -387,13 +420,27 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
         tare_s=held or None,
         remarks=tuple(
             one
-            for one in (no_floor, NOT_TARED if rules.tare and not held else "", _untrained(folds), *delay.remarks)
+            for one in (
+                _one_a_recording(folds),
+                no_floor,
+                NOT_TARED if rules.tare and not held else "",
+                _untrained(folds),
+                *delay.remarks,
+            )
             if one
         ),
     )
 
 
 NOT_TARED = "not tared: no recording states an unloaded hold"
+
+
+def _one_a_recording(folds: _Folds) -> str:
+    task = folds.context.task
+    if task.answer_per == "sample":
+        return ""
+    made_of = "its first row" if folds.rules.first_row_only else task.answer_from
+    return f"one answer a recording, from {made_of}"
 
 
 def _untrained(folds: _Folds) -> str:

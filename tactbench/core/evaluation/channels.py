@@ -9,7 +9,7 @@ import numpy as np
 from tactbench.core.errors import DataError, NotApplicable, UsageError
 from tactbench.core.evaluation.alignment import nearest_rows
 from tactbench.core.recording.reader import Recording
-from tactbench.core.samples import FloatArray, Quality, StreamData
+from tactbench.core.samples import FloatArray, Quality, StreamData, StreamReadings
 from tactbench.core.spec import units
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.sensor import ChannelSpec
@@ -62,6 +62,27 @@ def features_on(
     if not len(readings):
         return names, np.full((len(rows), len(picked)), np.nan)
     return names, np.where((rows >= 0)[:, None], readings[np.maximum(rows, 0)], np.nan)
+
+
+def own_readings(clock: StreamData, stream: StreamData, task: TaskSpec, counts: Counter[str]) -> StreamReadings:
+    """Return one stream's features on its own clock, in seconds since the first row of `clock`."""
+    picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.features]
+    data = numbers(stream)[:, picked]
+    whole = np.asarray(~np.isnan(data).any(axis=1))
+    if stream is not clock and not whole.all():
+        counts[f"rows of {stream.spec.name} left out because a channel has no sample"] += int((~whole).sum())
+    time_s = (stream.t_ns - clock.t_ns[0]) * 1e-9 if stream.t_ns is not None and clock.t_ns is not None else None
+    steps = np.diff(time_s) if time_s is not None else np.zeros(0)
+    step_s = float(np.median(steps)) if len(steps) else 0.0
+    channels = [stream.spec.channels[place] for place in picked]
+    return StreamReadings(
+        stream=stream.spec.name,
+        channels=tuple(channel.name for channel in channels),
+        kinds=tuple(channel.kind for channel in channels),
+        data=data[whole],
+        time_s=None if time_s is None else time_s[whole],
+        rate_hz=1.0 / step_s if step_s > 0 else stream.spec.rate_hz,
+    )
 
 
 def numbers(data: StreamData) -> FloatArray:

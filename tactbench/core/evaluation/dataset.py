@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,16 @@ import numpy.typing as npt
 
 from tactbench.core.errors import DataError, NotApplicable
 from tactbench.core.evaluation.alignment import require_forward
-from tactbench.core.evaluation.channels import channel_on, channels_for, feature_streams, features_on, on_clock
+from tactbench.core.evaluation.channels import (
+    channel_on,
+    channels_for,
+    feature_streams,
+    features_on,
+    on_clock,
+    own_readings,
+)
 from tactbench.core.recording.reader import Recording, open_recording
-from tactbench.core.samples import FloatArray, IntArray, StreamData
+from tactbench.core.samples import FloatArray, IntArray, StreamData, StreamReadings
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec
 
@@ -42,6 +49,8 @@ class Table:
     """(n,) index of the row in its stream"""
     groups: Mapping[str, npt.NDArray[np.str_]]
     """Labels by which rows can be kept together: name -> (n,)"""
+    readings: tuple[StreamReadings, ...] = ()
+    """Every stream on its own clock, times from the first row on; read where a task summarises recordings"""
 
 
 @dataclass(frozen=True)
@@ -58,6 +67,10 @@ class Dataset:
     """The files of the tables"""
     stamps: tuple[str, ...] = ()
     """What a reader of a score must know of the recordings"""
+    whole: bool = False
+    """Each recording has one answer: no split may cut it"""
+    vote: bool = False
+    """That answer is combined from those of the recording's rows"""
 
     @property
     def metas(self) -> tuple[RecordingMeta, ...]:
@@ -101,7 +114,24 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
         counts[f"of {sum(len(table.row) for table in tables)} rows have no {_wanted(task)} and were left out"] = (
             unlabelled
         )
-    return Dataset(tables, read[0][1].features, classes, dict(counts), tuple(used), _clock_stamps(repeated))
+    whole = task.answer_per == "recording"
+    if whole:
+        tables = tuple(_whole(table, task) for table in tables)
+    return Dataset(
+        tables, read[0][1].features, classes, dict(counts), tuple(used), _clock_stamps(repeated), whole, bool(task.vote)
+    )
+
+
+def _whole(table: Table, task: TaskSpec) -> Table:
+    """Return a recording that no group cuts; one whose answer changes is refused."""
+    if len(np.unique(table.y[table.labelled])) > 1:
+        raise NotApplicable(
+            f"Task {task.name!r} asks one answer of each recording, and {_wanted(task)} changes within "
+            f"{table.meta.name!r}.",
+            hint="Cut the recordings where it changes (`recording` in the mapping), or ask a task of single samples.",
+        )
+    constant = {name: column for name, column in table.groups.items() if len(np.unique(column)) < 2}
+    return replace(table, groups=constant)
 
 
 def _clock_stamps(repeated: Mapping[str, int]) -> tuple[str, ...]:
@@ -122,6 +152,7 @@ class _Raw:
     time_s: FloatArray
     row: IntArray
     groups: dict[str, npt.NDArray[np.str_]]
+    readings: tuple[StreamReadings, ...]
 
 
 def _read(recording: Recording, task: TaskSpec, counts: Counter[str], repeated: dict[str, int]) -> _Raw:
@@ -153,7 +184,11 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str], repeated: 
                 hint="Is it a fill value? State it under `sentinels` in the mapping, or mark it as missing.",
             )
     time_s = (data.t_ns - data.t_ns[0]) * 1e-9 if data.t_ns is not None else np.arange(len(X), dtype=np.float64)
-    raw = _Raw(names, X, y, labelled, force, time_s, np.arange(len(X), dtype=np.int64), _groups(meta, data, task))
+    own: tuple[StreamReadings, ...] = ()
+    if task.summaries or task.features_by:
+        own = tuple(own_readings(data, stream, task, counts) for stream in streams)
+    row = np.arange(len(X), dtype=np.int64)
+    raw = _Raw(names, X, y, labelled, force, time_s, row, _groups(meta, data, task), own)
     whole = np.asarray(~np.isnan(X).any(axis=1))
     if not whole.all():
         for name, column in zip(names, X.T, strict=True):
@@ -166,7 +201,7 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str], repeated: 
 def _rows(raw: _Raw, keep: npt.NDArray[np.bool_]) -> _Raw:
     return _Raw(
         raw.features, raw.X[keep], raw.y[keep], raw.labelled[keep], None if raw.force is None else raw.force[keep],
-        raw.time_s[keep], raw.row[keep], {name: column[keep] for name, column in raw.groups.items()},
+        raw.time_s[keep], raw.row[keep], {name: column[keep] for name, column in raw.groups.items()}, raw.readings,
     )  # fmt: skip
 
 
@@ -244,7 +279,7 @@ def _table(meta: RecordingMeta, raw: _Raw, classes: tuple[Any, ...]) -> Table:
     if classes:
         index = {label: place for place, label in enumerate(classes)}
         y = np.array([index.get(value, -1) for value in raw.y.tolist()], dtype=np.int64)
-    return Table(meta, raw.X, y, raw.labelled, raw.force, raw.time_s, raw.row, raw.groups)
+    return Table(meta, raw.X, y, raw.labelled, raw.force, raw.time_s, raw.row, raw.groups, raw.readings)
 
 
 def _wanted(task: TaskSpec) -> str:

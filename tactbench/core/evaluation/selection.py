@@ -17,6 +17,7 @@ from tactbench.core.evaluation.metrics import Metric
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import FeatureScale, SetRows, keep, part
 from tactbench.core.evaluation.splits import Assignment, inner_splits
+from tactbench.core.evaluation.vote import voted
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray, Part
 from tactbench.core.spec.rig import EstimatorDescriptor
@@ -95,7 +96,8 @@ def select(
         filtered = [(part(a, scale_a, k), part(b, scale_b, k)) for a, scale_a, b, scale_b in pairs]
         for values in itertools.product(*grid.values()):
             params = {**given, **dict(zip(grid, values, strict=True))}
-            tried.append(Candidate(params, k, _score(descriptor, build, params, filtered, metric, n_classes, counted)))
+            score = _score(descriptor, build, params, filtered, metric, n_classes, counted, vote=data.vote)
+            tried.append(Candidate(params, k, score))
     best = max(tried, key=lambda candidate: sign * candidate.score)  # of equals the first
     return Choice(best.params, best.k, best.score, tuple(tried))
 
@@ -135,12 +137,16 @@ def _score(
     metric: Metric,
     n_classes: int,
     counts: Counter[str],
+    *,
+    vote: bool,
 ) -> float:
-    """Return the score over all validation rows together."""
+    """Return the score over all validation rows, or recordings, together."""
     truth, given = [], []
     for train, check in pairs:
         model = build(params)
         fit(model, features_of(train, descriptor), train.y, descriptor.name, counts)
-        truth.append(check.y)
-        given.append(answers(model, features_of(check, descriptor), descriptor.name, n_classes))
+        predicted = answers(model, features_of(check, descriptor), descriptor.name, n_classes)
+        asked, combined = voted(check, predicted, n_classes) if vote else (check, predicted)
+        truth.append(asked.y)
+        given.append(combined)
     return metric.of(np.concatenate(truth), np.concatenate(given), n_classes)

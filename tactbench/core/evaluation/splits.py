@@ -27,6 +27,7 @@ SPLITS_WITHOUT_GROUPS = ("roles", "session", "in-session", "shuffled")
 MOST_ONE_BY_ONE = 12
 """Up to so many groups of a task's own campaign are left out one by one; more are dealt into folds."""
 SHUFFLED_STAMP = "leaks: split shuffled puts neighbouring rows of one recording or object on both sides."
+SHUFFLED_WHOLE_STAMP = "leaks: split shuffled deals recordings at random, those of one object or session on both sides."
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,11 @@ def _chosen(task: TaskSpec, protocol: ProtocolSpec, data: Dataset, requested: st
                 hint="Use --protocol deployable.",
             )
         return "roles"
+    if requested == "in-session" and data.whole:
+        raise NotApplicable(
+            f"Split 'in-session' cuts recordings in time; task {task.name!r} asks one answer of each as a whole.",
+            hint="Use a split that keeps recordings whole, such as --split recording.",
+        )
     if requested is not None:
         if not _can(requested, data):
             names = {name for table in data.tables for name in table.groups} | {"roles", "in-session", "shuffled"}
@@ -94,7 +100,7 @@ def _can(name: str, data: Dataset) -> bool:
     if name == "roles":
         return {"train", "test"} <= {meta.role for meta in data.metas}
     if name in ("in-session", "shuffled"):
-        return True
+        return name == "shuffled" or not data.whole
     number = shots(name)
     if number is not None:
         return len(training_sessions(data)) >= number and any(meta.role == "test" for meta in data.metas)
@@ -263,6 +269,9 @@ def _held_out(data: Dataset, group: str, values: set[str], name: str) -> Assignm
 def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
     rng = np.random.default_rng(seed)
     places = _open_to_folds(data)
+    if data.whole:
+        yield from _shuffled_whole(data, rng.permutation(places))
+        return
     fold = [rng.permutation(np.arange(len(data.tables[place].row)) % FOLDS) for place in places]
     for number in range(FOLDS):
         train, test = _none(data), _none(data)
@@ -270,6 +279,19 @@ def _shuffled(data: Dataset, seed: int) -> Iterator[Assignment]:
             test[place] = dealt == number
             train[place] = dealt != number
         yield Assignment(f"shuffled fold {number + 1}", tuple(train), tuple(test), groups="recording")
+
+
+def _shuffled_whole(data: Dataset, places: npt.NDArray[np.integer]) -> Iterator[Assignment]:
+    """Deal whole recordings into folds in the order given, class by class, so that folds have about equal shares."""
+    labelled = [place for place in places if data.tables[place].labelled.any()]
+    if data.classes:
+        labelled.sort(key=lambda place: int(data.tables[place].y[data.tables[place].labelled][0]))
+    number = min(FOLDS, len(labelled))
+    for fold in range(number):
+        test, train = _none(data), _none(data)
+        for order, place in enumerate(labelled):
+            (test if order % number == fold else train)[place][:] = True
+        yield Assignment(f"shuffled fold {fold + 1}", tuple(train), tuple(test), groups="recording")
 
 
 def _values(data: Dataset, group: str) -> list[str]:
@@ -281,17 +303,16 @@ def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[t
     """Return (train, validation) masks inside the training rows of `outer`, for choosing hyper-parameters.
 
     What the outer split keeps apart is kept apart here too: each session (or group) is left out once, in five folds
-    where there are more than five. With a single one, the last fifth in time of each recording is held back.
+    where there are more than five. With a single one, the last fifth in time of each recording is held back; where
+    recordings are answered whole, a fifth of them.
     """
-    sizes: Counter[str] = Counter()
-    for table, mask in zip(data.tables, outer.train, strict=True):
-        if mask.any():
-            values, counts = np.unique(table.groups[outer.groups][mask & table.labelled], return_counts=True)
-            sizes.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
+    groups, sizes = outer.groups, _sizes(data, outer, outer.groups)
+    if data.whole and len(sizes) < 2:
+        groups, sizes = "recording", _sizes(data, outer, "recording")
     if len(sizes) >= 2:
         inner = []
         for held_out in _dealt(sizes):
-            apart = [np.isin(table.groups.get(outer.groups, ""), sorted(held_out)) for table in data.tables]
+            apart = [np.isin(table.groups.get(groups, ""), sorted(held_out)) for table in data.tables]
             fit = tuple(mask & ~out for mask, out in zip(outer.train, apart, strict=True))
             check = tuple(mask & out for mask, out in zip(outer.train, apart, strict=True))
             inner.append((fit, check))
@@ -305,6 +326,29 @@ def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[t
             learn[place] = outer.train[place] & (number < first - gap)
             last[place] = outer.train[place] & (number >= first)
     return [(tuple(learn), tuple(last))]
+
+
+def _sizes(data: Dataset, outer: Assignment, groups: str) -> Counter[str]:
+    """Return how many training rows each group has."""
+    sizes: Counter[str] = Counter()
+    for table, mask in zip(data.tables, outer.train, strict=True):
+        if mask.any():
+            values, counts = np.unique(table.groups[groups][mask & table.labelled], return_counts=True)
+            sizes.update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
+    return sizes
+
+
+def over_rows(assignment: Assignment, recorded: Dataset) -> Assignment:
+    """Return an assignment of recordings that are one row each as one of all rows that were recorded."""
+
+    def spread(masks: tuple[Mask, ...]) -> tuple[Mask, ...]:
+        return tuple(
+            mask if len(mask) == len(table.row) else np.full(len(table.row), bool(mask[0]))
+            for mask, table in zip(masks, recorded.tables, strict=True)
+        )
+
+    validation = None if assignment.validation is None else spread(assignment.validation)
+    return replace(assignment, train=spread(assignment.train), test=spread(assignment.test), validation=validation)
 
 
 def assert_disjoint(assignments: Sequence[Assignment]) -> None:

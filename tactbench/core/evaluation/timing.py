@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from tactbench.core.evaluation.sets import FeatureScale
 from tactbench.core.evaluation.windows import causal_mean
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray
+
+T = TypeVar("T")
 
 WARM_UP = 1
 AT_LEAST, AT_MOST = 20, 200
@@ -25,7 +28,7 @@ def single_row_latency_s(model: Estimator, X: FloatArray, clock: Callable[[], fl
     At least 20 calls and at most 200, within 0.3 s where 20 take less; the first is not counted. Rows are spread
     over `X`, so that a model that answers some rows faster is not flattered.
     """
-    return _timed(len(X), lambda place: X[place : place + 1], model.predict, clock)
+    return calls_s(len(X), lambda place: X[place : place + 1], model.predict, clock)
 
 
 def single_row_preparation_s(
@@ -43,7 +46,7 @@ def single_row_preparation_s(
     def ready(readings: FloatArray) -> FloatArray:
         return causal_mean(scale(readings - rest if tared else readings), k, segment[: len(readings)])[-1:]
 
-    return _timed(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock, at_most)
+    return calls_s(len(X), lambda place: X[max(0, place - k) : place + 1], ready, clock, at_most)
 
 
 def tail_ms(spent_s: FloatArray) -> tuple[float | None, float]:
@@ -52,13 +55,14 @@ def tail_ms(spent_s: FloatArray) -> tuple[float | None, float]:
     return float(1e3 * np.quantile(spent_s, 0.95)) if enough else None, float(1e3 * spent_s.max())
 
 
-def _timed(
+def calls_s(
     rows: int,
-    given: Callable[[int], FloatArray],
-    work: Callable[[FloatArray], object],
+    given: Callable[[int], T],
+    work: Callable[[T], object],
     clock: Callable[[], float],
     at_most: int = AT_MOST,
 ) -> FloatArray:
+    """Return (calls,) seconds of `work` on what is `given` for places spread over `rows`."""
     places = np.linspace(0, rows - 1, at_most).astype(int)
     for place in places[:WARM_UP]:
         work(given(place))

@@ -170,6 +170,8 @@ def _about_shuffled(row: Row, shuffled: Row | None) -> list[str]:
     if shuffled is None or shuffled["status"] != "done":
         return []
     best = row["ci_low"] if _lower_is_better(row) else row["ci_high"]
+    if best is None:
+        return ["no interval to hold the shuffled score against"]
     if _skill(shuffled["score"], best, row) <= 0:
         return []
     by = score(abs(shuffled["score"] - row["score"]), row["unit"])

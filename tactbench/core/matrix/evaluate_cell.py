@@ -156,7 +156,7 @@ def _seed_everything(seed: int) -> None:
 
 
 FIXED = ("cell", "sensor", "task", "rig", "protocol", "estimator", "params", "is_baseline", "repeat", "repeats", "seed",
-         "simulation", "metric", "unit", "equivalence", "reference_score")  # fmt: skip
+         "simulation", "answer_per", "answer_from", "metric", "unit", "equivalence", "reference_score")  # fmt: skip
 """What a row says of its cell: evaluating it does not change it."""
 
 
@@ -179,6 +179,8 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
         "seed": cell.seed,
         "simulation": cell.simulation.model_dump(exclude_defaults=True),
         "status": "planned",
+        "answer_per": task.answer_per,
+        "answer_from": task.answer_from,
         "metric": task.metric,
         "unit": task.unit,
         "equivalence": task.equivalence,

@@ -63,7 +63,9 @@ class Keys:
         pair = cell.task, cell.estimator
         if pair not in self._answers:
             task, estimator = self._registry.tasks.owned(cell.task), self._registry.estimators.owned(cell.estimator)
-            source = self.sources.behind([task.module, estimator.module, estimator.descriptor.where], "answer")
+            code = [task.descriptor.spec.features_by, estimator.descriptor.where]
+            modules = [task.module, estimator.module, *(where for where in code if where)]
+            source = self.sources.behind(modules, "answer")
             self._answers[pair] = _fixed(
                 source,
                 estimator.descriptor.distributions,

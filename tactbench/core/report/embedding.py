@@ -16,6 +16,7 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.preparation import assigned, prepared
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.selection import features_of
+from tactbench.core.evaluation.summaries import summarised
 from tactbench.core.provenance.source import versions
 from tactbench.core.report.results import Results
 from tactbench.core.report.stored import stored
@@ -101,8 +102,10 @@ def _features(results: Results, row: Mapping[str, Any], test: Answers) -> FloatA
     """Return (n, features) of the test set as the estimator saw them: kept, scaled and filtered by the protocol."""
     task = results.registry.tasks[row["task"]].spec
     estimator = results.registry.estimators[row["estimator"]]
-    data = load_dataset(task, results.recordings(row))
     rules = protocol_called(row["protocol"])
+    data = summarised(load_dataset(task, results.recordings(row)), task, rules)
+    if data.vote:
+        raise NotApplicable("a recording is answered by its frames, and has no features of its own")
     (assignment,) = assigned(task, estimator, data, row["split"], row["seed"])
     k = int(row["chosen"].get("k", estimator.window_grid[0]))
     asked = prepared(assignment, data, rules, k, Counter()).test

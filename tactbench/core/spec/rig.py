@@ -9,9 +9,8 @@ from pydantic import Field
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import SensorSpec
-from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.task import WHERE, TaskSpec
 
-_WHERE = r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"
 _NAME = r"^[a-z][a-z0-9_-]*$"
 EmulatedLink = Literal["bytes", "can", "datagram", "spi"]
 
@@ -20,16 +19,16 @@ class SensorDescriptor(Frozen):
     """A sensor, and where the code for it is."""
 
     spec: SensorSpec
-    transducer: str | None = Field(default=None, pattern=_WHERE)
+    transducer: str | None = Field(default=None, pattern=WHERE)
     """``module:callable`` -> :class:`tactbench.plugin.simulation.Transducer`; needed on the twin only."""
-    driver: str | None = Field(default=None, pattern=_WHERE)
+    driver: str | None = Field(default=None, pattern=WHERE)
     """``module:callable`` -> :class:`tactbench.plugin.devices.Driver`, called with DriverSettings; for real devices."""
-    emulator: str | None = Field(default=None, pattern=_WHERE)
+    emulator: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with EmulatorSettings: the device as a model at the far end of `emulated_link`, a
     :class:`tactbench.plugin.devices.DeviceEmulator`, or a SpiDeviceEmulator on SPI."""
     emulated_link: EmulatedLink | None = None
     """What the driver speaks through; needed where there is an emulator."""
-    log_reader: str | None = Field(default=None, pattern=_WHERE)
+    log_reader: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with (Path, options): a DeviceLog; for logs of the device's own tools."""
     emulated_options: dict[str, Scalar | bool] = Field(default_factory=dict)
     """Options that the driver needs and only a real device's papers state, as they are of the emulated one: they hold
@@ -48,10 +47,10 @@ class DeviceDescriptor(Frozen):
     title: str
     kind: Literal["force", "motor"]
     """What a rig uses it for. The streams of a force sensor have channels of kind `force`."""
-    driver: str = Field(pattern=_WHERE)
+    driver: str = Field(pattern=WHERE)
     """``module:callable`` -> :class:`tactbench.plugin.devices.Driver`, called with DriverSettings; of a motor, what its
     rig expects."""
-    emulator: str | None = Field(default=None, pattern=_WHERE)
+    emulator: str | None = Field(default=None, pattern=WHERE)
     """As of a sensor."""
     emulated_link: EmulatedLink | None = None
     """As of a sensor."""
@@ -75,24 +74,24 @@ class RigDescriptor(Frozen):
 
     name: str = Field(pattern=_NAME)
     title: str
-    where: str = Field(pattern=_WHERE)
+    where: str = Field(pattern=WHERE)
     """``module:callable``, called with a :class:`tactbench.plugin.RigContext`: a Rig or a ReplayRig."""
     simulated: bool = False
     """Rows from this rig are marked SIM and never ranked against hardware."""
     rungs: tuple[str, ...] = ()
     """Names of the rungs of its ladder of solvers, the cheapest first; for simulated rigs."""
-    verification: str | None = Field(default=None, pattern=_WHERE)
+    verification: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called without arguments: the simulation against its oracles, a sequence of Check."""
-    work_precision: str | None = Field(default=None, pattern=_WHERE)
+    work_precision: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with a SensorDescriptor and, by name, ``rounds`` (how often a recording is timed): a
     CostStudy of error against seconds per recording."""
-    likeness: str | None = Field(default=None, pattern=_WHERE)
+    likeness: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with (SensorDescriptor, folder of recordings or None): Checks of the simulated
     sensor against what was measured on real ones, or of recordings against the same ranges."""
-    file: str | None = Field(default=None, pattern=_WHERE)
+    file: str | None = Field(default=None, pattern=WHERE)
     """``module:class``, a RigFile that also checks the rig's own settings: complaints about them then name their
     line."""
-    check: str | None = Field(default=None, pattern=_WHERE)
+    check: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with a RigFile: a RigCheck of what the rig would do, with nothing opened or moved."""
 
 
@@ -102,7 +101,7 @@ class EstimatorDescriptor(Frozen):
     name: str = Field(pattern=_NAME)
     title: str
     kinds: tuple[Literal["regression", "classification"], ...]
-    where: str = Field(pattern=_WHERE)
+    where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(kind=..., seed=..., threads=..., **params)``: an object with
     scikit-learn's ``fit(X, y)`` and ``predict(X)``."""
     params: dict[str, Any] = Field(default_factory=dict)
@@ -129,11 +128,11 @@ class EffectDescriptor(Frozen):
 
     name: str = Field(pattern=_NAME)
     title: str
-    where: str = Field(pattern=_WHERE)
+    where: str = Field(pattern=WHERE)
     """``module:callable``; imported only when a plan includes the effect."""
     produces: tuple[str, ...] = ()
     consumes: tuple[str, ...] = ()
-    called_for: str = Field(pattern=_WHERE)
+    called_for: str = Field(pattern=WHERE)
     """``module:callable``, called with (Scene, SensorSpec): a Reason; light, no numerics."""
     groups: tuple[str, ...] = ()
     """Words that stand for several effects at once in a scene's ``simulation.effects``: ``drift``, ``noise``."""

@@ -51,6 +51,8 @@ class RowModel(BaseModel):
     params: dict[str, Any] = {}
     is_baseline: bool = False
     looks_at: str = ""
+    answer_per: str = "sample"
+    answer_from: str = ""
     repeat: int = 1
     repeats: int = 1
     seed: int = 0

@@ -6,11 +6,15 @@ import hashlib
 from collections.abc import Sequence
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.sensor import ChannelKind
+from tactbench.core.spec.summary import Summary
+
+WHERE = r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$"
+"""Of code: ``module:callable``."""
 
 
 class PlannedScene(Frozen):
@@ -93,6 +97,17 @@ class TaskSpec(Frozen):
     features: tuple[ChannelKind, ...] = ("taxel",)
     """Kinds of channels an estimator may look at."""
     target: ChannelTarget | LabelTarget
+    answer_per: Literal["sample", "recording"] = "sample"
+    """`recording`: one class or number for each recording as a whole, made in one of the three ways that follow. The
+    target is then a label that does not change within a recording."""
+    summaries: tuple[Summary, ...] = ()
+    """Features of a recording: these numbers of each channel."""
+    features_by: str | None = Field(default=None, pattern=WHERE)
+    """``module:callable``, called with one recording, a tuple of :class:`tactbench.plugin.StreamReadings`: features of
+    the task's own, name to number, the same names for every recording. They stand behind `summaries`, or alone."""
+    vote: Literal["frames"] | None = None
+    """Every frame is answered, and the answers of a recording are combined: the commonest class, of equals the first;
+    the mean of numbers."""
     metric: str
     """Name of the primary metric; see docs/glossary.md."""
     unit: str = "1"
@@ -118,6 +133,32 @@ class TaskSpec(Frozen):
     baselines: tuple[str, ...]
     """Trivial answers that stand in every table and are probed; the best of them is the bar."""
     published: tuple[Published, ...] = ()
+
+    @model_validator(mode="after")
+    def _recordings_are_answered_in_one_way(self) -> TaskSpec:
+        summarised = bool(self.summaries or self.features_by)
+        if self.answer_per == "sample":
+            if summarised or self.vote:
+                raise ValueError("summaries, features_by and vote belong to answer_per: recording")
+            return self
+        if summarised == bool(self.vote):
+            raise ValueError("answer_per: recording needs either summaries or features_by, or else vote: frames")
+        if not isinstance(self.target, LabelTarget):
+            raise ValueError("answer_per: recording asks for a label")
+        if "in-session" in self.splits:
+            raise ValueError("split in-session cuts recordings in time; answer_per: recording asks each as a whole")
+        names = [one.name for one in self.summaries]
+        if len(set(names)) < len(names):
+            raise ValueError("two summaries are the same")
+        return self
+
+    @property
+    def answer_from(self) -> str:
+        """What an answer for a whole recording is made of; empty where answers are of samples."""
+        if self.vote:
+            return f"the {'commonest' if self.kind == 'classification' else 'mean'} answer of its frames"
+        own = [f"features by {self.features_by}"] if self.features_by else []
+        return ", ".join([one.name for one in self.summaries] + own)
 
     def published_for(self, sensor: str, protocol: str, estimator: str, split: str | None) -> Published | None:
         """Return the published figure that a result may stand beside, or None; the one for this sensor first."""

@@ -1,0 +1,249 @@
+"""From recordings to one row each: the features of recordings that are answered as a whole."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from tactbench.core.errors import DataError, NotApplicable, PluginContractError
+from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.evaluation.sets import moments
+from tactbench.core.evaluation.unloaded import hold_s
+from tactbench.core.plugins.registry import load_object
+from tactbench.core.samples import FloatArray, StreamReadings
+from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.summary import Summary
+from tactbench.core.spec.task import TaskSpec
+
+Features = Mapping[str, float]
+
+
+def is_summarised(task: TaskSpec, rules: ProtocolSpec) -> bool:
+    """Tell whether a recording becomes one row; a first row alone is one already."""
+    return bool(task.summaries or task.features_by) and not rules.first_row_only
+
+
+def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
+    """Return each recording as one row of features, what the protocol drops left out; `data` where none are asked for.
+
+    The row stands where the recording ends: it is the first at which the answer can be known.
+
+    Raises
+    ------
+    NotApplicable
+        If the protocol drops single samples by number or value, or a band cannot be observed.
+    DataError
+        If a window has no sample.
+    PluginContractError
+        If the task's own features are not finite numbers of the same names for every recording.
+    """
+    if not is_summarised(task, rules):
+        return data
+    if rules.three_sigma or rules.discard_samples:
+        raise NotApplicable(
+            f"Protocol {rules.name!r} drops single samples; task {task.name!r} summarises whole recordings, and a "
+            "summary over what is left would be of another signal.",
+            hint="Use --protocol deployable.",
+        )
+    compute = recording_features(task, rules)
+    rows = [compute(table) for table in data.tables]
+    names = tuple(rows[0])
+    for table, row in zip(data.tables, rows, strict=True):
+        if tuple(row) != names:
+            raise PluginContractError(
+                f"{task.features_by} gave other features for recording {table.meta.name!r} than for "
+                f"{data.tables[0].meta.name!r}.",
+                hint="It must give the same names in the same order for every recording.",
+            )
+    tables = tuple(_one_row(table, row) for table, row in zip(data.tables, rows, strict=True))
+    return replace(data, tables=tables, features=names)
+
+
+def without_windows(estimator: EstimatorDescriptor, task: TaskSpec) -> EstimatorDescriptor:
+    """Return `estimator` without mean filters to choose from where a recording is one row: there is nothing before."""
+    one = bool(task.summaries or task.features_by)
+    return estimator.model_copy(update={"window_grid": (0,)}) if one else estimator
+
+
+def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table], Features]:
+    """Return what makes the features of one recording; the task's own code is imported here."""
+    own = load_object(task.features_by) if task.features_by else None
+
+    def compute(table: Table) -> Features:
+        streams = kept(table, rules)
+        found: dict[str, float] = {}
+        for summary in task.summaries:
+            for stream in streams:
+                columns = [place for place, kind in enumerate(stream.kinds)
+                           if not summary.kinds or kind in summary.kinds]  # fmt: skip
+                if columns:
+                    values = summary_of(stream, summary, table.meta.name)[columns]
+                    names = [f"{stream.channels[place]} {summary.name}" for place in columns]
+                    found |= dict(zip(names, values.tolist(), strict=True))
+        if own is not None:
+            found |= _checked(own(streams), f"{task.features_by}", table)
+        if not found:
+            raise NotApplicable(
+                f"Task {task.name!r} summarises channels that recording {table.meta.name!r} does not have.",
+                hint="See what the sensor has with `tactbench show`.",
+            )
+        return found
+
+    return compute
+
+
+def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
+    """Return the readings that the protocol keeps, tared as it has it; times count from the first of them."""
+    begin_s = 0.0
+    if rules.discard_hold and table.meta.scene is not None and table.meta.clock != "none":
+        begin_s = table.meta.scene.profile.hold.to("s")
+    found = []
+    for stream in table.readings:
+        data, time_s = stream.data, stream.time_s
+        if time_s is not None:
+            unloaded = time_s < hold_s(table.meta)
+            if rules.tare and unloaded.any():
+                data = data - data[unloaded].mean(axis=0)
+            later = time_s >= begin_s
+            data, time_s = data[later], time_s[later] - begin_s
+        if not len(data):
+            raise DataError(
+                f"Recording {table.meta.name!r} has no sample of {stream.stream} that the protocol keeps.",
+                hint="Record it again, or leave it out.",
+            )
+        found.append(replace(stream, data=data, time_s=time_s))
+    return tuple(found)
+
+
+def summary_of(stream: StreamReadings, summary: Summary, recording: str) -> FloatArray:
+    """Return (channels,) numbers, from the samples in the summary's window; a filter has seen those before it too."""
+    rows = _window(stream, summary, recording)
+    if summary.band_hz is not None:
+        return np.asarray((_in_band(stream, summary.band_hz, recording)[rows] ** 2).mean(axis=0))
+    X = stream.data[rows]
+    if summary.measure == "mean":
+        return np.asarray(X.mean(axis=0))
+    if summary.measure == "deviation":
+        return moments(X)[1]
+    if summary.measure == "range":
+        return np.asarray(np.ptp(X, axis=0))
+    if summary.measure == "change":
+        return np.asarray(X[-1] - X[0])
+    steps = np.abs(np.diff(X, axis=0))
+    return np.asarray(steps.mean(axis=0)) if len(steps) else np.zeros(X.shape[1])
+
+
+def waiting_for_the_whole(
+    parts_ms: Mapping[str, float], data: Dataset, task: TaskSpec, rules: ProtocolSpec
+) -> dict[str, float]:
+    """Return the parts of an answer delay with the time that a recording is listened to as ``window``."""
+    parts = dict(parts_ms)
+    if task.answer_per == "recording":
+        span_s = answer_span_s(data, task, rules)
+        parts.pop("window", None)
+        parts |= {} if span_s is None else {"window": 1e3 * span_s}
+    return parts
+
+
+def answer_span_s(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> float | None:
+    """Return how long a recording is listened to before its answer is there, the longest of all; None: not known."""
+    if rules.first_row_only:
+        return 0.0
+    spans = [_span_s(table, task, rules) for table in data.tables]
+    known = [span for span in spans if span is not None]
+    return max(known) if len(known) == len(spans) else None
+
+
+def _span_s(table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
+    if task.vote:
+        if table.meta.clock == "none":
+            return None
+        scene = table.meta.scene
+        hold = scene.profile.hold.to("s") if rules.discard_hold and scene is not None else 0.0
+        return max(float(table.time_s[-1]) - hold, 0.0)
+    lengths = [_length_s(stream) for stream in kept(table, rules)]
+    if any(length is None for length in lengths):
+        return None
+    length = max(one for one in lengths if one is not None)
+    windows = [(one.start, one.end) if one.unit == "s" else (one.start * length, one.end * length)
+               for one in task.summaries]  # fmt: skip
+    if task.features_by:
+        windows.append((0.0, length))
+    return max(end for _, end in windows) - min(start for start, _ in windows)
+
+
+def _length_s(stream: StreamReadings) -> float | None:
+    if stream.time_s is not None:
+        return float(stream.time_s[-1])
+    return None if stream.rate_hz is None else len(stream.data) / stream.rate_hz
+
+
+def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:
+    n = len(stream.data)
+    if summary.unit == "recording":
+        first = min(math.floor(summary.start * n), n - 1)
+        return slice(first, max(math.ceil(summary.end * n), first + 1))
+    if stream.time_s is None:
+        raise NotApplicable(
+            f"{summary.name!r} is a window in seconds, and recording {recording!r} has no clock.",
+            hint="State the clock or the rate in the mapping, or ask for shares of the recording.",
+        )
+    step_s = 0.0 if stream.rate_hz is None else 1.0 / stream.rate_hz
+    first, last = (int(place) for place in np.searchsorted(stream.time_s, [summary.start, summary.end]))
+    # The last sample stands for the interval after it.
+    if first == last or stream.time_s[-1] + step_s * (1 + 1e-6) < summary.end:
+        raise DataError(
+            f"Recording {recording!r} has {stream.time_s[-1]:.4g} s of {stream.stream} that the protocol keeps, and "
+            f"{summary.name!r} needs {summary.end:g} s.",
+            hint="Leave the recording out, or ask for shares of the recording.",
+        )
+    return slice(first, last)
+
+
+def _in_band(stream: StreamReadings, band_hz: tuple[float, float], recording: str) -> FloatArray:
+    """Return what a causal band-pass leaves of a stream, at rest at its first sample."""
+    if stream.rate_hz is None:
+        raise NotApplicable(
+            f"A band in Hz needs a sampling rate, and recording {recording!r} states none for {stream.stream}.",
+            hint="State the clock or the rate in the mapping, or ask for another summary.",
+        )
+    if band_hz[1] >= stream.rate_hz / 2:
+        raise NotApplicable(
+            f"The band {band_hz[0]:g}-{band_hz[1]:g} Hz cannot be observed: {stream.stream} of recording {recording!r} "
+            f"is sampled at {stream.rate_hz:.4g} Hz, which shows nothing above {stream.rate_hz / 2:.4g} Hz.",
+            hint="Ask for a lower band, or limit the summary to the `kinds` of channels that are fast enough.",
+        )
+    signal = importlib.import_module("scipy.signal")
+    sections = signal.butter(2, band_hz, "bandpass", fs=stream.rate_hz, output="sos")
+    return np.asarray(signal.sosfilt(sections, stream.data - stream.data[0], axis=0))
+
+
+def _checked(given: object, code: str, table: Table) -> dict[str, float]:
+    found = dict(given) if isinstance(given, Mapping) else {}
+    try:
+        numbers = {name: float(value) for name, value in found.items() if isinstance(name, str)}
+    except (TypeError, ValueError):
+        numbers = {}
+    if not numbers or len(numbers) < len(found) or not all(math.isfinite(value) for value in numbers.values()):
+        raise PluginContractError(
+            f"{code} gave no finite number by name for recording {table.meta.name!r}.",
+            hint="It is called with a tuple of StreamReadings and must return a mapping of names to finite numbers.",
+        )
+    return numbers
+
+
+def _one_row(table: Table, features: Features) -> Table:
+    """Return a recording as its last row, with other features."""
+    last = slice(-1, None)
+    labelled = np.flatnonzero(table.labelled)
+    y = table.y[labelled[:1]] if len(labelled) else table.y[last]
+    return replace(
+        table, X=np.array([list(features.values())], dtype=np.float64), y=y, labelled=np.array([len(labelled) > 0]),
+        force=None, time_s=table.time_s[last], row=table.row[last],
+        groups={name: column[last] for name, column in table.groups.items()}, readings=(),
+    )  # fmt: skip

@@ -1,0 +1,353 @@
+"""One answer a recording: by summaries on each stream's own clock, by code of the task's own, or by a vote."""
+
+import time
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import DataError, NotApplicable, PluginContractError, UsageError
+from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.protocols import protocol_called
+from tactbench.core.evaluation.splits import make_splits
+from tactbench.core.evaluation.summaries import answer_span_s, summarised
+from tactbench.core.evaluation.vote import voted
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Part
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.plugin import (
+    Block,
+    ChannelSpec,
+    ChannelTarget,
+    ForceRamp,
+    Indenter,
+    Scene,
+    SensorSpec,
+    Source,
+    StreamSpec,
+    Summary,
+    assumed,
+)
+from tests.core.evaluation.made import label_task, record
+
+REGISTRY = load_registry()
+MOVES = (Summary(measure="deviation"), Summary(measure="mean-step"))
+HERE = __name__
+
+
+def task(**more):
+    return label_task("slip", **{
+        "splits": ("object", "session", "recording", "shuffled"), "answer_per": "recording", "summaries": MOVES, **more
+    })  # fmt: skip
+
+
+def vote(**more):
+    return task(summaries=(), vote="frames", **more)
+
+
+def sequences(folder, number=24, n=40, seed=5, **more):
+    """Recordings of which every third slips: it shakes three times as much, about an offset that tells nothing."""
+    rng = np.random.default_rng(seed)
+    paths = []
+    for place in range(number):
+        slips = place % 3 == 0
+        X = rng.normal(0, 3.0 if slips else 1.0, (n, 2)) + rng.normal(0, 50.0, 2)
+        labels = {"slip": "slipped" if slips else "stable", **{name: each(place) for name, each in more.items()}}
+        paths.append(record(folder / f"s{place:02d}.h5", X, labels=labels, trial=str(place)))
+    return paths
+
+
+def run(asked, paths, split=None, estimator="forest", protocol="deployable", **more):
+    params = {"n_estimators": 20} if estimator == "forest" else {}
+    context = CellContext(
+        asked, REGISTRY.estimators[estimator], params, protocol, split, seed=1, clock=time.perf_counter,
+        **{"latency": False, **more},
+    )  # fmt: skip
+    return evaluate(context, paths)
+
+
+def test_a_recording_is_one_answer_by_what_it_did_and_not_where_it_stood(tmp_path):
+    paths = sequences(tmp_path)
+    result = run(task(), paths)
+    assert result.split == "recording"
+    assert result.n_test == 24
+    assert sorted(result.sets["test"].recording.tolist()) == list(range(24))
+    assert result.n_train == 4 * 24
+    # Deviations of 1 and 3 from 40 samples are known to 11 %: eight standard errors apart.
+    assert result.score == 1.0
+    assert run(task(), paths, estimator="majority").scores["accuracy"] == pytest.approx(16 / 24)
+    assert result.ci_method.startswith("jackknife over 24 recordings ")
+    assert "one answer a recording, from deviation, mean-step" in result.remarks
+
+
+def test_the_delay_of_an_answer_holds_the_recording_it_waits_for(tmp_path):
+    paths = sequences(tmp_path)
+    whole = run(task(), paths, latency=True)
+    assert whole.delay_parts_ms["window"] == pytest.approx(390.0)
+    assert whole.answer_delay_ms == pytest.approx(sum(whole.delay_parts_ms.values()))
+    assert whole.delay_parts_ms["features"] > 0
+    part = task(summaries=(Summary(measure="deviation", start=0.1, end=0.3, unit="s"),))
+    assert run(part, paths).delay_parts_ms["window"] == pytest.approx(200.0)
+    half = task(summaries=(Summary(measure="deviation", end=0.5),))
+    assert run(half, paths).delay_parts_ms["window"] == pytest.approx(195.0)
+    assert run(vote(), paths).delay_parts_ms["window"] == pytest.approx(390.0)
+    assert "window" not in run(task(), paths, estimator="majority").delay_parts_ms
+
+
+def test_without_a_clock_shares_are_asked_and_the_delay_is_not_known(tmp_path):
+    rng = np.random.default_rng(0)
+    paths = [record(tmp_path / f"s{place}.h5", rng.normal(0, 1 + 2 * (place % 2), (30, 2)), t_ns=None,
+                    labels={"slip": place % 2}) for place in range(12)]  # fmt: skip
+    result = run(task(), paths, latency=True)
+    assert result.score == 1.0
+    assert result.answer_delay_ms is None
+    assert "answer delay unknown: the recordings do not tell their sampling rate" in result.remarks
+    with pytest.raises(NotApplicable, match="states none for taxels"):
+        run(task(summaries=(Summary(measure="band-energy", band_hz=(1.0, 2.0)),)), paths)
+
+
+def test_splits_keep_recordings_whole(tmp_path):
+    paths = sequences(tmp_path, object=lambda place: f"o{place % 4}")
+    data = load_dataset(task(), paths)
+    for split in ("object", "recording", "shuffled"):
+        for fold in make_splits(data, split, 1):
+            for train, test in zip(fold.train, fold.test, strict=True):
+                assert train.all() or not train.any()
+                assert test.all() or not test.any()
+                assert train[0] != test[0]
+    tested = [[int(data.tables[place].y[0]) for place, mask in enumerate(fold.test) if mask.any()]
+              for fold in make_splits(data, "shuffled", 1)]  # fmt: skip
+    assert {sum(one) for one in tested} <= {3, 4}, "16 of 24 are stable: folds have about equal shares"
+    assert "deals recordings at random" in run(task(), paths, "shuffled").stamps[0]
+
+
+@pytest.mark.parametrize("asked", [task(), vote()])
+def test_a_split_in_time_and_groups_that_cut_recordings_are_refused_with_words(tmp_path, asked):
+    rng = np.random.default_rng(0)
+    paths = [record(tmp_path / f"s{place}.h5", rng.normal(size=(20, 2)), labels={"slip": place % 2},
+                    annotations={"press": np.repeat([1, 2], 10)}) for place in range(6)]  # fmt: skip
+    with pytest.raises(NotApplicable, match="'in-session' cuts recordings in time"):
+        run(asked, paths, "in-session")
+    with pytest.raises(UsageError, match="cannot be split by 'press'"):
+        run(asked, paths, "press")
+
+
+@pytest.mark.parametrize("asked", [task(), vote()])
+def test_an_answer_that_changes_within_a_recording_is_none_of_the_whole(tmp_path, asked):
+    X = np.random.default_rng(0).normal(size=(20, 2))
+    paths = [record(tmp_path / f"s{place}.h5", X, annotations={"slip": np.repeat([0, 1], 10)}) for place in range(3)]
+    with pytest.raises(NotApplicable, match="asks one answer of each recording, and slip changes within 's0'"):
+        run(asked, paths)
+
+
+def test_a_copied_recording_leaks_as_whole_as_it_is(tmp_path):
+    paths = sequences(tmp_path)
+    X = np.random.default_rng(5).normal(0, 1, (40, 2))
+    twins = [record(tmp_path / f"{name}.h5", X, labels={"slip": "stable"}) for name in ("a", "b")]
+    assert not run(task(), paths).stamps
+    stamps = run(task(), [*paths, *twins]).stamps
+    assert len(stamps) == 1
+    assert stamps[0].startswith("leaks: ")
+
+
+def test_the_first_frame_alone_is_asked_as_of_samples(tmp_path):
+    result = run(task(), sequences(tmp_path), protocol="first-frame")
+    assert result.n_test == 24
+    assert set(result.sets["test"].row.tolist()) == {0}
+    assert "one answer a recording, from its first row" in result.remarks
+    assert result.score < 0.9, "an offset drawn at random does not tell slip"
+
+
+# --- own clocks
+
+
+TWO = SensorSpec(
+    name="two", title="Two rates", principle="none", principle_source=Source(tag="assumed", reference="a test"),
+    streams=(
+        StreamSpec(name="taxels", channels=(ChannelSpec(name="t", kind="taxel"),)),
+        StreamSpec(name="pac", channels=(ChannelSpec(name="p", kind="ac_pressure"),)),
+    ),
+)  # fmt: skip
+SLOW_HZ, FAST_HZ = 50, 2000
+
+
+def two_rates(folder, number=12, s=2.0, hold_s=0.0):
+    """Taxels of noise alone, and a fast stream that hums at 200 Hz where it slips; loaded after the hold, if any."""
+    rng = np.random.default_rng(2)
+    held = Scene(name="held", indenter=Indenter(), profile=ForceRamp(hold=assumed(hold_s, "s", "a test"), samples=100))
+    paths = []
+    for place in range(number):
+        path = folder / f"s{place:02d}.h5"
+        meta = RecordingMeta(name=path.stem, sensor=TWO, rig="made", clock="device", labels={"slip": place % 2},
+                             scene=held if hold_s else None)  # fmt: skip
+        slow_s, fast_s = np.arange(0, s, 1 / SLOW_HZ), np.arange(0, s, 1 / FAST_HZ)
+        hum = (place % 2) * np.sin(2 * np.pi * 200 * fast_s) + rng.normal(0, 0.1, len(fast_s)) + 30.0
+        with RecordingWriter(path, meta) as writer:
+            writer.append(Block("taxels", (slow_s * 1e9).astype(np.int64), rng.normal(20.0, 1, (len(slow_s), 1))))
+            writer.append(Block("pac", (fast_s * 1e9).astype(np.int64), hum[:, None]))
+        paths.append(path)
+    return paths
+
+
+FAST = task(
+    features=("taxel", "ac_pressure"),
+    summaries=(
+        Summary(measure="band-energy", band_hz=(150.0, 300.0), start=0.5, kinds=("ac_pressure",)),
+        Summary(measure="mean"),
+        Summary(measure="deviation"),
+    ),
+)
+
+
+def test_every_stream_is_summarised_on_its_own_clock(tmp_path):
+    """A hum of 200 Hz sampled at every fortieth sample would stand still; its energy is half its amplitude squared."""
+    data = load_dataset(FAST, two_rates(tmp_path))
+    found = summarised(data, FAST, protocol_called("deployable-untared"))
+    assert found.features == (
+        "p band-energy 150-300 Hz 0.5-1 of the recording of ac_pressure", "t mean", "p mean", "t deviation",
+        "p deviation",
+    )  # fmt: skip
+    energies = [table.X[0, 0] for table in found.tables]
+    # The gain of the filter at 200 Hz is within 1 % of 1; noise of 0.1 puts less than 0.01 into the band.
+    assert energies[1::2] == pytest.approx([0.5] * 6, abs=0.02)
+    assert max(energies[::2]) < 0.01
+    deviations = [table.X[0, 4] for table in found.tables]
+    assert deviations[1::2] == pytest.approx([np.sqrt(0.51)] * 6, abs=0.01)
+    assert run(FAST, two_rates(tmp_path)).score == 1.0
+    with pytest.raises(NotApplicable, match="taxels of recording 's00' is sampled at 50 Hz"):
+        run(task(features=("taxel", "ac_pressure"),
+                 summaries=(Summary(measure="band-energy", band_hz=(150.0, 300.0)),)), two_rates(tmp_path))  # fmt: skip
+
+
+def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
+    data = load_dataset(FAST, two_rates(tmp_path, hold_s=0.5))
+    tared, untared = (summarised(data, FAST, protocol_called(name)) for name in ("deployable", "deployable-untared"))
+    # A mean of 25 and of 1000 samples less one of 75 and of 3000: 0.23 and 0.03 at most, four times that here.
+    assert all(abs(table.X[0, 1]) < 1.0 and abs(table.X[0, 2]) < 0.1 for table in tared.tables)
+    assert all(table.X[0, 1] == pytest.approx(20, abs=1) for table in untared.tables)
+    assert answer_span_s(data, FAST, protocol_called("deployable")) == pytest.approx(1.5, abs=1 / SLOW_HZ)
+    assert run(FAST, two_rates(tmp_path, hold_s=0.5)).tare_s == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("protocol", ["karl2016", "karl2016-training-scale"])
+def test_protocols_that_drop_single_samples_do_not_go_with_summaries(tmp_path, protocol):
+    data = load_dataset(task(), sequences(tmp_path))
+    with pytest.raises(NotApplicable, match="summarises whole recordings"):
+        summarised(data, task(), protocol_called(protocol))
+
+
+# --- code of the task's own
+
+
+def crest_factor(streams):
+    (taxels,) = streams
+    X = taxels.data - taxels.data.mean(axis=0)
+    return {"crest": float(np.abs(X).max() / X.std()), "spread": float(X.std())}
+
+
+def other_names(streams):
+    return {f"first {streams[0].data[0, 0]}": 0.0}
+
+
+def not_a_number(streams):
+    return {"bad": float("nan")}
+
+
+def test_a_task_may_name_code_for_features_of_its_own(tmp_path):
+    paths = sequences(tmp_path)
+    own = task(summaries=(), features_by=f"{HERE}:crest_factor")
+    assert summarised(load_dataset(own, paths), own, protocol_called("deployable")).features == ("crest", "spread")
+    assert run(own, paths).score == 1.0
+    assert any(f"{HERE}:crest_factor" in remark for remark in run(own, paths).remarks)
+    both = task(features_by=f"{HERE}:crest_factor")
+    assert len(summarised(load_dataset(both, paths), both, protocol_called("deployable")).features) == 6
+    for name, words in (("other_names", "other features"), ("not_a_number", "no finite number")):
+        with pytest.raises(PluginContractError, match=words):
+            run(task(summaries=(), features_by=f"{HERE}:{name}"), paths)
+
+
+# --- the vote
+
+
+def part_of(recording, y):
+    n = len(y)
+    row = np.arange(n)
+    return Part(np.zeros((n, 1)), np.asarray(y), row * 1.0, np.asarray(recording), row, np.zeros(n, dtype=np.int64))
+
+
+def test_frames_vote_and_of_equals_the_first_class_wins():
+    asked, answer = voted(part_of([0, 0, 0, 2, 2], [1, 1, 1, 0, 0]), np.array([1, 1, 0, 1, 0]), 2)
+    assert answer.tolist() == [1, 0]
+    assert asked.y.tolist() == [1, 0]
+    assert asked.recording.tolist() == [0, 2]
+    assert asked.row.tolist() == [2, 4]
+    _, mean = voted(part_of([0, 0, 1], [1.0, 1.0, 2.0]), np.array([1.0, 3.0, 5.0]), 0)
+    assert mean.tolist() == [2.0, 5.0]
+
+
+def test_a_vote_scores_recordings_that_frames_alone_get_half_wrong(tmp_path):
+    """A class shifts readings by half their deviation: 60 % of the frames are answered rightly, and 60 frames agree."""
+    rng = np.random.default_rng(4)
+    paths = [record(tmp_path / f"s{place:02d}.h5", rng.normal(place % 2 * 0.5, 1, (120, 1)),
+                    labels={"slip": place % 2}) for place in range(20)]  # fmt: skip
+    frames = label_task("slip", splits=("recording",))
+    one, all_of_them = run(frames, paths, estimator="logistic"), run(vote(), paths, estimator="logistic")
+    assert one.score < 0.7
+    assert all_of_them.score > 0.9
+    assert (one.n_test, all_of_them.n_test) == (2400, 20)
+    assert one.n_train == all_of_them.n_train
+    assert all_of_them.batch_rows == 2400
+    assert "one answer a recording, from the commonest answer of its frames" in all_of_them.remarks
+    assert all_of_them.ci_method.startswith("jackknife over 20 recordings ")
+
+
+def test_parameters_are_chosen_by_the_vote_too(tmp_path):
+    """Numbers, and a window to choose: ridge is scored by recordings on the validation folds as well."""
+    rng = np.random.default_rng(4)
+    paths = [record(tmp_path / f"s{place:02d}.h5", rng.normal(place, 3, (60, 1)), labels={"slip": place})
+             for place in range(12)]  # fmt: skip
+    number = vote(kind="regression", metric="rmse")
+    result = run(number, paths, estimator="ridge")
+    assert result.n_test == 12
+    # A mean of sixty readings of deviation 3 is known to 0.4; folds of neighbours are answered across a gap of two.
+    assert result.score < 1.0
+    assert "one answer a recording, from the mean answer of its frames" in result.remarks
+    by_mean = task(kind="regression", metric="rmse", summaries=(Summary(measure="mean"),))
+    summed = run(by_mean, paths, estimator="ridge")
+    assert summed.score < 1.0
+    assert {one["k"] for one in summed.search} == {0}, "one row has nothing before it to average"
+
+
+def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_path):
+    """Its rows are dropped and scaled sample by sample, and those that are left vote."""
+    rng = np.random.default_rng(4)
+    roles = ("train", "validation", "test")
+    paths = [record(tmp_path / f"s{place}.h5", rng.normal(place % 2, 1, (700, 1)), np.full(700, 1.0), role=role,
+                    labels={"slip": place % 2}) for place, role in enumerate(roles * 2)]  # fmt: skip
+    result = run(vote(), paths, estimator="logistic", protocol="karl2016")
+    assert result.n_test == 2
+    assert result.counts["test rows before the press begins"] == 1200
+    short = record(tmp_path / "short.h5", rng.normal(size=(500, 1)), np.full(500, 1.0), role="test", labels={"slip": 0})
+    with pytest.raises(DataError, match="leaves no row of recording 'short'"):
+        run(vote(), [*paths, short], estimator="logistic", protocol="karl2016")
+
+
+# --- the declaration
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"vote": "frames"}, "or else vote"),
+        ({"summaries": ()}, "needs either"),
+        ({"answer_per": "sample"}, "belong to answer_per: recording"),
+        ({"target": ChannelTarget()}, "asks for a label"),
+        ({"splits": ("recording", "in-session")}, "cuts recordings in time"),
+        ({"summaries": (MOVES[0], MOVES[0])}, "the same"),
+        ({"features_by": "no colon"}, "pattern"),
+    ],
+)
+def test_a_task_that_contradicts_itself_is_refused(wrong, words):
+    with pytest.raises(ValueError, match=words):
+        task(**wrong)

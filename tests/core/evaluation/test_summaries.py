@@ -1,0 +1,136 @@
+"""Summaries keep the laws of what they are named after, and know nothing of what comes after their window."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from tactbench.core.errors import DataError, NotApplicable
+from tactbench.core.evaluation.summaries import summary_of
+from tactbench.plugin import StreamReadings, Summary
+
+RATE_HZ = 100.0
+BAND = (5.0, 20.0)
+MEASURES = ("mean", "deviation", "range", "change", "mean-step", "band-energy")
+UNMOVED = tuple(name for name in MEASURES if name != "mean")
+# Readings of up to 1e3, sums of 60 of them: rounding of 1e-16 of each, times what a filter of four poles makes of it.
+ROUNDING = 1e-8
+
+
+def summary(measure, **more):
+    return Summary(measure=measure, band_hz=BAND if measure == "band-energy" else None, **more)
+
+
+def stream(X, rate_hz=RATE_HZ):
+    X = np.asarray(X, dtype=np.float64).reshape(len(X), -1)
+    names = tuple(f"t{place}" for place in range(X.shape[1]))
+    return StreamReadings("taxels", names, ("taxel",) * len(names), X, np.arange(len(X)) / rate_hz, rate_hz)
+
+
+def value(X, measure, **more):
+    return summary_of(stream(X), summary(measure, **more), "r")
+
+
+readings = arrays(np.float64, st.tuples(st.integers(8, 60), st.integers(1, 3)), elements=st.floats(-1e3, 1e3))
+
+
+@pytest.mark.parametrize("measure", UNMOVED)
+@given(X=readings, offset=st.floats(-1e3, 1e3))
+def test_an_offset_changes_the_mean_alone(measure, X, offset):
+    assert value(X + offset, measure) == pytest.approx(value(X, measure), abs=ROUNDING * 1e3**2, rel=ROUNDING)
+    assert value(X + offset, "mean") == pytest.approx(value(X, "mean") + offset, abs=ROUNDING)
+
+
+@pytest.mark.parametrize("measure", MEASURES)
+@given(X=readings, factor=st.floats(-10, 10))
+def test_a_gain_scales_as_the_unit_says(measure, X, factor):
+    gain = {"mean": factor, "change": factor, "band-energy": factor**2}.get(measure, abs(factor))
+    assert value(factor * X, measure) == pytest.approx(gain * value(X, measure), abs=ROUNDING * 1e6, rel=ROUNDING)
+
+
+@pytest.mark.parametrize("measure", MEASURES)
+@given(X=readings, later=readings, data=st.data())
+def test_what_comes_after_the_window_changes_nothing(measure, X, later, data):
+    n = len(X)
+    last = data.draw(st.integers(4, n))
+    window = {"start": 0.02, "end": last / RATE_HZ, "unit": "s"}
+    changed = X.copy()
+    changed[last:] = np.resize(later, (n - last, X.shape[1]))
+    assert np.array_equal(value(changed, measure, **window), value(X, measure, **window))
+
+
+@pytest.mark.parametrize("measure", ["mean", "deviation", "range"])
+@given(X=readings, data=st.data())
+def test_order_within_the_window_matters_to_changes_alone(measure, X, data):
+    order = data.draw(st.permutations(range(len(X))))
+    assert value(X[order], measure) == pytest.approx(value(X, measure), abs=ROUNDING)
+
+
+@given(X=readings)
+def test_halves_of_a_recording_are_its_halves(X):
+    n = len(X) // 2
+    X = X[: 2 * n]
+    assert np.array_equal(value(X, "mean", end=0.5), value(X[:n], "mean"))
+    assert np.array_equal(value(X, "range", start=0.5), value(X[n:], "range"))
+
+
+def test_what_the_words_mean():
+    X = [1.0, 3.0, 2.0, 6.0]
+    assert value(X, "mean") == 3.0
+    assert value(X, "deviation") == pytest.approx(np.sqrt(3.5))
+    assert value(X, "range") == 5.0
+    assert value(X, "change") == 5.0
+    assert value(X, "mean-step") == pytest.approx((2 + 1 + 4) / 3)
+    assert value([0.1] * 1000, "deviation") == 0.0, "what never changes has no deviation, not its rounding"
+
+
+def test_a_band_passes_its_own_and_stops_the_others():
+    """A sine of amplitude 2 has a mean square of 2; the filter of four poles passes its centre whole."""
+    t = np.arange(0, 20, 1 / RATE_HZ)
+    settled = {"start": 0.5, "end": 1.0}
+    inside, below, above = (value(2 * np.sin(2 * np.pi * f * t) + 7, "band-energy", **settled) for f in (10.0, 0.5, 45))
+    # The response at the geometric centre is 1; ten whole seconds hold whole periods.
+    assert inside == pytest.approx(2.0, rel=1e-3)
+    assert max(below[0], above[0]) < 0.01 * inside[0]
+
+
+def test_a_band_that_the_rate_does_not_show_is_no_feature():
+    with pytest.raises(NotApplicable, match=r"sampled at 30 Hz, which shows nothing above 15 Hz"):
+        summary_of(stream(np.zeros(100), 30.0), summary("band-energy"), "r")
+    with pytest.raises(NotApplicable, match="states none for taxels"):
+        summary_of(replace(stream(np.zeros(100)), rate_hz=None), summary("band-energy"), "r")
+
+
+def test_a_window_in_seconds_needs_a_clock_and_a_recording_that_is_long_enough():
+    window = summary("mean", start=0.5, end=1.0, unit="s")
+    assert summary_of(stream(np.arange(100.0)), window, "r") == pytest.approx(np.arange(50, 100).mean())
+    with pytest.raises(NotApplicable, match="has no clock"):
+        summary_of(replace(stream(np.arange(100.0)), time_s=None), window, "r")
+    with pytest.raises(DataError, match=r"'r' has 0.98 s of taxels"):
+        summary_of(stream(np.arange(99.0)), window, "r")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"measure": "mean", "start": 0.5, "end": 0.5}, "ends after it starts"),
+        ({"measure": "mean", "end": 2.0}, "ends at 1"),
+        ({"measure": "band-energy"}, "needs it"),
+        ({"measure": "mean", "band_hz": (1.0, 2.0)}, "belongs to band-energy"),
+        ({"measure": "band-energy", "band_hz": (2.0, 1.0)}, "lower end"),
+        ({"measure": "mean", "end": float("inf"), "unit": "s"}, "finite"),
+    ],
+)
+def test_a_summary_that_means_nothing_is_refused(wrong, words):
+    with pytest.raises(ValueError, match=words):
+        Summary(**wrong)
+
+
+def test_names_say_which_window_and_which_band():
+    assert Summary(measure="deviation").name == "deviation"
+    assert summary("band-energy").name == "band-energy 5-20 Hz"
+    assert Summary(measure="mean", end=0.25).name == "mean 0-0.25 of the recording"
+    assert Summary(measure="mean", start=1, end=2, unit="s", kinds=("taxel",)).name == "mean 1-2 s of taxel"
