@@ -48,6 +48,7 @@ def task_page(task: TaskSpec) -> Page:
     facts = [
         ("question", task.question),
         ("target", _target(task)),
+        *([("one answer", f"a recording, from {task.answer_from}")] if task.answer_per == "recording" else []),
         ("looks at", f"channels of kind {', '.join(task.features)}"),
         ("metric", f"{METRIC_NAMES.get(task.metric, task.metric)}{suffix(task.unit)}, {direction} is better"),
         ("the same in practice", "nobody has said" if task.equivalence is None

@@ -173,12 +173,12 @@ class _Folds:
         self.test: Any = None
 
     def look_over(self, assignments: Sequence[Assignment]) -> None:
-        """Count what the folds together use, and what they do not."""
+        """Count which recorded rows the folds together use, and which they do not."""
         used = used_rows(assignments)
-        self.counts.update(without_part(self.data, self.split, used))
-        self.counts.update(not_asked_for(self.data, self.rules, used))
+        self.counts.update(without_part(self.recorded, self.split, used))
+        self.counts.update(not_asked_for(self.recorded, self.rules, used))
         self.took_part = [
-            table.meta for table, mask in zip(self.data.tables, used, strict=True) if (mask & table.labelled).any()
+            table.meta for table, mask in zip(self.recorded.tables, used, strict=True) if (mask & table.labelled).any()
         ]
 
     def add(self, number: int, assignment: Assignment, build: Build, *, alone: bool) -> None:
@@ -272,11 +272,12 @@ def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> Cell
     data = folds.data
     assignments = assigned(context.task, estimator, data, folds.split, context.seed)
     assert_disjoint(assignments)
-    folds.look_over(assignments)
+    over_recorded = [over_rows(one, recorded) for one in assignments]
+    folds.look_over(over_recorded)
     if folds.split == "shuffled":
         folds.stamps += (SHUFFLED_WHOLE_STAMP if data.whole else SHUFFLED_STAMP,)
     else:
-        folds.stamps += leak_stamps(recorded, [over_rows(one, recorded) for one in assignments])
+        folds.stamps += leak_stamps(recorded, over_recorded)
     build = builder(estimator, context.params, context.task, context.seed, context.threads)
     with thread_limit(context.threads):
         for number, assignment in enumerate(assignments):

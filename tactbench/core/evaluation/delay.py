@@ -44,7 +44,7 @@ def reading_delay_ms(data: Dataset, rules: ProtocolSpec, k: int) -> tuple[dict[s
         A part that is not known is absent.
     """
     parts: dict[str, float] = {}
-    interval_s = _row_interval_s(data)
+    interval_s = row_interval_s(data)
     remarks: dict[str, None] = {}
     own: list[float | None] = []
     for meta in data.metas:
@@ -87,7 +87,7 @@ def _used(meta: RecordingMeta, data: Dataset) -> list[StreamSpec]:
     return sorted(used, key=lambda one: all(channel.name != data.features[0] for channel in one.channels))
 
 
-def _row_interval_s(data: Dataset) -> float | None:
+def row_interval_s(data: Dataset) -> float | None:
     """Return the interval between rows, the longest of all recordings: the median of the clock's steps.
 
     Without a clock, by the rate that the stream states; None where a recording has neither.

@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from tactbench.core.errors import DataError, NotApplicable, PluginContractError
-from tactbench.core.evaluation.dataset import Dataset, Table
+from tactbench.core.evaluation.dataset import LARGEST, Dataset, Table
+from tactbench.core.evaluation.delay import row_interval_s
 from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.sets import moments
 from tactbench.core.evaluation.unloaded import hold_s
@@ -86,12 +87,19 @@ def recording_features(task: TaskSpec, rules: ProtocolSpec) -> Callable[[Table],
                     names = [f"{stream.channels[place]} {summary.name}" for place in columns]
                     found |= dict(zip(names, values.tolist(), strict=True))
         if own is not None:
-            found |= _checked(own(streams), f"{task.features_by}", table)
-        if not found:
-            raise NotApplicable(
-                f"Task {task.name!r} summarises channels that recording {table.meta.name!r} does not have.",
-                hint="See what the sensor has with `tactbench show`.",
-            )
+            more = _checked(own(streams), f"{task.features_by}", table)
+            if found.keys() & more.keys():
+                raise PluginContractError(
+                    f"{task.features_by} gave {min(found.keys() & more.keys())!r}, which is a summary's name.",
+                    hint="Call it otherwise.",
+                )
+            found |= more
+        for name, value in found.items():
+            if not abs(value) <= LARGEST:
+                raise DataError(
+                    f"In recording {table.meta.name!r}, {name} reaches {value:.3g}, which cannot be computed with.",
+                    hint="Is a reading a fill value? State it under `sentinels` in the mapping.",
+                )
         return found
 
     return compute
@@ -154,15 +162,16 @@ def answer_span_s(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> float |
     """Return how long a recording is listened to before its answer is there, the longest of all; None: not known."""
     if rules.first_row_only:
         return 0.0
-    spans = [_span_s(table, task, rules) for table in data.tables]
+    spans = [_span_s(data, table, task, rules) for table in data.tables]
     known = [span for span in spans if span is not None]
     return max(known) if len(known) == len(spans) else None
 
 
-def _span_s(table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
+def _span_s(data: Dataset, table: Table, task: TaskSpec, rules: ProtocolSpec) -> float | None:
     if task.vote:
         if table.meta.clock == "none":
-            return None
+            interval_s = row_interval_s(data)
+            return None if interval_s is None else len(table.row) * interval_s
         scene = table.meta.scene
         hold = scene.profile.hold.to("s") if rules.discard_hold and scene is not None else 0.0
         return max(float(table.time_s[-1]) - hold, 0.0)

@@ -147,6 +147,9 @@ class TaskSpec(Frozen):
             raise ValueError("answer_per: recording asks for a label")
         if "in-session" in self.splits:
             raise ValueError("split in-session cuts recordings in time; answer_per: recording asks each as a whole")
+        unseen = {kind for one in self.summaries for kind in one.kinds} - set(self.features)
+        if unseen:
+            raise ValueError(f"summaries of {', '.join(sorted(unseen))}, which the task's features do not have")
         names = [one.name for one in self.summaries]
         if len(set(names)) < len(names):
             raise ValueError("two summaries are the same")

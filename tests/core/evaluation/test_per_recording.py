@@ -227,7 +227,9 @@ def test_the_hold_is_tared_on_and_left_out_of_every_stream(tmp_path):
     assert all(abs(table.X[0, 1]) < 1.0 and abs(table.X[0, 2]) < 0.1 for table in tared.tables)
     assert all(table.X[0, 1] == pytest.approx(20, abs=1) for table in untared.tables)
     assert answer_span_s(data, FAST, protocol_called("deployable")) == pytest.approx(1.5, abs=1 / SLOW_HZ)
-    assert run(FAST, two_rates(tmp_path, hold_s=0.5)).tare_s == pytest.approx(0.5)
+    result = run(FAST, two_rates(tmp_path, hold_s=0.5))
+    assert result.tare_s == pytest.approx(0.5)
+    assert result.counts["rows before the press begins"] == 12 * 25
 
 
 @pytest.mark.parametrize("protocol", ["karl2016", "karl2016-training-scale"])
@@ -250,6 +252,14 @@ def other_names(streams):
     return {f"first {streams[0].data[0, 0]}": 0.0}
 
 
+def a_summarys_name(streams):
+    return {"t0 deviation": 0.0}
+
+
+def too_large(streams):
+    return {"large": 1e200}
+
+
 def not_a_number(streams):
     return {"bad": float("nan")}
 
@@ -262,6 +272,10 @@ def test_a_task_may_name_code_for_features_of_its_own(tmp_path):
     assert any(f"{HERE}:crest_factor" in remark for remark in run(own, paths).remarks)
     both = task(features_by=f"{HERE}:crest_factor")
     assert len(summarised(load_dataset(both, paths), both, protocol_called("deployable")).features) == 6
+    with pytest.raises(PluginContractError, match="is a summary's name"):
+        run(task(features_by=f"{HERE}:a_summarys_name"), paths)
+    with pytest.raises(DataError, match="cannot be computed with"):
+        run(task(features_by=f"{HERE}:too_large"), paths)
     for name, words in (("other_names", "other features"), ("not_a_number", "no finite number")):
         with pytest.raises(PluginContractError, match=words):
             run(task(summaries=(), features_by=f"{HERE}:{name}"), paths)
@@ -327,7 +341,7 @@ def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_pa
                     labels={"slip": place % 2}) for place, role in enumerate(roles * 2)]  # fmt: skip
     result = run(vote(), paths, estimator="logistic", protocol="karl2016")
     assert result.n_test == 2
-    assert result.counts["test rows before the press begins"] == 1200
+    assert result.counts["rows before the press begins"] == 6 * 600
     short = record(tmp_path / "short.h5", rng.normal(size=(500, 1)), np.full(500, 1.0), role="test", labels={"slip": 0})
     with pytest.raises(DataError, match="leaves no row of recording 'short'"):
         run(vote(), [*paths, short], estimator="logistic", protocol="karl2016")
@@ -346,6 +360,7 @@ def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_pa
         ({"splits": ("recording", "in-session")}, "cuts recordings in time"),
         ({"summaries": (MOVES[0], MOVES[0])}, "the same"),
         ({"features_by": "no colon"}, "pattern"),
+        ({"summaries": (Summary(measure="mean", kinds=("ac_pressure",)),)}, "features do not have"),
     ],
 )
 def test_a_task_that_contradicts_itself_is_refused(wrong, words):

@@ -159,3 +159,9 @@ def test_simulated_rows_say_so_and_every_text_format_has_the_table():
         assert "LEAK: the first frame alone scores 0.900 of 0.950" in text
         assert "a SIM" in text
     assert "50\\% or more" in to_latex(rows)
+
+
+def test_without_an_interval_nothing_holds_the_shuffled_score():
+    """One session carries no interval: tables take its ends from the row."""
+    alone = classed(0.95) | {"ci_low": None, "ci_high": None}
+    assert verdict(alone, classed(0.99, split="shuffled")) == "no interval to hold the shuffled score against"

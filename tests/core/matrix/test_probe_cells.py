@@ -77,4 +77,10 @@ def test_a_ready_matrix_of_real_recordings(registry, path):
 
 
 def test_there_is_one_for_each_data_set():
-    assert {path.stem for path in MATRICES} == {"real-biotacsp", "real-eflesh", "real-eflesh-shear", "real-icub"}
+    assert {path.stem for path in MATRICES} == {
+        "real-biotacsp",
+        "real-eflesh",
+        "real-eflesh-shear",
+        "real-eflesh-slip",
+        "real-icub",
+    }

@@ -61,8 +61,8 @@ def draw(group: Group, remark: Remark) -> Sketch:
     caption = (
         f"Confusion matrices, one row a sensor ({sensors(group)}): {left}. Rows are the true "
         f"{with_unit(quantity(group.task), unit)}, columns the answer; numbers are per cent of the row, whose "
-        f"count of samples stands on the right (n). A perfect answer would be a clear diagonal. {metric} of the test "
-        f"set: {scores}.{marks(group)}"
+        f"count of {group.task.answer_per}s stands on the right (n). A perfect answer would be a clear diagonal. "
+        f"{metric} of the test set: {scores}.{marks(group)}"
     )
     return Sketch("confusion", f"Confusion of {quantity(group.task)}", caption, group, figure)
 
