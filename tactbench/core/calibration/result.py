@@ -15,7 +15,7 @@ from pydantic import ValidationError
 import tactbench
 from tactbench.core.calibration.draw import Draw, Varied
 from tactbench.core.errors import FormatError
-from tactbench.core.matrix.files import read_regular, replace_file
+from tactbench.core.files import read_regular, replace_file
 from tactbench.core.spec.calibration import CalibrationSpec
 
 DRAWS, RUN, VARIATIONS = "draws.csv", "run.json", "variations.csv"

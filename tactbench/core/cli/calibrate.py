@@ -99,7 +99,7 @@ def _write(result: CalibrationResult, stats: Summary, folder: Path) -> None:
     from tactbench.core.calibration.summary import acceptance, records
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UnwritableError
-    from tactbench.core.matrix.files import replace_file
+    from tactbench.core.files import replace_file
 
     tables = records(stats)
     about = {

@@ -251,7 +251,7 @@ def _write(points: Sequence[CostPoint], records: Sequence[dict[str, Any]], study
     from tactbench.core.cli.screen import remark
     from tactbench.core.cost.precision_figure import draw
     from tactbench.core.errors import UnwritableError
-    from tactbench.core.matrix.files import replace_file
+    from tactbench.core.files import replace_file
     from tactbench.core.tables.csv_text import csv_of_records
 
     try:

@@ -144,7 +144,7 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
 
 def _put(content: bytes, to: Path | None) -> None:
     from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.files import replace_file
+    from tactbench.core.files import replace_file
 
     if to is None:
         click.echo(content, nl=False)

@@ -49,7 +49,7 @@ from typing import Any
 
 from tactbench.core.cost.ladder import Ladder
 from tactbench.core.errors import UnwritableError
-from tactbench.core.matrix.files import read_regular, replace_file
+from tactbench.core.files import read_regular, replace_file
 
 VERSION = 2
 

@@ -22,7 +22,7 @@ class SlipThresholds(Frozen):
     """Where stick, incipient and gross slip part. No field has a default."""
 
     hold_s: Seconds = Field(gt=0)
-    """A contact rests where its relative displacement stays within `gross_displacement_m` for this long [s]."""
+    """A contact rests where its displacements of this long [s] differ by no more than `gross_displacement_m`."""
     gross_displacement_m: float = Field(gt=0, allow_inf_nan=False)
     """Gross slip is displacement of more than this after such a hold [m]."""
     incipient_slip_share: float = Field(gt=0, lt=1)
@@ -52,7 +52,8 @@ THRESHOLDS = SlipThresholds(
     hold_s=0.1, gross_displacement_m=1e-4, incipient_slip_share=0.1, gross_stick_ratio=0.1, contact_force_n=0.05
 )
 """The published ones. All five are assumed: no source was found that states them for a whole contact. They see slip
-faster than 1 mm/s. What a score owes to them is shown by halving and doubling them (:func:`labels_at_scales`)."""
+faster than 1 mm/s, or by steps of more than 0.1 mm. What a score owes to them is shown by halving and doubling them
+(:func:`labels_at_scales`)."""
 
 
 @dataclass(frozen=True)
@@ -156,23 +157,38 @@ def labels_at_scales(
 
 
 def at_rest(t_ns: IntArray, displacement_m: FloatArray, thresholds: SlipThresholds) -> npt.NDArray[np.bool_]:
-    """Return (n,) whether a sample lies in a hold: `hold_s` in which no two displacements differ by more than allowed.
+    """Return (n,) whether a sample lies in a hold.
 
-    The first sample after a hold is therefore the first that has moved by more than the threshold within `hold_s`.
+    Notes
+    -----
+    A hold begins at the first sample from which on no two displacements of `hold_s` differ by more than
+    `gross_displacement_m`. It ends before the first later sample where two of the last `hold_s` do: that sample is the
+    onset, even if another hold begins there, as after a slip that is shorter than a sample.
     """
     n, hold = t_ns.size, nanoseconds(thresholds.hold_s)
-    begin = np.flatnonzero(t_ns + hold <= t_ns[-1]) if n else np.zeros(0, dtype=np.int64)
-    end = np.searchsorted(t_ns, t_ns[begin] + hold, side="left") + 1  # as short as a hold may be
-    pairs = np.column_stack([begin, end]).ravel()
-    if pairs.size == 0:
-        return np.zeros(n, dtype=np.bool_)
-    padded = np.append(displacement_m, displacement_m[-1])  # reduceat wants every place to exist
-    spread = np.maximum.reduceat(padded, pairs)[::2] - np.minimum.reduceat(padded, pairs)[::2]
-    still = spread <= thresholds.gross_displacement_m
-    edges = np.zeros(n + 1, dtype=np.int64)
-    np.add.at(edges, begin[still], 1)
-    np.add.at(edges, end[still], -1)
-    return np.asarray(np.cumsum(edges)[:-1] > 0)
+    rest = np.zeros(n, dtype=np.bool_)
+    last, first = np.searchsorted(t_ns, t_ns + hold, side="left"), np.searchsorted(t_ns, t_ns - hold, side="right") - 1
+    ahead, behind = last < n, first >= 0  # where there is so much time
+    place = np.arange(n)
+    still = place[ahead][_spread(displacement_m, place[ahead], last[ahead]) <= thresholds.gross_displacement_m]
+    moved = place[behind][_spread(displacement_m, first[behind], place[behind]) > thresholds.gross_displacement_m]
+    onset = -1
+    while (following := np.searchsorted(still, onset)) < still.size:
+        begin = still[following]
+        later = np.searchsorted(moved, last[begin], side="right")
+        end = moved[later] if later < moved.size else n
+        rest[max(begin, onset + 1) : end] = True
+        onset = end
+    return rest
+
+
+def _spread(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
+    """Return (k,) largest minus smallest of ``values[first..last]``, both ends included."""
+    if first.size == 0:
+        return np.zeros(0)
+    pairs = np.column_stack([first, last + 1]).ravel()
+    padded = np.append(values, values[-1])  # reduceat wants every place to exist
+    return np.asarray(np.maximum.reduceat(padded, pairs)[::2] - np.minimum.reduceat(padded, pairs)[::2])
 
 
 def _stretches(mask: npt.NDArray[np.bool_]) -> IntArray:

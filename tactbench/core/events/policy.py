@@ -20,8 +20,8 @@ def nanoseconds(seconds: float) -> int:
 class AlarmPolicy(Frozen):
     """How a detector's frames become alarms, and what an alarm is held against.
 
-    No field has a default. A hidden default may decide the result: the usual ones of seizure scoring (30 s before, 60 s
-    after, merging below 90 s) give F1 = 1 to a detector whose last alarm comes 10 s after the event's end.
+    No field has a default. A hidden one may decide the result: those of timescoring 0.0.7, made for seizures (30 s
+    before, 60 s after, merging below 90 s), give F1 = 1 to a detector whose last alarm comes 10 s after the event.
     """
 
     window_before_s: Seconds

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import UsageError
+from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.formats import TEXTS, VIEWED
 from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.leaderboard.view import WHOLE
-from tactbench.core.matrix.files import replace_file
 
 Row = Mapping[str, Any]
 

@@ -20,7 +20,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tactbench.core.matrix.files import read_regular, replace_file
+from tactbench.core.files import read_regular, replace_file
 from tactbench.core.matrix.keys import Fixed, Section
 
 Sections = Mapping[str, Section]

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.matrix.files import read_regular, replace_file
+from tactbench.core.files import read_regular, replace_file
 
 Facts = Mapping[str, str | None]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import re
 from collections.abc import Iterator
@@ -30,11 +31,13 @@ def taken_mb(pid: int, shared_mb: float) -> float:
     -----
     Pages shared by several processes of the family are counted once, by their proportional share
     (proc_pid_smaps(5), Pss); what is shared with processes outside is at most `shared_mb`, which is taken off, so that
-    the sum of a family is never too large.
+    the sum of a family is never too large. A child that has not yet replaced itself by a program has its parent's
+    memory itself (vfork(2)), and is not counted again.
     """
-    below = descendants(pid)
+    family = [pid]
+    family += [one for one in descendants(pid) if not any(_have_one_memory(one, other) for other in family)]
     alone = resident_mb(pid)
-    together = sum(_proportional_mb(one) for one in (pid, *below)) if below else 0.0
+    together = sum(map(_proportional_mb, family)) if len(family) > 1 else 0.0
     return max(alone, together) - shared_mb
 
 
@@ -95,12 +98,28 @@ def _proportional_mb(pid: int) -> float:
     return 0.0
 
 
+_KCMP = {"x86_64": 312, "aarch64": 272}
+_KCMP_VM = 1
+"""Number of the system call kcmp(2) by machine, which the C library does not name, and what it compares."""
+
+
+def _have_one_memory(one: int, other: int) -> bool:
+    """Return whether two processes share all of their memory; False where the system does not say."""
+    number = _KCMP.get(os.uname().machine)
+    return number is not None and _libc().syscall(number, one, other, _KCMP_VM, 0, 0) == 0
+
+
 def _data_bytes() -> int:
     """Return what RLIMIT_DATA counts of this process now (setrlimit(2): data, heap and private writable mappings)."""
     with suppress(OSError):
         if match := re.search(r"^VmData:\s+(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE):
             return int(match[1]) * 1024
     return 0
+
+
+@lru_cache(maxsize=1)
+def _libc() -> ctypes.CDLL:
+    return ctypes.CDLL(None)
 
 
 @lru_cache(maxsize=1)

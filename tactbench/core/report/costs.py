@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.cost.ladder_file import VERSION
-from tactbench.core.matrix.files import read_regular
+from tactbench.core.files import read_regular
 from tactbench.core.report.ladder_table import COLUMNS, SORTED_BY, line, title
 from tactbench.core.report.section import Picture, ReportData, Section
 from tactbench.core.tables.text import command_line

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import UnwritableError, UsageError
+from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.records import JSON_KEYS
-from tactbench.core.matrix.files import replace_file
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.figures.sensitivity import draw_sensitivity

@@ -6,7 +6,7 @@ import json
 from collections import Counter
 from typing import Any
 
-from tactbench.core.matrix.files import read_regular
+from tactbench.core.files import read_regular
 from tactbench.core.provenance.source import RELEVANT
 from tactbench.core.report.figures.published_and_ours import COLUMN
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.matrix.files import read_regular, replace_file
+from tactbench.core.files import read_regular, replace_file
 
 FOLDER = "report"
 """Inside a result folder."""

@@ -33,10 +33,10 @@ def test_the_curve_is_each_threshold_on_its_own(recordings, rules):
         assert_same(curve.at(threshold), at_one(recordings, threshold, rules))
 
 
-def walk(seed, n=2000, step_s=0.01):
-    """Return a score that wanders and rises after each of three onsets."""
+def walk(seed, n=2000, step_s=0.01, jitter=0.0):
+    """Return a score that wanders and rises after each of three onsets, on a clock that need not be even."""
     rng = np.random.default_rng(seed)
-    clock = seconds(*(step_s * np.arange(n)))
+    clock = seconds(*(step_s * (np.arange(n) + jitter * rng.uniform(0.0, 1.0, n))))
     score = np.convolve(rng.normal(0.0, 1.0, n), np.ones(5) / 5, "same")
     events = [(onset, onset + 0.5) for onset in (4.0, 9.0, 15.0)]
     for onset, end in events:
@@ -55,7 +55,7 @@ def walk(seed, n=2000, step_s=0.01):
     ids=["plain", "all", "disturbances", "merged-into-one"],
 )
 def test_the_curve_of_real_valued_scores_is_each_threshold_on_its_own(rules):
-    recordings = [walk(1), walk(2)]
+    recordings = [walk(1), walk(2, jitter=0.9)]
     curve = threshold_curve(recordings, rules)
     seen = np.unique(np.concatenate([one.score for one in recordings]))
     rng = np.random.default_rng(3)
@@ -98,6 +98,17 @@ def test_the_operating_point_is_the_best_that_is_allowed(recordings, rules, boun
     )
     assert curve.operating_point(bound) == best[2]
     assert chosen.recall == best[0]
+
+
+def test_of_thresholds_of_equal_recall_the_fewest_false_positives_decide_and_then_the_highest():
+    # An event at 1 s and a false rise at 5 s, outside the disturbance: each threshold up to 4 keeps the bound.
+    clock, score = seconds(*range(10)), np.array([0.0, 4.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0])
+    one = ScoredRecording(clock, score, truth([(1.0, 1.5)], disturbances=[(7.0, 8.0)], span=(0.0, 10.0)))
+    assert threshold_curve([one], policy(time="disturbances")).operating_point(1.0) == 4.0
+    # A second rise in the window of the event at every threshold above 2: the lower threshold has the better F1.
+    score = np.array([0.0, 4.0, 2.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    one = ScoredRecording(clock, score, one.truth)
+    assert threshold_curve([one], policy(after=3.0, time="disturbances")).operating_point(1.0) == 2.0
 
 
 def test_a_detector_that_hits_nothing_within_the_bound_never_raises_an_alarm():

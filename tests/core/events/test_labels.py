@@ -1,5 +1,7 @@
 """Labels of a made drag whose truth is known, and of the twin's own closed forms."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,12 +16,15 @@ from tactbench.core.events.labels import (
     THRESHOLDS,
     UNDECIDED,
     SlipThresholds,
+    at_rest,
     labels_at_scales,
     slip_labels,
     stick_ratio,
 )
 from tactbench.rigs.twin.effects import partial_slip
-from tests.core.events.made import seconds
+from tactbench.rigs.twin.effects.slip_event import Mode
+from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
+from tests.core.events.made import MS, clocks, seconds
 
 MU, P = 0.8, 2.0
 SPEED = 0.01
@@ -94,6 +99,72 @@ def test_motion_in_the_air_and_motion_from_the_first_sample_are_no_events():
     moving = slip_labels(seconds(*t[late]), displacement[late], pull[late], normal[late], MU, THRESHOLDS)
     assert moving.gross_ns.shape == (0, 2)
     assert np.any(moving.state == GROSS)
+
+
+def test_a_contact_made_as_the_motion_begins_was_held_by_nothing():
+    t, displacement, pull, _ = drag()
+    first = int(np.flatnonzero(labelled()[1].state == GROSS)[0])
+    normal = np.where(np.arange(t.size) >= first, P, 0.0)
+    labels = slip_labels(seconds(*t), displacement, pull, normal, MU, THRESHOLDS)
+    assert labels.state[first - 1 : first + 1].tolist() == [UNDECIDED, GROSS]
+    assert labels.gross_ns.shape == (0, 2)
+
+
+def holds_one_by_one(t, moved, hold, allowed):
+    """Return which samples lie in a hold, as the definition says it, sample by sample."""
+
+    def ahead(at):
+        inside = [k for k in range(at, t.size) if k == at or t[k - 1] - t[at] < hold]
+        return t[-1] - t[at] >= hold and np.ptp(moved[inside]) <= allowed
+
+    def behind(at, begin):
+        inside = [k for k in range(begin, at + 1) if k == at or t[at] - t[k + 1] < hold]
+        return np.ptp(moved[inside]) <= allowed
+
+    rest, begin, onset = np.zeros(t.size, dtype=np.bool_), None, None
+    for at in range(t.size):
+        if begin is not None and not behind(at, begin):
+            begin, onset = None, at
+        if begin is None and ahead(at):
+            begin = at
+        rest[at] = begin is not None and at != onset
+    return rest
+
+
+@given(clocks, st.data(), st.integers(1, 6), st.integers(1, 3))
+def test_a_hold_is_what_its_definition_says(clock, data, hold_ms, allowed):
+    """In whole metres, so that displacement is compared exactly."""
+    steps = data.draw(st.lists(st.sampled_from([0, 0, 0, 1, -1, 3, 9]), min_size=clock.size, max_size=clock.size))
+    moved = np.cumsum(np.asarray(steps, dtype=np.float64))
+    rules = THRESHOLDS.model_copy(update={"hold_s": hold_ms / 1000, "gross_displacement_m": float(allowed)})
+    assert np.array_equal(at_rest(clock, moved, rules), holds_one_by_one(clock, moved, hold_ms * MS, allowed))
+
+
+@pytest.mark.parametrize("samples", [1, 2, 5])
+def test_a_slip_as_short_as_a_sample_is_a_slip(samples):
+    t = 0.001 * np.arange(1000)
+    jump = 1.5 * THRESHOLDS.gross_displacement_m * np.clip((np.arange(1000) - 500) / samples, 0.0, 1.0)
+    pull = np.full(1000, 0.5 * MU * P)
+    labels = slip_labels(seconds(*t), jump, pull, np.full(1000, P), MU, THRESHOLDS)
+    assert labels.gross_ns[:, 0].tolist() == seconds(t[500 + math.ceil(samples / 1.5)]).tolist()
+
+
+def test_slow_stick_slip_on_the_twin_is_an_event_a_slip():
+    grid = np.linspace(0.0, 4.0, 801)
+    load = np.full(801, 2.0)
+    drive = Drive(
+        speed_mm_s=2.0, start_s=0.5, end_s=math.inf, static=0.8, kinetic=0.6, stribeck_mm_s=5.0, mode=Mode(2000.0, 0.1),
+        t_s=grid, load_n=load, stiffness=2.0 * np.cbrt(load),
+    )  # fmt: skip
+    dragged, t = Dragged(drive), 0.001 * np.arange(4000)
+    seen = dragged(t)
+    labels = slip_labels(seconds(*t), 1e-3 * seen.slip_mm, seen.force_n, np.full(4000, 2.0), 0.8, THRESHOLDS)
+    # A swing lasts pi/omega = 1.6 ms, then comes the next sample.
+    assert labels.gross_ns[:, 0] / 1e9 - dragged.let_go_s[dragged.let_go_s < t[-1]] == pytest.approx(0.0013, abs=0.0013)
+    sticking = (t > 0.5) & (t < dragged.let_go_s[0])
+    found = stick_ratio(seen.force_n, np.full(4000, 2.0), 0.8)[sticking]
+    # The twin's forces have a viscous part beside friction's: 2 % at most.
+    assert found == pytest.approx(seen.stick_ratio[sticking], abs=0.02)
 
 
 def test_a_surface_that_never_rests_is_refused():

@@ -32,6 +32,7 @@ def test_the_policy_says_every_field_of_its_own():
 
 
 # One event from 100 s to 110 s; three alarms around it, and one 10 s after its end.
+# timescoring 0.0.7 with its defaults says F1 = 1 and no false alarm.
 SEIZURE = truth([(100.0, 110.0)], span=(0.0, 600.0))
 ALARMS = seconds(95.0, 101.0, 108.0, 120.0)
 

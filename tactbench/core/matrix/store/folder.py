@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import FormatError, RecordingError
-from tactbench.core.matrix.files import read_regular, replace_file, write_file
+from tactbench.core.files import read_regular, replace_file, write_file
 from tactbench.core.matrix.store import leftovers, limits
 from tactbench.core.matrix.store.disk import sync_path, writing
 from tactbench.core.matrix.store.image import digest_of, read_image

@@ -6,7 +6,7 @@ import hashlib
 from pathlib import Path
 
 from tactbench.core.errors import FormatError
-from tactbench.core.matrix.files import read_regular
+from tactbench.core.files import read_regular
 from tactbench.core.matrix.store import limits
 
 SEE = "Delete it, and the next run computes the cell again."

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FolderError
-from tactbench.core.matrix.files import read_regular, write_all
+from tactbench.core.files import read_regular, write_all
 from tactbench.core.matrix.store import limits
 from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
 from tactbench.core.matrix.store.sharing import canonical, definition, digest_of, joined, parted, shared_lines

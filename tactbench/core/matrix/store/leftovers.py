@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 _ASIDE = re.compile(r"\..+\.(\d{1,10})\.partial")
-"""Names of files written aside by `tactbench.core.matrix.files.replace_file`: hidden, with the writer's process."""
+"""Names of files written aside by `tactbench.core.files.replace_file`: hidden, with the writer's process."""
 
 
 def sweep(folder: Path) -> None:

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from tactbench.core.errors import FolderError
-from tactbench.core.matrix.files import replace_file
+from tactbench.core.files import replace_file
 
 _held: set[tuple[int, int]] = set()
 """Folders that this process holds, by device and inode: a record lock keeps other processes out, not its own."""

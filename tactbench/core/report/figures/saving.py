@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tactbench.core.matrix.files import replace_file
+from tactbench.core.files import replace_file
 from tactbench.core.report.figures.sketch import Sketch
 from tactbench.core.report.saved_figure import SavedFigure
 
