@@ -144,8 +144,9 @@ def _suggest(rows: Sequence[Mapping[str, Any]]) -> None:
     else:
         probe = {"tactbench run … --probe": "what the recordings give away: first frame alone, shuffled rows"}
         probed = any(is_probe(row["protocol"]) for row in rows)
+        other = "all" if any(row["estimator"] == "forest" for row in rows) else "forest"
         tries = ({} if probed else probe) | {
-            "tactbench run … --estimator forest": "another answer (see tactbench list estimators)",
+            f"tactbench run … --estimator {other}": "other answers (see tactbench list estimators)",
             "tactbench inspect FILE": "what is in a recording, and whether it is healthy",
         }
     width = max(len(command) for command in tries)

@@ -15,7 +15,12 @@ if TYPE_CHECKING:
 
 @click.command(name="show")
 @click.argument("names", nargs=-1, required=True)
-@click.option("--all", "everything", is_flag=True, help="Every parameter, and who states it.")
+@click.option(
+    "--all",
+    "everything",
+    is_flag=True,
+    help="Every parameter, and who states it; of a task in JSON every scene of its campaigns.",
+)
 @click.option("--format", "shape", type=click.Choice(("table", "json", "md")), default="table", show_default=True)
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     """Show sensors side by side (the paper's Table I and their data sheets), or a task, rig, estimator or effect."""
@@ -33,6 +38,8 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
         raise UsageError("Only sensors can be shown as Markdown.", hint="Leave --format out, or take --format json.")
     if shape == "json" and not only_sensors:
         found = [shown for name in names for shown in _described(name, registry)]
+        for shown in found if not everything else ():
+            _count_campaigns(shown)
         click.echo(json_text(found[0] if len(found) == 1 else found, indent=1))
         return
     sensors = [registry.sensors[name].spec for name in names if name in registry.sensors]
@@ -41,6 +48,13 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     if not only_sensors:
         _pages([family.owned(name) for name in names for kind, family in families.items()
                 if kind != "sensors" and name in family])  # fmt: skip
+
+
+def _count_campaigns(shown: dict[str, Any]) -> None:
+    """Put the number of scenes in the place of those of each campaign: thousands of lines."""
+    campaigns = shown.get("spec", {}).pop("campaigns", None)
+    if campaigns:
+        shown["spec"]["campaign_scenes"] = {name: len(scenes) for name, scenes in campaigns.items()}
 
 
 def _described(name: str, registry: Registry) -> list[dict[str, Any]]:

@@ -51,8 +51,8 @@ def notes_of(rows: Sequence[Row], blocks: Sequence[Block]) -> list[str]:
     return [
         *_stopped_notes(rows, STOPPED),
         *_mark_notes(rows),
-        *_no_better_notes(rows),
         *_floor_notes(rows),
+        *_no_better_notes(rows),
         *_tare_notes(rows),
         *_rank_notes(blocks),
         *_true_error_notes(rows),

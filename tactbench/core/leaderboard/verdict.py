@@ -60,7 +60,7 @@ def verdict_of(
         bar = score(best["baseline"], best["unit"]) + suffix(best["unit"])
         sentence = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {bar}."
     elif len(rows) == 1:
-        sentence = f"{names[0]}: {_measured(best)}, the only answer better than the trivial one."
+        sentence = f"{names[0]}: {_measured(best)}, the only answer better than {_bar(best, trivial)}."
     elif len(leaders) == 1:
         sentence = f"{names[0]} is best: {_measured(best)}."
     else:
@@ -204,6 +204,12 @@ def _reaches(row: Row, of_errors: str, of_shares: str, trivial: float | None) ->
     if figure is None or trivial is None:
         return False
     return bool(figure >= trivial if lower else figure <= trivial)
+
+
+def _bar(row: Row, trivial: Sequence[Row]) -> str:
+    """Return what the trivial answer is called that the baseline of a row is of."""
+    named = [answer_name(one) for one in trivial if asked_in(one) == asked_in(row) and one["score"] == row["baseline"]]
+    return f"the trivial {named[0]}" if named else "the trivial one"
 
 
 def _none_better(below: int, trivial: Sequence[Row]) -> str:

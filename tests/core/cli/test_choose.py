@@ -146,6 +146,10 @@ def test_a_task_is_a_page(tmp_path, verbs):
         assert said in page
     whole = json.loads(verbs("show", "force", "--format", "json").stdout)
     assert len(whole["spec"]["scenes"]) == 3
+    assert whole["spec"]["campaign_scenes"]["placement"] == 5
+    assert "campaigns" not in whole["spec"], "they are thousands of lines"
+    every = json.loads(verbs("show", "force", "--all", "--format", "json").stdout)
+    assert len(every["spec"]["campaigns"]["placement"]) == 5
     assert "--rig replay" in verbs("show", "shear-force").stdout
 
 

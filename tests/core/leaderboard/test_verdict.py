@@ -68,6 +68,13 @@ def test_an_answer_without_touch_that_is_as_good_is_named():
     assert build_table(rows).blocks[0].verdict[-1].startswith("mean reads no sensor, only the time since the press")
 
 
+def test_the_trivial_answer_that_is_the_bar_is_named():
+    timed = [one | {"looks_at": "time", "is_baseline": True} for one in replicates([0.3] * 8, estimator="time-index")]
+    known = [one | {"baseline": 0.9} for one in replicates([0.4] * 8)]
+    rows = over_replicates([*known, *timed, *replicates([0.9] * 8, estimator="mean")])
+    assert "the only answer better than the trivial mean." in build_table(rows).blocks[0].verdict[0]
+
+
 def test_an_answer_without_touch_is_named_where_there_are_few_replicates_too():
     timed = [one | {"looks_at": "time"} for one in replicates([0.3], estimator="mean")]
     said = build_table(over_replicates([*replicates([0.4]), *timed])).blocks[0].verdict

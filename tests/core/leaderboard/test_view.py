@@ -99,7 +99,7 @@ def test_three_notes_are_shown_the_most_important_first_and_a_command_for_the_ot
     assert commands(table, DEFAULT_VIEW)[0].startswith(f"{hidden} more notes and all columns: `tactbench leaderboard")
     assert notes(table, WHOLE) == table.notes
     order = [next(n for n, note in enumerate(table.notes) if text in note) for text in (
-        "not shown to be better", "Floor,", "chosen on validation", "before the press", "SIM:",
+        "Floor,", "not shown to be better", "chosen on validation", "before the press", "SIM:",
     )]  # fmt: skip
     assert order == sorted(order)
 

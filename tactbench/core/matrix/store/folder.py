@@ -17,7 +17,7 @@ from tactbench.core.matrix.store.disk import sync_path, writing
 from tactbench.core.matrix.store.image import digest_of, read_image
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
-from tactbench.core.matrix.store.rows import NAMING, NotPlainError, Row, named, plain
+from tactbench.core.matrix.store.rows import NAMING, NotPlainError, Row, named, plain, text_of
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
 
 if TYPE_CHECKING:
@@ -240,12 +240,12 @@ class Store:
         if image is None:
             return False
         try:
-            text = plain(entry.row)[1]
+            text = text_of(entry.row)
             if text.encode() in image:  # texts are stored as they are: no need to look where
                 return True
             from tactbench.core.matrix.store import shard
 
-            return plain(named(shard.row_in(self._shard(entry.key), image), entry.row))[1] == text
+            return text_of(named(shard.row_in(self._shard(entry.key), image), entry.row)) == text
         except (FormatError, NotPlainError):
             return False
 

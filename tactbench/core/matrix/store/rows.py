@@ -35,12 +35,17 @@ def plain(row: Mapping[str, Any]) -> tuple[Row, str]:
     NotPlainError
         If it holds what JSON has no word for.
     """
+    text = text_of(row)
+    back: Row = json.loads(text)
+    return back, text
+
+
+def text_of(row: Mapping[str, Any]) -> str:
+    """Return the text of a row; raises NotPlainError."""
     try:
-        text = _finite(row)
-        back: Row = json.loads(text)
+        return _finite(row)
     except (TypeError, ValueError, RecursionError) as error:
         raise NotPlainError(str(error)) from error
-    return back, text
 
 
 def fault_in_row(row: Row) -> str:

@@ -67,15 +67,15 @@ def read_arrays(path: Path, shown: str, how: Arrays) -> Iterator[tuple[Words, Ar
         yield {"index": f"{index:0{wide}d}", **words}, ArrayTable(f"{shown}[{how.array}, {index}]", rows)
 
 
-def require_small(path: Path, shown: str) -> None:
-    """Refuse an archive that unpacks to more than is read; MappingError, zipfile.BadZipFile."""
+def require_small(path: Path, shown: str, most: int = MAX_BYTES) -> None:
+    """Refuse an archive that unpacks to more than `most` bytes; MappingError, zipfile.BadZipFile."""
     with zipfile.ZipFile(path) as archive:
-        _require_small(shown, sum(member.file_size for member in archive.infolist()))
+        _require_small(shown, sum(member.file_size for member in archive.infolist()), most)
 
 
-def _require_small(shown: str, size: int) -> None:
-    if size > MAX_BYTES:
-        raise MappingError(f"{shown} unpacks to {size} bytes; at most {MAX_BYTES} are read.", hint="Split it.")
+def _require_small(shown: str, size: int, most: int) -> None:
+    if size > most:
+        raise MappingError(f"{shown} unpacks to {size} bytes; at most {most} are read.", hint="Split it.")
 
 
 def _require_there(shown: str, names: set[str], there: Collection[str]) -> None:
@@ -106,7 +106,7 @@ def _load_mat(path: Path, shown: str, names: set[str]) -> dict[str, npt.NDArray[
     try:
         sizes = {name: math.prod(shape) * _MAT_BYTES for name, shape, _ in io.whosmat(path)}
         _require_there(shown, names, sizes)
-        _require_small(shown, sum(sizes[name] for name in names))
+        _require_small(shown, sum(sizes[name] for name in names), MAX_BYTES)
         found = io.loadmat(path, variable_names=sorted(names))
     except MappingError:
         raise

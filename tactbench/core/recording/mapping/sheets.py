@@ -14,6 +14,8 @@ from tactbench.core.recording.mapping.model import Xlsx
 from tactbench.core.recording.mapping.table import TextTable, plain
 from tactbench.core.recording.mapping.text import Line, table_of
 
+MOST_BYTES = 2**29
+"""Unpacked: openpyxl holds all texts of a workbook in memory."""
 MOST_CELLS = 20_000_000
 """Empty ones too: a small file can name a cell in the last row of the last column."""
 
@@ -34,7 +36,7 @@ def read_sheet(path: Path, shown: str, how: Xlsx) -> TextTable:
             hint="Install it with `pip install 'tactbench[xlsx]'`, or save the sheet as CSV.",
         ) from error
     try:
-        require_small(path, shown)
+        require_small(path, shown, MOST_BYTES)
         with warnings.catch_warnings(), path.open("rb") as opened:
             warnings.simplefilter("ignore")  # styles and extensions that openpyxl does not know
             book = load_workbook(opened, read_only=True, data_only=True)
