@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.plugins.registry import installed
+from tactbench.core.plugins.registry import installed, load_registry
 from tactbench.core.provenance.source import versions
 from tactbench.core.spec.scene import Simulation
 
@@ -84,7 +84,7 @@ def test_keys_are_the_same_in_another_process(keys):
     text = """
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.plugins.registry import installed
+from tactbench.core.plugins.registry import installed, load_registry
 cell = Cell("ideal", "force", "twin", "deployable", "session", "lasso", (("lambda_", 0.2),), False, 1, 3, 5)
 print(Keys(installed()).of_cell(cell, ("d1", "d2")))
 """
@@ -103,3 +103,19 @@ def test_versions_of_what_computes_are_there_and_missing_ones_say_so():
     import numpy
 
     assert found["numpy"] == numpy.__version__
+
+
+def test_the_code_of_a_tasks_own_features_is_in_the_key(tmp_path, monkeypatch):
+    """In a package of its own: a changed feature is computed again."""
+    monkeypatch.syspath_prepend(tmp_path)
+    code = tmp_path / "features_of_a_stranger.py"
+    registry = load_registry()
+    owned = registry.tasks.owned(CELL.task)
+    spec = owned.descriptor.spec.model_copy(update={"features_by": "features_of_a_stranger:crest"})
+    named = replace(owned, descriptor=owned.descriptor.model_copy(update={"spec": spec}))
+    monkeypatch.setattr(registry.tasks, "owned", lambda _: named)
+    keys = []
+    for body in ("1.0", "2.0"):
+        code.write_text(f"def crest(streams):\n    return {{'crest': {body}}}\n")
+        keys.append(key(Keys(registry)))
+    assert keys[0] != keys[1] == key(Keys(registry))
