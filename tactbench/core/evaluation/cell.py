@@ -272,6 +272,8 @@ def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> Cell
     data = folds.data
     assignments = assigned(context.task, estimator, data, folds.split, context.seed)
     assert_disjoint(assignments)
+    if not assignments:
+        raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
     over_recorded = [over_rows(one, recorded) for one in assignments]
     folds.look_over(over_recorded)
     if folds.split == "shuffled":

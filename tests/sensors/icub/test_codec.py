@@ -448,7 +448,7 @@ def _lawicel(one: CanFrame) -> bytes:
         bus.send(can.Message(arbitration_id=one.id, data=one.data, is_extended_id=one.extended))
         text: bytes = port.read_until(b"\r")
         port.write(text)
-        heard = bus.recv(timeout=1.0)
+        heard = bus.recv(timeout=30.0)
         assert heard is not None
         assert CanFrame(heard.arbitration_id, bytes(heard.data), heard.is_extended_id) == one
         return text
