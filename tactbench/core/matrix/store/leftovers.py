@@ -46,11 +46,12 @@ def _remove(path: Path) -> None:
 def _alive(process: int) -> bool:
     try:
         os.kill(process, 0)
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]  # proc_pid_stat(5)
     except ProcessLookupError:
         return False
-    except (OSError, OverflowError):  # somebody else's, or no number of a process
-        pass
-    return True
+    except (OSError, OverflowError, IndexError):  # somebody else's, no number of a process, or a system without /proc
+        return True
+    return state not in "ZX"  # ended, and only not reaped yet
 
 
 def _being_written(journal: Path) -> bool:

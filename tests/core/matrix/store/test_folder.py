@@ -241,3 +241,14 @@ def test_a_long_log_is_kept_from_its_end(tmp_path):
     assert len(row["log"]) < 70_000
     assert row["log"].endswith("the end")
     assert json.dumps(row)
+
+
+def test_what_a_process_left_that_nobody_has_reaped_is_removed_and_that_of_a_living_one_is_not(tmp_path):
+    cells = tmp_path / "cells"
+    cells.mkdir()
+    with subprocess.Popen([sys.executable, "-c", "pass"]) as over:
+        os.waitid(os.P_PID, over.pid, os.WEXITED | os.WNOWAIT)
+        for process in (over.pid, os.getpid()):
+            (cells / f".{key('a')}.h5.{process}.partial").write_bytes(b"half")
+        with Store(tmp_path).hold():
+            assert [path.name for path in cells.iterdir()] == [f".{key('a')}.h5.{os.getpid()}.partial"]
