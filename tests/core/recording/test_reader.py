@@ -397,3 +397,18 @@ def test_texts_that_nothing_can_print(good, name):
         file.attrs["meta"] = np.bytes_(text.replace(json.loads(text)["name"], name).encode("utf-8", "surrogateescape"))
     with pytest.raises(FormatError, match="damaged"):
         open_recording(good)
+
+
+def test_texts_in_chunks_that_are_large_when_compressed_are_read(write):
+    """What a row of texts takes in a chunk is its reference, 16 bytes, and no pointer of this process."""
+    rows = 200_000
+    texts = [f"{number:x}" for number in np.random.default_rng(0).integers(0, 2**63, rows)]
+    path = write(np.arange(3 * rows).reshape(rows, 3) % 4096, force=np.arange(float(rows)))
+    with h5py.File(path, "r+") as file:
+        notes = file["streams/taxels"].require_group("annotations")
+        made = notes.create_dataset(
+            "object", data=texts, dtype=h5py.string_dtype("utf-8"), chunks=(rows,), compression="gzip"
+        )
+        assert made.id.get_chunk_info(0).size > 2**18
+    with open_recording(path) as recording:
+        assert recording.read("taxels").annotations["object"].tolist() == texts
