@@ -1,4 +1,4 @@
-"""Writing a file whole or not at all, and reading one that anybody may have put there."""
+"""Writing a file whole or not at all, reading one that anybody may have put there, and locks."""
 
 from __future__ import annotations
 
@@ -29,6 +29,25 @@ def read_regular(path: Path, most: int, *, follow: bool = True) -> bytes:
         if not stat.S_ISREG(os.fstat(opened).st_mode):
             raise OSError(errno.EINVAL, "it is no regular file", str(path))
         return file.read(most + 1)
+
+
+def try_lock(file: int) -> bool | None:
+    """Lock an open file for this process (flock(2)); the kernel lets go when it is closed, however the process ends.
+
+    Returns
+    -------
+    bool or None
+        False if another process has it; None where there are no locks: on Windows, on some network disks.
+    """
+    try:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except (ImportError, OSError):
+        return None
+    return True
 
 
 def replace_file(path: Path, content: bytes, *, sync: bool = True) -> None:

@@ -169,7 +169,6 @@ class _Folds:
         self.untrained: dict[str, list[str]] = {}
         self.search_s = self.fit_s = self.predict_s = 0.0
         self.batch_rows = 0
-        self.model: Estimator | None = None
         self.test: Any = None
 
     def look_over(self, assignments: Sequence[Assignment]) -> None:
@@ -181,8 +180,8 @@ class _Folds:
             table.meta for table, mask in zip(self.recorded.tables, used, strict=True) if (mask & table.labelled).any()
         ]
 
-    def add(self, number: int, assignment: Assignment, build: Build, *, alone: bool) -> None:
-        """Choose, fit and test on one fold; `alone`: it is the only one."""
+    def add(self, number: int, assignment: Assignment, build: Build, *, alone: bool) -> Estimator:
+        """Choose, fit and test on one fold, and return the fitted model; `alone`: it is the only one."""
         context, data, rules, metric, counts = self.context, self.data, self.rules, self.metric, self.counts
         estimator, clock = context.estimator, context.clock
         began = clock()
@@ -226,7 +225,8 @@ class _Folds:
             self.scores["validation"] = choice.score
         self.n_train += len(fold.train)
         self.folds += 1
-        self.model, self.test, self.k = model, fold.test, k
+        self.test, self.k = fold.test, k
+        return model
 
     def _combined(self, part: Part, predicted: npt.NDArray[Any]) -> tuple[Part, npt.NDArray[Any]]:
         """Return what is scored: rows and their answers, or recordings and what their rows' answers come to."""
@@ -284,10 +284,8 @@ def evaluate(context: CellContext, recordings: Sequence[Path] | Dataset) -> Cell
     with thread_limit(context.threads):
         for number, assignment in enumerate(assignments):
             say(f"{estimator.name}: {assignment.name}")
-            folds.add(number, assignment, build, alone=len(assignments) == 1)
-        if folds.model is None:
-            raise DataError("No fold could be made of these recordings.", hint="Choose another --split.")
-        latency = _latency_ms(folds.model, features_of(folds.test, estimator), context.clock) if context.latency else {}
+            model = folds.add(number, assignment, build, alone=len(assignments) == 1)
+        latency = _latency_ms(model, features_of(folds.test, estimator), context.clock) if context.latency else {}
         delay = _delay(folds, latency)
     return _result(folds, latency, delay)
 

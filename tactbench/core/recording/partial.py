@@ -8,6 +8,7 @@ A journal is frames, one after the other, each with its length and checksum. Wha
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import struct
@@ -22,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import FormatError, MissingRecordingError
+from tactbench.core.files import try_lock
 from tactbench.core.recording.format import canonical
 
 MAGIC = b"tactbench-partial 2\n"
@@ -54,7 +56,8 @@ class Partial:
         self._end = 0
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
         try:
-            _lock(self._file)
+            if try_lock(self._file) is False:
+                raise OSError(errno.EWOULDBLOCK, "another process is recording into it")
             os.ftruncate(self._file, 0)
             self._write(MAGIC + _frame(text.encode(), b""))
         except BaseException:
@@ -212,17 +215,3 @@ def _understood(path: Path) -> Iterator[None]:
         yield
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise FormatError(f"{path} holds a frame that makes no sense: {error}.", hint="Record it again.") from error
-
-
-def _lock(file: int) -> None:
-    """Keep a second process from recording into the same file."""
-    try:
-        import fcntl
-    except ImportError:  # Windows keeps others from an open file by itself
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise OSError(error.errno, "another process is recording into it") from error
-    except OSError:
-        pass  # some network disks know no locks

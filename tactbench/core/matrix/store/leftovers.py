@@ -7,6 +7,8 @@ import re
 from contextlib import suppress
 from pathlib import Path
 
+from tactbench.core.files import try_lock
+
 _ASIDE = re.compile(r"\..+\.(\d{1,10})\.partial")
 """Names of files written aside by `tactbench.core.files.replace_file`: hidden, with the writer's process."""
 
@@ -57,12 +59,7 @@ def _alive(process: int) -> bool:
 def _being_written(journal: Path) -> bool:
     """Return whether a process holds the lock that the writer of a recording keeps on its journal."""
     try:
-        import fcntl
-
         with journal.open("rb") as file:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except (ImportError, OSError):
+            return try_lock(file.fileno()) is False
+    except OSError:
         return False
-    return False

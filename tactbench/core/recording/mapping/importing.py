@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import cast, get_args
 
 from tactbench.core.errors import MappingError, RecordingError, UnwritableError
+from tactbench.core.files import try_lock
 from tactbench.core.recording.health import Finding, examine
 from tactbench.core.recording.mapping.channels import MappedStream, device, fill, sensor_of
 from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
@@ -150,7 +151,7 @@ def _aside(out: Path) -> Iterator[Path]:
             f"The folder {out} cannot be written: {error.strerror}.", hint="Give another with --out DIR."
         ) from error
     with lock:
-        _lock(lock.fileno())
+        try_lock(lock.fileno())
         try:
             yield folder
         finally:
@@ -161,20 +162,9 @@ def _held(folder: Path) -> bool:
     """Return whether a process still writes into a folder of `_aside`."""
     try:
         with (folder / _LOCK).open("rb") as lock:
-            return not _lock(lock.fileno())
+            return not try_lock(lock.fileno())
     except OSError:  # no lock yet, perhaps
         return True
-
-
-def _lock(file: int) -> bool:
-    """Lock a file for this process; the kernel lets go when it ends. Return False if another has it, or nobody can."""
-    try:
-        import fcntl
-
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (ImportError, OSError):
-        return False
-    return True
 
 
 def _count_files(sets: Sequence[FileSet]) -> int:
