@@ -91,11 +91,12 @@ def acquire_missing(
 
 
 def _discard(request: RecordingRequest) -> None:
-    """Remove what there is of a recording; a disk that refuses has been told of already."""
-    from tactbench.core.recording.format import partial_path
+    """Remove what there is of an unfinished recording; a disk that refuses has been told of already."""
+    from tactbench.core.recording.format import completing_path, partial_path
 
-    with suppress(OSError):
-        partial_path(request.path).unlink(missing_ok=True)
+    for unfinished in (partial_path(request.path), completing_path(request.path)):
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
 
 
 def _computed(request: RecordingRequest) -> bool:
