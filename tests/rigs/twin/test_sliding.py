@@ -204,10 +204,34 @@ def test_louder_with_roughness_and_the_same_with_the_same_seed(record):
 @pytest.mark.parametrize(
     ("sensor", "kind", "stream"), [("icub", "taxel", "taxels"), ("biotac", "dc_pressure", "electrodes")]
 )
-def test_sliding_disturbs_no_other_channel(record, sensor, kind, stream):
+def test_a_profile_that_passes_is_read_like_a_force_that_changes(record, sensor, kind, stream):
+    rough = Surface(roughness=_q(100.0, "um"))
+
+    def read(force=1.0, slide=None):
+        # As slow as the slower sensor, so that both kinds of recording have one clock.
+        held = _held(force).model_copy(update={"samples": 400})
+        _, streams, _ = record(sensor, profile=held, observe=(kind,), environment=SILENT, slide=slide)
+        return streams[stream].data.astype(float), _columns(streams["force_torque"])["fz"]
+
+    (still, _), (moving, force) = read(), read(slide=_slide(20.0, surface=rough))
+    (less, _), (more, _) = read(0.8), read(1.2)
+    np.testing.assert_array_equal(still[:50], moving[:50])
+    assert not (force[:50] - 1.0).any()
+    assert force[50:].std() > 0.05
+    # Per newton by two still recordings. Each of the four is rounded to a count; the profile counts in first order.
+    expected = (force - 1.0)[:, None] * (more - less) / 0.4
+    assert np.abs(moving - still - expected).max() < 2.0 + 0.1 * np.abs(expected).max()
+    assert np.abs(expected).max() > 4.0
+
+
+@pytest.mark.parametrize(
+    ("sensor", "kind", "stream"), [("icub", "taxel", "taxels"), ("biotac", "dc_pressure", "electrodes")]
+)
+def test_sliding_over_an_even_surface_disturbs_no_slow_channel(record, sensor, kind, stream):
     held = _held().model_copy(update={"samples": 400})
+    even = Surface(roughness=_q(0.0, "um"))
     still = record(sensor, "x", profile=held, observe=(kind,))[1][stream].data
-    moving = record(sensor, "x", profile=held, observe=(kind,), slide=_slide(20.0))[1][stream].data
+    moving = record(sensor, "x", profile=held, observe=(kind,), slide=_slide(20.0, surface=even))[1][stream].data
     np.testing.assert_array_equal(still, moving)
 
 
