@@ -24,6 +24,7 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import Environment, Slide, Surface
 from tactbench.rigs.twin import tactbench_effects
+from tactbench.rigs.twin.closed_forms.tangential import CattaneoMindlin
 from tactbench.rigs.twin.rig import build
 
 TWIN = RigDescriptor(name="twin", title="Twin", where="tactbench.rigs.twin.rig:build", simulated=True)
@@ -141,6 +142,40 @@ def test_every_component_of_the_force_has_its_noise_and_its_low_pass(record):
     assert raw == pytest.approx([0.5] * 3, rel=0.12)
     assert max(smooth) < 0.2
     assert set(np.unique(slip)) <= {0.0, 1.0}
+
+
+@pytest.mark.parametrize("sensor", ["biotac", "icub"])
+def test_a_recorded_stick_ratio_is_that_of_cattaneo_and_mindlin(record, sensor):
+    kinds = ("ac_pressure",) if sensor == "biotac" else ("taxel",)
+    held = _held(1.0).model_copy(update={"samples": 8000})
+    _, streams, _ = record(sensor, profile=held, observe=kinds, environment=SILENT, slide=_slide(1.0))
+    found, t_s = _columns(streams["force_torque"]), streams["force_torque"].t_ns / 1e9
+    first = np.argmax(found["slipping"] > 0)
+    loading = (t_s >= 1.0) & (np.arange(t_s.size) < first)
+    assert loading.sum() > 100
+    # The smaller contact, that would just slip under the same push, over the whole one; a is theirs by Hertz.
+    law = CattaneoMindlin(0.7834, 1.0, 1.0, tangential_modulus_mpa=1.0)
+    sticking = np.array([law.stick_radius_mm(push) for push in found["tangential"][loading]])
+    # Off by the viscous force alone, 2 z/w V k: 1e-4 of the limit at 1 mm/s, whose cube root is 0.05 at the very end.
+    share = found["tangential"][loading] / 0.7834
+    whole = share < 0.99
+    assert np.abs(found["stick_ratio"][loading] - sticking)[whole].max() < 0.02 * sticking[whole].min()
+    assert np.abs(found["stick_ratio"][loading] - sticking).max() < 0.06
+
+
+@pytest.mark.parametrize("speed", [0.5, 20.0, 500.0])
+def test_a_recording_with_steps_a_thousand_times_as_long_says_the_same(record, speed):
+    def run(samples):
+        held = _held(1.0).model_copy(update={"samples": samples})
+        _, streams, _ = record(profile=held, environment=SILENT, slide=_slide(speed), observe=("dc_pressure",))
+        assert all(np.isfinite(stream.data.astype(float)).all() for stream in streams.values())
+        return _columns(streams["force_torque"])
+
+    coarse, fine = run(16), run(16000)
+    for name in ("slip", "tangential", "stick_ratio", "slipping"):
+        np.testing.assert_array_equal(coarse[name], fine[name][::1000])
+    # The profile is heard where its samples fall, and is never larger for that: seven standard deviations of it.
+    assert np.abs(coarse["normal"] - 1.0).max() < 7 * (fine["normal"] - 1.0).std()
 
 
 def test_a_scene_that_only_presses_has_no_tangential_channels_and_says_why(record):
