@@ -21,7 +21,7 @@ def require_first_rows(task: TaskSpec, data: Dataset, split: str) -> None:
         time, so that no first row is ever tested.
     """
     for table in data.tables:
-        if len(np.unique(table.y[table.labelled])) > 1:
+        if len(np.unique(table.y[table.labelled], axis=0)) > 1:
             raise NotApplicable(
                 f"Protocol {_NAME!r} asks whether the first row of a recording gives its answer away; the answer of "
                 f"task {task.name!r} changes within recording {table.meta.name!r}, and nothing in it comes before.",
