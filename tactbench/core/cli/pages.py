@@ -80,21 +80,23 @@ def _target(task: TaskSpec) -> str:
         return f"reference channel{name} of kind {task.target.kind}, in {task.target.unit}, sample by sample"
     if isinstance(task.target, VectorTarget):
         names = ", ".join(task.target.names)
-        return f"vector ({names}): reference channels of kind {task.target.kind}, in {task.target.unit}, sample by sample"
+        return (
+            f"vector ({names}): reference channels of kind {task.target.kind}, in {task.target.unit}, sample by sample"
+        )
     what = "a class" if task.kind == "classification" else "a number"
     return f"{what}: label {task.target.name}{f', in {task.target.unit}' if task.target.unit != '1' else ''}"
 
 
 def _scenes(task: TaskSpec) -> list[tuple[str, ...]]:
     """Return one line for each role and indenter with equal force profiles, with how many scenes there are."""
-    scenes = [(planned.role, *_scene(planned.scene)) for planned in task.scenes]
+    scenes = [(str(planned.role), *_scene(planned.scene)) for planned in task.scenes]
     places: dict[tuple[str, ...], set[str]] = {}
-    for role, indenter, where, *rest in scenes:
-        places.setdefault((role, indenter, *rest), set()).add(where)
+    for *way, where, force, duration in scenes:
+        places.setdefault((*way, force, duration), set()).add(where)
     counts: Counter[tuple[str, ...]] = Counter()
-    for role, indenter, where, *rest in scenes:
-        several = len(places[role, indenter, *rest])
-        counts[role, indenter, where if several <= MOST_PLACES else f"{several} places", *rest] += 1
+    for *way, where, force, duration in scenes:
+        several = len(places[*way, force, duration])
+        counts[*way, where if several <= MOST_PLACES else f"{several} places", force, duration] += 1
     merged: dict[tuple[str, ...], tuple[int, list[str]]] = {}
     for (role, indenter, *rest), count in counts.items():
         number, indenters = merged.get((role, *rest), (0, []))
