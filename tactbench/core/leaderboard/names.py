@@ -18,6 +18,7 @@ EMULATED = "EMULATED"
 METRIC_NAMES = {
     "rmse": "RMSE",
     "mae": "MAE",
+    "mean_euclidean_error": "mean Euclidean error",
     "r2": "R²",
     "macro_f1": "macro F1",
     "accuracy": "accuracy",

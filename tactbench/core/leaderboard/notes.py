@@ -13,6 +13,7 @@ from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.names import answer_name, answer_or_probe, question_name
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
+from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
 from tactbench.core.spec.status import STATUSES, STOPPED
 from tactbench.core.tables.numbers import score, suffix
 from tactbench.core.tables.text import command_line, cut, visible
@@ -52,6 +53,7 @@ def notes_of(rows: Sequence[Row], blocks: Sequence[Block]) -> list[str]:
         *_stopped_notes(rows, STOPPED),
         *_mark_notes(rows),
         *_floor_notes(rows),
+        *_vector_notes(rows),
         *_no_better_notes(rows),
         *_tare_notes(rows),
         *_rank_notes(blocks),
@@ -92,6 +94,18 @@ def _tare_notes(rows: Sequence[Row]) -> list[str]:
     if any(row["protocol"] == "deployable-untared" and row["status"] == "done" for row in rows):
         sentences.append("`deployable-untared`: readings as they are")
     return [f"{'; '.join(sentences)}."] if sentences else []
+
+
+def _vector_notes(rows: Sequence[Row]) -> list[str]:
+    """Return the percentiles that stand beside mean errors of vectors."""
+    named = _namer(rows)
+    found = [
+        f"{named(row)}/{answer_name(row)} {score(row['scores'][MEDIAN_ERROR], row['unit'])}, "
+        f"{score(row['scores'][HIGH_ERROR], row['unit'])}{suffix(row['unit'])}"
+        for row in rows
+        if MEDIAN_ERROR in (row["scores"] or {}) and not row["is_baseline"]
+    ]
+    return [visible(f"Median and 95th percentile of the error over test rows: {'; '.join(found)}.")] if found else []
 
 
 def _floor_notes(rows: Sequence[Row]) -> list[str]:
