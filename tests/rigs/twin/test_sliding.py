@@ -156,11 +156,9 @@ def test_a_recorded_stick_ratio_is_that_of_cattaneo_and_mindlin(record, sensor):
     # The smaller contact, that would just slip under the same push, over the whole one; a is theirs by Hertz.
     law = CattaneoMindlin(0.7834, 1.0, 1.0, tangential_modulus_mpa=1.0)
     sticking = np.array([law.stick_radius_mm(push) for push in found["tangential"][loading]])
-    # Off by the viscous force alone, 2 z/w V k: 1e-4 of the limit at 1 mm/s, whose cube root is 0.05 at the very end.
-    share = found["tangential"][loading] / 0.7834
-    whole = share < 0.99
-    assert np.abs(found["stick_ratio"][loading] - sticking)[whole].max() < 0.02 * sticking[whole].min()
-    assert np.abs(found["stick_ratio"][loading] - sticking).max() < 0.06
+    # Off by the viscous force alone, 2 z/w V k: 1e-4 of the limit at 1 mm/s. Beyond 99 % of it the radius is a fifth.
+    before = found["tangential"][loading] < 0.99 * 0.7834
+    assert np.abs(found["stick_ratio"][loading] / sticking - 1)[before].max() < 0.02
 
 
 @pytest.mark.parametrize("speed", [0.5, 20.0, 500.0])
