@@ -22,6 +22,7 @@ from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig,
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality, StreamReadings
 from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.events import THRESHOLDS, AlarmPolicy, SlipTarget, SlipThresholds
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor, SensorDescriptor, TaskDescriptor
@@ -43,7 +44,9 @@ if TYPE_CHECKING:
     from tactbench.core.samples import FloatArray
 
 __all__ = [
+    "THRESHOLDS",
     "Acquisition",
+    "AlarmPolicy",
     "Block",
     "ChannelKind",
     "ChannelSpec",
@@ -77,6 +80,8 @@ __all__ = [
     "Scene",
     "SensorDescriptor",
     "SensorSpec",
+    "SlipTarget",
+    "SlipThresholds",
     "Source",
     "Statement",
     "StreamReadings",

@@ -15,7 +15,7 @@ LOWER_IS_BETTER = frozenset({"rmse", "mae"})
 
 SCORES = {
     "rmse": (0.0, math.inf), "mae": (0.0, math.inf), "r2": (-math.inf, 1.0), "accuracy": (0.0, 1.0),
-    "balanced_accuracy": (0.0, 1.0), "macro_f1": (0.0, 1.0),
+    "balanced_accuracy": (0.0, 1.0), "macro_f1": (0.0, 1.0), "event_f1": (0.0, 1.0),
 }  # fmt: skip
 """What scores of a metric lie between."""
 
@@ -123,6 +123,8 @@ class RowModel(BaseModel):
     fold_sizes: dict[str, Any] = {}
     confusion: list[list[Any]] | None = None
     classes: list[str | bool | int | float] = []
+    events: Numbers = {}
+    operating_points: list[Numbers] = []
     replicates: dict[str, Any] = {}
 
 
