@@ -26,7 +26,7 @@ from tactbench.core.spec.events import THRESHOLDS, AlarmPolicy, SlipTarget, Slip
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor, SensorDescriptor, TaskDescriptor
-from tactbench.core.spec.scene import ForceRamp, Indenter, Placement, Role, Scene
+from tactbench.core.spec.scene import ForcePath, ForceRamp, Indenter, Placement, Role, Scene
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
@@ -57,6 +57,7 @@ __all__ = [
     "EstimatorDescriptor",
     "FloatArray",
     "ForceLoop",
+    "ForcePath",
     "ForceRamp",
     "Indenter",
     "LabelTarget",

@@ -107,7 +107,8 @@ def _scene(scene: Scene) -> tuple[str, str, str, str]:
     where = "nominal" if nominal else f"{place.x} along, {place.s} across"
     scatter = f", scatter {place.scatter}" if place.scatter.value else ""
     slide = f", slides {scene.slide}" if scene.slide else ""
-    force = f"{profile.start.value:g} to {profile.end}, after {profile.hold}"
+    end = profile.end if profile.kind == "ramp" else f"{profile.largest_n:g} N and elsewhere"
+    force = f"{profile.start.value:g} to {end}, after {profile.hold}"
     return str(scene.indenter), where + scatter, force + slide, str(profile.duration)
 
 
