@@ -218,7 +218,7 @@ def _bounds(summary: Summary, window_s: float) -> tuple[float, float]:
 def _measured(values: FloatArray, measure: str, first: IntArray, last: IntArray) -> FloatArray:
     """Return (frames, channels) of rows ``first .. last`` (excluded): what `summary_of` says of each window alone.
 
-    Sums are differences of running sums of centred columns; the error is that of `causal_mean`.
+    Sums are differences of running sums, counted from the first sample, so that no digit depends on later ones.
     """
     count = (last - first)[:, None].astype(np.float64)
     some = count > 0
@@ -233,7 +233,7 @@ def _measured(values: FloatArray, measure: str, first: IntArray, last: IntArray)
     elif measure == "band-energy":
         found = _sums(values**2, first, last) / np.maximum(count, 1)
     else:
-        centre = values.mean(axis=0)
+        centre = values[0]
         mean = _sums(values - centre, first, last) / np.maximum(count, 1)
         found = mean + centre
         if measure == "deviation":

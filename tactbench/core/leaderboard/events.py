@@ -26,10 +26,15 @@ _FIGURES = {
 }
 """Columns, and which figure each shows how."""
 _OTHER_LABELS = ("F1 with label thresholds halved", "F1 with label thresholds doubled")
+POINTS_TITLE = "Events · where more false alarms are put up with"
+POINTS_NOTE = (
+    "A column a bound of false alarms a minute, at which validation recordings chose a threshold; each says what test "
+    "recordings then have: recall, false alarms a minute, median latency. No score rests on them."
+)
 NOTE = (
     "Latency: from the labelled onset to the alarm, with the time that the detector computes; negative is early; over "
-    "hits alone, so read it beside the misses. Slipped: the median displacement from onset to alarm. Compute: seconds a "
-    "second of signal. Definitions: docs/events.md."
+    "hits alone, so read it beside the misses. Slipped: the median displacement from onset to alarm. Compute: seconds "
+    "a second of signal. Definitions: docs/events.md."
 )
 
 
@@ -55,6 +60,36 @@ def events_section(rows: Sequence[Row]) -> TextTable | None:
     kinds = tuple("baseline" if row["is_baseline"] else "result" for row in told)
     notes = (NOTE, *_policies(told), *_other_labels(told), *_oracles(told))
     return TextTable(TITLE, columns, tuple(lines), frozenset(columns[3:]), kinds=kinds, notes=notes)
+
+
+def operating_points_section(rows: Sequence[Row]) -> TextTable | None:
+    """Return what a detector hits, and how late, where more false alarms are put up with; None where nothing is said.
+
+    Parameters
+    ----------
+    rows
+        In the order of the leaderboard's lines.
+    """
+    told = [row for row in rows if row["status"] == "done" and row.get("operating_points")]
+    bounds = list(dict.fromkeys(point["bound"] for row in told for point in row["operating_points"]))
+    lines = []
+    for row in told:
+        points = {point["bound"]: _point(point) for point in row["operating_points"]}
+        texts = [points.get(bound, ABSENT) for bound in bounds]
+        lines.append((visible(row["task"]), sensor_name(row), answer_name(row), *texts))
+    columns = ("task", "sensor", "estimator", *(f"{bound:g}/min" for bound in bounds))
+    if not lines:
+        return None
+    return TextTable(POINTS_TITLE, columns, tuple(lines), frozenset(columns[3:]), notes=(POINTS_NOTE,))
+
+
+def _point(point: Mapping[str, float]) -> str:
+    """Return recall, false alarms a minute and latency of one operating point."""
+    late = point.get("onset latency p50 ms")
+    recall, rate = (
+        _figure(point.get(key), form) for key, form in (("recall", ".2f"), ("false alarms per minute", ".2g"))
+    )
+    return f"{recall}, {rate}/min" + ("" if late is None else f", {late:.0f} ms")
 
 
 def _figure(value: float | None, form: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
 from tactbench.core.leaderboard.columns import columns
-from tactbench.core.leaderboard.events import events_section
+from tactbench.core.leaderboard.events import events_section, operating_points_section
 from tactbench.core.leaderboard.footer import footer_of
 from tactbench.core.leaderboard.hosts import host_letters, timing_notes
 from tactbench.core.leaderboard.lines import Line
@@ -74,8 +74,8 @@ def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: b
     notes = notes_of(ordered, blocks)
     if times:
         notes += timing_notes(rows, letters, known)
-    events = events_section(ordered) if times else None
-    sections = (events, over_tasks(rows), published_section(rows), build_probe(ordered))
+    events = (events_section(ordered), operating_points_section(ordered)) if times else ()
+    sections = (*events, over_tasks(rows), published_section(rows), build_probe(ordered))
     return Table(
         blocks,
         names,
