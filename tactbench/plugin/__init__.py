@@ -22,7 +22,7 @@ from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig,
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality, StreamReadings
 from tactbench.core.spec.drive import ForceLoop
-from tactbench.core.spec.events import THRESHOLDS, AlarmPolicy, SlipTarget, SlipThresholds
+from tactbench.core.spec.events import AlarmPolicy, SlipTarget
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor, SensorDescriptor, TaskDescriptor
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from tactbench.core.samples import FloatArray
 
 __all__ = [
-    "THRESHOLDS",
     "Acquisition",
     "AlarmPolicy",
     "Block",
@@ -82,7 +81,6 @@ __all__ = [
     "SensorDescriptor",
     "SensorSpec",
     "SlipTarget",
-    "SlipThresholds",
     "Source",
     "Statement",
     "StreamReadings",
