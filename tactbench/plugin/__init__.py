@@ -37,7 +37,7 @@ from tactbench.core.spec.sensor import (
     StreamSpec,
 )
 from tactbench.core.spec.summary import Summary
-from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
+from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec, VectorTarget
 from tactbench.plugin.on_demand import on_demand
 
 if TYPE_CHECKING:
@@ -91,6 +91,7 @@ __all__ = [
     "TaskSpec",
     "UnknownNameError",
     "UsageError",
+    "VectorTarget",
     "assumed",
     "derived",
     "hookimpl",

@@ -13,7 +13,7 @@ from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES
 from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.rig import EffectDescriptor, EstimatorDescriptor, RigDescriptor
 from tactbench.core.spec.scene import Scene
-from tactbench.core.spec.task import ChannelTarget, Published, TaskSpec
+from tactbench.core.spec.task import ChannelTarget, Published, TaskSpec, VectorTarget
 from tactbench.core.tables.numbers import suffix
 
 Pair = tuple[str, str]
@@ -71,6 +71,10 @@ def task_page(task: TaskSpec) -> Page:
     return page
 
 
+MOST_PLACES = 8
+"""That are named one by one."""
+
+
 def _where_there(kinds: Sequence[str]) -> str:
     return f"; where a sensor has them {', '.join(kinds)}" if kinds else ""
 
@@ -82,15 +86,25 @@ def _target(task: TaskSpec) -> str:
     if isinstance(task.target, SlipTarget):
         what = "when slip begins" if task.kind == "events" else "stick, incipient or gross slip"
         return f"{what}, by the reference alone; {task.target}"
+    if isinstance(task.target, VectorTarget):
+        names = ", ".join(task.target.names)
+        return (
+            f"vector ({names}): reference channels of kind {task.target.kind}, in {task.target.unit}, sample by sample"
+        )
     what = "a class" if task.kind == "classification" else "a number"
     return f"{what}: label {task.target.name}{f', in {task.target.unit}' if task.target.unit != '1' else ''}"
 
 
 def _scenes(task: TaskSpec) -> list[tuple[str, ...]]:
     """Return one line for each role and indenter with equal force profiles, with how many scenes there are."""
+    scenes = [(str(planned.role), *_scene(planned.scene)) for planned in task.scenes]
+    places: dict[tuple[str, ...], set[str]] = {}
+    for *way, where, force, duration in scenes:
+        places.setdefault((*way, force, duration), set()).add(where)
     counts: Counter[tuple[str, ...]] = Counter()
-    for planned in task.scenes:
-        counts[(planned.role, *_scene(planned.scene))] += 1
+    for *way, where, force, duration in scenes:
+        several = len(places[*way, force, duration])
+        counts[*way, where if several <= MOST_PLACES else f"{several} places", force, duration] += 1
     merged: dict[tuple[str, ...], tuple[int, list[str]]] = {}
     for (role, indenter, *rest), count in counts.items():
         number, indenters = merged.get((role, *rest), (0, []))

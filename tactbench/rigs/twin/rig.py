@@ -28,6 +28,7 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import EffectDescriptor, Explained
 from tactbench.rigs.twin.contact.stages import bare_skin
+from tactbench.rigs.twin.contact_point import contact_point
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
@@ -172,10 +173,15 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
     )
     measured = np.column_stack([run.reference_n, *(values for _, values in more.values())])
     samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), measured, None)
+    places: tuple[StreamSpec, ...] = ()
+    if "position" in run.scene.observe:
+        place, values, quality = contact_point(run, rate, _ONE_CLOCK)
+        samples[place.name] = Samples(_ns(run.t_s), values, quality)
+        places = (place,)
     contact_x, contact_s = commanded_place_mm(run.sensor.spec, run.scene)
     return TwinAcquisition(
         streams=tuple(streams),
-        reference=(reference,),
+        reference=(reference, *places),
         plan=plan.settled(run.settled),
         assumptions={
             "contact_x_mm": contact_x,
