@@ -11,7 +11,7 @@ from tactbench.core.spec.rig import EffectDescriptor, EstimatorDescriptor, RigDe
 from tactbench.core.spec.sensor import ChannelSpec, DataSheet, Nuisances, SensorSpec, StreamSpec
 from tactbench.core.spec.skin import BondedLayer, SkinSheet
 from tactbench.core.spec.task import TaskSpec
-from tests.conftest import ROOT, Shell, Verbs
+from tests.conftest import ROOT, Verbs
 
 EXPLAINED = {
     "sensor": (SensorDescriptor, SensorSpec, StreamSpec, ChannelSpec, BondedLayer, SkinSheet, Nuisances, DataSheet),
