@@ -12,6 +12,7 @@ from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.matrix import REPLICATES, EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Simulation
@@ -45,6 +46,8 @@ class Cell:
     """How a simulated rig is asked to carry out its scenes."""
     rig_file: str = ""
     """What the rig file says, as canonical JSON; empty: there is none."""
+    declared_task: str = ""
+    """What the recordings declare of the task, as JSON; empty: it is an installed one."""
 
     @cached_property
     def name(self) -> str:
@@ -53,6 +56,13 @@ class Cell:
         split = f":{self.split}" if self.split else ""
         path = (self.sensor, self.task, self.rig, f"{self.protocol}{split}", f"{self.estimator}{options}")
         return "/".join((*path, str(self.repeat)))
+
+
+def task_of(cell: Cell, registry: Registry) -> TaskSpec:
+    """Return the task of a cell, in a process that may not have seen its recordings."""
+    if cell.declared_task:
+        return DeclaredTask.model_validate_json(cell.declared_task).spec
+    return registry.tasks[cell.task].spec
 
 
 def plan_cells(
@@ -82,7 +92,8 @@ def plan_cells(
     repeats = matrix.repeats or (REPLICATES if registry.rigs[matrix.rig].simulated else 1)
     for repeat in range(1, repeats + 1):
         for choice in matrix.tasks:
-            task = registry.tasks[choice.name].spec
+            owned = registry.tasks.owned(choice.name)
+            task = owned.descriptor.spec
             ways = _ways(task, choice)
             answers = _estimators(task, choice, registry)
             for sensor in sensors:
@@ -102,6 +113,7 @@ def plan_cells(
                         latency=matrix.latency,
                         simulation=matrix.simulation,
                         rig_file=rig_file_text,
+                        declared_task=owned.declared.model_dump_json() if owned.declared else "",
                     )
                     cells[cell] = None  # once, in the order in which they were asked for
     return with_probes(list(cells), registry) if matrix.probe else list(cells)
@@ -118,7 +130,7 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     planned = frozenset(every)
     for cell in cells:
         rules = protocol_called(cell.protocol)
-        task = registry.tasks[cell.task].spec
+        task = task_of(cell, registry)
         if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator not in task.baselines):
             continue
         if rules.roles_only and task.splits[:1] == ("roles",):
