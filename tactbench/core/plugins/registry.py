@@ -19,6 +19,7 @@ import pluggy
 
 from tactbench.core.errors import DuplicateNameError, PluginContractError, PluginError, UnknownNameError
 from tactbench.core.plugins import hookspecs
+from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.rig import (
     DeviceDescriptor,
     EffectDescriptor,
@@ -54,6 +55,8 @@ class Owned(Generic[D]):
     module: str
     distribution: str
     version: str
+    declared: DeclaredTask | None = None
+    """Of a task that came with recordings: what they say of it; None: a plugin's."""
 
     @property
     def ours(self) -> bool:
