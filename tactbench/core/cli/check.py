@@ -43,10 +43,10 @@ def command(
     timeout: float,
     shape: str,
 ) -> None:
-    """Check a sensor, rig, task, estimator or effect, or all that a plugin brings; docs/conformance.md lists the checks.
+    """Check a sensor, rig, task, estimator or effect, or all that a plugin brings.
 
-    By default nothing is opened and nothing moves. Exit code 1 if a check failed or fewer ran than every plugin of that
-    kind can run, 2 if nothing is called NAME.
+    By default nothing is opened and nothing moves; docs/conformance.md lists the checks. Exit code 1 if a check failed
+    or fewer ran than every plugin of that kind can run, 2 if nothing is called NAME.
     """
     one_thread()
     from tactbench.core.cli.screen import remark
@@ -76,7 +76,9 @@ def command(
         subjects = [one for one in subjects if one.kind == "sensor"]
     if invasive and not yes:
         what = ", ".join(f"the {one.kind} {one.name}" for one in subjects)
-        click.confirm(f"This opens lines of {what} and may move or press something. Is the rig clear?", abort=True, err=True)
+        click.confirm(
+            f"This opens lines of {what} and may move or press something. Is the rig clear?", abort=True, err=True
+        )
     reports = [
         run_checks(one, modes=modes, recording=recording, rig_file=rig_file, timeout_s=timeout) for one in subjects
     ]

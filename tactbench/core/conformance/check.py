@@ -7,12 +7,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, NamedTuple, NoReturn
+from typing import Any, Literal, NamedTuple, NoReturn
 
 from tactbench.core.errors import TactbenchError
-
-if TYPE_CHECKING:
-    from tactbench.core.conformance.subject import Subject
 
 Kind = Literal["sensor", "rig", "task", "estimator", "effect"]
 KINDS: tuple[Kind, ...] = ("sensor", "rig", "task", "estimator", "effect")
@@ -23,7 +20,7 @@ Level = Literal["bronze", "silver", "gold"]
 LEVELS: tuple[Level, ...] = ("bronze", "silver", "gold")
 
 
-class CheckFailed(AssertionError):
+class CheckFailed(AssertionError):  # noqa: N818  (a result, as its sibling)
     """A plugin fails a check.
 
     Parameters
@@ -62,8 +59,8 @@ class Check:
     """Checks that must have passed; otherwise it is skipped, with their reason."""
     may_skip: bool
     """Whether it is about an ability that a plugin need not have."""
-    run: Callable[[Subject], None]
-    """Raises CheckFailed, or CheckSkipped."""
+    run: Callable[[Any], None]
+    """Called with a Subject; raises CheckFailed, or CheckSkipped."""
 
     def __str__(self) -> str:
         return self.name
@@ -75,14 +72,14 @@ def check(
     level: Level = "bronze",
     mode: Mode = "passive",
     may_skip: bool = False,
-) -> Callable[[Callable[[Subject], None]], Check]:
+) -> Callable[[Callable[[Any], None]], Check]:
     """Make a check of a function: its name is the check's, its docstring says why it exists, and then what to do."""
 
-    def made(run: Callable[[Subject], None]) -> Check:
+    def made(run: Callable[[Any], None]) -> Check:
         why, _, cure = inspect.cleandoc(run.__doc__ or "").partition("\n\n")
         name = run.__name__.strip("_").replace("_", "-")
-        one_line = [" ".join(text.split()) for text in (why, cure)]
-        return Check(name, kinds, mode, level, *one_line, needs, may_skip or bool(needs), run)
+        why, cure = (" ".join(text.split()) for text in (why, cure))
+        return Check(name, kinds, mode, level, why, cure, needs, may_skip or bool(needs), run)
 
     return made
 

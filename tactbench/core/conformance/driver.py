@@ -61,7 +61,7 @@ def _emulated(subject: Subject, *faults: str, **options: Any) -> Iterator[tuple[
     try:
         with code_of("driver", subject.package):
             driver = subject.code("driver")(DriverSettings(lines, descriptor.spec.streams, given, devices.clock))
-        yield driver, lines, devices.clock  # type: ignore[misc]
+        yield driver, lines, devices.clock
     finally:
         if driver is not None:
             with suppress(Exception):
@@ -82,7 +82,7 @@ def _at_rest(spec: Any) -> Any:
 def driver_opens(subject: Subject) -> None:
     """A driver is open once it is made: through the link that it is given, and no other.
 
-    Call settings.open_link() once in the driver's making, and give the descriptor an emulator to try it without a device.
+    Call settings.open_link() once in the driver's making; give the descriptor an emulator, to try it without a device.
     """
     descriptor = subject.descriptor
     if descriptor.driver is None:

@@ -46,16 +46,14 @@ def _quick(subject: Subject) -> dict[str, Any]:
 
 
 def _built(subject: Subject, kind: str, **params: Any) -> Estimator:
-    with code_of("where", subject.package):
-        try:
-            made: Estimator = subject.code("where")(
-                kind=kind, seed=SEED, threads=1, **{**_quick(subject), **params}
-            )
-        except NotApplicable as error:
-            caught = error
-        else:
-            return made
-    skip(f"it says: {caught.message}")
+    try:
+        with code_of("where", subject.package):
+            made: Estimator = subject.code("where")(kind=kind, seed=SEED, threads=1, **{**_quick(subject), **params})
+    except CheckFailed as failure:
+        if isinstance(failure.__cause__, NotApplicable):
+            skip(f"it says: {failure.__cause__.message}")
+        raise
+    return made
 
 
 def _fitted(subject: Subject, kind: str, **params: Any) -> Estimator:

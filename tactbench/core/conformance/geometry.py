@@ -50,9 +50,7 @@ def pressed_locally(skin: Skin, grid: SkinGrid, force_n: float, at_mm: tuple[flo
 
     dx, ds = grid.cell_mm
     sigma = PATCH_CELLS * max(dx, ds)
-    bell = np.exp(
-        -((grid.x_mm[:, None] - at_mm[0]) ** 2 + (grid.s_mm[None, :] - at_mm[1]) ** 2) / (2 * sigma**2)
-    )
+    bell = np.exp(-((grid.x_mm[:, None] - at_mm[0]) ** 2 + (grid.s_mm[None, :] - at_mm[1]) ** 2) / (2 * sigma**2))
     rest = _thickness_mm(skin, grid)
     deepest = min(force_n / 3, 0.9)
     deflection = deepest * bell * rest

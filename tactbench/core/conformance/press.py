@@ -106,10 +106,11 @@ def carried_out(rig: Any, descriptor: RigDescriptor, sensor: SensorDescriptor, s
 def simulated_rig(registry: Registry) -> tuple[Any, RigDescriptor]:
     """Return the first simulated rig, built, those that come with this package before others."""
     owned = [registry.rigs.owned(name) for name in registry.rigs.names()]
-    for one in sorted(owned, key=lambda one: not one.ours):
-        if one.descriptor.simulated:
-            return load_object(one.descriptor.where)(RigContext(effects=tuple(registry.effects))), one.descriptor
-    skip("no simulated rig is installed")
+    simulated = sorted((one for one in owned if one.descriptor.simulated), key=lambda one: not one.ours)
+    if not simulated:
+        skip("no simulated rig is installed")
+    descriptor = simulated[0].descriptor
+    return load_object(descriptor.where)(RigContext(effects=tuple(registry.effects))), descriptor
 
 
 def simulated_sensors(registry: Registry) -> Sequence[SensorDescriptor]:
@@ -379,7 +380,9 @@ def force_follows_the_profile(subject: Subject) -> None:
             found = float(made.values(stream.name)[-5:, column].mean())
             if abs(found - end) > FORCE_SHARE * end:
                 factor = found / end
-                meant = ": are these gram-force?" if 80 < factor < 125 else ": is its sign turned?" if factor < 0 else ""
+                meant = (
+                    ": are these gram-force?" if 80 < factor < 125 else ": is its sign turned?" if factor < 0 else ""
+                )
                 fail(
                     f"reference[{stream.name}].channels[{channel.name}]",
                     f"it says {found:.4g} at the end of a press to {end:g} N{meant}",

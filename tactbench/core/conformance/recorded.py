@@ -130,7 +130,10 @@ def recording_keeps_the_limits(subject: Subject) -> None:
                 ("upper", high, values > (math.inf if high is None else high)),
             ):
                 if limit is not None and np.any(beyond):
-                    fail(f"spec channel {channel.name}: {field}", f"{limit:g} is stated, {name} holds {values[beyond][0]:g}")
+                    fail(
+                        f"spec channel {channel.name}: {field}",
+                        f"{limit:g} is stated, {name} holds {values[beyond][0]:g}",
+                    )
 
 
 @check("sensor", mode="recording", level="gold", needs=("recording-is-of-this-sensor",))
@@ -198,12 +201,20 @@ def recording_has_the_sign(subject: Subject) -> None:
         force = np.interp(stream.t_ns, pressing.t_ns, pressing.data[:, column].astype(np.float64))  # type: ignore[arg-type]
         for place, channel in enumerate(stream.spec.channels):
             values = stream.data[:, place].astype(np.float64)
-            if not signs.get(channel.name) or not np.isfinite(values).all() or np.ptp(values) == 0 or np.ptp(force) == 0:
+            if (
+                not signs.get(channel.name)
+                or not np.isfinite(values).all()
+                or np.ptp(values) == 0
+                or np.ptp(force) == 0
+            ):
                 continue
             likeness = float(np.corrcoef(values, force)[0, 1])
             if likeness * signs[channel.name] < -CLEAR:
                 stated = signs[channel.name]
-                fail(f"spec channel {channel.name}: sign", f"{stated:+d} is stated, its correlation with the force is {likeness:+.2f}")
+                fail(
+                    f"spec channel {channel.name}: sign",
+                    f"{stated:+d} is stated, its correlation with the force is {likeness:+.2f}",
+                )
 
 
 @check("sensor", mode="recording", level="gold", needs=("recording-is-of-this-sensor",), may_skip=True)

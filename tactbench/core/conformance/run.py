@@ -9,8 +9,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.conformance.check import KINDS, Check, CheckFailed, CheckSkipped, Kind, Level, Mode, Outcome, line_in
-from tactbench.core.conformance.kit import ENOUGH, FLOORS, checks_of
+from tactbench.core.conformance.check import (
+    KINDS,
+    Check,
+    CheckFailed,
+    CheckSkipped,
+    Kind,
+    Level,
+    Mode,
+    Outcome,
+    line_in,
+)
+from tactbench.core.conformance.kit import FLOORS, checks_of, enough_checks_ran, expected_failures_are_checks
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.errors import CellStopped, UnknownNameError
 from tactbench.core.plugins.registry import PluginRow, Registry
@@ -23,11 +33,15 @@ TIMEOUT_S = 60.0
 """Seconds that one check may take: the slowest of ours, a press on the largest skin, takes two."""
 LISTED = "EXPECTED_FAILURES"
 """Name in a plugin's module: by name of a descriptor, checks that fail and why they may."""
+_NOT_TRIED = "not tried, for "
 _PRELOAD = ("numpy", "tactbench.core.conformance.kit")
 _SILVER: Mapping[Kind, tuple[str, ...]] = {
-    "sensor": ("press-is-recorded",), "rig": ("press-is-recorded",), "task": (), "estimator": ("answers-have-the-shape",),
+    "sensor": ("press-is-recorded",),
+    "rig": ("press-is-recorded",),
+    "task": (),
+    "estimator": ("answers-have-the-shape",),
     "effect": ("it-is-applied",),
-}  # fmt: skip
+}
 """Checks that must have run for silver: a plugin without them is not worse, it has shown less."""
 
 
@@ -77,7 +91,7 @@ class Report:
     def level(self) -> Level | None:
         """How much is proved; None: not even bronze, or only a recording was read."""
         status = {one.check: one.status for one in self.outcomes}
-        if "passive" not in self.modes or status.get(ENOUGH) != "passed":
+        if "passive" not in self.modes or status.get(enough_checks_ran.name) != "passed":
             return None
         checks = {one.name: one for one in checks_of(self.kind, *self.modes)}
         unmet = {checks[name].level for name, one in status.items() if one in ("failed", "expected") and name in checks}
@@ -186,10 +200,10 @@ def run_checks(
             settle(_stopped(name, given, subject) if stopped else Outcome(name, *given))  # type: ignore[arg-type, misc]
             if stopped:
                 break  # what needs this check is not tried in another process
-    for name in sorted(set(expected) - set(checks) - {one.name for one in checks_of(subject.kind, "passive", "invasive")}):
-        settle(Outcome(name, "failed", f"{subject.module}.{LISTED}[{subject.name}]", "no check has this name"))
     if "passive" in modes:
-        settle(_enough(subject.kind, outcomes))
+        for check in (_only_checks(subject, expected), _enough(subject.kind, outcomes)):
+            outcomes[check.check] = check
+            done(check)
     return Report(subject.kind, subject.name, tuple(modes), tuple(outcomes.values()))
 
 
@@ -249,7 +263,7 @@ def _blocked(check: Check, checks: Mapping[str, Check], outcomes: Mapping[str, O
             continue
         if before.status == "skipped" and before.text:
             return before.text
-        return f"not tried, for {name} has not passed"
+        return f"{_NOT_TRIED}{name} has not passed"
     return ""
 
 
@@ -268,19 +282,30 @@ def _weighed(outcome: Outcome, expected: Mapping[str, str]) -> Outcome:
     reason = expected.get(outcome.check)
     if reason is None:
         return outcome
-    if outcome.status == "failed" and outcome.check != ENOUGH:
+    if outcome.status == "failed":
         return outcome._replace(status="expected", text=reason)
     if outcome.status == "passed":
         return outcome._replace(status="failed", where=LISTED, text=f"it passes now: take it off the list ({reason})")
     return outcome
 
 
+def _only_checks(subject: Subject, expected: Mapping[str, str]) -> Outcome:
+    known = {one.name for one in checks_of(subject.kind, "passive", "invasive", "recording")}
+    for name in sorted(set(expected) - known):
+        where = f"{subject.module}.{LISTED}[{subject.name}][{name}]"
+        return Outcome(expected_failures_are_checks.name, "failed", where, "no check has this name")
+    return Outcome(expected_failures_are_checks.name, "passed")
+
+
 def _enough(kind: Kind, outcomes: Mapping[str, Outcome]) -> Outcome:
-    ran = sum(one.status != "skipped" for one in outcomes.values())
+    # What another failure keeps from being tried is red already.
+    ran = sum(one.status != "skipped" or one.text.startswith(_NOT_TRIED) for one in outcomes.values())
     if ran < FLOORS[kind]:
         reasons = "; ".join(sorted({one.text for one in outcomes.values() if one.status == "skipped"}))
-        return Outcome(ENOUGH, "failed", "checks", f"{ran} ran, and every {kind} can run {FLOORS[kind]}: {reasons}")
-    return Outcome(ENOUGH, "passed")
+        return Outcome(
+            enough_checks_ran.name, "failed", "checks", f"{ran} ran, and every {kind} can run {FLOORS[kind]}: {reasons}"
+        )
+    return Outcome(enough_checks_ran.name, "passed")
 
 
 def _expected(subject: Subject, isolated: bool, timeout_s: float) -> dict[str, str]:

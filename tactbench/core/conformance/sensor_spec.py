@@ -85,7 +85,9 @@ def limits_are_in_order(subject: Subject) -> None:
         try:
             rest = channel.rest.to(channel.unit)
         except UsageError:
-            fail(f"{place}.rest", f"its unit {channel.rest.unit!r} cannot be turned into the channel's {channel.unit!r}")
+            fail(
+                f"{place}.rest", f"its unit {channel.rest.unit!r} cannot be turned into the channel's {channel.unit!r}"
+            )
         if not low <= rest <= high:
             fail(f"{place}.rest", f"{rest:g} {channel.unit} is not within {low:g} to {high:g}")
 
@@ -172,7 +174,7 @@ def positions_are_in_metres(subject: Subject) -> None:
 
 @check("sensor", needs=("positions-are-in-metres",))
 def positions_are_apart(subject: Subject) -> None:
-    """Two taxels in one place are usually one that was copied; channels of one site share theirs, and then all sites do.
+    """Two taxels in one place are usually a copied line; where sites have several channels, all sites have as many.
 
     Correct position_m of one of them.
     """

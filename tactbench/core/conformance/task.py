@@ -1,4 +1,4 @@
-"""Checks of a task: every name it uses exists, its scenes can be carried out, its answer can be told from its inputs."""
+"""Checks of a task: every name it uses exists, and its scenes can be carried out."""
 
 from __future__ import annotations
 
@@ -233,7 +233,10 @@ def scenes_are_named_once(subject: Subject) -> None:
     spec = subject.descriptor.spec
     if not spec.scenes and not spec.campaigns:
         skip("it has no scenes")
-    for where, campaign in (("spec.scenes", spec.scenes), *((f"spec.campaigns[{k}]", v) for k, v in spec.campaigns.items())):
+    for where, campaign in (
+        ("spec.scenes", spec.scenes),
+        *((f"spec.campaigns[{k}]", v) for k, v in spec.campaigns.items()),
+    ):
         names = [planned.scene.name for planned in campaign]
         doubled = [name for name in names if names.count(name) > 1]
         if doubled:
@@ -254,7 +257,10 @@ def scenes_observe_the_features(subject: Subject) -> None:
         skip("it has no scenes")
     for place, planned in _planned(spec):
         if not set(spec.features) & set(planned.scene.observe):
-            fail(f"{place}.observe", f"{', '.join(planned.scene.observe)}: none of the features {', '.join(spec.features)}")
+            fail(
+                f"{place}.observe",
+                f"{', '.join(planned.scene.observe)}: none of the features {', '.join(spec.features)}",
+            )
 
 
 @check("task")

@@ -107,7 +107,9 @@ def transducer_leaves_the_spec_alone(subject: Subject) -> None:
     spec = subject.asked_again().spec
     before = copy.deepcopy(spec.model_dump())
     with code_of("transducer", subject.package):
-        transducer = subject.code("transducer")(spec, skin_grid(spec.skin.sheet), list(_names(wanted_channels(subject))))
+        transducer = subject.code("transducer")(
+            spec, skin_grid(spec.skin.sheet), list(_names(wanted_channels(subject)))
+        )
         transducer(_state(subject, GENTLE_N))
     place = difference(before, spec.model_dump())
     if place:
@@ -209,7 +211,10 @@ def order_follows_wanted(subject: Subject) -> None:
     for name, value in zip(fewer, given.tolist(), strict=True):
         # A solver may stop elsewhere for fewer channels.
         if not math.isclose(value, whole[name], rel_tol=1e-3, abs_tol=1e-6):
-            fail("transducer", f"{name} reads {value:g} where it is asked for in another order, and {whole[name]:g} before")
+            fail(
+                "transducer",
+                f"{name} reads {value:g} where it is asked for in another order, and {whole[name]:g} before",
+            )
 
 
 @check("sensor", needs=("finite-at-zero-load",), level="silver")
@@ -230,7 +235,7 @@ def same_state_same_reading(subject: Subject) -> None:
 
 @check("sensor", needs=("readings-have-the-shape",), level="silver")
 def state_is_not_changed(subject: Subject) -> None:
-    """The twin uses a state for every effect and interpolates between states; one that was written into is wrong for all.
+    """The twin uses a state for every effect and interpolates between states; one written into is wrong for all.
 
     Work on a copy: ``state.pressure_mpa.copy()``, and no ``+=`` on fields of the state.
     """
