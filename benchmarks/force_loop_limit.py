@@ -46,7 +46,7 @@ def loop(rate_hz: float, cutoff_hz: float | None, gain: float, law: str = "I"):
     )
 
 
-def stepped(of: ForceLoop, seconds: float, noise_n: float = 0.0, wanted_n: float = 1.0, seed: int = 1) -> np.ndarray:
+def stepped(of: ForceLoop, seconds: float, noise_n: float = 0.0, setpoint_n: float = 1.0, seed: int = 1) -> np.ndarray:
     """Return (n,) true forces [N] of the controller on the spring, from a step of 1 N or with a noisy sensor."""
     law = ForceLaw(
         loop=of,
@@ -56,7 +56,7 @@ def stepped(of: ForceLoop, seconds: float, noise_n: float = 0.0, wanted_n: float
     )
     steps = round(seconds / LinearLoop.of(of).period_s)
     noise = noise_n * np.random.default_rng(seed).standard_normal(steps)
-    depth = pressed_spring(law, 1e3 * STIFFNESS_N_MM, np.full(steps, wanted_n), noise)
+    depth = pressed_spring(law, 1e3 * STIFFNESS_N_MM, np.full(steps, setpoint_n), noise)
     return 1e3 * STIFFNESS_N_MM * depth
 
 

@@ -66,7 +66,7 @@ class Setting:
     stiffness_n_m: float = 20e3
     period_s: float = 20e-3
     ceiling_n: float = 6.0
-    wanted_n: float = 5.0
+    setpoint_n: float = 5.0
     seed: int = 1
     force_age_s: float = 13e-3
     same_samples: int = 50
@@ -238,7 +238,7 @@ class Press:
             case "approach" if not last.moving:
                 return replace(beat, command=CommandKind.MOVE_TO, position_m=SKIN_M - 0.1e-3, speed_m_s=0.02)
             case "touch" | "ramp" | "hold":
-                missing = (0.2 if self.phase == "touch" else self.setting.wanted_n) - last.force_n
+                missing = (0.2 if self.phase == "touch" else self.setting.setpoint_n) - last.force_n
                 wish = 0.3 * missing / self.setting.stiffness_n_m if self.phase != "touch" else limits.step_m
                 return replace(beat, command=CommandKind.STEP, distance_m=min(max(wish, -limits.step_m), limits.step_m))
             case "unload" if not last.moving:
@@ -251,7 +251,7 @@ class Press:
             self.phase = "touch"
         elif self.phase == "touch" and last.force_n > 0.1:
             self.phase = "ramp"
-        elif self.phase == "ramp" and last.force_n > 0.97 * self.setting.wanted_n:
+        elif self.phase == "ramp" and last.force_n > 0.97 * self.setting.setpoint_n:
             self.phase, self._held_s = "hold", 0.0
         elif self.phase == "hold":
             self._held_s += self.setting.period_s
@@ -264,7 +264,7 @@ class Press:
 # Faults ---------------------------------------------------------------------------------------------------------------
 
 FORCE_UNKNOWN = {Trigger.FORCE_OLD, Trigger.FORCE_GAP, Trigger.FORCE_LOST}
-SILENT = {Trigger.MOTOR_SILENT, Trigger.MOTOR_GONE, Trigger.MOTOR_FAULT}
+SILENT = {Trigger.MOTOR_SILENT, Trigger.MOTOR_LOST, Trigger.MOTOR_FAULT}
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,7 @@ settings.load_profile("ci" if os.environ.get("CI") else "here")
 # before any of them is loaded; tests of several threads ask for them.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# A fork server imports what whoever starts it asks for, and cells need more than a pool does on its own: whichever test
-# comes first, the children of all are spared their imports.
+# What a fork server imports before it forks; see `fork_server`.
 forkserver.set_forkserver_preload(list(PRELOAD))
 
 # A shell's background jobs are deaf to Ctrl-C, and so is all that they start: tests that send one would wait for ever.
@@ -37,6 +36,16 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 ROOT = Path(__file__).resolve().parents[1]
 THIRD_PARTY = ROOT / "tests" / "third_party"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def fork_server() -> None:
+    """Start the fork server with what cells need, before a test starts one that lacks it.
+
+    There is one for each process, and it keeps what it was started with: without scikit-learn every cell of every later
+    test would import that again, which takes five times as long as the cell.
+    """
+    forkserver.ensure_running()
 
 
 @pytest.fixture(scope="session")

@@ -150,7 +150,7 @@ class Part:
     X: FloatArray
     """(n, features)"""
     y: npt.NDArray[Any]
-    """(n,) numbers, or class indices 0 … n_classes-1"""
+    """(n,) numbers, (n, components) vectors, or class indices 0 … n_classes-1"""
     time_s: FloatArray
     """(n,) seconds since the recording's first sample (row index when there is no clock)"""
     recording: IntArray
@@ -179,9 +179,9 @@ class Answers:
     """What an estimator said about the rows of one role, beside the truth."""
 
     y_true: npt.NDArray[Any]
-    """(n,) numbers, or class indices"""
+    """(n,) numbers, (n, components) vectors, or class indices"""
     y_pred: npt.NDArray[Any]
-    """(n,)"""
+    """of the same shape"""
     recording: IntArray
     """(n,) which recording of the cell the row is from"""
     row: IntArray

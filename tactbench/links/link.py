@@ -46,7 +46,7 @@ class Link(ABC):
         self.address = address
         self._clock = clock
         self._closed = False
-        self._gone: BaseException | None = None
+        self._loss: BaseException | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -82,8 +82,8 @@ class Link(ABC):
         """
         if self._closed:
             raise LinkClosed(f"The link {self.address} is closed.", hint="Open a new one.")
-        if self._gone is not None:
-            raise self._unplugged(self._gone)
+        if self._loss is not None:
+            raise self._unplugged(self._loss)
         if not 0 <= timeout_s < math.inf:
             raise LinkError(
                 f"{self.address}: a time-out of {timeout_s} s was given, a finite one of 0 or more was expected.",
@@ -92,7 +92,7 @@ class Link(ABC):
         return self.timer() + timeout_s
 
     def _unplugged(self, cause: BaseException) -> LinkUnplugged:
-        self._gone = cause
+        self._loss = cause
         return LinkUnplugged(
             f"The other end of {self.address} is gone: {cause}.",
             hint="Check cable, power and other end, close this link and open a new one.",

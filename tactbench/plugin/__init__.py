@@ -25,7 +25,7 @@ from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor, SensorDescriptor, TaskDescriptor
-from tactbench.core.spec.scene import ForceRamp, Indenter, Placement, Role, Scene
+from tactbench.core.spec.scene import ForcePath, ForceRamp, Indenter, Placement, Role, Scene
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,
@@ -36,7 +36,7 @@ from tactbench.core.spec.sensor import (
     StreamSpec,
 )
 from tactbench.core.spec.summary import Summary
-from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec
+from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, Published, TaskSpec, VectorTarget
 from tactbench.plugin.on_demand import on_demand
 
 if TYPE_CHECKING:
@@ -54,6 +54,7 @@ __all__ = [
     "EstimatorDescriptor",
     "FloatArray",
     "ForceLoop",
+    "ForcePath",
     "ForceRamp",
     "Indenter",
     "LabelTarget",
@@ -87,6 +88,7 @@ __all__ = [
     "TaskSpec",
     "UnknownNameError",
     "UsageError",
+    "VectorTarget",
     "assumed",
     "derived",
     "hookimpl",

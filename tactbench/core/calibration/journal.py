@@ -74,7 +74,7 @@ class Journal:
                 raise self._damaged() from error
             self.draws[draw.number] = draw
         if self._last != self._now:
-            self.remark = f"The draws found were made with {_told(self._last)}."
+            self.remark = f"The draws found were made with {_versions_text(self._last)}."
         if len(whole) + 1 < len(content):
             with self.path.open("r+b") as file:
                 file.truncate(len(whole) + 1)
@@ -100,7 +100,7 @@ class Journal:
 
     def _go_on(self, made_by: dict[str, str]) -> None:
         self._last = made_by
-        self.made_by = {**self.made_by, "continued with": _told(made_by)}
+        self.made_by = {**self.made_by, "continued with": _versions_text(made_by)}
 
     def _parsed(self, line: bytes) -> dict[str, Any]:
         try:
@@ -129,5 +129,5 @@ def decides_draws(spec: CalibrationSpec) -> dict[str, Any]:
     }
 
 
-def _told(made_by: Any) -> str:
+def _versions_text(made_by: Any) -> str:
     return ", ".join(f"{name} {value}" for name, value in made_by.items()) if isinstance(made_by, dict) else "others"

@@ -79,9 +79,8 @@ def commanded_n(metas: Sequence[RecordingMeta], recording: IntArray, row: IntArr
             raise DataError(f"The recording {meta.name!r} states no scene.", hint="Calibrate with simulated rigs.")
         profile = meta.scene.profile
         here = recording == place
-        hold, whole = profile.hold.to("s"), profile.duration.to("s")
-        times = row[here] * (whole / profile.samples)
-        commanded[here] = np.interp(times, [hold, whole], [profile.start.to("N"), profile.end.to("N")])
+        times = row[here] * (profile.duration.to("s") / profile.samples)
+        commanded[here] = np.interp(times, *profile.corners)
     return commanded
 
 

@@ -61,7 +61,7 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
     UsageError
         If there is no such folder or cell, or more than one cell is meant.
     """
-    from tactbench.core.cli.selection import matrix_asked
+    from tactbench.core.cli.selection import requested_matrix
     from tactbench.core.matrix.keys import Keys
     from tactbench.core.matrix.naming import cell_of, meant
     from tactbench.core.matrix.plan_recordings import plan_run, request_key
@@ -95,7 +95,7 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
         # The options change how the cell was asked; what they do not mention stays.
         was = {"sensors": (rows[given]["sensor"],), "tasks": (rows[given]["task"],), "rig": rows[given]["rig"]}
         selection |= {name: value for name, value in was.items() if not selection[name]}
-    matrix, folder = matrix_asked(registry, **selection)
+    matrix, folder = requested_matrix(registry, **selection)
     cells, needed = plan_run(matrix, registry, keys, store, folder, recorded)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
     made = tuple(needed.requests.get(request_key(cell), ()))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tactbench.core.samples import Block
     from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.core.spec.rig_file import DeviceEntry, RigFile
-    from tactbench.core.spec.scene import ForceRamp, Scene
+    from tactbench.core.spec.scene import ForceProfile, Scene
     from tactbench.core.spec.sensor import StreamSpec
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples
@@ -190,7 +190,7 @@ class Presser:
 class _ForceAlone:
     """The force of a profile without anything pressed."""
 
-    def __init__(self, profile: ForceRamp) -> None:
+    def __init__(self, profile: ForceProfile) -> None:
         from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
         self._profile = profile

@@ -27,7 +27,7 @@ _COLUMNS = ("", "effect", "cost", "if left out", "reason")
 _WAYS = 2
 _LONGEST_S = 60.0
 """Seconds that recordings may take for a score that nobody asked for by name."""
-_TOLD_APART = 0.1
+_SMALLEST_DIFFERENCE = 0.1
 """Share by which two times of one run each differ on a machine that does other things as well."""
 _SCORE_COLUMNS = ("effects", "score", "simulated in")
 
@@ -121,7 +121,7 @@ def _print_scores(sensor: str, chosen: TaskScore, every: TaskScore) -> None:
     if chosen.sim_s is not None and every.sim_s:
         saved = every.sim_s - chosen.sim_s
         seconds = f"{saved:.2f} of {every.sim_s:.2f} s of the processor for {every.recordings} recordings"
-        if abs(saved) < _TOLD_APART * every.sim_s:
+        if abs(saved) < _SMALLEST_DIFFERENCE * every.sim_s:
             click.echo(f"Leaving out the others saved {seconds}: no more than one run each tells apart.")
         else:
             click.echo(f"Leaving out the others saved {seconds}, {100 * saved / every.sim_s:.0f} %.")

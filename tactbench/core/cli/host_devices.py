@@ -18,7 +18,7 @@ IFF_UP = 1
 """Flag of an interface that is up (linux/if.h)."""
 MULTICAST_GROUP = "239.74.163.2"
 """python-can's group for udp_multicast over IPv4 (``UdpMulticastBus.DEFAULT_GROUP_IPv4``)."""
-ASKED_BUFFER_BYTES = 4 << 20
+REQUESTED_BUFFER_BYTES = 4 << 20
 """What a datagram link asks of the system unless its address says otherwise."""
 FOR_DEVELOPERS = ("test", "dev")
 """Extras that no device needs."""
@@ -201,10 +201,10 @@ def network() -> Network:
         largest = int(Path("/proc/sys/net/core/rmem_max").read_text())
     except (OSError, ValueError):
         largest = None
-    if largest is not None and largest < ASKED_BUFFER_BYTES:
+    if largest is not None and largest < REQUESTED_BUFFER_BYTES:
         hints.append(
-            f"Datagrams have a buffer of {largest} bytes where {ASKED_BUFFER_BYTES} are asked for: "
-            f"sudo sysctl -w net.core.rmem_max={ASKED_BUFFER_BYTES}"
+            f"Datagrams have a buffer of {largest} bytes where {REQUESTED_BUFFER_BYTES} are asked for: "
+            f"sudo sysctl -w net.core.rmem_max={REQUESTED_BUFFER_BYTES}"
         )
     return Network(socketcan, multicast_from, largest, tuple(hints))
 

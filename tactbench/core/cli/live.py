@@ -50,7 +50,7 @@ class LiveView:
 
     def beside(self, rig: Rig) -> Rig:
         """Return a rig that does what `rig` does, and tells this view of its streams once they are known."""
-        return _Told(rig, self)
+        return _ObservedRig(rig, self)
 
     def begin(self, acquisition: Acquisition) -> None:
         """Begin to draw."""
@@ -91,7 +91,7 @@ class LiveView:
             self._drawing = None
 
 
-class _Told:
+class _ObservedRig:
     """A rig that tells a view of what it opens."""
 
     def __init__(self, rig: Rig, view: LiveView) -> None:

@@ -94,7 +94,7 @@ def force_text(watched: Watched) -> str:
     state, place = found
     unit = channel_of(state, place).unit
     bad = _bad(state, place)
-    return f"{_value(state, place)} {unit}, wanted {_wanted(watched, unit)} {unit}{f', {bad}' if bad else ''}"
+    return f"{_value(state, place)} {unit}, wanted {_setpoint(watched, unit)} {unit}{f', {bad}' if bad else ''}"
 
 
 def _value(state: StreamState, place: int) -> str:
@@ -114,9 +114,9 @@ def _in_unit(newtons: float, unit: str) -> float:
     return newtons / units.conversion(unit, "N")
 
 
-def _wanted(watched: Watched, unit: str) -> str:
-    wanted_n = watched.wanted_n
-    return _number(None if wanted_n is None else _in_unit(wanted_n, unit), 2)
+def _setpoint(watched: Watched, unit: str) -> str:
+    setpoint_n = watched.setpoint_n
+    return _number(None if setpoint_n is None else _in_unit(setpoint_n, unit), 2)
 
 
 def _force(watched: Watched, width: int, *, low: bool) -> list[Text]:
@@ -136,7 +136,7 @@ def _force(watched: Watched, width: int, *, low: bool) -> list[Text]:
     drawn[2] += f" {channel.unit}"
     beside = (
         (f"{channel.name} of {state.spec.name}", ""),
-        (f"wanted {_wanted(watched, channel.unit)} {channel.unit}", ""),
+        (f"wanted {_setpoint(watched, channel.unit)} {channel.unit}", ""),
         (bad, BAD),
     )
     lines = []
@@ -149,8 +149,8 @@ def _force(watched: Watched, width: int, *, low: bool) -> list[Text]:
     largest = _in_unit(watched.scene.profile.largest_n, channel.unit)
     room = width - _FORCE_WIDTH
     if room >= 10 and largest > 0 and state.latest is not None:
-        wanted_n = watched.wanted_n
-        target = None if wanted_n is None else _in_unit(wanted_n, channel.unit)
+        setpoint_n = watched.setpoint_n
+        target = None if setpoint_n is None else _in_unit(setpoint_n, channel.unit)
         lines[1].append_text(_track(float(state.latest[place]), target, largest, room))
         lines[2].append(f"0{f'{largest:g} {channel.unit}':>{room - 1}}", style="dim")
     return lines

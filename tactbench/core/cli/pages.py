@@ -12,7 +12,7 @@ from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES
 from tactbench.core.spec.rig import EffectDescriptor, EstimatorDescriptor, RigDescriptor
 from tactbench.core.spec.scene import Scene
-from tactbench.core.spec.task import ChannelTarget, Published, TaskSpec
+from tactbench.core.spec.task import ChannelTarget, Published, TaskSpec, VectorTarget
 from tactbench.core.tables.numbers import suffix
 
 Pair = tuple[str, str]
@@ -70,19 +70,33 @@ def task_page(task: TaskSpec) -> Page:
     return page
 
 
+MOST_PLACES = 8
+"""That are named one by one."""
+
+
 def _target(task: TaskSpec) -> str:
     if isinstance(task.target, ChannelTarget):
         name = f" {task.target.name}" if task.target.name else ""
         return f"reference channel{name} of kind {task.target.kind}, in {task.target.unit}, sample by sample"
+    if isinstance(task.target, VectorTarget):
+        names = ", ".join(task.target.names)
+        return (
+            f"vector ({names}): reference channels of kind {task.target.kind}, in {task.target.unit}, sample by sample"
+        )
     what = "a class" if task.kind == "classification" else "a number"
     return f"{what}: label {task.target.name}{f', in {task.target.unit}' if task.target.unit != '1' else ''}"
 
 
 def _scenes(task: TaskSpec) -> list[tuple[str, ...]]:
     """Return one line for each role and indenter with equal force profiles, with how many scenes there are."""
+    scenes = [(str(planned.role), *_scene(planned.scene)) for planned in task.scenes]
+    places: dict[tuple[str, ...], set[str]] = {}
+    for *way, where, force, duration in scenes:
+        places.setdefault((*way, force, duration), set()).add(where)
     counts: Counter[tuple[str, ...]] = Counter()
-    for planned in task.scenes:
-        counts[(planned.role, *_scene(planned.scene))] += 1
+    for *way, where, force, duration in scenes:
+        several = len(places[*way, force, duration])
+        counts[*way, where if several <= MOST_PLACES else f"{several} places", force, duration] += 1
     merged: dict[tuple[str, ...], tuple[int, list[str]]] = {}
     for (role, indenter, *rest), count in counts.items():
         number, indenters = merged.get((role, *rest), (0, []))
@@ -99,7 +113,8 @@ def _scene(scene: Scene) -> tuple[str, str, str, str]:
     where = "nominal" if nominal else f"{place.x} along, {place.s} across"
     scatter = f", scatter {place.scatter}" if place.scatter.value else ""
     slide = f", slides {scene.slide}" if scene.slide else ""
-    force = f"{profile.start.value:g} to {profile.end}, after {profile.hold}"
+    end = profile.end if profile.kind == "ramp" else f"{profile.largest_n:g} N and elsewhere"
+    force = f"{profile.start.value:g} to {end}, after {profile.hold}"
     return str(scene.indenter), where + scatter, force + slide, str(profile.duration)
 
 

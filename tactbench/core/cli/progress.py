@@ -63,14 +63,14 @@ class Lines:
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        self._began_s = self._said_s = 0.0
+        self._began_s = self._printed_s = 0.0
         self._stage, self._total, self._done, self._stopped = "", 0, 0, 0
 
     def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
         """Say what begins."""
         self._stage, self._total, self._done, self._stopped = stage, total, 0, 0
         self._began_s = self._clock()
-        self._said_s = self._began_s - _QUIET_S
+        self._printed_s = self._began_s - _QUIET_S
         remark(f"{stage}: {total} to do")
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
@@ -80,8 +80,8 @@ class Lines:
         if self._done * 10 // self._total == (self._done - 1) * 10 // self._total:
             return
         now_s = self._clock()
-        if self._done == self._total or self._total <= _FEW or now_s - self._said_s >= _QUIET_S:
-            self._said_s = now_s
+        if self._done == self._total or self._total <= _FEW or now_s - self._printed_s >= _QUIET_S:
+            self._printed_s = now_s
             remark(f"{self._stage}: {self._done}/{self._total} {what}{self._beside(now_s)}")
 
     def _beside(self, now_s: float) -> str:

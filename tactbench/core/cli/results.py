@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tactbench.core.matrix.store import Store
 
-_MOST_TOLD = 5
+_MOST_PRINTED = 5
 """Rows that cannot be shown and are told one by one."""
 
 
@@ -49,10 +49,10 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
             f"{store.folder} has no row that can be shown" + (f": {messages[0]}." if messages else "."),
             hint="Run `tactbench run` again.",
         )
-    for one in messages[:_MOST_TOLD]:
+    for one in messages[:_MOST_PRINTED]:
         remark(f"Left out: {one}")
-    if len(messages) > _MOST_TOLD:
-        remark(f"Left out: {len(messages) - _MOST_TOLD} more rows.")
+    if len(messages) > _MOST_PRINTED:
+        remark(f"Left out: {len(messages) - _MOST_PRINTED} more rows.")
     return over_replicates(rows)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactbench.core.cli.engines import choice_of, engine_options
-from tactbench.core.cli.selection import matrix_asked, selecting_options
+from tactbench.core.cli.selection import requested_matrix, selecting_options
 from tactbench.core.cli.tables import (
     DEFAULT_FOLDER,
     TABLE_FORMATS,
@@ -66,7 +66,7 @@ def command(
     from tactbench.core.plugins.registry import installed
     from tactbench.core.statistics.replicates import over_replicates
 
-    matrix, folder = matrix_asked(installed(), **selection)
+    matrix, folder = requested_matrix(installed(), **selection)
     choice = choice_of(matrix, engine=engine, jobs=jobs, timeout=timeout, memory=memory, scheduler=scheduler)
     store = Store(out)
     with progress() as display:

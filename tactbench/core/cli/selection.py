@@ -46,7 +46,7 @@ def selecting_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def matrix_asked(
+def requested_matrix(
     registry: Registry,
     *,
     probe: bool,

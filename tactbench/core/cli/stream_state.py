@@ -155,7 +155,7 @@ class Watched:
         return self.scene.profile.duration.to("s")
 
     @property
-    def wanted_n(self) -> float | None:
+    def setpoint_n(self) -> float | None:
         """Force of the scene's profile at this time [N]; None: no time yet."""
         import numpy as np
 

@@ -117,7 +117,7 @@ def _fit(one: TimedEstimator, timing: Timing) -> None:
 
 def _answer(one: TimedEstimator, timing: Timing) -> None:
     assert timing._model is not None
-    timing.answers = answers(timing._model, one.X_test, one.name, one.n_classes)
+    timing.answers = answers(timing._model, one.X_test, one.name, one.n_classes, one.y_test.shape[1:])
 
 
 def _median_s(work: Callable[[], None], clock: Callable[[], float]) -> float:

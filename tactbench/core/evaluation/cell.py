@@ -52,13 +52,14 @@ from tactbench.core.evaluation.timing import (
     tail_ms,
 )
 from tactbench.core.evaluation.unloaded import tare_s
+from tactbench.core.evaluation.vectors import vector_details
 from tactbench.core.evaluation.vote import require_answers, voted
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import Answers, FloatArray, Fold, Part
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
-from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.task import TaskSpec, VectorTarget
 from tactbench.core.thread_limit import thread_limit
 
 
@@ -200,7 +201,7 @@ class _Folds:
         self.fit_s += clock() - began
         n_classes = len(data.classes)
         began = clock()
-        predicted = answers_of(model, X_test, estimator.name, n_classes)
+        predicted = answers_of(model, X_test, estimator.name, n_classes, fold.test.y.shape[1:])
         self.predict_s += clock() - began
         self.batch_rows += len(fold.test)
         if data.vote:
@@ -210,10 +211,11 @@ class _Folds:
         self.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(asked))
         self._keep("test", asked, combined, number)
         if alone and not n_classes:
-            again = self._combined(fold.train, answers_of(model, X_train, estimator.name, n_classes))
-            self._keep("train", *again, number)
+            on_training = answers_of(model, X_train, estimator.name, n_classes, fold.train.y.shape[1:])
+            self._keep("train", *self._combined(fold.train, on_training), number)
         if fold.validation is not None and len(fold.validation):
-            on_validation = answers_of(model, features_of(fold.validation, estimator), estimator.name, n_classes)
+            X_validation, shape = features_of(fold.validation, estimator), fold.validation.y.shape[1:]
+            on_validation = answers_of(model, X_validation, estimator.name, n_classes, shape)
             held_back, on_validation = self._combined(fold.validation, on_validation)
             if not choice:
                 self.scores["validation"] = metric.of(held_back.y, on_validation, n_classes)
@@ -341,7 +343,7 @@ def _worth_answering(fold: Fold, data: Dataset) -> None:
             raise DataError(
                 f"The {what} set of fold {fold.name!r} has no labelled row.", hint="Choose another --split."
             )
-    values = np.unique(fold.train.y)
+    values = np.unique(fold.train.y, axis=0)
     if len(values) < 2:
         only = data.classes[int(values[0])] if data.classes else values[0]
         raise DataError(
@@ -370,7 +372,7 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
     interval = score_interval(metric, y, predicted, recording, unit.codes, unit.name, n_classes, seed)
     scores = dict(folds.scores)
     for other in METRICS.values():
-        if other.kind == task.kind and other is not metric:
+        if other.kind == task.kind and other.vector == metric.vector and other is not metric:
             scores[other.name] = other.of(y, predicted, n_classes)
     table = None
     if n_classes:
@@ -378,6 +380,8 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
         table = confusion(sums, n_classes).astype(np.int64)
         for label, value in zip(data.classes, class_f1(sums, n_classes), strict=True):
             scores[f"F1 of {label}"] = float(value)
+    if isinstance(task.target, VectorTarget):
+        scores |= vector_details(task.target, y, predicted)
     # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
     scores = {name: value for name, value in scores.items() if np.isfinite(value)}
     return CellResult(
@@ -423,6 +427,7 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
             one
             for one in (
                 _one_a_recording(folds),
+                _of_vectors(task),
                 no_floor,
                 NOT_TARED if rules.tare and not held else "",
                 _untrained(folds),
@@ -442,6 +447,12 @@ def _one_a_recording(folds: _Folds) -> str:
         return ""
     made_of = "its first row" if folds.rules.first_row_only else task.answer_from
     return f"one answer a recording, from {made_of}"
+
+
+def _of_vectors(task: TaskSpec) -> str:
+    if not isinstance(task.target, VectorTarget):
+        return ""
+    return f"answers are vectors ({', '.join(task.target.names)}): one model per component"
 
 
 def _untrained(folds: _Folds) -> str:

@@ -113,7 +113,7 @@ Found = tuple[str, int, ChannelSpec]
 
 
 def channels_for(recording: Recording, target: ChannelTarget) -> list[Found]:
-    """Return the channels that could be meant; of several the one called ``normal`` or ``fz`` alone.
+    """Return the channels that could be meant; of several the one called ``normal``, else the one called ``fz``.
 
     One called ``shear`` must be asked for by name: it is a force, but not the one that presses.
     """
@@ -124,8 +124,11 @@ def channels_for(recording: Recording, target: ChannelTarget) -> list[Found]:
         if channel.kind == target.kind
         and (channel.name == target.name or (target.name is None and channel.name != "shear"))
     ]
-    plain = [one for one in found if one[2].name in ("normal", "fz")]
-    return plain if len(found) > 1 and len(plain) == 1 else found
+    for name in ("normal", "fz"):
+        plain = [one for one in found if one[2].name == name]
+        if plain:
+            return plain if len(plain) == 1 else found
+    return found
 
 
 def on_clock(recording: Recording, features: StreamData, name: str, place: int, channel: ChannelSpec) -> FloatArray:

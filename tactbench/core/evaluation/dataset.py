@@ -24,7 +24,7 @@ from tactbench.core.evaluation.channels import (
 from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.samples import FloatArray, IntArray, StreamData, StreamReadings
 from tactbench.core.spec.recording import RecordingMeta
-from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec
+from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
 
 LARGEST = 1e100
 """Of a reading or a target, in whatever unit: sums of the squares of a billion of them are still numbers."""
@@ -38,7 +38,8 @@ class Table:
     X: FloatArray
     """(n, features) readings as recorded"""
     y: npt.NDArray[Any]
-    """(n,) numbers in the task's unit, or class indices; meaningless where `labelled` is False"""
+    """(n,) numbers in the task's unit, (n, components) where it asks for a vector, or class indices; meaningless where
+    `labelled` is False"""
     labelled: npt.NDArray[np.bool_]
     """(n,) False where the recording has no label for the row"""
     force: FloatArray | None
@@ -212,11 +213,20 @@ Labels = tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]
 def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Labels:
     if isinstance(task.target, LabelTarget):
         return _label(recording.meta, task.target.name, features)
+    if isinstance(task.target, VectorTarget):
+        return _vector(recording, task.target, features)
     column = channel_on(recording, task.target, features)
     if column is None:
         n = len(features.data)
         return np.full(n, np.nan), np.zeros(n, dtype=bool)
     return column, ~np.isnan(column)
+
+
+def _vector(recording: Recording, target: VectorTarget, features: StreamData) -> Labels:
+    missing = np.full(len(features.data), np.nan)
+    found = [channel_on(recording, one, features) for one in target.components]
+    vectors = np.column_stack([missing if one is None else one for one in found])
+    return vectors, np.asarray(~np.isnan(vectors).any(axis=1))
 
 
 def _label(meta: RecordingMeta, name: str, features: StreamData) -> Labels:
@@ -253,7 +263,8 @@ def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, 
     for name, column in data.annotations.items():
         own = column.dtype.kind in "iu"
         groups[name] = np.array([f"{meta.session}/{value}" if own else str(value) for value in column], dtype=np.str_)
-    groups.pop(task.target.name or "", None)
+    if not isinstance(task.target, VectorTarget):
+        groups.pop(task.target.name or "", None)
     return groups
 
 
@@ -285,4 +296,6 @@ def _table(meta: RecordingMeta, raw: _Raw, classes: tuple[Any, ...]) -> Table:
 def _wanted(task: TaskSpec) -> str:
     if isinstance(task.target, LabelTarget):
         return task.target.name
+    if isinstance(task.target, VectorTarget):
+        return f"{task.target.kind} samples called {' and '.join(map(repr, task.target.names))}"
     return f"{task.target.kind} sample" + (f" called {task.target.name!r}" if task.target.name else "")

@@ -15,7 +15,7 @@ from tactbench.core.samples import FloatArray
 
 
 def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts: Counter[str]) -> None:
-    """Fit `model` to X (n, p) and y (n,).
+    """Fit `model` to X (n, p) and y (n,) or (n, components).
 
     A warning (a solver that did not converge …) is counted under the estimator's `name` and stands in the row; on
     standard error nobody would connect it with a score.
@@ -40,8 +40,15 @@ def fit(model: Estimator, X: FloatArray, y: npt.NDArray[Any], name: str, counts:
         counts[f"fits of {name} with a {kind}"] += 1
 
 
-def answers(model: Estimator, X: FloatArray, name: str, n_classes: int) -> npt.NDArray[Any]:
+def answers(
+    model: Estimator, X: FloatArray, name: str, n_classes: int, components: tuple[int, ...] = ()
+) -> npt.NDArray[Any]:
     """Return the answers of `model` to X (n, p): (n,) numbers, or class indices below `n_classes` unless it is 0.
+
+    Parameters
+    ----------
+    components
+        Shape of one answer: empty, or (d,) where it is a vector.
 
     Raises
     ------
@@ -53,7 +60,7 @@ def answers(model: Estimator, X: FloatArray, name: str, n_classes: int) -> npt.N
     wrong = ""
     if np.ma.is_masked(predicted):
         wrong = f"{int(np.ma.getmaskarray(predicted).sum())} values that are masked"
-    elif given.shape != (len(X),):
+    elif given.shape != (len(X), *components):
         wrong = f"shape {given.shape}"
     elif given.dtype.kind not in "biuf":
         wrong = f"values of type {given.dtype}"

@@ -180,7 +180,8 @@ def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) ->
     """Return (n,) what each row adds to the error: its square, or whether the class is wrong."""
     if metric.kind == "classification":
         return np.asarray(y != predicted, dtype=np.float64)
-    return np.asarray((predicted - y) ** 2)
+    squares = np.asarray((predicted - y) ** 2)
+    return np.asarray(squares.sum(axis=1)) if metric.vector else squares
 
 
 def circular_blocks(rows: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:

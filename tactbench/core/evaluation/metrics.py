@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.samples import FloatArray
+from tactbench.core.spec.task import VECTOR_METRIC
 
 Rows = Callable[[npt.NDArray[Any], npt.NDArray[Any], int], FloatArray]
 Score = Callable[[FloatArray, int], FloatArray]
@@ -30,6 +31,8 @@ class Metric:
     """(y, prediction, number of classes) -> (n, m) summands"""
     score: Score
     """(…, m) sums and the number of classes -> (…,) scores"""
+    vector: bool = False
+    """Truth and predictions are (n, components)."""
 
     def of(self, y: npt.NDArray[Any], predicted: npt.NDArray[Any], n_classes: int = 0) -> float:
         """Return the score of `predicted` against `y`."""
@@ -42,6 +45,15 @@ def _squares(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatA
 
 def _absolutes(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
     return np.column_stack([np.abs(predicted - y), np.ones(len(y))])
+
+
+def _distances(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
+    return np.column_stack([distances(y, predicted), np.ones(len(y))])
+
+
+def distances(y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
+    """Return the (n,) Euclidean lengths of the differences of (n, components)."""
+    return np.asarray(np.linalg.norm(predicted - y, axis=1))
 
 
 def _explained(y: npt.NDArray[Any], predicted: npt.NDArray[Any], _: int) -> FloatArray:
@@ -104,6 +116,7 @@ METRICS = {
     for metric in (
         Metric("rmse", "regression", False, _squares, _rmse),
         Metric("mae", "regression", False, _absolutes, _mae),
+        Metric(VECTOR_METRIC, "regression", False, _distances, _mae, vector=True),
         Metric("r2", "regression", True, _explained, _r2),
         Metric("accuracy", "classification", True, _pairs, _accuracy),
         Metric("balanced_accuracy", "classification", True, _pairs, _balanced),

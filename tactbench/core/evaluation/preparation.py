@@ -12,11 +12,12 @@ from tactbench.core.evaluation.protocols import ProtocolSpec
 from tactbench.core.evaluation.selection import Build, scales
 from tactbench.core.evaluation.sets import constant_features, keep, part
 from tactbench.core.evaluation.splits import Assignment, make_splits
+from tactbench.core.evaluation.vectors import PerComponent
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import Fold
 from tactbench.core.spec.rig import EstimatorDescriptor
-from tactbench.core.spec.task import TaskSpec
+from tactbench.core.spec.task import TaskSpec, VectorTarget
 
 
 def assigned(task: TaskSpec, estimator: EstimatorDescriptor, data: Dataset, split: str, seed: int) -> list[Assignment]:
@@ -28,6 +29,8 @@ def builder(
     estimator: EstimatorDescriptor, params: Mapping[str, Any], task: TaskSpec, seed: int, threads: int
 ) -> Build:
     """Return what makes a fresh estimator from parameters; its imports are done, and one has been made to see.
+
+    Where the task asks for a vector, it is one estimator a component.
 
     Raises
     ------
@@ -50,6 +53,8 @@ def builder(
         return made
 
     build({})
+    if isinstance(task.target, VectorTarget):
+        return lambda chosen: PerComponent(lambda: build(chosen))
     return build
 
 

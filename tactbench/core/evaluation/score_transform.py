@@ -38,7 +38,7 @@ def transform_of(metric: str, score: float, n: int) -> ScoreTransform:
     one side: their logarithmic odds have (Agresti 2013, Categorical data analysis, section 3.1). Both are measured in
     ``benchmarks/coverage.py``.
     """
-    if metric in ("rmse", "mae"):
+    if metric in ("rmse", "mae", "mean_euclidean_error"):
         least = max(score, np.finfo(np.float64).tiny ** 0.5) / 1e3
         return ScoreTransform(
             "reciprocal scale",

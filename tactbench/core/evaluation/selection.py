@@ -145,7 +145,7 @@ def _score(
     for train, check in pairs:
         model = build(params)
         fit(model, features_of(train, descriptor), train.y, descriptor.name, counts)
-        predicted = answers(model, features_of(check, descriptor), descriptor.name, n_classes)
+        predicted = answers(model, features_of(check, descriptor), descriptor.name, n_classes, check.y.shape[1:])
         asked, combined = voted(check, predicted, n_classes) if vote else (check, predicted)
         truth.append(asked.y)
         given.append(combined)

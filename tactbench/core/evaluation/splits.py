@@ -220,7 +220,7 @@ def _leave_one_out(data: Dataset, group: str) -> Iterator[Assignment]:
 
 def _told(fold: Assignment, data: Dataset) -> Assignment:
     """Say in the name of a fold that tests one single number whether training had any on both sides of it."""
-    if data.classes:
+    if data.classes or any(table.y.ndim > 1 for table in data.tables):
         return fold
     train, test = (
         np.concatenate([table.y[mask & table.labelled] for table, mask in zip(data.tables, masks, strict=True)])

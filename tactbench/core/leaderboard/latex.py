@@ -71,12 +71,12 @@ def _table(grid: TextTable, notes: Iterable[str], *, whole_width: bool, number: 
     places = {name: place for place, name in enumerate(grid.columns)}
     gap = 2 * SEP_PT
     intervals = {places[name] for name in INTERVALS if name in places}
-    widths, gone = fit(
+    widths, hidden = fit(
         grid.headers, grid.lines, {places["sensor"], places["estimator"], *intervals}, room=COLUMN_PT - gap, gap=gap,
         measure=points, first_to_go=[places[name] for name in _FIRST_TO_GO if name in places], broken_last=intervals,
     )  # fmt: skip
-    if gone:
-        notes = [*notes, f"There was no room for: {', '.join(grid.headers[place] for place in gone)}."]
+    if hidden:
+        notes = [*notes, f"There was no room for: {', '.join(grid.headers[place] for place in hidden)}."]
     lines = [list(_broken(cells, widths)) for cells in grid.lines]
     rules = [sum(map(len, lines[:place])) for place in _first_trivial(grid)]
     heads = list(_broken(grid.headers, widths))

@@ -18,6 +18,7 @@ EMULATED = "EMULATED"
 METRIC_NAMES = {
     "rmse": "RMSE",
     "mae": "MAE",
+    "mean_euclidean_error": "mean Euclidean error",
     "r2": "R²",
     "macro_f1": "macro F1",
     "accuracy": "accuracy",
@@ -63,6 +64,6 @@ def question_name(row: Row) -> str:
     return visible(f"{row['sensor']}/{row['task']}")
 
 
-def asked_of(row: Row) -> str:
+def answer_or_probe(row: Row) -> str:
     """Return the estimator or, for a probe, its protocol: what makes no sense to probe makes none with any other."""
     return visible(str(row["protocol"])) if is_probe(row["protocol"]) else answer_name(row)

@@ -11,8 +11,9 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
-from tactbench.core.leaderboard.names import answer_name, asked_of, question_name
-from tactbench.core.leaderboard.verdict import against_trivial, asked_in, best_trivials
+from tactbench.core.leaderboard.names import answer_name, answer_or_probe, question_name
+from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
+from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
 from tactbench.core.spec.status import STATUSES, STOPPED
 from tactbench.core.tables.numbers import score, suffix
 from tactbench.core.tables.text import command_line, cut, visible
@@ -52,6 +53,7 @@ def notes_of(rows: Sequence[Row], blocks: Sequence[Block]) -> list[str]:
         *_stopped_notes(rows, STOPPED),
         *_mark_notes(rows),
         *_floor_notes(rows),
+        *_vector_notes(rows),
         *_no_better_notes(rows),
         *_tare_notes(rows),
         *_rank_notes(blocks),
@@ -92,6 +94,18 @@ def _tare_notes(rows: Sequence[Row]) -> list[str]:
     if any(row["protocol"] == "deployable-untared" and row["status"] == "done" for row in rows):
         sentences.append("`deployable-untared`: readings as they are")
     return [f"{'; '.join(sentences)}."] if sentences else []
+
+
+def _vector_notes(rows: Sequence[Row]) -> list[str]:
+    """Return the percentiles that stand beside mean errors of vectors."""
+    named = _namer(rows)
+    found = [
+        f"{named(row)}/{answer_name(row)} {score(row['scores'][MEDIAN_ERROR], row['unit'])}, "
+        f"{score(row['scores'][HIGH_ERROR], row['unit'])}{suffix(row['unit'])}"
+        for row in rows
+        if MEDIAN_ERROR in (row["scores"] or {}) and not row["is_baseline"]
+    ]
+    return [visible(f"Median and 95th percentile of the error over test rows: {'; '.join(found)}.")] if found else []
 
 
 def _floor_notes(rows: Sequence[Row]) -> list[str]:
@@ -182,11 +196,11 @@ def _picked(key: str, value: object, row: Row) -> str:
     name, _, fold = key.partition(" of fold ")
     where = f" of fold {fold}" if fold else ""
     if name == "k":
-        return f"k = {_told(value)} samples before the newest in the mean filter{where}"
-    return f"{name.rstrip('_')} = {_told(value)}{where} (parameter of {row['estimator']})"
+        return f"k = {_value_text(value)} samples before the newest in the mean filter{where}"
+    return f"{name.rstrip('_')} = {_value_text(value)}{where} (parameter of {row['estimator']})"
 
 
-def _told(value: object) -> str:
+def _value_text(value: object) -> str:
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
@@ -198,7 +212,7 @@ def _no_better_notes(rows: Sequence[Row]) -> list[str]:
     for row in rows:
         if row["status"] != "done" or row["is_baseline"] or is_probe(row["protocol"]):
             continue  # a probe should be no better than trivial
-        trivial = best.get(asked_in(row))
+        trivial = best.get(comparison_key(row))
         bar = row["baseline"] if trivial is None else trivial["score"]
         shown = "" if bar is None else against_trivial(row, bar)
         if not shown:
@@ -296,7 +310,7 @@ def _stopped_notes(rows: Sequence[Row], statuses: Collection[str]) -> list[str]:
 
 
 def _stopped_note(status: str, signal: int | None, reason: str, members: list[Row]) -> str:
-    names = list(dict.fromkeys(f"{question_name(row)}/{asked_of(row)}" for row in members))
+    names = list(dict.fromkeys(f"{question_name(row)}/{answer_or_probe(row)}" for row in members))
     more = len(names) - MOST_NAMES
     listed = ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
     by = f" by signal {signal}" if signal is not None else ""

@@ -9,7 +9,7 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, sensor_name
-from tactbench.core.leaderboard.verdict import against_trivial, asked_in, best_trivials
+from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
 from tactbench.core.tables.numbers import interval, score, suffix
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
@@ -48,7 +48,7 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
         shuffled = probes.of(row, DEPLOYABLE.name, "shuffled")
         if first is None and shuffled is None:
             continue
-        lines.append(tuple(map(visible, _line(row, shuffled, first, best.get(asked_in(row))))))
+        lines.append(tuple(map(visible, _line(row, shuffled, first, best.get(comparison_key(row))))))
         if first is not None and first["status"] == "skipped":
             skipped.append(visible(f"{row['sensor']}/{row['task']}: {first['reason']}"))
     if not lines:

@@ -170,13 +170,13 @@ def best_trivials(rows: Iterable[Row]) -> dict[tuple[Any, ...], Row]:
     for row in rows:
         if row["is_baseline"] and row["status"] == "done":
             sign = 1.0 if row["metric"] in LOWER_IS_BETTER else -1.0
-            known = best.setdefault(asked_in(row), row)
+            known = best.setdefault(comparison_key(row), row)
             if sign * row["score"] < sign * known["score"]:
-                best[asked_in(row)] = row
+                best[comparison_key(row)] = row
     return best
 
 
-def asked_in(row: Row) -> tuple[Any, ...]:
+def comparison_key(row: Row) -> tuple[Any, ...]:
     """Return what answers must share to be held against a trivial one."""
     return tuple(row[key] for key in ("sensor", "task", "rig", "protocol", "split"))
 
@@ -208,7 +208,11 @@ def _reaches(row: Row, of_errors: str, of_shares: str, trivial: float | None) ->
 
 def _bar(row: Row, trivial: Sequence[Row]) -> str:
     """Return what the trivial answer is called that the baseline of a row is of."""
-    named = [answer_name(one) for one in trivial if asked_in(one) == asked_in(row) and one["score"] == row["baseline"]]
+    named = [
+        answer_name(one)
+        for one in trivial
+        if comparison_key(one) == comparison_key(row) and one["score"] == row["baseline"]
+    ]
     return f"the trivial {named[0]}" if named else "the trivial one"
 
 

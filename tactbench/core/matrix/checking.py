@@ -16,9 +16,10 @@ from tactbench.core.matrix.evaluate_cell import FIXED
 from tactbench.core.matrix.store import Row
 from tactbench.core.matrix.store.rows import fault_in_row
 from tactbench.core.samples import Answers
+from tactbench.core.spec.task import VECTOR_METRIC
 
 _COLUMNS = tuple(column.name for column in fields(Answers))
-
+_ASKED = ("y_true", "y_pred")
 
 SAME_SCORE = 1e-9
 """Relative difference of two scores of the same answers: sums of a million terms in another order, as on another kind
@@ -63,7 +64,8 @@ def _fault_in_answers(sets: Any, row: Row) -> str:
         if not (isinstance(columns, Mapping) and columns.keys() == set(_COLUMNS)):
             return f"its {role} answers are a {type(columns).__name__} without the columns of answers"
         for name, column in columns.items():
-            if not (isinstance(column, np.ndarray) and column.ndim == 1 and column.dtype.kind in "biufSU"):
+            dimensions = 2 if name in _ASKED and row["metric"] == VECTOR_METRIC else 1
+            if not (isinstance(column, np.ndarray) and column.ndim == dimensions and column.dtype.kind in "biufSU"):
                 return f"its {role} answers have no plain column {name}"
         lengths = {name: len(column) for name, column in columns.items()}
         if len(set(lengths.values())) != 1:

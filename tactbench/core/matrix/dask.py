@@ -129,7 +129,7 @@ class Dask:
                     future.release()  # here, and not by its destructor: there a Ctrl-C would be lost
                     yield item, outcome
             for item in (*(item for item, _ in pending.values()), *waiting):
-                yield item, self._gone(client)
+                yield item, self._lost(client)
         finally:
             if pending and client.status == "running":
                 with suppress(OSError, TimeoutError):
@@ -145,9 +145,9 @@ class Dask:
             return EngineError(f"What a Dask worker computed did not arrive: {lost!r}.")
         if isinstance(error, KilledWorker):
             return error
-        return self._gone(client) if error is None else EngineError(f"A Dask worker could not pass it on: {error!r}.")
+        return self._lost(client) if error is None else EngineError(f"A Dask worker could not pass it on: {error!r}.")
 
-    def _gone(self, client: Any) -> EngineError:
+    def _lost(self, client: Any) -> EngineError:
         what = f"has had no worker for {self._alone_s:.0f} s" if client.status == "running" else "went away"
         return EngineError(
             f"The Dask scheduler at {client.scheduler.address} {what} before this cell was computed.",

@@ -300,7 +300,7 @@ def import_estimators(cells: Iterable[Cell]) -> None:
     _import({(cell.estimator, installed().tasks[cell.task].spec.kind) for cell in cells})
 
 
-def import_ours() -> None:
+def import_own_estimators() -> None:
     """Prepare all of our own estimators."""
     _import({(one.name, kind) for one in installed().estimators for kind in one.kinds})
 

@@ -17,7 +17,7 @@ from tactbench.core.provenance.source import Source, SourceDigests, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
 
-_TOLD_OTHERWISE = {"published", "equivalence", "reference_score", "title", "question", "scenes", "campaigns"}
+_NOT_IN_THE_KEY = {"published", "equivalence", "reference_score", "title", "question", "scenes", "campaigns"}
 """Of a task: what changes no number, and what its recordings say themselves, by their content."""
 
 Section = Mapping[str, Any]
@@ -69,7 +69,7 @@ class Keys:
             self._answers[pair] = _fixed(
                 source,
                 estimator.descriptor.distributions,
-                task=task.descriptor.spec.model_dump(exclude=_TOLD_OTHERWISE),
+                task=task.descriptor.spec.model_dump(exclude=_NOT_IN_THE_KEY),
                 estimator=estimator.descriptor.model_dump(exclude={"title", "linear", "rehearsal"}),
             )
         return self._answers[pair]

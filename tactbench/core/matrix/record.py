@@ -61,7 +61,7 @@ def acquire_missing(
         return
     book.write(recording_entry(request, keys) for request in missing)
     simulated = all(_computed(request) for request in missing)
-    hands = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
+    workers = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     progress.begin(stage, len(missing), alone=False)
     outcomes: Generator[tuple[RecordingRequest, str | BaseException], None, None]
     try:
@@ -69,9 +69,11 @@ def acquire_missing(
             outcomes = _one_by_one(missing, operator)
         else:
             registry = installed()
-            ours = all(registry.sensors.owned(one.sensor).ours and registry.rigs.owned(one.rig).ours for one in missing)
+            own_plugins = all(
+                registry.sensors.owned(one.sensor).ours and registry.rigs.owned(one.rig).ours for one in missing
+            )
             # What an import of somebody else's changes in its process, it changes for one recording.
-            pool = choice.pool(hands, grace_s=0.0 if simulated else GRACE_S, reuse=ours)
+            pool = choice.pool(workers, grace_s=0.0 if simulated else GRACE_S, reuse=own_plugins)
             outcomes = pool.each(record, missing)
         with closing(outcomes):
             for request, outcome in outcomes:
@@ -91,11 +93,12 @@ def acquire_missing(
 
 
 def _discard(request: RecordingRequest) -> None:
-    """Remove what there is of a recording; a disk that refuses has been told of already."""
-    from tactbench.core.recording.format import partial_path
+    """Remove what there is of an unfinished recording; a disk that refuses has been told of already."""
+    from tactbench.core.recording.format import completing_path, partial_path
 
-    with suppress(OSError):
-        partial_path(request.path).unlink(missing_ok=True)
+    for unfinished in (partial_path(request.path), completing_path(request.path)):
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
 
 
 def _computed(request: RecordingRequest) -> bool:

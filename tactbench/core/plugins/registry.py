@@ -58,7 +58,7 @@ class Owned(Generic[D]):
     @property
     def ours(self) -> bool:
         """Whether it comes with this package: tested with it, and trusted not to change or end whoever imports it."""
-        return _is_ours(self.module)
+        return _is_built_in(self.module)
 
 
 @dataclass
@@ -186,7 +186,7 @@ def load_registry(points: Iterable[EntryPoint] | None = None, *, timeout_s: floa
         owner = owners[id(point.dist)]
         unique[point.name, point.value, owner[0]] = point, owner
     several = [unique[key] for key in sorted(unique)]
-    answers = _asked_apart([point for point, _ in several if not _is_ours(point.module)], timeout_s)
+    answers = _described_in_children([point for point, _ in several if not _is_built_in(point.module)], timeout_s)
     for point, owner in several:
         _add(registry, point, owner, answers.get((point.name, point.value)))
     return registry
@@ -198,7 +198,7 @@ def installed() -> Registry:
     return load_registry()
 
 
-def _is_ours(module: str) -> bool:
+def _is_built_in(module: str) -> bool:
     return module.partition(".")[0] == __name__.partition(".")[0]
 
 
@@ -222,7 +222,7 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
     registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "loaded", tuple(brings)))
 
 
-def _asked_apart(points: Sequence[EntryPoint], timeout_s: float) -> dict[tuple[str, str], Any]:
+def _described_in_children(points: Sequence[EntryPoint], timeout_s: float) -> dict[tuple[str, str], Any]:
     """Ask each plugin in a child process; return what it describes, or what stopped it, by name and module."""
     if not points:
         return {}

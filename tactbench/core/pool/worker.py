@@ -71,18 +71,18 @@ class Worker:
             context.set_forkserver_preload(list(preload))
         log = Connection(open_log())
         self._log: Connection[Any, Any] = log
-        self.connection, theirs = multiprocessing.Pipe()
+        self.connection, child_end = multiprocessing.Pipe()
         flush()
         try:
             parent = os.getpid() if preload is None else None
-            self._process = context.Process(target=run_child, args=(work, items, theirs, log, limits, parent))
+            self._process = context.Process(target=run_child, args=(work, items, child_end, log, limits, parent))
             self._process.start()
         except BaseException:
             self.connection.close()
             log.close()
             raise
         finally:
-            theirs.close()
+            child_end.close()
         os.set_blocking(self.connection.fileno(), False)
         self._inbox = Inbox(self.connection.fileno())
         self._shared_mb = memory.resident_mb(os.getpid()) if preload is None else 0.0

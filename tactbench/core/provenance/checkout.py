@@ -38,14 +38,14 @@ def checkout_of(folder: Path) -> Checkout | None:
     if not any((place / ".git").exists() for place in (folder, *folder.parents)):
         return None
     try:
-        (status,) = _asked(folder, ("status", "--porcelain=v2", "--branch", "--untracked-files=all", "--", "."))
+        (status,) = _git_output(folder, ("status", "--porcelain=v2", "--branch", "--untracked-files=all", "--", "."))
         head = re.search(rb"^# branch\.oid ([0-9a-f]{12})", status, re.MULTILINE)
         if head is None:
             return None  # nothing was ever committed
         commit = head[1].decode()
         if all(line.startswith(b"#") for line in status.splitlines()):
             return Checkout(commit, "")
-        diff, unknown = _asked(
+        diff, unknown = _git_output(
             folder,
             ("diff", "HEAD", "--no-ext-diff", "--no-textconv", "--no-color", "--binary", "--relative", "--", "."),
             ("ls-files", "--others", "--exclude-standard", "-z", "--", "*.py"),
@@ -59,7 +59,7 @@ def checkout_of(folder: Path) -> Checkout | None:
     return Checkout(commit, digest.hexdigest()[:12] if diff or names else "")
 
 
-def _asked(folder: Path, *several: Sequence[str]) -> list[bytes]:
+def _git_output(folder: Path, *several: Sequence[str]) -> list[bytes]:
     """Return what git says to each command; raises SubprocessError if it refuses one."""
     running = [
         subprocess.Popen(

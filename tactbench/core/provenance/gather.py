@@ -17,7 +17,7 @@ from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.provenance.checkout import checkout_of
 from tactbench.core.provenance.machine import blas, container, cpu_model, host_id, memory_mb, system
 from tactbench.core.provenance.source import (
-    OURS,
+    PACKAGE,
     RELEVANT,
     SourceDigests,
     installed_distributions,
@@ -65,7 +65,7 @@ def _plugins(registry: Registry, digests: SourceDigests) -> Iterator[dict[str, s
     """Yield every package of a plugin that is not ours: who brought it, its version, its source and its commit."""
     packages = {package_of(row.module): row for row in registry.plugins}
     for package, row in sorted(packages.items()):
-        if package == OURS:
+        if package == PACKAGE:
             continue
         place = location_of(package)
         yield {
@@ -90,7 +90,7 @@ def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     several
         What `gather` returned for each of the runs that the rows come from; keys may be missing.
     """
-    texts = [*map(_software, several), *(text for one in several for text in _strangers(one)), *map(_place, several)]
+    texts = [*map(_software, several), *(text for one in several for text in _plugin_texts(one)), *map(_place, several)]
     hosts = {str(one["host"]) for one in several if one.get("host")}
     if len(hosts) > 1:
         texts.append(f"{len(hosts)} hosts: times of one are not to be compared with times of another.")
@@ -110,7 +110,7 @@ def _software(one: Mapping[str, Any]) -> str:
     return f"tactbench {one['tactbench']}{commit}, Python {one.get('python', '?')}, {', '.join(libraries)}."
 
 
-def _strangers(one: Mapping[str, Any]) -> Iterator[str]:
+def _plugin_texts(one: Mapping[str, Any]) -> Iterator[str]:
     for plugin in one.get("plugins", ()):
         state = plugin.get("commit") or f"source {str(plugin.get('source', ''))[:12]}"
         yield f"Plugin {plugin.get('distribution')} {plugin.get('version')} ({state})."

@@ -23,7 +23,7 @@ from typing import Literal
 
 Purpose = Literal["recording", "answer"]
 
-OURS = "tactbench"
+PACKAGE = "tactbench"
 _DOORS = frozenset({"tactbench", "tactbench.plugin", "tactbench.testing"})
 
 SHOWING = (
@@ -76,16 +76,16 @@ class SourceDigests:
     def _follow(self, modules: frozenset[str], purpose: Purpose) -> Source:
         packages: dict[str, Mapping[str, str]] = {}
         versions: dict[str, str] = {}
-        ours = {module.partition(":")[0] for module in modules if package_of(module) == OURS}
-        waiting = sorted({package_of(module) for module in modules} - {OURS})
+        own_modules = {module.partition(":")[0] for module in modules if package_of(module) == PACKAGE}
+        waiting = sorted({package_of(module) for module in modules} - {PACKAGE})
         while waiting:
             name = waiting.pop()
             if name in packages:
                 continue
             packages[name], imported = self._look_at(name)
-            ours |= {module for module in imported if package_of(module) == OURS}
+            own_modules |= {module for module in imported if package_of(module) == PACKAGE}
             for other in sorted(imported):
-                if package_of(other) == OURS or other in packages or other in versions:
+                if package_of(other) == PACKAGE or other in packages or other in versions:
                     continue
                 place = location_of(other)
                 if place is None:
@@ -96,15 +96,15 @@ class SourceDigests:
                     waiting.append(other)
                 else:
                     versions[other] = version
-        packages[OURS] = self._ours(purpose, ours - _DOORS)
+        packages[PACKAGE] = self._own_files(purpose, own_modules - _DOORS)
         return Source(packages, versions)
 
-    def _ours(self, purpose: Purpose, used: set[str]) -> Mapping[str, str]:
+    def _own_files(self, purpose: Purpose, used: set[str]) -> Mapping[str, str]:
         """Return tactbench's own files that count; every one if somebody uses rooms that otherwise would not."""
         left_out = (*SHOWING, *_NOT_FOR[purpose])
         rooms = [module.partition(".")[2].replace(".", "/") + "/" for module in used]
         beyond = any(room.startswith(left_out) or room == "core/" for room in rooms)
-        return self._look_at(OURS, () if beyond else left_out)[0]
+        return self._look_at(PACKAGE, () if beyond else left_out)[0]
 
     def _look_at(self, package: str, left_out: tuple[str, ...] = ()) -> tuple[dict[str, str], frozenset[str]]:
         if (package, left_out) not in self._packages:
@@ -119,7 +119,7 @@ class SourceDigests:
                     digests[_free(name, digests)] = f"unreadable {uuid.uuid4().hex}"
                     continue
                 digests[_free(name, digests)] = hashlib.sha256(content).hexdigest()[:32]
-                if package != OURS and name.endswith((".py", ".pyw")):
+                if package != PACKAGE and name.endswith((".py", ".pyw")):
                     imported.update(imports_of(content))
             if not digests:
                 digests["(its source cannot be found)"] = uuid.uuid4().hex
@@ -170,10 +170,10 @@ def imports_of(content: bytes) -> list[str]:
 
 def _room(name: str) -> str:
     package, _, rest = name.partition(".")
-    if package != OURS or not rest:
+    if package != PACKAGE or not rest:
         return package
     first, _, second = rest.partition(".")
-    return f"{OURS}.{first}" + (f".{second.partition('.')[0]}" if first == "core" and second else "")
+    return f"{PACKAGE}.{first}" + (f".{second.partition('.')[0]}" if first == "core" and second else "")
 
 
 def _imports(function: ast.expr) -> bool:

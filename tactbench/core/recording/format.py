@@ -100,3 +100,8 @@ def channel_attributes(spec: StreamSpec) -> Iterable[tuple[str, Any]]:
 def partial_path(path: Path) -> Path:
     """Return where a recording lies while it is being written."""
     return path.with_name(path.name + PARTIAL)
+
+
+def completing_path(path: Path) -> Path:
+    """Return where the finished file of a recording lies until it is renamed."""
+    return path.with_name(path.name + COMPLETING)

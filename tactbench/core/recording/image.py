@@ -76,7 +76,7 @@ def store(memory: BytesIO, file: Any, digest: str, target: Path) -> None:
     file.attrs["content_sha256"] = digest
     file.attrs["complete"] = True
     file.flush()
-    completing = target.with_name(target.name + layout.COMPLETING)
+    completing = layout.completing_path(target)
     try:
         with completing.open("wb") as written, memory.getbuffer() as content:
             written.write(content)

@@ -212,11 +212,11 @@ def _columns(
 ) -> dict[str, Any]:
     """Return the datasets of a stream by their name below it, each looked at but not read."""
     data = trust.numbers(path, group, "data", "iuf", 2, strict=strict)
-    wanted = np.dtype(spec.dtype)
-    if data is None or data.shape[1] != len(spec.channels) or data.dtype.newbyteorder("=") != wanted:
+    declared = np.dtype(spec.dtype)
+    if data is None or data.shape[1] != len(spec.channels) or data.dtype.newbyteorder("=") != declared:
         what = "no data" if data is None else f"{data.dtype} in {data.shape[1]} columns"
         raise FormatError(
-            f"In {path}, stream {spec.name!r} holds {what}; its spec says {wanted} in {len(spec.channels)}.",
+            f"In {path}, stream {spec.name!r} holds {what}; its spec says {declared} in {len(spec.channels)}.",
             hint=trust.SEE,
         )
     columns: dict[str, Any] = {

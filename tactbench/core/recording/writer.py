@@ -124,7 +124,7 @@ class RecordingWriter:
         try:
             self._open.revise(self.meta.model_dump(mode="json", include=set(changes)))
         except ValueError as error:
-            raise self._unsayable(error) from error
+            raise self._not_storable(error) from error
         except OSError as error:
             raise cannot_write(self.path, error) from error
 
@@ -195,9 +195,9 @@ class RecordingWriter:
         try:
             return layout.meta_text(self.meta)
         except ValueError as error:
-            raise self._unsayable(error) from error
+            raise self._not_storable(error) from error
 
-    def _unsayable(self, error: ValueError) -> RecordingError:
+    def _not_storable(self, error: ValueError) -> RecordingError:
         return RecordingError(
             f"What the recording {self.meta.name!r} says about itself cannot be stored: {error}.",
             hint="Use text and finite numbers; leave out what is not known.",
@@ -289,10 +289,10 @@ def _whole(numbers: npt.NDArray[Any], name: str, spec: StreamSpec) -> npt.NDArra
 
 
 def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
-    wanted = np.dtype(spec.dtype)
-    if wanted.kind == "f" or data.dtype == wanted:
-        return data.astype(wanted, copy=False)
-    limits = np.iinfo(wanted)
+    declared = np.dtype(spec.dtype)
+    if declared.kind == "f" or data.dtype == declared:
+        return data.astype(declared, copy=False)
+    limits = np.iinfo(declared)
     fits = data.dtype.kind in "iuf" and bool(
         np.all((data >= limits.min) & (data <= limits.max)) and np.array_equal(np.rint(data), data)
     )
@@ -301,7 +301,7 @@ def _stored(data: npt.NDArray[Any], spec: StreamSpec) -> npt.NDArray[Any]:
             f"Stream {spec.name!r} stores {spec.dtype}, and a reading does not fit it without loss.",
             hint="Round and clip in the rig, or declare a wider dtype in the sensor's spec.",
         )
-    return data.astype(wanted)
+    return data.astype(declared)
 
 
 def cannot_write(path: Path, error: OSError) -> UnwritableError:

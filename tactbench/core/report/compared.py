@@ -20,7 +20,7 @@ def probe_tables(subject: ReportData) -> list[TextTable]:
     lines = []
     for line in table.lines:
         facts = dict(zip(table.columns, line, strict=True))
-        asked = {
+        conditions = {
             "sensor": facts["sensor"].removesuffix(" SIM"),
             "task": facts["task"],
             "estimator": facts["estimator"],
@@ -29,11 +29,13 @@ def probe_tables(subject: ReportData) -> list[TextTable]:
             "repeat": int(facts["repeat"]) if facts.get("repeat") else None,
         }
         other = {
-            "shuffled": {**asked, "split": "shuffled"},
-            "first frame alone": {**asked, "protocol": FIRST_FRAME.name},
+            "shuffled": {**conditions, "split": "shuffled"},
+            "first frame alone": {**conditions, "protocol": FIRST_FRAME.name},
         }
         entries = [
-            Entry(text, sort_value(text), subject.anchor_of(other.get(name, asked))) if name in NUMERIC else Entry(text)
+            Entry(text, sort_value(text), subject.anchor_of(other.get(name, conditions)))
+            if name in NUMERIC
+            else Entry(text)
             for name, text in facts.items()
         ]
         lines.append(entries)

@@ -108,12 +108,12 @@ def _features(results: Results, row: Mapping[str, Any], test: Answers) -> FloatA
         raise NotApplicable("a recording is answered by its frames, and has no features of its own")
     (assignment,) = assigned(task, estimator, data, row["split"], row["seed"])
     k = int(row["chosen"].get("k", estimator.window_grid[0]))
-    asked = prepared(assignment, data, rules, k, Counter()).test
-    if not (np.array_equal(asked.recording, test.recording) and np.array_equal(asked.row, test.row)):
+    test_part = prepared(assignment, data, rules, k, Counter()).test
+    if not (np.array_equal(test_part.recording, test.recording) and np.array_equal(test_part.row, test.row)):
         raise DataError(
             f"The recordings of {row['cell']} give other test rows than were answered.", hint="Run it again."
         )
-    return features_of(asked, estimator)
+    return features_of(test_part, estimator)
 
 
 def _tsne(X: FloatArray, perplexity: float, seed: int) -> tuple[FloatArray, float]:

@@ -65,9 +65,11 @@ def _tasks(subject: ReportData) -> list[Highlight]:
         if not block.verdict or row["task"] in found:
             continue
         sentence = (*block.verdict[:1], *(one for one in block.verdict[2:] if not one.startswith(PUBLISHED)))
-        asked = f"{row['task']} under {row['protocol']}{' †' if row['dagger'] else ''}"
-        asked += ", SIM" if row["simulated"] else ""
-        found[row["task"]] = Highlight(f"{asked}: {' '.join(sentence)}", block_anchor(place), f"table of {row['task']}")
+        question = f"{row['task']} under {row['protocol']}{' †' if row['dagger'] else ''}"
+        question += ", SIM" if row["simulated"] else ""
+        found[row["task"]] = Highlight(
+            f"{question}: {' '.join(sentence)}", block_anchor(place), f"table of {row['task']}"
+        )
     return list(found.values())[:MOST_TASKS]
 
 

@@ -48,9 +48,9 @@ def reproduce(registry: Registry, rows: Sequence[Row], calibrated: Calibrated | 
     (see `unasked`). Tasks come in the order of the rows.
     """
     lines: list[Reproduction] = []
-    asked = list(dict.fromkeys(row["task"] for row in rows))
+    task_names = list(dict.fromkeys(row["task"] for row in rows))
     known = {descriptor.name: descriptor.spec for descriptor in registry.tasks}
-    for name in sorted(known, key=lambda name: asked.index(name) if name in asked else len(asked)):
+    for name in sorted(known, key=lambda name: task_names.index(name) if name in task_names else len(task_names)):
         task = known[name]
         for published in task.published:
             beside = [row for row in rows if stands_beside(row, task, published)]

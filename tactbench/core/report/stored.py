@@ -34,11 +34,11 @@ def stored(results: Path, kind: str, facts: Mapping[str, Any], compute: Callable
     -----
     A file that is damaged is made anew, and a folder that cannot be written costs the next reader the time, no more.
     """
-    asked = json.dumps(facts, sort_keys=True)
-    path = results / FOLDER / kind / f"{hashlib.sha256(asked.encode()).hexdigest()[:32]}.json"
+    key_text = json.dumps(facts, sort_keys=True)
+    path = results / FOLDER / kind / f"{hashlib.sha256(key_text.encode()).hexdigest()[:32]}.json"
     try:
         found = json.loads(read_regular(path, _MOST_BYTES))
-        if found["facts"] == json.loads(asked):
+        if found["facts"] == json.loads(key_text):
             return found["numbers"]
     except (OSError, ValueError, KeyError, TypeError):
         pass

@@ -10,14 +10,17 @@ from pydantic import BaseModel, ConfigDict
 
 from tactbench.core.spec.status import Status
 
-LOWER_IS_BETTER = frozenset({"rmse", "mae"})
+LOWER_IS_BETTER = frozenset({"rmse", "mae", "mean_euclidean_error"})
 """Metrics of a row's score that are errors."""
 
 SCORES = {
-    "rmse": (0.0, math.inf), "mae": (0.0, math.inf), "r2": (-math.inf, 1.0), "accuracy": (0.0, 1.0),
-    "balanced_accuracy": (0.0, 1.0), "macro_f1": (0.0, 1.0),
+    "rmse": (0.0, math.inf), "mae": (0.0, math.inf), "mean_euclidean_error": (0.0, math.inf), "r2": (-math.inf, 1.0),
+    "accuracy": (0.0, 1.0), "balanced_accuracy": (0.0, 1.0), "macro_f1": (0.0, 1.0),
 }  # fmt: skip
 """What scores of a metric lie between."""
+
+MEDIAN_ERROR, HIGH_ERROR = "median error", "95th percentile of the error"
+"""Keys of `scores` that stand beside the mean error of a vector: percentiles over the test rows."""
 
 INTERVALS = (
     ("score", "ci_low", "ci_high"),

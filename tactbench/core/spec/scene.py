@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, Field, FiniteFloat, ValidationError, field_serializer, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    FiniteFloat,
+    Tag,
+    ValidationError,
+    field_serializer,
+    model_validator,
+)
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
 from tactbench.core.spec.drive import ForceLoop
-from tactbench.core.spec.quantity import Frozen, Quantity, assumed, derived, measured, sourced
+from tactbench.core.spec.quantity import Frozen, Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.sensor import ChannelKind
 
 M = TypeVar("M", bound=BaseModel)
@@ -77,6 +88,76 @@ class ForceRamp(Frozen):
         if self.hold_s >= duration:
             return (0.0, duration), (start, start)
         return (0.0, self.hold_s, duration), (start, start, end)
+
+
+class ForcePath(Frozen):
+    """A normal force that runs straight from point to point, as in presses, taps and ripples."""
+
+    kind: Literal["path"] = "path"
+    times_s: tuple[FiniteFloat, ...] = Field(min_length=2)
+    """(k,) ascending from 0 [s]; the last is the whole recording."""
+    forces_n: tuple[Annotated[FiniteFloat, Field(ge=0)], ...]
+    """(k,) [N]"""
+    samples: int = Field(ge=1)
+    """Samples of the reference clock over the whole recording."""
+    source: Source
+    """Why these forces."""
+
+    @model_validator(mode="after")
+    def _runs(self) -> ForcePath:
+        if len(self.times_s) != len(self.forces_n):
+            raise ValueError("a force path has one force for each time")
+        if self.times_s[0] != 0 or any(b <= a for a, b in pairwise(self.times_s)):
+            raise ValueError("the times of a force path ascend from 0 s")
+        return self
+
+    @property
+    def start(self) -> Quantity:
+        """The force at the first sample."""
+        return Quantity(value=self.forces_n[0], unit="N", source=self.source)
+
+    @property
+    def end(self) -> Quantity:
+        """The force at the end."""
+        return Quantity(value=self.forces_n[-1], unit="N", source=self.source)
+
+    @property
+    def hold(self) -> Quantity:
+        """How long the force stays at its start."""
+        still = next((time for time, force in zip(self.times_s[1:], self.forces_n[1:], strict=True)
+                      if force != self.forces_n[0]), self.times_s[-1])  # fmt: skip
+        return Quantity(value=still, unit="s", source=self.source)
+
+    @property
+    def duration(self) -> Quantity:
+        """The whole recording."""
+        return Quantity(value=self.times_s[-1], unit="s", source=self.source)
+
+    @property
+    def largest_n(self) -> float:
+        """The largest force of the profile [N]."""
+        return max(self.forces_n)
+
+    @property
+    def hold_s(self) -> float:
+        """How long the force stays at its start [s]."""
+        return self.hold.value
+
+    @property
+    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Times [s] and forces [N] between which the force runs straight."""
+        return self.times_s, self.forces_n
+
+
+def _profile_kind(given: Any) -> str:
+    """Return which profile is meant; one that states no kind is a ramp."""
+    return str(given.get("kind", "ramp") if isinstance(given, Mapping) else getattr(given, "kind", "ramp"))
+
+
+ForceProfile = Annotated[
+    Annotated[ForceRamp, Tag("ramp")] | Annotated[ForcePath, Tag("path")], Discriminator(_profile_kind)
+]
+"""The normal force over time."""
 
 
 class Environment(Frozen):
@@ -215,7 +296,7 @@ class Scene(Frozen):
     """Short and unique within a task, fit for a file name."""
     indenter: Indenter = Indenter()
     placement: Placement = Placement()
-    profile: ForceRamp = ForceRamp()
+    profile: ForceProfile = ForceRamp()
     drive: ForceLoop | None = None
     """How the force is brought about; None: the indenter follows the profile exactly."""
     slide: Slide | None = None

@@ -59,6 +59,33 @@ class ChannelTarget(Frozen):
     unit: str = "N"
 
 
+VECTOR_METRIC = "mean_euclidean_error"
+"""What a vector is scored by."""
+
+
+class VectorTarget(Frozen):
+    """The vector to predict is several channels of the reference, sample by sample; a row without one has no label."""
+
+    source: Literal["vector"] = "vector"
+    kind: ChannelKind = "position"
+    """Of every component."""
+    names: tuple[str, ...] = Field(min_length=2)
+    """The channels, one a component."""
+    unit: str
+    """Of every component: the length of a difference is in it too."""
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> VectorTarget:
+        if len(set(self.names)) < len(self.names):
+            raise ValueError("two components of the target are the same channel")
+        return self
+
+    @property
+    def components(self) -> tuple[ChannelTarget, ...]:
+        """Each component as a target of its own."""
+        return tuple(ChannelTarget(kind=self.kind, name=name, unit=self.unit) for name in self.names)
+
+
 class LabelTarget(Frozen):
     """The class to predict is a label: of the whole recording, or of each row (an annotation)."""
 
@@ -96,7 +123,7 @@ class TaskSpec(Frozen):
     kind: Literal["regression", "classification"]
     features: tuple[ChannelKind, ...] = ("taxel",)
     """Kinds of channels an estimator may look at."""
-    target: ChannelTarget | LabelTarget
+    target: ChannelTarget | VectorTarget | LabelTarget
     answer_per: Literal["sample", "recording"] = "sample"
     """`recording`: one class or number for each recording as a whole, made in one of the three ways that follow. The
     target is then a label that does not change within a recording."""
@@ -133,6 +160,15 @@ class TaskSpec(Frozen):
     baselines: tuple[str, ...]
     """Trivial answers that stand in every table and are probed; the best of them is the bar."""
     published: tuple[Published, ...] = ()
+
+    @model_validator(mode="after")
+    def _vectors_have_a_metric_of_their_own(self) -> TaskSpec:
+        vector = isinstance(self.target, VectorTarget)
+        if vector and self.kind != "regression":
+            raise ValueError("a vector is predicted by kind: regression")
+        if vector != (self.metric == VECTOR_METRIC):
+            raise ValueError(f"metric {VECTOR_METRIC} and a target that is a vector belong together")
+        return self
 
     @model_validator(mode="after")
     def _recordings_are_answered_in_one_way(self) -> TaskSpec:

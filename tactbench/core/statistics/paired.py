@@ -110,7 +110,7 @@ def _paired(first: Row, second: Row, value: float, sign: float, group: PairableR
     if first["replicates"].get("of") == "beyond":
         over += ", of the errors beyond the floor"
     own = value + carried * _to_own(group)
-    return _told(
+    return _difference(
         value, deviation, freedom, sign, _region(first),
         p=p,
         smallest_p=smallest,
@@ -144,7 +144,7 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
     why = "they have other replicates" if len(of) == 2 else "replicates are missing, their own intervals stand in"
     spread = float(np.sqrt((np.var(own[0], ddof=1) + np.var(own[1], ddof=1)) / 2)) if len(of) == 2 else 0.0
     pairs = sign * np.subtract.outer(own[0], own[1]) if len(of) == 2 else np.empty(0)
-    return _told(
+    return _difference(
         value, deviation, freedom, sign, _region(first),
         p=two_sided(value / deviation, freedom) if 0 < deviation < np.inf else None,
         smallest_p=0.0 if 0 < deviation < np.inf else None,
@@ -158,7 +158,7 @@ def _unpaired(first: Row, second: Row, value: float, sign: float, groups: list[P
     )  # fmt: skip
 
 
-def _told(value: float, deviation: float, freedom: float, sign: float, region: float, **more: Any) -> Difference:
+def _difference(value: float, deviation: float, freedom: float, sign: float, region: float, **more: Any) -> Difference:
     if not np.isfinite(deviation):
         return Difference(value, None, None, verdict="undecided", beyond=False, **more)
     reach = float(quantile(freedom)) * deviation

@@ -85,7 +85,7 @@ def fit(
         )
         for place, name in enumerate(headers)
     }
-    gone: list[int] = []
+    hidden: list[int] = []
 
     def taken(of: dict[int, float]) -> float:
         return sum(of[place] for place in widths) + gap * (len(widths) - 1)
@@ -94,7 +94,7 @@ def fit(
         if taken(least) <= room:
             break
         del widths[place]
-        gone.append(place)
+        hidden.append(place)
     if taken(widths) > room:
         widths = {place: max(_of_header(headers[place], measure), bodies[place]) for place in widths}
     while taken(widths) > room:
@@ -108,7 +108,7 @@ def fit(
             break
         widest = max(slack, key=lambda place: (place not in broken_last, widths[place]))
         widths[widest] = max(least[widest], widths[widest] - 1.0)
-    return widths, gone
+    return widths, hidden
 
 
 def _of_header(text: str, measure: Measure) -> float:

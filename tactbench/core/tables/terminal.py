@@ -46,10 +46,10 @@ def _lines(parts: Iterable[Part], width: int) -> Iterator[Styled]:
         if last:
             yield "", ""
         table = part if isinstance(part, TextTable) else None
-        lines, gone = _table_lines(table, width) if table else ([], [])
+        lines, hidden = _table_lines(table, width) if table else ([], [])
         lines += _note_lines(part.notes if isinstance(part, TextTable) else part, width)
         yield from lines
-        left_out |= dict.fromkeys(gone)
+        left_out |= dict.fromkeys(hidden)
         last = lines[-1][0] if lines else last
     if left_out:
         yield from _note_lines(
@@ -69,7 +69,7 @@ def _table_lines(table: TextTable, width: int) -> tuple[list[Styled], list[str]]
     intervals = {places[name] for name in table.intervals if name in places}
     to_go = [places[name] for name in table.first_to_go if name in places]
     for gap in _GAPS:
-        widths, gone = fit(
+        widths, hidden = fit(
             table.headers, lines, breakable, room=width - _MARGIN, gap=gap, measure=_width, first_to_go=to_go,
             broken_last=intervals, uncut={places[name] for name in table.unbroken if name in places},
         )  # fmt: skip
@@ -102,7 +102,7 @@ def _table_lines(table: TextTable, width: int) -> tuple[list[Styled], list[str]]
         body += [(text, _STYLE.get(kind, "")) for text in padded(line)]
     title: list[Styled] = [(line, "bold") for line in _folded(table.title, width)]
     title += [(line, "") for text in table.summary for line in _folded(text, width)]
-    return [*title, ("", ""), *body, ("", "")], [table.columns[place] for place in gone]
+    return [*title, ("", ""), *body, ("", "")], [table.columns[place] for place in hidden]
 
 
 def _split(line: Sequence[str]) -> list[list[str]]:

@@ -107,7 +107,7 @@ class Line:
         self._seen: Counter[Fault] = Counter()
         self._byte_s = BITS_PER_BYTE / baud if baud else 0.0
         self._keep_log = keep_log
-        self._gone_s = min((fault.start_s for fault in faults if fault.name == "unplug"), default=math.inf)
+        self._unplugged_s = min((fault.start_s for fault in faults if fault.name == "unplug"), default=math.inf)
         self._next_s: float | None = None
         self._in: deque[tuple[float, Piece]] = deque()
         self._out: deque[tuple[float, Piece]] = deque()
@@ -133,19 +133,19 @@ class Line:
         """Let the device go on to `now_s`, and deliver what is due by then."""
         if self.gone:
             return
-        until_s = min(now_s, self._gone_s)
+        until_s = min(now_s, self._unplugged_s)
         while self._in and self._in[0][0] <= until_s:
             t_s, piece = self._in.popleft()
             self._send(self._emulator.feed(piece, t_s))
         self._send(self._emulator.poll(until_s))
-        while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._gone_s:
+        while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._unplugged_s:
             t_s, piece = self._out.popleft()
             self.bytes_to_host += _size(piece)
             if self._keep_log:
                 self.log.append(Passed(t_s, "device", piece))
             if self.deliver is not None:
                 self.deliver(t_s, piece)
-        self.gone = now_s >= self._gone_s
+        self.gone = now_s >= self._unplugged_s
         self._next_s = math.inf if self.gone else self._due_s(until_s)
 
     def next_s(self) -> float:
@@ -159,7 +159,7 @@ class Line:
             self._emulator.next_s(),
             self._in[0][0] if self._in else math.inf,
             self._out[0][0] if self._out else math.inf,
-            self._gone_s,
+            self._unplugged_s,
         )
         return due_s if due_s > polled_s else polled_s + _AGAIN_S
 

@@ -170,7 +170,7 @@ class Control:
                 self._guard.advance(self._next_ns)
                 self._period()
         except Exception as error:
-            self.press.fail(_said(error))
+            self.press.fail(_error_text(error))
             self.press.abandon()
 
     def _gather(self) -> None:
@@ -206,20 +206,20 @@ class Control:
         try:
             command = press.step(self._report, raw, 1e-9 * now_ns)
         except TactbenchError as error:
-            press.fail(_said(error))
+            press.fail(_error_text(error))
             command = press.step(self._report, (), 1e-9 * now_ns)
         self._beats += 1
-        asked: dict[str, Any] = {
+        request: dict[str, Any] = {
             "command": command.kind,
             "distance_m": command.distance_m,
             "position_m": command.position_m,
             "speed_m_s": command.speed_m_s,
         }
         self._report = self._guard.beat(
-            Beat(self._beats, now_ns, str(press.state), force_sequence=self._report.force_sequence, **asked)
+            Beat(self._beats, now_ns, str(press.state), force_sequence=self._report.force_sequence, **request)
         )
 
 
-def _said(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     text = error.message if isinstance(error, TactbenchError) else f"{type(error).__name__}: {error}"
     return text.rstrip(".")

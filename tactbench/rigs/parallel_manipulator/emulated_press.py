@@ -45,6 +45,8 @@ def quiet(scene: Scene) -> Scene:
     profile = scene.profile
     if scene.slide is not None:
         raise NotApplicable(f"The scene {scene.name!r} slides, and this rig only presses.")
+    if profile.kind != "ramp":
+        raise NotApplicable(f"The scene {scene.name!r} states a path of forces, and this rig only raises one.")
     if profile.start.to("N") != 0 or not profile.end.to("N") > 0 or not profile.duration.to("s") > profile.hold_s:
         raise NotApplicable(f"The scene {scene.name!r} does not rise from 0 N, as this rig presses.")
     environment = scene.environment.model_copy(update={"force_filter": None})

@@ -2,7 +2,7 @@
 
 Of step length T, position positive into the skin, measured force m, filter y, integral i, target c:
 
-    y_n = a y_{n-1} + (1 - a) m_n    a = exp(-2 pi f T)       e_n = wanted_n - y_n
+    y_n = a y_{n-1} + (1 - a) m_n    a = exp(-2 pi f T)       e_n = setpoint_n - y_n
     i_n = i_{n-1} + ki T e_n + T r_n/k                        c_n = kp e_n + i_n
 
 With kp = 0 it is the law of increments c += ki T e, and what a velocity in proportion to the missing force does; an
@@ -108,7 +108,7 @@ class ForceController:
                 hint="An unknown force counts as too large a force: retreat.",
             )
 
-    def step(self, force_n: float, position_m: float, now_s: float, wanted_n: float, slope_n_s: float = 0.0) -> float:
+    def step(self, force_n: float, position_m: float, now_s: float, setpoint_n: float, slope_n_s: float = 0.0) -> float:
         """Return the increment of the motor's target [m], positive into the skin.
 
         Parameters
@@ -119,7 +119,7 @@ class ForceController:
             Measured position of the motor [m].
         now_s
             Time of the sample [s].
-        wanted_n, slope_n_s
+        setpoint_n, slope_n_s
             Wanted force [N] and its slope [N/s], for the feed-forward.
 
         Raises
@@ -129,7 +129,7 @@ class ForceController:
         UsageError
             If time does not go forwards.
         """
-        self._known(force_n, position_m, now_s, wanted_n, slope_n_s)
+        self._known(force_n, position_m, now_s, setpoint_n, slope_n_s)
         passed = now_s - self._now
         if passed <= 0:
             raise UsageError(f"The force loop was stepped at {now_s} s and at {self._now} s before.")
@@ -140,7 +140,7 @@ class ForceController:
         if self.late:
             self.limited = False
             return 0.0
-        missing = wanted_n - self.filtered_n
+        missing = setpoint_n - self.filtered_n
         growth = self._ki * passed * missing + passed * slope_n_s * self._per_slope
         wish = self._kp * missing + self._integral + growth
         most = self._speed * passed

@@ -80,7 +80,7 @@ MANDATORY = (
 _ORDINARY = (Trigger.COMMANDED, Trigger.TERMINATED)
 _HOME_ANEW = (
     Trigger.MOTOR_FAULT,
-    Trigger.MOTOR_GONE,
+    Trigger.MOTOR_LOST,
     Trigger.MOTOR_SILENT,
     Trigger.DEVIATION,
     Trigger.HOMING,
@@ -158,10 +158,10 @@ class LocalGuard:
         self._force_blocks: list[Block] = []
         self._motor_blocks: list[Block] = []
         self._events: list[Event] = []
-        self._said: list[str] = []
+        self._reports: list[str] = []
         self._not_out = ""
         self._counts: Counter[str] = Counter()
-        self._force_gone = self._motor_gone = self._home_anew = self._closed = False
+        self._force_lost = self._motor_lost = self._home_anew = self._closed = False
         self._beats = self._refused = 0
         self._beat_ns = 0
         self._end_sequence = -1
@@ -297,7 +297,7 @@ class LocalGuard:
     def abandon(self) -> None:
         """Close the motor's link and send nothing more: for whoever goes on without this guard."""
         self._motor.close()
-        self._motor_gone, self.state = True, GuardState.FAULT
+        self._motor_lost, self.state = True, GuardState.FAULT
 
     def close(self) -> None:
         """Disarm, and close both devices; once closed, this does nothing."""
@@ -352,19 +352,19 @@ class LocalGuard:
     def _seen(self, timeout_s: float, limits: Limits | None) -> Problem | None:
         """Take what both devices have sent; return the first thing that is wrong, of the force first."""
         of_force = self._take_force(timeout_s, limits)
-        of_motor = self._take_motor(timeout_s if self._force_gone else 0.0, limits)
-        if self._force_gone and self._motor_gone and timeout_s > 0.0:
+        of_motor = self._take_motor(timeout_s if self._force_lost else 0.0, limits)
+        if self._force_lost and self._motor_lost and timeout_s > 0.0:
             self._advance(self._clock() + round(1e9 * timeout_s))
         return of_force or of_motor
 
     def _take_force(self, timeout_s: float, limits: Limits | None) -> Problem | None:
         watch, problem = self._seen_force, None
-        if self._force_gone:
+        if self._force_lost:
             return None if limits is None else (Trigger.FORCE_LOST, "the force sensor is gone")
         try:
             blocks = self._force.read(timeout_s)
         except (LinkError, RigError) as error:
-            self._force_gone = True
+            self._force_lost = True
             return Trigger.FORCE_LOST, error.message
         for block in blocks:
             newer = self._order(block)
@@ -375,14 +375,14 @@ class LocalGuard:
         return problem or (None if limits is None else watch.old(self._clock(), limits))
 
     def _take_motor(self, timeout_s: float, limits: Limits | None) -> Problem | None:
-        if self._motor_gone:
-            return Trigger.MOTOR_GONE, "the motor's link is gone"
+        if self._motor_lost:
+            return Trigger.MOTOR_LOST, "the motor's link is gone"
         was_moving = self._motor.moving
         try:
             self._motor_blocks += self._motor.read(timeout_s)
         except (LinkUnplugged, LinkClosed) as error:
-            self._motor_gone = True
-            return Trigger.MOTOR_GONE, error.message
+            self._motor_lost = True
+            return Trigger.MOTOR_LOST, error.message
         except (MotorSilentError, AnswerMissingError, LinkTimeout) as error:
             return Trigger.MOTOR_SILENT, error.message
         except MotorError as error:
@@ -484,7 +484,7 @@ class LocalGuard:
         try:
             self._motor.retreat()
         except (LinkUnplugged, LinkClosed):
-            self._motor_gone = True
+            self._motor_lost = True
         except TactbenchError:
             self._counts["retreats_not_sent"] += 1
 
@@ -492,8 +492,8 @@ class LocalGuard:
         """See whether the motor is there; send it again, or end in a fault."""
         now_ns, state = self._clock(), self._motor.state
         took = f"{1e-9 * (now_ns - self._began_ns):.3f} s"
-        if self._motor_gone:
-            self._end(Trigger.MOTOR_GONE, "stand clear: the motor ends its last move and holds there")
+        if self._motor_lost:
+            self._end(Trigger.MOTOR_LOST, "stand clear: the motor ends its last move and holds there")
         elif not self._motor.moving and self._at(limits.retreat_m) and state is not None and state.t_ns > self._sent_ns:
             self._end(None, f"out after {took}")
         elif now_ns > self._deadline_ns:
@@ -547,7 +547,7 @@ class LocalGuard:
                 limits.torque_ceiling_nm is not None and not any(channel.kind == "torque" for channel in channels),
                 "there is a ceiling of torque and no torque",
             ),
-            (self._force_gone or self._motor_gone, "a device is gone: close the guard and open a new one"),
+            (self._force_lost or self._motor_lost, "a device is gone: close the guard and open a new one"),
         ):
             if wrong:
                 raise GuardRefusesError(f"The guard does not arm: {problem}.", hint="See docs/hardware.md, Safety.")
@@ -630,12 +630,12 @@ class LocalGuard:
             values={} if watch is None else {"norm_n": watch.norm_n, "force_age_s": watch.age_s(self._clock())},
         )
         self._events.append(event)
-        self._said.append(f"{1e-9 * event.t_ns:.3f} s: {'' if trigger is None else f'{trigger}: '}{text}")
+        self._reports.append(f"{1e-9 * event.t_ns:.3f} s: {'' if trigger is None else f'{trigger}: '}{text}")
         self._on_event(event)
 
     def _report(self, sequence: int, verdict: _Verdict) -> Report:
         watch, state = self._seen_force, self._motor.state
-        said, self._said = self._said, []
+        reports, self._reports = self._reports, []
         return Report(
             sequence=sequence,
             t_ns=self._clock(),
@@ -653,5 +653,5 @@ class LocalGuard:
             touched=self._touched,
             trigger=self.trigger,
             not_out=self._not_out,
-            event="; ".join(said),
+            event="; ".join(reports),
         )

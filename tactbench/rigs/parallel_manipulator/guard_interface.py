@@ -85,7 +85,7 @@ class Trigger(StrEnum):
     DEVIATION = "motor away from its reference"
     MOTOR_FAULT = "motor fault"
     MOTOR_SILENT = "motor does not answer"
-    MOTOR_GONE = "motor's link is gone"
+    MOTOR_LOST = "motor's link is gone"
     HOMING = "force or fault while homing"
     RETREAT_FAILED = "retreat failed"
     GUARD_LOST = "guard is gone"

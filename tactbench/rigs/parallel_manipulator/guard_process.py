@@ -95,10 +95,10 @@ class GuardProcess:
         self._held: dict[int, list[Block]] = {FORCE: [], MOTOR: []}
         self._events: list[Event] = []
         self._closed = False
-        self._control, theirs = socket.socketpair()
-        self._data, theirs_data = socket.socketpair()
-        with theirs, theirs_data, Path(settings.log).open("ab") as errors:
-            descriptors = (theirs.fileno(), theirs_data.fileno())
+        self._control, child_control = socket.socketpair()
+        self._data, child_data = socket.socketpair()
+        with child_control, child_data, Path(settings.log).open("ab") as errors:
+            descriptors = (child_control.fileno(), child_data.fileno())
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", SERVER, *map(str, descriptors)],
                 pass_fds=descriptors,
@@ -228,7 +228,7 @@ class GuardProcess:
             # A line of some hundred bytes; a full socket means that nobody reads at the other end.
             self._control.sendall(encode_message(kind, body))
         except OSError as error:
-            self._gone(f"it does not take a message ({error})")
+            self._fail(f"it does not take a message ({error})")
 
     def _report(self, sequence: int, within_s: float) -> Report:
         until_ns = self._clock() + round(1e9 * min(within_s, START_S + HOMING_S))
@@ -250,7 +250,7 @@ class GuardProcess:
                     return one, body
             left_s = 1e-9 * (until_ns - self._clock())
             if left_s <= 0.0:
-                self._gone(f"it has not answered within {within_s:.3f} s")
+                self._fail(f"it has not answered within {within_s:.3f} s")
             self._take(left_s)
 
     def _take(self, timeout_s: float) -> None:
@@ -264,7 +264,7 @@ class GuardProcess:
             except ConnectionError:
                 pass
             if not data:
-                self._gone("its socket is closed")
+                self._fail("its socket is closed")
             if key.fileobj is self._data:
                 if self._blocks is not None:
                     for device, block in self._blocks.feed(data):
@@ -282,26 +282,26 @@ class GuardProcess:
         found, self._held[device] = self._held[device], []
         return found
 
-    def _gone(self, why: str) -> NoReturn:
+    def _fail(self, why: str) -> NoReturn:
         """End the process and let the motor retreat from here; raises GuardLostError, now and ever after."""
         with suppress(OSError):
             self._process.kill()
-        said = "the motor was not armed, nothing was sent to it"
+        outcome = "the motor was not armed, nothing was sent to it"
         opener = partial(open_link, self._settings.motor.link, self._clock)
         trigger, position_m = Trigger.GUARD_LOST, math.nan
         try:
             if self._arming:
                 stand_blind(opener, self._options, self._clock)
-                said = "the motor was told to stand"
+                outcome = "the motor was told to stand"
             elif self._limits is not None:
                 position_m = retreat_blind(opener, self._options, self._clock, self._limits.retreat_s)
-                said = f"the motor has retreated to {position_m:g} m"
+                outcome = f"the motor has retreated to {position_m:g} m"
         except TactbenchError as error:
             trigger = Trigger.RETREAT_FAILED
-            said = f"RETREAT FAILED: {error.message} Stand clear, and cut the motor's supply"
+            outcome = f"RETREAT FAILED: {error.message} Stand clear, and cut the motor's supply"
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)
-        text = f"The guard's process is lost: {why}; {said}."
+        text = f"The guard's process is lost: {why}; {outcome}."
         self._events.append(Event(self._clock(), GuardState.FAULT, trigger, math.nan, position_m, text))
         self._lost = GuardLostError(text, hint=f"Its last events are in {self._settings.log}.")
         raise self._lost

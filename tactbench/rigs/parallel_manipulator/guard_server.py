@@ -70,7 +70,7 @@ class _Server:
         self._log: IO[str] | None = None
         self._parent: int | None = None
         self._alone = self._over = False
-        self._told_alone = self._arming = False
+        self._alone_reported = self._arming = False
         self._dropped_rows = self._dropped_reports = 0
         self.terminated = False
 
@@ -126,9 +126,9 @@ class _Server:
         return self._alone or self.terminated
 
     def _tell_why(self, guard: LocalGuard) -> None:
-        if self._told_alone:
+        if self._alone_reported:
             return
-        self._told_alone = True
+        self._alone_reported = True
         if self.terminated:
             guard.trip(Trigger.TERMINATED, "the guard's process was told to end")
         else:

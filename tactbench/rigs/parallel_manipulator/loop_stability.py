@@ -147,7 +147,7 @@ def ramp_error_n(loop: ForceLoop, slope_n_s: float, stiffness_n_m: float) -> flo
 def pressed_spring(
     law: ForceLaw,
     stiffness_n_m: float,
-    wanted_n: FloatArray,
+    setpoint_n: FloatArray,
     error_n: FloatArray,
     start_m: float = 0.0,
     slope_n_s: float = 0.0,
@@ -160,7 +160,7 @@ def pressed_spring(
         With its limits.
     stiffness_n_m
         Of the spring [N/m].
-    wanted_n
+    setpoint_n
         (n,) wanted force.
     error_n
         (n,) error of the force sensor; force is rounded to the loop's resolution.
@@ -173,13 +173,13 @@ def pressed_spring(
     x = start_m
     controller = ForceController(law, stiffness_n_m * x, x, 0.0)
     targets = [x] * (at.delay_periods + 1)
-    depth = np.empty(wanted_n.size)
-    for n, (wanted, error) in enumerate(zip(wanted_n.tolist(), error_n.tolist(), strict=True)):
+    depth = np.empty(setpoint_n.size)
+    for n, (setpoint, error) in enumerate(zip(setpoint_n.tolist(), error_n.tolist(), strict=True)):
         depth[n] = x
         force = stiffness_n_m * x + error
         if resolution > 0:
             force = round(force / resolution) * resolution
-        controller.step(force, x, (n + 1) * at.period_s, wanted, slope_n_s)
+        controller.step(force, x, (n + 1) * at.period_s, setpoint, slope_n_s)
         targets = [controller.target_m, *targets[:-1]]
         x = at.lag_kept * x + (1 - at.lag_kept) * targets[-1]
     return depth

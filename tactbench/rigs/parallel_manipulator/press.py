@@ -72,7 +72,7 @@ class Command:
 class Course:
     """What a scene asks for."""
 
-    wanted_n: Callable[[float], float]
+    setpoint_n: Callable[[float], float]
     """Force at a second since its first sample."""
     slope_n_s: float
     """Of the ramp."""
@@ -120,7 +120,7 @@ class Press:
         self.contact_m = math.nan
         self.touch_n = 0.0
         self.error_n = math.nan
-        self.wanted_n = 0.0
+        self.setpoint_n = 0.0
         self._settings, self._course, self._increment_m = settings, course, increment_m
         limits, loop = settings.limits, settings.force_loop
         self._law: ForceLaw = loop.law(limits.travel_mm)
@@ -130,7 +130,7 @@ class Press:
         self._force_n = math.nan
         self._controller: ForceController | None = None
         self._goal: Command | None = None
-        self._asked_s: float | None = None
+        self._requested_s: float | None = None
         self._since_s = self._due_s = 0.0
         self._began_s: float | None = None
         self._paused_s = 0.0
@@ -236,7 +236,7 @@ class Press:
 
     def _enter(self, state: PressState, now_s: float) -> None:
         self.state, self._since_s = state, now_s
-        self._goal = self._asked_s = None
+        self._goal = self._requested_s = None
         self._band_since_s = self._error_since_s = math.nan
         self._swings, self._peak_n = 0, 0.0
 
@@ -244,15 +244,15 @@ class Press:
 
     def _move(self, position_m: float, speed_mm_s: float) -> None:
         self._goal = Command(CommandKind.MOVE_TO, position_m=position_m, speed_m_s=1e-3 * speed_mm_s)
-        self._asked_s = None
+        self._requested_s = None
 
     def _asking(self, report: Report, now_s: float) -> Command:
         """Return the move that is to be begun, until the guard has accepted it; a stop at once."""
-        if self._goal is None or self._asked_s is not None:
+        if self._goal is None or self._requested_s is not None:
             return Command()
         if report.moving and self._goal.kind is not CommandKind.STOP:
             return Command()
-        self._asked_s = now_s
+        self._requested_s = now_s
         if self._goal.kind is CommandKind.MOVE_TO:
             way_m = abs(self._goal.position_m - report.position_m)
             self._due_s = now_s + SLOW * way_m / self._goal.speed_m_s + SLACK_S
@@ -260,10 +260,10 @@ class Press:
 
     def _arrived(self, report: Report, now_s: float) -> bool:
         """Return whether the last move is over; asks for it again if it was not accepted."""
-        if self._goal is None or self._asked_s is None or now_s <= self._asked_s:
+        if self._goal is None or self._requested_s is None or now_s <= self._requested_s:
             return False
         if not report.accepted:
-            self._asked_s = None
+            self._requested_s = None
             return False
         if report.moving:
             if now_s > self._due_s:
@@ -278,13 +278,13 @@ class Press:
                 self._close_loop(report, now_s)
             return
         slowly = self._goal.position_m == settings.deepest_m
-        if slowly and self._asked_s is not None and (report.touched or self.mean_n > touch.mean_n):
+        if slowly and self._requested_s is not None and (report.touched or self.mean_n > touch.mean_n):
             # The guard has stopped it at a single touch; a mean that is reached is stopped here.
             self._goal = None if report.touched else Command(CommandKind.STOP)
-            self._asked_s = None
+            self._requested_s = None
             return
         if self._goal.kind is CommandKind.STOP:
-            if self._asked_s is not None and not report.moving:
+            if self._requested_s is not None and not report.moving:
                 self._goal = None
             return
         if self._arrived(report, now_s):
@@ -324,22 +324,22 @@ class Press:
         if self._lost:
             self._paused_s += now_s - self._waiting_s
 
-    def _wanted(self, now_s: float) -> tuple[float, float]:
+    def _setpoint(self, now_s: float) -> tuple[float, float]:
         """Return the wanted force and its slope."""
         least = self._settings.touch.contact_n
         if self.state is PressState.CONTACT or self._began_s is None:
             return least, 0.0
         scene_s = now_s - self._began_s - self._paused_s
-        wanted = self._course.wanted_n(scene_s)
-        rising = self.state is PressState.RAMP and wanted > least and scene_s < self._course.end_s
-        return max(least, wanted), self._course.slope_n_s if rising else 0.0
+        setpoint = self._course.setpoint_n(scene_s)
+        rising = self.state is PressState.RAMP and setpoint > least and scene_s < self._course.end_s
+        return max(least, setpoint), self._course.slope_n_s if rising else 0.0
 
     def _regulated(self, report: Report, now_s: float) -> Command:
         controller = self._controller
         assert controller is not None
-        self.wanted_n, slope = self._wanted(now_s)
-        controller.step(self._force_n, report.position_m, now_s, self.wanted_n, slope)
-        self.error_n = controller.filtered_n - self.wanted_n
+        self.setpoint_n, slope = self._setpoint(now_s)
+        controller.step(self._force_n, report.position_m, now_s, self.setpoint_n, slope)
+        self.error_n = controller.filtered_n - self.setpoint_n
         if self.state is PressState.CONTACT:
             if now_s - self._since_s >= self._settings.touch.settle_s:
                 self.contact_m = controller.target_m
@@ -372,20 +372,22 @@ class Press:
     def _kept(self, controller: ForceController, now_s: float) -> bool:
         """Return whether force and contact are as they should be; else see to what follows."""
         rules = self._settings.press
-        in_band = controller.filtered_n < rules.band_n and self.wanted_n > 2 * rules.band_n
+        in_band = controller.filtered_n < rules.band_n and self.setpoint_n > 2 * rules.band_n
         self._band_since_s = _since(self._band_since_s, in_band, now_s)
         if now_s - self._band_since_s >= rules.lost_s:
             if self._lost:
-                self.fail(f"contact lost a second time, at {self.wanted_n:.2f} N")
+                self.fail(f"contact lost a second time, at {self.setpoint_n:.2f} N")
                 return False
             self._lost, self._waiting_s = True, self._band_since_s
-            self.remarks.append(f"contact lost at {self.wanted_n:.2f} N, and approached again")
+            self.remarks.append(f"contact lost at {self.setpoint_n:.2f} N, and approached again")
             self._enter(PressState.APPROACH, now_s)
             self._move(self._settings.deepest_m, self._settings.touch.touch_speed_mm_s)
             return False
         self._error_since_s = _since(self._error_since_s, abs(self.error_n) > rules.error_band_n, now_s)
         if now_s - self._error_since_s >= 1.0:
-            self.fail(f"the force was off by more than {rules.error_band_n:g} N for a second, at {self.wanted_n:.2f} N")
+            self.fail(
+                f"the force was off by more than {rules.error_band_n:g} N for a second, at {self.setpoint_n:.2f} N"
+            )
             return False
         if self.error_n * self._peak_n < 0:
             self._swings = self._swings + 1 if abs(self._peak_n) > rules.error_band_n else 0

@@ -461,7 +461,7 @@ class ParallelManipulator:
         times, forces = profile.corners
         end_s = profile.duration.to("s")
         return Course(
-            wanted_n=lambda at_s: float(np.interp(at_s, times, forces)),
+            setpoint_n=lambda at_s: float(np.interp(at_s, times, forces)),
             slope_n_s=profile.end.to("N") / (end_s - profile.hold_s),
             ramp_s=profile.hold_s,
             end_s=end_s,

@@ -164,9 +164,9 @@ def _units(found: _Findings, settings: RigSettings, options: FaulhaberOptions) -
 
 
 def _has_speed(profile: MotorProfile, name: str, speed_mm_s: float) -> None:
-    asked, unit = 1e-3 * speed_mm_s, profile.speed_unit.to("m/s")
-    got = profile.speed_m_s(profile.speed(asked))
-    if got < 0.9 * asked:
+    requested, unit = 1e-3 * speed_mm_s, profile.speed_unit.to("m/s")
+    got = profile.speed_m_s(profile.speed(requested))
+    if got < 0.9 * requested:
         raise UsageError(
             f"{name} of {speed_mm_s:g} mm/s would be {1e3 * got:g} mm/s: the drive's unit is {1e3 * unit:g} mm/s.",
             hint="State another speed, or the drive's own unit under `options: speed_unit_m_s`.",

@@ -39,7 +39,7 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-def _said(value: float, unit: str) -> Quantity:
+def _from_rig_file(value: float, unit: str) -> Quantity:
     return sourced(value, unit, "the rig file")
 
 
@@ -126,23 +126,23 @@ class ForceControl(_Part):
     def loop(self) -> ForceLoop:
         """Return the loop as scenes state it."""
         return ForceLoop(
-            proportional=_said(self.proportional_mm_n, "mm/N"),
-            integral=_said(self.integral_mm_n_s, "mm/N/s"),
-            cutoff=None if self.cutoff_hz is None else _said(self.cutoff_hz, "Hz"),
-            rate=_said(self.rate_hz, "Hz"),
-            delay=_said(self.delay_ms, "ms"),
-            motor_lag=_said(self.motor_lag_ms, "ms"),
-            speed=_said(self.speed_mm_s, "mm/s"),
+            proportional=_from_rig_file(self.proportional_mm_n, "mm/N"),
+            integral=_from_rig_file(self.integral_mm_n_s, "mm/N/s"),
+            cutoff=None if self.cutoff_hz is None else _from_rig_file(self.cutoff_hz, "Hz"),
+            rate=_from_rig_file(self.rate_hz, "Hz"),
+            delay=_from_rig_file(self.delay_ms, "ms"),
+            motor_lag=_from_rig_file(self.motor_lag_ms, "ms"),
+            speed=_from_rig_file(self.speed_mm_s, "mm/s"),
         )
 
     def law(self, travel_mm: Range) -> ForceLaw:
         """Return the law within a travel of the motor."""
         return ForceLaw(
             loop=self.loop(),
-            speed=_said(self.speed_mm_s, "mm/s"),
-            windup_time=_said(self.windup_ms, "ms"),
-            travel=(_said(travel_mm[0], "mm"), _said(travel_mm[1], "mm")),
-            feed_forward=None if self.feed_forward_n_mm is None else _said(self.feed_forward_n_mm, "N/mm"),
+            speed=_from_rig_file(self.speed_mm_s, "mm/s"),
+            windup_time=_from_rig_file(self.windup_ms, "ms"),
+            travel=(_from_rig_file(travel_mm[0], "mm"), _from_rig_file(travel_mm[1], "mm")),
+            feed_forward=None if self.feed_forward_n_mm is None else _from_rig_file(self.feed_forward_n_mm, "N/mm"),
         )
 
 
@@ -206,7 +206,7 @@ class Heights(_Part):
     def heights(self) -> PressHeights:
         """Return them as moves use them."""
         names = ("surface", "surface_spread", "cap_tolerance", "stand_off", "clearance", "depth")
-        return PressHeights(**{name: _said(getattr(self, f"{name}_mm"), "mm") for name in names})
+        return PressHeights(**{name: _from_rig_file(getattr(self, f"{name}_mm"), "mm") for name in names})
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -262,9 +262,9 @@ class JointMotion(_Part):
     def limits(self) -> MotionLimits:
         """Return the limits of a move."""
         return MotionLimits(
-            speed=_said(self.speed_mm_s, "mm/s"),
-            acceleration=_said(self.acceleration_mm_s2, "mm/s/s"),
-            jerk=_said(self.jerk_mm_s3, "mm/s/s/s"),
+            speed=_from_rig_file(self.speed_mm_s, "mm/s"),
+            acceleration=_from_rig_file(self.acceleration_mm_s2, "mm/s/s"),
+            jerk=_from_rig_file(self.jerk_mm_s3, "mm/s/s/s"),
         )
 
 
@@ -279,10 +279,10 @@ class Postures(_Part):
     def limits(self) -> PostureLimits:
         """Return the limits of the workspace."""
         return PostureLimits(
-            serial=_said(self.serial, "1"),
-            parallel=_said(self.parallel, "1"),
-            constraint=_said(self.constraint, "1"),
-            sideways=_said(self.sideways_deg, "deg"),
+            serial=_from_rig_file(self.serial, "1"),
+            parallel=_from_rig_file(self.parallel, "1"),
+            constraint=_from_rig_file(self.constraint, "1"),
+            sideways=_from_rig_file(self.sideways_deg, "deg"),
         )
 
 
@@ -367,12 +367,13 @@ def settings_of(file: RigFile) -> RigSettings:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         name = ".".join(map(str, ("settings", *first["loc"])))
-        said = "is missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
+        message = "is missing" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
         raise UsageError(
-            f"{name} in the rig file: {said}.", hint="`tactbench rig check FILE` names the line; see docs/hardware.md."
+            f"{name} in the rig file: {message}.",
+            hint="`tactbench rig check FILE` names the line; see docs/hardware.md.",
         ) from error
-    wanted = (MOTOR,) if found.manipulator == "fixed" else (MOTOR, *JOINTS)
-    missing = [name for name in wanted if name not in file.devices]
+    required = (MOTOR,) if found.manipulator == "fixed" else (MOTOR, *JOINTS)
+    missing = [name for name in required if name not in file.devices]
     if missing or file.force is None:
         raise UsageError(
             f"The rig file has no {', '.join([*missing, *(['force'] if file.force is None else [])])}.",

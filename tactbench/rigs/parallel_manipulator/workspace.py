@@ -241,13 +241,13 @@ class Workspace:
         length = name == "reach" or (name.endswith("joint value") and not angle)
         factor, unit = (180 / math.pi, " deg") if angle else (1e3, " mm") if length else (1.0, "")
         if name == "reach":
-            said = f"leg {leg} misses it by up to {factor * value:.3g}{unit}"
+            problem = f"leg {leg} misses it by up to {factor * value:.3g}{unit}"
         elif name == "assembly mode":
-            said = "the links would stand on the other side of a singularity"
+            problem = "the links would stand on the other side of a singularity"
         else:
-            said = f"{name}{of_leg} comes to {factor * value:.3f}{unit}, its limit is {factor * limit:.3f}{unit}"
+            problem = f"{name}{of_leg} comes to {factor * value:.3f}{unit}, its limit is {factor * limit:.3f}{unit}"
         error = PlaceRefusedError(
-            f"{_text(place)} {what}: {said}.",
+            f"{_text(place)} {what}: {problem}.",
             hint="Nothing was moved. Choose another place or another way.",
         )
         error.measure, error.leg, error.place_m = name, leg, tuple(float(x) for x in place)

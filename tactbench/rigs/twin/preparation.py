@@ -83,10 +83,18 @@ def _load(scene: Scene) -> tuple[FloatArray, Load]:
 
 
 def _tracks(spec: SensorSpec, scene: Scene, plan: Plan, t_s: FloatArray, load: Load) -> Iterator[Track]:
-    """Yield the channels on the reference clock, then those of every stream that keeps its own."""
+    """Yield the channels on the reference clock, then those of every stream that keeps its own.
+
+    A scene that slides asks when something happened: there, no stream is faster than its sensor samples it.
+    """
     duration = scene.profile.duration.to("s")
     slowest = min((stream.rate_hz for stream in spec.streams if stream.rate_hz is not None), default=math.inf)
-    slow = tuple(stream for stream in spec.streams if (stream.rate_hz or 0.0) < _OWN_CLOCK_FROM * slowest)
+    at_least = 0.0 if scene.slide is None else scene.profile.samples / duration
+    slow = tuple(
+        stream
+        for stream in spec.streams
+        if stream.rate_hz is None or at_least <= stream.rate_hz < _OWN_CLOCK_FROM * slowest
+    )
     for clock, streams in (("", slow), *((stream.name, (stream,)) for stream in spec.streams if stream not in slow)):
         channels = tuple(channel for stream in streams for channel in stream.channels if channel.kind in plan.kinds)
         if not channels:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -27,6 +28,7 @@ from tactbench.plugin import (
 )
 from tactbench.plugin.simulation import EffectDescriptor, Explained
 from tactbench.rigs.twin.contact.stages import bare_skin
+from tactbench.rigs.twin.contact_point import contact_point
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
@@ -162,21 +164,24 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
             streams.append(stream.model_copy(update={"channels": kept, **clock}))
             stored = _stored(track.readings[:, own], stream, kept)
             samples[stream.name] = Samples(_ns(track.t_s), stored, track.quality[:, own])
+    more = {**run.reference_more, **_along_the_slide(run)}
     reference = StreamSpec(
         name=REFERENCE_STREAM,
         rate_hz=rate,
         rate_source=_ONE_CLOCK,
-        channels=(
-            ChannelSpec(name="fz", kind="force", unit="N", sign=1),
-            *(channel for channel, _ in run.reference_more.values()),
-        ),
+        channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1), *(channel for channel, _ in more.values())),
     )
-    measured = np.column_stack([run.reference_n, *(values for _, values in run.reference_more.values())])
+    measured = np.column_stack([run.reference_n, *(values for _, values in more.values())])
     samples[REFERENCE_STREAM] = Samples(_ns(run.t_s), measured, None)
+    places: tuple[StreamSpec, ...] = ()
+    if "position" in run.scene.observe:
+        place, values, quality = contact_point(run, rate, _ONE_CLOCK)
+        samples[place.name] = Samples(_ns(run.t_s), values, quality)
+        places = (place,)
     contact_x, contact_s = commanded_place_mm(run.sensor.spec, run.scene)
     return TwinAcquisition(
         streams=tuple(streams),
-        reference=(reference,),
+        reference=(reference, *places),
         plan=plan.settled(run.settled),
         assumptions={
             "contact_x_mm": contact_x,
@@ -188,6 +193,19 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         samples=samples,
         run=run,
     )
+
+
+def _along_the_slide(run: Synthesis) -> dict[str, tuple[ChannelSpec, FloatArray]]:
+    """Return the measured force across the surface and along its motion; nothing where nothing slides."""
+    if run.scene.slide is None or "fx" not in run.reference_more:
+        return {}
+    angle = run.scene.slide.direction.to("rad")
+    along = math.cos(angle) * run.reference_more["fx"][1] + math.sin(angle) * run.reference_more["fy"][1]
+    measured = {"normal": run.reference_n, "tangential": along}
+    return {
+        name: (ChannelSpec(name=name, kind="force", unit="N", sign=1 if name == "normal" else 0), values)
+        for name, values in measured.items()
+    }
 
 
 _TOLD = frozenset({

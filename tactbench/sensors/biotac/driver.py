@@ -128,7 +128,7 @@ class BioTacDriver(Driver):
         self._sent: deque[tuple[int, int]] = deque()
         self._skipped = 0
         self._last: tuple[int, int] | None = None
-        self._heard_ns = self._clock()
+        self._received_ns = self._clock()
 
     @property
     def streams(self) -> tuple[StreamSpec, ...]:
@@ -219,14 +219,14 @@ class BioTacDriver(Driver):
     def _give_up_lost(self) -> None:
         """Drop what is under way if nothing has come for longer than all of it can take."""
         due_ns = self._ahead * self._batches.timing(0).end_ns + round(PATIENCE_S * 1e9)
-        if self._clock() - self._heard_ns > due_ns:
+        if self._clock() - self._received_ns > due_ns:
             self._link.abandon()
             self._counts["batches lost"] += len(self._sent)
             self._sent.clear()
-            self._heard_ns = self._clock()
+            self._received_ns = self._clock()
 
     def _take(self, reply: SpiReply) -> None:
-        self._heard_ns = self._clock()
+        self._received_ns = self._clock()
         first = self._answered(reply)
         if first is None:
             return

@@ -272,18 +272,18 @@ class FrameBatches:
     ) -> None:
         self._rows = FrameRows(frame)
         self._select = select
-        self._asked = 1 + resends
+        self._commands = 1 + resends
         self._words = len(frame) if words is None else words
         self._speed_hz = speed_hz
         self._position = 0
-        rate_hz, bits = round(COMMAND_RATE.to("Hz")), 32 * self._asked
+        rate_hz, bits = round(COMMAND_RATE.to("Hz")), 32 * self._commands
         # Pauses of one word, in us: a quotient of whole numbers, 1e6 (1/rate - bits/speed).
         self._pauses_us = (1_000_000 * (speed_hz - bits * rate_hz), rate_hz * speed_hz)
         self._command_us, self._word_us = round(SAMPLING_PAUSE.to("us")), round(WORD_PAUSE.to("us"))
-        self._within_us = self._asked * self._command_us + resends * self._word_us
+        self._within_us = self._commands * self._command_us + resends * self._word_us
         if self._paused_us(1) < self._within_us + self._word_us:
             raise ValueError(
-                f"{self._asked} x {self._command_us} us, the pauses between and {bits} bits at {speed_hz} Hz do not "
+                f"{self._commands} x {self._command_us} us, the pauses between and {bits} bits at {speed_hz} Hz do not "
                 f"fit into a word's 1/{rate_hz} s"
             )
         self.faults: dict[str, Counter[Fault]] = {name: Counter() for name in dict.fromkeys(frame)}
@@ -305,7 +305,7 @@ class FrameBatches:
         self._position += self._words
         for n in range(first, self._position):
             command = sampling_command(INDEX[self._rows.frame[n % len(self._rows.frame)]])
-            for k in range(self._asked):
+            for k in range(self._commands):
                 steps.append(SpiStep(RESEND if k else command, self._select, self._command_us))
                 steps.append(SpiStep(FILLER, self._select, self._word_us))
             rest_us = self._paused_us(n + 1) - self._paused_us(n) - self._within_us
@@ -316,7 +316,7 @@ class FrameBatches:
         """Return the times within the batch whose first word has position `first`."""
         over, under = 16 * 1_000_000_000, self._speed_hz
         begins = [
-            1000 * (self._paused_us(first + n) - self._paused_us(first)) + 2 * self._asked * n * over // under
+            1000 * (self._paused_us(first + n) - self._paused_us(first)) + 2 * self._commands * n * over // under
             for n in range(self._words + 1)
         ]
         return Timing(tuple(begin + over // under for begin in begins[:-1]), begins[-1])
@@ -342,7 +342,7 @@ class FrameBatches:
             Words that were not asked for in their time so far, as whole frames: sequence numbers stay with the time.
         """
         sampled_ns, end_ns = self.timing(first)
-        stride = 2 * self._asked
+        stride = 2 * self._commands
         for n, after_ns in enumerate(sampled_ns):
             words = data[stride * n + 1 : stride * (n + 1) : 2]
             reply = self._reply(self._rows.frame[(first + n) % len(self._rows.frame)], words)

@@ -77,17 +77,17 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     DataError
         If the file cannot be read, or has no sample of the sensor.
     """
-    wanted = LogOptions.checked(options)
+    settings = LogOptions.checked(options)
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
         raise DataError(f"{path} cannot be read: {error.strerror}.", hint="Give a text log.") from error
-    log = read_text_log(lines, wanted.sensor)
+    log = read_text_log(lines, settings.sensor)
     header = "\n".join(log.header)
     stated = re.search(r"SampRate:\s*([1-9]\d*)", header)
     source = None
-    if wanted.rate_hz is not None:
-        rate_hz, source = wanted.rate_hz, Source(tag="sourced", reference="option rate_hz of the import")
+    if settings.rate_hz is not None:
+        rate_hz, source = settings.rate_hz, Source(tag="sourced", reference="option rate_hz of the import")
     elif stated is not None:
         rate_hz, source = float(stated[1]), Source(tag="sourced", reference="SampRate in the log's header")
     elif log.rate_hz is not None:

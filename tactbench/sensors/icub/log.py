@@ -48,8 +48,8 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     DataError
         If no frames of such a fingertip are in it.
     """
-    wanted = checked(LogOptions, options)
-    classes = (OLD_SKIN, SKIN) if wanted.old_ids else (SKIN,)
+    settings = checked(LogOptions, options)
+    classes = (OLD_SKIN, SKIN) if settings.old_ids else (SKIN,)
     halves: dict[tuple[int, int], list[CanFrame]] = {}
     commands = []
     frames = 0
@@ -64,29 +64,29 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
                 halves.setdefault((frame.id >> 4 & 0xF, frame.id & 0xF), []).append(frame)
             elif (found := read_command(frame)) is not None:
                 commands.append(found)
-    board, triangle = _chosen(path, wanted, sorted(halves), frames)
-    ours = halves[board, triangle]
-    period_s, rate = _period(path, wanted, ours)
-    decoder = SkinDecoder(period_s, old_ids=wanted.old_ids)
-    samples = [sample for frame in ours for sample in decoder.feed(frame)] + decoder.flush()
+    board, triangle = _chosen(path, settings, sorted(halves), frames)
+    half = halves[board, triangle]
+    period_s, rate = _period(path, settings, half)
+    decoder = SkinDecoder(period_s, old_ids=settings.old_ids)
+    samples = [sample for frame in half for sample in decoder.feed(frame)] + decoder.flush()
     if not samples:
         raise DataError(f"{path} has no whole frame of board {board}, triangle {triangle}.", hint="Record it again.")
     kept = samples[:1]
     for sample in samples[1:]:
         if sample.t_ns > kept[-1].t_ns:
             kept.append(sample)
-    told = [command for to, command in commands if to in (board, BROADCAST)]
+    sent = [command for to, command in commands if to in (board, BROADCAST)]
     counts = {
         **decoder.counts[board, triangle].named(),
-        "frames of others": frames - len(ours) - len(commands),
+        "frames of others": frames - len(half) - len(commands),
         "error frames": log.error_frames,
         "remote and FD frames": log.other_frames,
         "unreadable frames": log.damaged,
         "times that go back": log.backward,
         "samples kept out, not after the one before": len(samples) - len(kept),
-        "baselines taken": sum(isinstance(command, TriangleSetup) for command in told),
+        "baselines taken": sum(isinstance(command, TriangleSetup) for command in sent),
     }
-    setups = dict.fromkeys(command for command in told if isinstance(command, BoardSetup))
+    setups = dict.fromkeys(command for command in sent if isinstance(command, BoardSetup))
     return DeviceLog(
         streams=(STREAMS[0].model_copy(update={"rate_hz": 1 / period_s, "rate_source": rate}),),
         blocks=(to_block(kept),),
@@ -103,12 +103,12 @@ def read_log(path: Path, options: Mapping[str, Any]) -> DeviceLog:
     )
 
 
-def _chosen(path: Path, wanted: LogOptions, there: list[tuple[int, int]], frames: int) -> tuple[int, int]:
+def _chosen(path: Path, settings: LogOptions, there: list[tuple[int, int]], frames: int) -> tuple[int, int]:
     """Return the one (board, triangle) of `there` that fits `wanted`."""
     fitting = [
         (board, triangle)
         for board, triangle in there
-        if wanted.board in (None, board) and wanted.triangle in (None, triangle)
+        if settings.board in (None, board) and settings.triangle in (None, triangle)
     ]
     listed = "; ".join(f"board {board}, triangle {triangle}" for board, triangle in there)
     if not fitting:
@@ -126,11 +126,11 @@ def _chosen(path: Path, wanted: LogOptions, there: list[tuple[int, int]], frames
     return fitting[0]
 
 
-def _period(path: Path, wanted: LogOptions, frames: list[CanFrame]) -> tuple[float, Source]:
+def _period(path: Path, settings: LogOptions, frames: list[CanFrame]) -> tuple[float, Source]:
     """Return the period in seconds, and where it is from."""
-    if wanted.period_ms is not None:
-        text = f"{wanted.period_ms} ms between samples by the option period_ms"
-        return 1e-3 * wanted.period_ms, Source(tag="assumed", reference=text)
+    if settings.period_ms is not None:
+        text = f"{settings.period_ms} ms between samples by the option period_ms"
+        return 1e-3 * settings.period_ms, Source(tag="assumed", reference=text)
     steps = np.diff([frame.t_ns for frame in frames if frame.data[0] == HEAD])
     steps = steps[steps > 0]
     if not len(steps):

@@ -65,7 +65,7 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         press = made.press()
         assert press.phase == "over", press.reports[-1]
         assert press.reports[-1].state is GuardState.ARMED
-        assert made.world.largest_n == pytest.approx(made.setting.wanted_n, abs=0.3)
+        assert made.world.largest_n == pytest.approx(made.setting.setpoint_n, abs=0.3)
         blocks, moved = made.guard.force_blocks(), made.guard.motor_blocks()
         numbers = np.concatenate([block.sequence for block in blocks])
         forces = np.concatenate([block.data for block in blocks])
@@ -325,7 +325,7 @@ def test_a_touch_on_a_fast_approach_ends_it(made):
         ("force", "dropped:start_s={0},end_s={1}", Trigger.FORCE_GAP),
         ("force_link", "late:start_s={0},delay_s=0.014", Trigger.FORCE_OLD),
         ("force_link", "unplug:start_s={0}", Trigger.FORCE_LOST),
-        ("motor_link", "unplug:start_s={0}", Trigger.MOTOR_GONE),
+        ("motor_link", "unplug:start_s={0}", Trigger.MOTOR_LOST),
         ("motor", "motor-fault:start_s={0}", Trigger.MOTOR_FAULT),
         ("motor", "late-answers:start_s={0},delay_s=9", Trigger.MOTOR_SILENT),
     ],

@@ -11,7 +11,7 @@ from tests.rigs.parallel_manipulator.spring import file_of
 
 PERIOD_S = 0.02
 SETTINGS = settings_of(file_of(settings__force_loop__integral_mm_n_s=1.0, settings__press__hold_s=0.5))
-COURSE = Course(wanted_n=lambda s: min(max(0.0, s - 0.5), 3.0), slope_n_s=1.0, ramp_s=0.5, end_s=3.5)
+COURSE = Course(setpoint_n=lambda s: min(max(0.0, s - 0.5), 3.0), slope_n_s=1.0, ramp_s=0.5, end_s=3.5)
 
 
 class Plant:
@@ -95,11 +95,11 @@ def test_contact_that_is_lost_is_found_again_once():
         plant.go()
     plant.skin_m += 1e-3
     plant.until(PressState.APPROACH)
-    lost_n = plant.press.wanted_n
+    lost_n = plant.press.setpoint_n
     plant.until(PressState.RAMP)
     # The ramp's clock was held meanwhile.
     plant.go()
-    assert plant.press.wanted_n == pytest.approx(lost_n, abs=0.4)
+    assert plant.press.setpoint_n == pytest.approx(lost_n, abs=0.4)
     assert "contact lost" in plant.press.remarks[0]
     plant.until(PressState.DONE)
     assert plant.largest_n < 3.5

@@ -91,16 +91,23 @@ def test_a_minute_of_sliding_comes_back_from_its_file(record):
     assert {"friction", "skin-vibration", "ac-pressure", "hum"} <= {e.effect for e in meta.plan if e.included}
     kinds = [(channel.name, channel.kind) for channel in force.spec.channels]
     assert kinds == [
-        ("fz", "force"), ("fx", "force"), ("fy", "force"), ("slip", "other"), ("stick_ratio", "other")
+        ("fz", "force"), ("fx", "force"), ("fy", "force"), ("slip", "position"), ("slipping", "other"),
+        ("stick_ratio", "other"), ("normal", "force"), ("tangential", "force"),
     ]  # fmt: skip
     found, t_s = _columns(force), force.t_ns / 1e9
     before, moving = t_s < 20, (t_s > 20) & (t_s < 50)
-    assert not found["slip"][before].any()
-    assert set(np.unique(found["slip"])) == {0.0, 1.0}
+    assert not found["slipping"][before].any()
+    assert set(np.unique(found["slipping"])) == {0.0, 1.0}
     # Stick-slip: it does both, all the time.
-    assert 0.02 < found["slip"][moving].mean() < 0.5
-    assert np.all(found["stick_ratio"][found["slip"] == 1] == 0)
-    assert np.all(found["stick_ratio"][(found["slip"] == 0) & (t_s > 8)] > 0)
+    assert 0.02 < found["slipping"][moving].mean() < 0.5
+    assert np.all(found["stick_ratio"][found["slipping"] == 1] == 0)
+    assert np.all(found["stick_ratio"][(found["slipping"] == 0) & (t_s > 8)] > 0)
+    # The surface moves 600 mm; the skin under it follows by what friction holds, less than a millimetre.
+    assert not found["slip"][before].any()
+    assert 0.599 < found["slip"][-1] < 0.6
+    # The sensor's own forces, across the surface and along its motion.
+    np.testing.assert_array_equal(found["normal"], found["fz"])
+    np.testing.assert_allclose(found["tangential"], found["fy"], atol=1e-12)
     # Across the finger: fx is the sensor's noise alone (0.6875 N), fy is carried along.
     assert found["fx"].std() == pytest.approx(0.6875, rel=0.05)
     assert found["fy"][(t_s > 45) & (t_s < 50)].mean() > 1.0
@@ -115,7 +122,7 @@ def test_the_force_task_still_picks_the_normal_force(rig, sensors, tmp_path):
     acquire(rig, sensors["icub"], TWIN, scene, role=None, seed=1, path=path, clock=time.monotonic, provenance={})
     with open_recording(path) as recording:
         (found,) = channels_for(recording, ChannelTarget(kind="force"))
-        assert found[2].name == "fz"
+        assert found[2].name == "normal"
         (named,) = channels_for(recording, ChannelTarget(kind="force", name="fx"))
         assert named[2].name == "fx"
 
@@ -127,7 +134,7 @@ def test_every_component_of_the_force_has_its_noise_and_its_low_pass(record):
         slide = _slide(200.0, 0.0, direction=_q(90.0, "deg"))
         _, streams, _ = record(profile=_held(), environment=environment, slide=slide)
         found = _columns(streams["force_torque"])
-        return [found[name][100:].std() for name in ("fx", "fy", "fz")], found["slip"]
+        return [found[name][100:].std() for name in ("fx", "fy", "fz")], found["slipping"]
 
     (raw, _), (smooth, slip) = spread(False), spread(True)
     # 700 numbers: a standard deviation errs by 3 %.
@@ -198,8 +205,9 @@ def test_louder_with_roughness_and_the_same_with_the_same_seed(record):
     ("sensor", "kind", "stream"), [("icub", "taxel", "taxels"), ("biotac", "dc_pressure", "electrodes")]
 )
 def test_sliding_disturbs_no_other_channel(record, sensor, kind, stream):
-    still = record(sensor, "x", profile=_held(), observe=(kind,))[1][stream].data
-    moving = record(sensor, "x", profile=_held(), observe=(kind,), slide=_slide(20.0))[1][stream].data
+    held = _held().model_copy(update={"samples": 400})
+    still = record(sensor, "x", profile=held, observe=(kind,))[1][stream].data
+    moving = record(sensor, "x", profile=held, observe=(kind,), slide=_slide(20.0))[1][stream].data
     np.testing.assert_array_equal(still, moving)
 
 

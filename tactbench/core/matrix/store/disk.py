@@ -15,7 +15,7 @@ _FULL = {
     errno.EDQUOT: "the quota is used up",
     errno.EFBIG: "a file would be larger than this process may write",
 }
-_GONE = {errno.ENOENT, errno.ESTALE}
+_MISSING = {errno.ENOENT, errno.ESTALE}
 
 
 @contextmanager
@@ -35,7 +35,7 @@ def writing(folder: Path) -> Iterator[None]:
         hint = f"{kept}: check its permissions, or give another one with --out DIR."
         if error.errno in _FULL:
             hint = f"{kept}: make room, and the same command goes on from there."
-        elif error.errno in _GONE:
+        elif error.errno in _MISSING:
             what = "was removed or moved while it was being written"
             hint = "What was finished before lies where it was moved to; run the same command again, or with its new "
             hint += "place as --out DIR."

@@ -72,7 +72,7 @@ def _write_text(file: Any, name: str, text: str) -> None:
 def _table(answers: Answers) -> npt.NDArray[Any]:
     """Return (n,) answers, a field for each column."""
     columns = {name: getattr(answers, name) for name in _COLUMNS}
-    types = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
+    types = [(name, values.dtype.newbyteorder("<"), values.shape[1:]) for name, values in columns.items()]
     table = np.empty(len(answers), dtype=types)
     for name, values in columns.items():
         table[name] = values
@@ -149,7 +149,7 @@ def _text(path: Path, file: Any, name: str) -> str:
 def _read(path: Path, file: Any, role: str) -> npt.NDArray[Any]:
     """Return the table of a role, looked at before it is read."""
     dataset = trust.numbers(path, file, role, "V", 1, strict=True)
-    kinds = {dataset.dtype[name].kind for name in dataset.dtype.names or ()}
+    kinds = {dataset.dtype[name].base.kind for name in dataset.dtype.names or ()}
     if dataset.dtype.names != _COLUMNS or not kinds <= set("iuf"):
         raise _damaged(path, f"{role} holds {dataset.dtype}")
     most = max(limits.FEW_BYTES, limits.LARGEST_RATIO * dataset.file.id.get_filesize())

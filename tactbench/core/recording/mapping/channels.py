@@ -84,9 +84,9 @@ def sensor_of(mapping: MappingFile) -> tuple[SensorSpec, tuple[StreamSpec, ...],
             )  # fmt: skip
             streams[name] = MappedStream(spec, source, channels)
         _unique([channel.spec.name for stream in streams.values() for channel in stream.channels])
-        said = mapping.sensor.model_dump()
+        described = mapping.sensor.model_dump()
         sensor = SensorSpec(
-            **said | {"name": _WORD.sub("x", said["name"])},  # until its words are known
+            **described | {"name": _WORD.sub("x", described["name"])},  # until its words are known
             streams=tuple(stream.spec for stream in streams.values() if stream.source.of == "sensor"),
         )
     except ValidationError as error:

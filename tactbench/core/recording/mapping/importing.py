@@ -117,20 +117,20 @@ def import_tables(
     UnwritableError
         If `out` cannot be written.
     """
-    wanted = load_yaml(mapping, Mapping)
-    sensor, reference, streams = sensor_of(wanted)
-    sets = find(wanted, mapping.parent if root is None else root)
+    loaded = load_yaml(mapping, Mapping)
+    sensor, reference, streams = sensor_of(loaded)
+    sets = find(loaded, mapping.parent if root is None else root)
     made: list[Imported] = []
     with _aside(out) as folder:
         for done, files in enumerate(sets, 1):
-            for raw in read(wanted, files):
-                meta = _meta(wanted, raw, sensor, reference)
+            for raw in read(loaded, files):
+                meta = _meta(loaded, raw, sensor, reference)
                 _unique_name(meta, made)
-                made.append(_write(folder / f"{meta.name}{ENDING}", meta, wanted, raw, streams))
+                made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
             if progress is not None:
                 progress(done, len(sets), next(iter(files.files.values())).shown)
         placed = _place(made, out, replace=replace)
-    return ImportReport(wanted.title, tuple(placed), _count_files(sets))
+    return ImportReport(loaded.title, tuple(placed), _count_files(sets))
 
 
 @contextmanager

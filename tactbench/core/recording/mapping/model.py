@@ -364,8 +364,8 @@ def _nests(parsed: Any, *, repeated: bool) -> bool:
     return False
 
 
-def _convertible(given: str, wanted: str) -> None:
+def _convertible(given: str, required: str) -> None:
     try:
-        units.conversion(given, wanted)
+        units.conversion(given, required)
     except UsageError as error:
         raise ValueError(str(error).rstrip(".")) from error

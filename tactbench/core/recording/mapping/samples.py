@@ -46,20 +46,20 @@ def samples(stream: MappedStream, table: Table) -> Samples:
     missing = {}
     for place, channel in enumerate(stream.channels):
         given = table.numbers(channel.column)
-        gone = np.isnan(given) | np.isin(given, channel.group.sentinels or ())
-        _some_sample(channel, table, gone)
-        _no_hidden_sentinel(channel, table, given[~gone])
+        absent = np.isnan(given) | np.isin(given, channel.group.sentinels or ())
+        _some_sample(channel, table, absent)
+        _no_hidden_sentinel(channel, table, given[~absent])
         factor = units.conversion(channel.group.given_in or channel.group.unit, channel.group.unit)
-        data[:, place] = np.where(gone, np.nan, given * factor)
-        if gone.any():
-            missing[channel.spec.name] = int(gone.sum())
-    gone = np.isnan(data)
-    quality = np.where(gone, Quality.MISSING, Quality.GOOD).astype(np.uint8)
-    wanted = np.dtype(stream.spec.dtype)
-    if wanted.kind != "f":
-        data = np.where(gone, 0.0, data)
-        _fits(stream, table, data, wanted)
-    return Samples(data.astype(wanted), quality, missing)
+        data[:, place] = np.where(absent, np.nan, given * factor)
+        if absent.any():
+            missing[channel.spec.name] = int(absent.sum())
+    absent = np.isnan(data)
+    quality = np.where(absent, Quality.MISSING, Quality.GOOD).astype(np.uint8)
+    column_dtype = np.dtype(stream.spec.dtype)
+    if column_dtype.kind != "f":
+        data = np.where(absent, 0.0, data)
+        _fits(stream, table, data, column_dtype)
+    return Samples(data.astype(column_dtype), quality, missing)
 
 
 def times(table: Table, time: Time) -> IntArray:
@@ -132,11 +132,11 @@ def check_join(mapping: Mapping, tables: dict[str, Table]) -> None:
                 f"{table.shown} (table {name!r}) has {len(table)} rows, {lead.shown} has {len(lead)}.",
                 hint="Tables joined by rows must be equally long; with a clock each, `by: clock` is an alternative.",
             )
-        mine, theirs = mapping.tables[first].time, mapping.tables[name].time
+        own, other = mapping.tables[first].time, mapping.tables[name].time
         within = mapping.join.times_within_ms
-        if mine is None or theirs is None or within is None:
+        if own is None or other is None or within is None:
             continue
-        apart_ms = np.abs(times(lead, mine) - times(table, theirs)) * 1e-6
+        apart_ms = np.abs(times(lead, own) - times(table, other)) * 1e-6
         if (apart_ms > within).any():
             row = int(np.flatnonzero(apart_ms > within)[0])
             raise MappingError(
@@ -146,11 +146,11 @@ def check_join(mapping: Mapping, tables: dict[str, Table]) -> None:
             )
 
 
-def _some_sample(channel: MappedChannel, table: Table, gone: npt.NDArray[np.bool_]) -> None:
-    if gone.all():
+def _some_sample(channel: MappedChannel, table: Table, absent: npt.NDArray[np.bool_]) -> None:
+    if absent.all():
         raise MappingError(
             f"{table.shown}: column {channel.column!r} (channel {channel.spec.name}) has no sample in any of "
-            f"{len(gone)} rows.",
+            f"{len(absent)} rows.",
             hint="Leave the channel out, or correct `sentinels`.",
         )
 
@@ -170,12 +170,12 @@ def _no_hidden_sentinel(channel: MappedChannel, table: Table, given: FloatArray)
             )
 
 
-def _fits(stream: MappedStream, table: Table, data: FloatArray, wanted: np.dtype[Any]) -> None:
-    limits = np.iinfo(wanted)
+def _fits(stream: MappedStream, table: Table, data: FloatArray, column_dtype: np.dtype[Any]) -> None:
+    limits = np.iinfo(column_dtype)
     wrong = (data != np.rint(data)) | (data < limits.min) | (data > limits.max)
     if wrong.any():
         row, place = (int(index) for index in np.argwhere(wrong)[0])
         raise MappingError(
-            f"{table.where(row)}: column {stream.channels[place].column!r}: {data[row, place]:g} is no {wanted}.",
+            f"{table.where(row)}: column {stream.channels[place].column!r}: {data[row, place]:g} is no {column_dtype}.",
             hint="Choose a wider `dtype` for the stream.",
         )

@@ -11,6 +11,7 @@ from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.report.figures import (
     confusion,
     embedding_map,
+    location_map,
     prediction_against_time,
     residuals,
     score_by_force,
@@ -24,15 +25,17 @@ from tactbench.core.report.figures.sketch import Sketch
 from tactbench.core.report.figures.style import styled
 from tactbench.core.report.results import Results
 from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.spec.task import TaskSpec, VectorTarget
 
 Draw = Callable[[Group, Remark], Sketch]
 """A group of cells to a figure; raises NotApplicable where it does not apply, and tells of panels it leaves out."""
 
 FIGURES: dict[str, tuple[Draw, ...]] = {
     "regression": (prediction_against_time.draw, residuals.draw, validation_curve.draw),
+    "vector": (location_map.draw, residuals.draw, validation_curve.draw),
     "classification": (confusion.draw, score_by_force.draw, embedding_map.draw, validation_curve.draw),
 }
-"""By kind of task, in the order of a report."""
+"""By kind of task, vectors apart, in the order of a report."""
 
 
 def draw_figures(
@@ -67,7 +70,7 @@ def draw_figures(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"The folder {folder} cannot be made: {error.strerror}.", hint="Give another one.") from error
-    work = [(group, draw) for group in _worth_drawing(results, say) for draw in FIGURES[group.task.kind]]
+    work = [(group, draw) for group in _worth_drawing(results, say) for draw in _figures_of(group.task)]
     refused: dict[tuple[str, str], list[str]] = {}
     if not work:
         return []
@@ -95,6 +98,10 @@ def draw_figures(
     except Exception as error:
         say(f"No figure of few sessions: {type(error).__name__}: {error}")
     return drawn
+
+
+def _figures_of(task: TaskSpec) -> tuple[Draw, ...]:
+    return FIGURES["vector" if isinstance(task.target, VectorTarget) else task.kind]
 
 
 def _worth_drawing(results: Results, say: Remark) -> list[Group]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name
 from tactbench.core.report.figures.group import Group, Panel
 from tactbench.core.report.figures.style import colour_name
-from tactbench.core.spec.task import LabelTarget, TaskSpec
+from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -81,6 +81,8 @@ def quantity(task: TaskSpec) -> str:
     target = task.target
     if isinstance(target, LabelTarget):
         return target.name.removesuffix(f"_{target.unit}").replace("_", " ")
+    if isinstance(target, VectorTarget):
+        return f"{target.kind} ({', '.join(target.names)})"
     return (target.name if target.name and len(target.name) > 2 else target.kind).replace("_", " ")
 
 

@@ -132,8 +132,8 @@ class Drive:
             acceleration = profile.acceleration_m_s2(settings.acceleration)
             braking = profile.acceleration_m_s2(settings.braking)
             if self._velocity is not None:
-                wanted = min(max(profile.speed_m_s(self._velocity), -speed), speed)
-                reference.to_speed(self._at_limits(wanted, braking), self.servo.tick_s, acceleration, braking)
+                commanded = min(max(profile.speed_m_s(self._velocity), -speed), speed)
+                reference.to_speed(self._at_limits(commanded, braking), self.servo.tick_s, acceleration, braking)
             else:
                 if self._homing:
                     speed = profile.speed_m_s(settings.homing_speed)
@@ -151,14 +151,14 @@ class Drive:
         )
         return notices
 
-    def _at_limits(self, wanted: float, braking: float) -> float:
+    def _at_limits(self, commanded: float, braking: float) -> float:
         if not self.settings.limits_on:
-            return wanted
+            return commanded
         lower, upper = self._limits_m()
-        end_m = upper if wanted > 0.0 else lower
-        room_m = max((end_m - self._reference.position_m) * (1.0 if wanted > 0.0 else -1.0), 0.0)
+        end_m = upper if commanded > 0.0 else lower
+        room_m = max((end_m - self._reference.position_m) * (1.0 if commanded > 0.0 else -1.0), 0.0)
         largest = Profile.braking_speed(room_m, self.servo.tick_s, braking)
-        return min(max(wanted, -largest), largest)
+        return min(max(commanded, -largest), largest)
 
     def _limits_m(self) -> tuple[float, float]:
         settings = self.settings
@@ -192,11 +192,11 @@ class Drive:
         if at_m is not None and (before_m - at_m) * (position_m - at_m) <= 0.0:
             self._notify_at_m = None
             notices.append("p")
-        wanted = self._notify_speed_m_s
+        commanded = self._notify_speed_m_s
         # Passed, or within half of the drive's unit.
-        if wanted is not None and (
-            (before_m_s - wanted) * (speed_m_s - wanted) <= 0.0
-            or abs(speed_m_s - wanted) <= 0.5 * self.profile.speed_m_s(1.0)
+        if commanded is not None and (
+            (before_m_s - commanded) * (speed_m_s - commanded) <= 0.0
+            or abs(speed_m_s - commanded) <= 0.5 * self.profile.speed_m_s(1.0)
         ):
             self._notify_speed_m_s = None
             notices.append("v")
@@ -245,8 +245,10 @@ class Drive:
                 self._velocity = self._number(argument, self.profile.largest_speed, signed=True)
                 self._attained = self._homing = False
             case "HO":
-                wanted = 0 if argument is None else self._number(argument, self.profile.largest_position, signed=True)
-                self.origin_m = self.servo.position_m - self.profile.position_m(wanted)
+                commanded = (
+                    0 if argument is None else self._number(argument, self.profile.largest_position, signed=True)
+                )
+                self.origin_m = self.servo.position_m - self.profile.position_m(commanded)
             case "GOHOSEQ":
                 if self._reference_switch_m is None:
                     raise Refused(NOT_AVAILABLE)
@@ -263,8 +265,8 @@ class Drive:
             case "NPOFF":
                 self._notify_end, self._notify_at_m = False, None
             case "NV":
-                wanted = (self._velocity or 0) if argument is None else argument
-                self._notify_speed_m_s = self.profile.speed_m_s(wanted)
+                commanded = (self._velocity or 0) if argument is None else argument
+                self._notify_speed_m_s = self.profile.speed_m_s(commanded)
             case "NVOFF":
                 self._notify_speed_m_s = None
             case "SP":

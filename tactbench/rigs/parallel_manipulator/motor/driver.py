@@ -92,7 +92,7 @@ class FaulhaberDriver(Driver):
         self._profile = options.profile()
         self._clock = settings.clock
         # Arguments that the drive does not have are refused here, before anything is sent.
-        self._settings = self._wanted()
+        self._settings = self._required_settings()
         self._limits = [
             ("LL", self._profile.increments(end), query)
             for end, query in ((options.upper_m, "GPL"), (options.lower_m, "GNL"))
@@ -119,7 +119,7 @@ class FaulhaberDriver(Driver):
         self._enabled = self._homed = self._in_fault = False
         self._problem: MotorError | None = None
 
-    def _wanted(self) -> list[tuple[str, int, str]]:
+    def _required_settings(self) -> list[tuple[str, int, str]]:
         """Return command, argument and the query that reads it back, of what the options state."""
         options, profile = self._options, self._profile
         found: list[tuple[str, int, str]] = []
@@ -553,10 +553,10 @@ class FaulhaberDriver(Driver):
         if answer.line is None:
             self._queue.appendleft(("TPOS", None))
         elif self._target is not None and answer.value != self._target:
-            wanted, found = (self._profile.position_m(steps) for steps in (self._target, answer.value))
+            expected, found = (self._profile.position_m(steps) for steps in (self._target, answer.value))
             self._abort()
             raise MotorFaultError(
-                f"The motor's target is {found:g} m, and {wanted:g} m was asked for.",
+                f"The motor's target is {found:g} m, and {expected:g} m was asked for.",
                 hint="A byte was damaged on the line: let it retreat, and check the cable.",
             )
 

@@ -109,7 +109,7 @@ class Exchange:
         self.answer_s = 3.0 * line_time_s(LONGEST_ANSWER, baud) + HOST_S
         self._link, self._clock, self._node = link, clock, node
         self._reader = LineReader()
-        self._asked: deque[tuple[str, int | None, object]] = deque()
+        self._pending_commands: deque[tuple[str, int | None, object]] = deque()
         self._since_ns = 0
         self._known = ""
         self._marking = False
@@ -118,7 +118,7 @@ class Exchange:
     @property
     def ready(self) -> bool:
         """Whether no answer is waited for."""
-        return not self._asked and not self._marking
+        return not self._pending_commands and not self._marking
 
     def send(self, name: str, argument: int | None = None, of: object = None) -> None:
         """Send a command now, also while others are out: the drive keeps their order.
@@ -130,10 +130,10 @@ class Exchange:
         LinkTimeout, LinkUnplugged
             As the link.
         """
-        if not self._asked:
+        if not self._pending_commands:
             self._since_ns = self._clock()
         self._link.write(encode(name, argument, node=self._node))
-        self._asked.append((name, argument, of))
+        self._pending_commands.append((name, argument, of))
 
     def pump(self, timeout_s: float) -> list[Answer]:
         """Take what comes, and wait for the first of it at most so long; return what became of commands.
@@ -174,7 +174,7 @@ class Exchange:
         for _ in range(5):
             self.send(MARK)
             line = None
-            while self._asked:
+            while self._pending_commands:
                 for answer in self.pump(self.answer_s):
                     line = answer.line
                 if self._marking:  # Not known yet: ask again instead.
@@ -199,7 +199,7 @@ class Exchange:
                 seen += self._link.read(self.answer_s).data
                 self._refuse_newer(seen[-LONGEST_LINE:])
         self._reader.clear()
-        self._asked.clear()
+        self._pending_commands.clear()
         self._marking, self._missed = False, 0
 
     def _due_ns(self) -> int:
@@ -228,11 +228,11 @@ class Exchange:
                 self._since_ns = self._clock()
             else:
                 self.counts["late"] += 1
-        elif self._asked and answers(line, self._asked[0][0]):
+        elif self._pending_commands and answers(line, self._pending_commands[0][0]):
             self.counts["refusals"] += int(line.kind is Kind.REFUSAL)
             self._missed = 0
             self._since_ns = self._clock()
-            name, argument, of = self._asked.popleft()
+            name, argument, of = self._pending_commands.popleft()
             return [Answer(name, argument, line, t_ns, of)]
         else:
             self.counts["unexpected"] += 1
@@ -241,8 +241,8 @@ class Exchange:
     def _overdue(self) -> list[Answer]:
         """Give up what is out, and ask what is known; raises MotorSilentError."""
         now_ns = self._clock()
-        lost = [Answer(name, argument, None, now_ns, of) for name, argument, of in self._asked]
-        self._asked.clear()
+        lost = [Answer(name, argument, None, now_ns, of) for name, argument, of in self._pending_commands]
+        self._pending_commands.clear()
         self.counts["time_outs"] += len(lost)
         self._missed += 1
         if self._missed >= IN_A_ROW:

@@ -80,8 +80,8 @@ def retreat_blind(open_link: Callable[[], Link], options: FaulhaberOptions, cloc
         deadline = began_ns + round(1e9 * within_s)
         while clock() < deadline:
             link.write(encode("POS", node=options.node))
-            asked_ns, place_m = clock(), None
-            while place_m is None and clock() - asked_ns < 1e9 * answer_s:
+            requested_ns, place_m = clock(), None
+            while place_m is None and clock() - requested_ns < 1e9 * answer_s:
                 with suppress(LinkTimeout):
                     for line in reader.feed(link.read(answer_s).data):
                         if line.kind is Kind.VALUE:

@@ -73,8 +73,8 @@ class Profile:
             self.speed_m_s = 0.0
             return
         away = target_m - self.position_m
-        wanted = math.copysign(min(speed, self.braking_speed(away, tick_s, braking)), away)
-        self._go(wanted, tick_s, acceleration, braking)
+        commanded = math.copysign(min(speed, self.braking_speed(away, tick_s, braking)), away)
+        self._go(commanded, tick_s, acceleration, braking)
         # The last tick ends within rounding of its target.
         if abs(target_m - self.position_m) < 1e-12 and abs(self.speed_m_s) <= braking * tick_s * (1 + 1e-9):
             self.position_m = target_m
@@ -94,13 +94,13 @@ class Profile:
         n = max(1, math.ceil(math.sqrt(0.25 + 2.0 * abs(away_m) / (step * tick_s)) - 0.5))
         return abs(away_m) / (n * tick_s) + step * (n - 1) / 2.0
 
-    def _go(self, wanted: float, tick_s: float, acceleration: float, braking: float) -> None:
+    def _go(self, commanded: float, tick_s: float, acceleration: float, braking: float) -> None:
         now = self.speed_m_s
-        if now * wanted < 0.0:
+        if now * commanded < 0.0:
             # Backwards goes through rest.
-            wanted = 0.0
-        largest = (acceleration if abs(wanted) > abs(now) else braking) * tick_s
-        self.speed_m_s = now + min(max(wanted - now, -largest), largest)
+            commanded = 0.0
+        largest = (acceleration if abs(commanded) > abs(now) else braking) * tick_s
+        self.speed_m_s = now + min(max(commanded - now, -largest), largest)
         self.position_m += self.speed_m_s * tick_s
 
 
@@ -156,8 +156,8 @@ class Servo:
             if reference is None:
                 return 0.0
             missing = reference.position_m - (self.position_m + h * v)
-            wanted = kp * missing + kd * (reference.speed_m_s - v) + self.integral_n + h * ki * missing
-            return min(max(wanted, -largest), largest)
+            commanded = kp * missing + kd * (reference.speed_m_s - v) + self.integral_n + h * ki * missing
+            return min(max(commanded, -largest), largest)
 
         def residual(v: float) -> float:
             load = 0.0 if self.load is None else self.load(self.position_m + h * v, time_s)

@@ -68,7 +68,7 @@ def creep(scene: Scene, sensor: SensorSpec) -> Reason:
     if scene.drive is not None:
         return Reason(True, f"a motor's force loop may change the load at any rate; {100 * share:.0f} % comes late")
     profile = scene.profile
-    if profile.start.to("N") == profile.end.to("N") or profile.hold.to("s") >= profile.duration.to("s"):
+    if len(set(profile.corners[1])) == 1:
         return Reason(False, f"the load is constant: {profile.start.to('N'):g} N throughout", 0.0)
     slowest = max(term.tau.to("s") for term in terms)
     late = f"{100 * share:.0f} % of the response comes late, by up to {slowest:g} s"

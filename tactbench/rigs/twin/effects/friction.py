@@ -33,8 +33,9 @@ def mode_of(sensor: SensorSpec) -> Mode:
 def apply(run: Synthesis) -> None:
     """Drag the skin, and let the force sensor see the tangential force and who keeps score of slip.
 
-    The force sensor's stream gains ``fx`` and ``fy`` (force on the sensor, along x and s), ``slip`` (1 while the whole
-    contact slips) and ``stick_ratio``.
+    The force sensor's stream gains ``fx`` and ``fy`` (force on the sensor, along x and s), ``slip`` (how far the
+    surface has slipped over the skin under it, in metres), ``slipping`` (1 while the whole contact slips) and
+    ``stick_ratio``.
     """
     slide, skin = run.scene.slide, run.sensor.spec.skin
     if slide is None or skin is None or not run.load.largest_n > 0:
@@ -63,7 +64,8 @@ def apply(run: Synthesis) -> None:
     angle = slide.direction.to("rad")
     for name, share in (("fx", math.cos(angle)), ("fy", math.sin(angle))):
         run.reference_more[name] = (ChannelSpec(name=name, kind="force", unit="N"), share * seen.force_n)
-    for name, values in (("slip", seen.slipping.astype(np.float64)), ("stick_ratio", seen.stick_ratio)):
+    run.reference_more["slip"] = (ChannelSpec(name="slip", kind="position", unit="m"), 1e-3 * seen.slip_mm)
+    for name, values in (("slipping", seen.slipping.astype(np.float64)), ("stick_ratio", seen.stick_ratio)):
         run.reference_more[name] = (
             ChannelSpec(name=name, kind="other", unit="1", lower=0.0, upper=1.0),
             values,

@@ -8,7 +8,8 @@ nodes of a grid. Nothing is stepped through: a phase ends where its closed form 
 - **slip**: see :mod:`slip_event`; kinetic friction is that at the slip's mean speed, held at its beginning.
 - **slide**: if the skin is not caught; the force follows the LuGre bristle. It ends where sliding is no longer
   stable (friction weakens faster than the skin is damped) and a slip would be caught.
-- **held**: after the motion, the skin stays, and slides back as far as a falling load no longer holds it.
+- **held**: after the motion, the skin stays, and slides back as far as a falling load no longer holds it. Its partial
+  slip is that of the force ratio, counted as while it stuck; after a slip all of it sticks until the load falls.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class _Phases:
     x_mm: list[float] = field(default_factory=list)
     """Deflection at its beginning."""
     e_mm: list[float] = field(default_factory=list)
-    """Equilibrium of a slip."""
+    """Equilibrium of a slip; where the skin that is held after the motion last had tractions in proportion."""
     friction: list[float] = field(default_factory=list)
     """Coefficient of a slip."""
 
@@ -144,13 +145,14 @@ class Dragged:
         drive, phases = self.drive, self._phases
         phases.add(-math.inf, REST, 0.0)
         end = min(drive.end_s, float(drive.t_s[-1]))
-        t, x = drive.start_s, 0.0
+        t, x, since = drive.start_s, 0.0, 0.0
         sliding = bool(np.interp(t, drive.t_s, drive.load_n) <= _LEAST_LOAD_N)
         while t < end:
             if sliding:
                 t, x = self._slide(t, x, end)
-                sliding = False
+                sliding, since = False, x
                 continue
+            since = x
             phases.add(t, STICK, x)
             t, x = self._lets_go(t, x, end)
             if t >= end:
@@ -165,8 +167,9 @@ class Dragged:
             u = deflection_after(drive.mode, x - about, drive.speed_mm_s, lasting)
             # A slip of no length at all would let go again at the same moment, for ever.
             t, x = max(t + lasting, math.nextafter(t, math.inf)), about + u
+            since = x
         if drive.end_s < drive.t_s[-1]:
-            self._hold(max(t, drive.start_s), x)
+            self._hold(max(t, drive.start_s), x, since)
 
     def _lets_go(self, t: float, x: float, end: float) -> tuple[float, float]:
         """Return when and where the skin that sticks at x since t lets go; at `end` if not before."""
@@ -212,10 +215,10 @@ class Dragged:
         self._x_mm.append(deflection)
         return until, float(deflection[-1])
 
-    def _hold(self, t: float, x: float) -> None:
+    def _hold(self, t: float, x: float, since: float) -> None:
         drive = self.drive
         first = int(np.searchsorted(drive.t_s, t, side="right"))
-        self._phases.add(t, HELD, x)
+        self._phases.add(t, HELD, x, since)
         self._x_t.append(np.concatenate([[t], drive.t_s[first:]]))
         now = min(x, float(np.interp(t, drive.t_s, self._release_mm)))
         held = np.concatenate([[now], self._release_mm[first:]])
@@ -252,6 +255,9 @@ class Dragged:
         if own.any():
             x[own] = np.interp(t_s[own], self._knots_t, self._knots_mm)
             force[own] = stiffness[own] * x[own]
+        own = kind == HELD
+        left = np.interp(t_s[own], drive.t_s, self._release_mm) - about[own]
+        share[own] = np.divide(x[own] - about[own], left, out=np.ones(left.size), where=left > NOTHING_MM)
         slip[kind == SLIDE] = drive.speed_mm_s
         slipping = (kind == SLIP) | (kind == SLIDE)
         touched = load > _LEAST_LOAD_N

@@ -169,3 +169,22 @@ def test_a_disk_that_turns_read_only_while_recording_is_told_on_one_screen(tmp_p
         assert "Read-only file system" in told
         assert "Traceback" not in told
         assert Store(disk / "out").rows() == []
+
+
+def test_a_process_that_ends_while_it_writes_a_finished_recording_leaves_no_half_of_it(tmp_path):
+    code = (
+        "import os, signal, sys\nfrom tactbench.core.cli import main\nsynced = os.fsync\n"
+        "def sync(descriptor):\n"
+        "    if os.readlink(f'/proc/self/fd/{descriptor}').endswith('.completing'):\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    synced(descriptor)\n"
+        "os.fsync = sync\nmain(sys.argv[1:])\n"
+    )
+    asked = ("run", "--repeats", "1", "--sensor", "icub", "--task", "curvature", "--estimator", "logistic")
+    done_ = subprocess.run(
+        [sys.executable, "-c", code, *asked, "--jobs", "2", "--out", str(tmp_path)],
+        capture_output=True, text=True, cwd=ROOT,
+    )  # fmt: skip
+    assert done_.returncode == 1, done_.stderr
+    assert "SIGKILL" in done_.stdout + done_.stderr
+    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".partial", ".completing", ".h5")]

@@ -1,0 +1,166 @@
+"""The recordings behind the slip tasks: surfaces dragged over a pressed skin, and disturbances that are no slip.
+
+A cap is pressed and held; at a moment of its own its surface begins to move, and does so to the end. In a disturbance
+the surface moves by so little that the skin follows it (the start of a motor), and the normal force changes: presses,
+taps, ripples. Every condition is recorded once in each of four sessions, two of them for training.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
+
+from tactbench.plugin import ForcePath, Indenter, Placement, PlannedScene, Role, Scene, Source, assumed, derived
+from tactbench.plugin.simulation import Environment, Slide, Surface
+
+_CHOICE = "a condition of the slip campaign"
+SESSIONS: Mapping[str, Role] = MappingProxyType(
+    {"train-1": "train", "train-2": "train", "validation": "validation", "test": "test"}
+)
+"""Sessions of the campaign and what each is for."""
+SPEEDS_MM_S = (10.0, 20.0, 50.0)
+FORCES_N = (0.5, 1.5)
+REFERENCE_HZ = 500.0
+"""Of the reference clock: an onset is labelled to 2 ms."""
+HOLD_S, PRESS_S = 0.5, 0.3
+"""Nothing is pressed for the one; the force rises within the other."""
+EARLIEST_S, SPREAD_S = 1.6, 1.0
+"""When a drag begins: at the earliest, and how much later at most, so that no clock tells it."""
+SLIP_S = 4.6
+"""Length of a recording with a slip."""
+DISTURBED_S = 15.0
+"""Length of a recording of disturbances: six of them are a minute and a half."""
+START_MM = 0.03
+"""How far the surface moves when a motor starts and nothing slips: less than a third of the least way that the skin of
+a BioTac follows (0.11 mm), and of the displacement that is labelled a slip."""
+SLOT_S = 60.0
+_GOLDEN = 0.6180339887498949
+"""Multiples of it modulo 1 spread evenly."""
+
+
+def _surface(static: float, kinetic: float, rms_um: float, wave_mm: float, spread: float) -> Surface:
+    return Surface(
+        static_friction=assumed(static, "1", _CHOICE),
+        kinetic_friction=assumed(kinetic, "1", _CHOICE),
+        roughness=assumed(rms_um, "um", _CHOICE),
+        wavelength=assumed(wave_mm, "mm", _CHOICE),
+        spread=spread,
+    )
+
+
+SURFACES: Mapping[str, Surface] = MappingProxyType({
+    "smooth": _surface(0.5, 0.45, 2.0, 6.25, 0.5),
+    "default": Surface(),
+    "grating": _surface(0.6, 0.5, 100.0, 1.0, 0.1),
+    "knit": _surface(0.9, 0.78, 60.0, 2.0, 0.3),
+})  # fmt: skip
+"""What is dragged: a polished surface, the twin's default, a coarse grating of 1 mm, and a knitted fabric's ribs."""
+
+Points = list[tuple[float, float]]
+"""Times [s] and forces [N]."""
+
+
+def presses(force_n: float) -> Points:
+    """Return four releases and presses, each slower than the one before."""
+    points = []
+    for number, begin_s in enumerate((3.0, 6.0, 9.0, 12.0)):
+        ramp_s = 0.05 * 2.0**number
+        points += [(begin_s, force_n), (begin_s + ramp_s, 0.0), (begin_s + 1.0, 0.0), (begin_s + 1.0 + ramp_s, force_n)]
+    return points
+
+
+def taps(force_n: float) -> Points:
+    """Return taps of 30 ms on the pressed skin, of half a newton more, at uneven intervals."""
+    points = []
+    for number in range(8):
+        begin_s = 3.0 + 1.3 * number + 0.5 * (_GOLDEN * number % 1.0)
+        points += [(begin_s, force_n), (begin_s + 0.01, force_n + 0.5), (begin_s + 0.03, force_n)]
+    return points
+
+
+def ripples(force_n: float) -> Points:
+    """Return three triangular ripples of two seconds: 5 Hz of a fifth of the force, 20 Hz and 40 Hz of less."""
+    points = []
+    for begin_s, rate_hz, share in ((3.0, 5.0, 0.2), (7.0, 20.0, 0.05), (11.0, 40.0, 0.02)):
+        quarter_s = 0.25 / rate_hz
+        turns = [
+            (begin_s + (2 * turn + 1) * quarter_s, force_n * (1.0 + share * (-1.0) ** turn))
+            for turn in range(round(4.0 * rate_hz))
+        ]
+        points += [(begin_s, force_n), *turns, (begin_s + 2.0, force_n)]
+    return points
+
+
+DISTURBANCES: Mapping[str, Callable[[float], Points]] = MappingProxyType(
+    {"presses": presses, "taps": taps, "ripples": ripples}
+)
+"""What the normal force does without any slip, by kind."""
+
+
+def _profile(force_n: float, length_s: float, points: Points) -> ForcePath:
+    path = [(0.0, 0.0), (HOLD_S, 0.0), (HOLD_S + PRESS_S, force_n), *points, (length_s, force_n)]
+    return ForcePath(
+        times_s=tuple(time for time, _ in path),
+        forces_n=tuple(force for _, force in path),
+        samples=round(REFERENCE_HZ * length_s),
+        source=Source(tag="assumed", reference=_CHOICE),
+    )
+
+
+def _planned(
+    name: str, session: str, number: int, surface: str, speed_mm_s: float, force_n: float, kind: str = ""
+) -> PlannedScene:
+    """Return one recording: of a slip, or of a kind of disturbance."""
+    start_s = EARLIEST_S + SPREAD_S * (_GOLDEN * number % 1.0)
+    own = DISTURBANCES[kind](force_n) if kind else []
+    slide = Slide(
+        speed=assumed(speed_mm_s, "mm/s", _CHOICE),
+        start=assumed(round(start_s, 4), "s", "drawn so that no clock tells it"),
+        duration=assumed(START_MM / speed_mm_s, "s", "the start of a motor, which the skin follows") if kind else None,
+        surface=SURFACES[surface],
+    )
+    scene = Scene(
+        name=f"{name}-{session}",
+        indenter=Indenter(radius=assumed(20.0, "mm", _CHOICE)),
+        placement=Placement(scatter=assumed(0.5, "mm", "so that no two recordings press one place")),
+        profile=_profile(force_n, DISTURBED_S if kind else SLIP_S, own),
+        slide=slide,
+        environment=Environment(
+            force_noise=derived(
+                0.02, "N", "12 bits on +-10 V of a Nano17 with 3.7 N/V in its worst gauge, upper end of 8 to 20 mN"
+            )
+        ),
+        session=session,
+        starts_after_s=SLOT_S * number,
+        observe=("taxel", "dc_pressure", "ac_pressure"),
+        labels={
+            "event": "disturbance" if kind else "slip",
+            "friction_coefficient": SURFACES[surface].static_friction.to("1"),
+            "condition": name,
+            "surface": surface,
+        },
+    )
+    return PlannedScene(scene=scene, role=SESSIONS[session], drawn_order=f"slip-{session}")
+
+
+def _campaign() -> Iterator[PlannedScene]:
+    per_session = len(SURFACES) * len(SPEEDS_MM_S) * len(FORCES_N) + len(DISTURBANCES) * len(FORCES_N)
+    for place, session in enumerate(SESSIONS):
+        number = 0
+        # The moments of a session are another stretch of the same sequence: no condition keeps its own.
+        for surface in SURFACES:
+            for speed in SPEEDS_MM_S:
+                for force in FORCES_N:
+                    name = f"{surface}-{speed:g}mm-s-{force:g}N"
+                    yield _planned(name, session, place * per_session + number, surface, speed, force)
+                    number += 1
+        for kind in DISTURBANCES:
+            for force in FORCES_N:
+                surface = list(SURFACES)[(number + place) % len(SURFACES)]
+                name = f"{kind}-{force:g}N"
+                yield _planned(name, session, place * per_session + number, surface, 20.0, force, kind)
+                number += 1
+
+
+SLIP_SCENES: tuple[PlannedScene, ...] = tuple(_campaign())
+"""24 conditions of slip and six of disturbances, once in each of four sessions."""
