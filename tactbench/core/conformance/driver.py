@@ -321,7 +321,7 @@ def real_rig_presses(subject: Subject) -> None:
 
     Look at `tactbench rig check FILE` for limits, and at the message for what is missing.
     """
-    from tactbench.core.conformance.press import carried_out, tiny_scene
+    from tactbench.core.conformance.press import carried_out, effects_for, tiny_scene
     from tactbench.core.plugins.interfaces import RigContext
     from tactbench.core.plugins.rig_files import load_rig_file
 
@@ -329,7 +329,7 @@ def real_rig_presses(subject: Subject) -> None:
         skip("no rig file is given: `--rig-file FILE` says which devices it has")
     file = load_rig_file(subject.rig_file, subject.registry)
     sensor = subject.registry.sensors[next(iter(file.sensors))]
-    context = RigContext(effects=tuple(subject.registry.effects), rig_file=file, operator=_Present())
+    context = RigContext(effects=effects_for(subject), rig_file=file, operator=_Present())
     with code_of("where", subject.package):
         made = carried_out(subject.code("where")(context), subject.descriptor, sensor, tiny_scene(), 1)
     for stream in made.every_stream:

@@ -25,9 +25,7 @@ ALWAYS_WANTED = ("stored", "reference-force")
 
 
 def _scenes(subject: Subject) -> Sequence[Scene]:
-    kinds = tuple(
-        dict.fromkeys(one.kind for sensor in simulated_sensors(subject.registry) for one in sensor.spec.channels())
-    )
+    kinds = tuple(dict.fromkeys(one.kind for sensor in simulated_sensors(subject) for one in sensor.spec.channels()))
     return tuple(scenes_of(kinds or ("taxel",)))
 
 
@@ -80,7 +78,7 @@ def it_says_when_it_is_called_for(subject: Subject) -> None:
     """
     decide = subject.code("called_for")
     for scene in _scenes(subject):
-        for sensor in simulated_sensors(subject.registry):
+        for sensor in simulated_sensors(subject):
             before = (scene.model_dump(mode="json"), sensor.spec.model_dump(mode="json"))
             with code_of("called_for", subject.package):
                 reason = decide(scene, sensor.spec)
@@ -114,7 +112,7 @@ def the_same_scene_the_same_reason(subject: Subject) -> None:
     """
     decide = subject.code("called_for")
     for scene in _scenes(subject):
-        for sensor in simulated_sensors(subject.registry):
+        for sensor in simulated_sensors(subject):
             first, second = decide(scene, sensor.spec), decide(scene, sensor.spec)
             if first != second:
                 fail("called_for", f"asked twice it said {first.text!r} and {second.text!r}")
@@ -125,7 +123,7 @@ def _pressed(subject: Subject) -> tuple[Press, Any, Any, Any, Scene]:
     """Return a tiny press with the effect asked for by name, and with what it was made."""
     descriptor = subject.descriptor
     decide = subject.code("called_for")
-    sensors = simulated_sensors(subject.registry)
+    sensors = simulated_sensors(subject)
     scenes = _scenes(subject)
     calling = [scene for scene in scenes if any(decide(scene, one.spec).called_for for one in sensors)]
     found = first_that_goes(subject, calling or scenes, descriptor.name, "where")

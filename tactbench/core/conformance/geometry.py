@@ -12,8 +12,9 @@ from tactbench.core.spec.skin import FluidBackedShell, Skin, SkinSheet
 if TYPE_CHECKING:
     from tactbench.core.samples import FloatArray
 
-PATCH_CELLS = 1.5
-"""Standard deviation of a local press, cells of the skin's grid: as narrow as the grid resolves."""
+PATCH_MM, PATCH_CELLS = 1.25, 1.5
+"""Standard deviation of a local press: half the radius of a fingertip's contact, and no less than the grid resolves
+[cells]."""
 
 
 def sheet_of(spec: SensorSpec) -> SkinSheet | None:
@@ -40,6 +41,11 @@ def skin_grid(sheet: SkinSheet) -> SkinGrid:
     return SkinGrid(x_mm=x_mm, s_mm=s_mm)
 
 
+def patch_mm(grid: SkinGrid) -> float:
+    """Return the standard deviation of a local press."""
+    return max(PATCH_CELLS * max(grid.cell_mm), PATCH_MM)
+
+
 def pressed_locally(skin: Skin, grid: SkinGrid, force_n: float, at_mm: tuple[float, float] = (0.0, 0.0)) -> SkinState:
     """Return the state that a narrow press would leave: a bell of pressure, and a dent of the same shape.
 
@@ -48,8 +54,7 @@ def pressed_locally(skin: Skin, grid: SkinGrid, force_n: float, at_mm: tuple[flo
     """
     import numpy as np
 
-    dx, ds = grid.cell_mm
-    sigma = PATCH_CELLS * max(dx, ds)
+    sigma = patch_mm(grid)
     bell = np.exp(-((grid.x_mm[:, None] - at_mm[0]) ** 2 + (grid.s_mm[None, :] - at_mm[1]) ** 2) / (2 * sigma**2))
     rest = _thickness_mm(skin, grid)
     deepest = min(force_n / 3, 0.9)

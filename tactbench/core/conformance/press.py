@@ -15,11 +15,11 @@ from tactbench.core.conformance.common import difference
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.errors import NotApplicable, TactbenchError
 from tactbench.core.plugins.interfaces import RigContext
-from tactbench.core.plugins.registry import Registry, load_object
+from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import Block, Quality
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.recording import PlanEntry
-from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
+from tactbench.core.spec.rig import EffectDescriptor, RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Environment, ForceRamp, Scene, Simulation
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -103,37 +103,65 @@ def carried_out(rig: Any, descriptor: RigDescriptor, sensor: SensorDescriptor, s
     return Press(scene, sensor, descriptor, streams, reference, plan, said, blocks)
 
 
-def simulated_rig(registry: Registry) -> tuple[Any, RigDescriptor]:
+def effects_for(subject: Subject) -> tuple[EffectDescriptor, ...]:
+    """Return the effects that a check simulates with: those of this package and of the plugin's own distribution.
+
+    Another stranger's effect must not fail this one's check. Of an effect's siblings only those are taken that give it
+    what it consumes.
+    """
+    effects = subject.registry.effects
+    found = []
+    for owned in (effects.owned(name) for name in effects.names()):
+        own = owned.distribution == subject.distribution
+        if subject.kind == "effect":
+            consumed = set(subject.descriptor.consumes)
+            own = owned.descriptor.name == subject.name or (
+                own and bool(consumed.intersection(owned.descriptor.produces))
+            )
+        if owned.ours or own:
+            found.append(owned.descriptor)
+    return tuple(found)
+
+
+def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     """Return the first simulated rig, built, those that come with this package before others."""
+    registry = subject.registry
     owned = [registry.rigs.owned(name) for name in registry.rigs.names()]
     simulated = sorted((one for one in owned if one.descriptor.simulated), key=lambda one: not one.ours)
     if not simulated:
         skip("no simulated rig is installed")
     descriptor = simulated[0].descriptor
-    return load_object(descriptor.where)(RigContext(effects=tuple(registry.effects))), descriptor
+    return load_object(descriptor.where)(RigContext(effects=effects_for(subject))), descriptor
 
 
-def simulated_sensors(registry: Registry) -> Sequence[SensorDescriptor]:
-    """Return the sensors that a simulation can press, those with the least to compute first."""
-    able = [one for one in registry.sensors if one.spec.skin is not None and one.transducer is not None]
-    return sorted(able, key=lambda one: len(one.spec.channels()) * math.prod(one.spec.skin.sheet.cells))  # type: ignore[union-attr]
+def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
+    """Return sensors that a simulation can press: of this package, the cheapest first, then of the plugin's own."""
+    sensors = subject.registry.sensors
+    able = []
+    for owned in (sensors.owned(name) for name in sensors.names()):
+        skin = owned.descriptor.spec.skin
+        if skin is not None and owned.descriptor.transducer is not None:
+            cost = len(owned.descriptor.spec.channels()) * math.prod(skin.sheet.cells)
+            if owned.ours or owned.distribution == subject.distribution:
+                able.append((not owned.ours, cost, owned.descriptor.name, owned.descriptor))
+    return [one[-1] for one in sorted(able, key=lambda one: one[:3])]
 
 
 @lru_cache(maxsize=6)
 def pressed(subject: Subject, seed: int = 1) -> Press:
     """Return the tiny press of a subject: of a sensor on a simulated rig, or of a rig on a sensor."""
     if subject.kind == "sensor":
-        rig, descriptor = simulated_rig(subject.registry)
+        rig, descriptor = simulated_rig(subject)
         sensor, field = subject.descriptor, "spec"
     else:
         descriptor, field = subject.descriptor, "where"
         if not descriptor.simulated:
             skip("it moves something real: `--invasive --rig-file FILE` presses with it")
-        if not simulated_sensors(subject.registry):
+        if not simulated_sensors(subject):
             skip("no sensor that can be simulated is installed")
-        sensor = simulated_sensors(subject.registry)[0]
+        sensor = simulated_sensors(subject)[0]
         with code_of("where", subject.package):
-            rig = subject.code("where")(RigContext(effects=tuple(subject.registry.effects)))
+            rig = subject.code("where")(RigContext(effects=effects_for(subject)))
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
     scene = tiny_scene(observe=("taxel",) if "taxel" in kinds else kinds)
     with code_of(field, subject.package):
@@ -141,7 +169,7 @@ def pressed(subject: Subject, seed: int = 1) -> Press:
 
 
 @check(
-    "sensor", "rig", needs=("readings-have-the-shape", "hdf5-round-trip", "code-names-resolve", "rig-builds"),
+    "sensor", "rig", needs=("finite-at-zero-load", "hdf5-round-trip", "code-names-resolve", "rig-builds"),
     level="silver",
 )  # fmt: skip
 def tiny_press_is_carried_out(subject: Subject) -> None:
@@ -317,7 +345,10 @@ def other_seed_other_samples(subject: Subject) -> None:
         fail("open(…, seed)", "two seeds give the same samples in every stream")
 
 
-@check("sensor", "rig", needs=("blocks-fit-their-streams", "clocks-go-forward", "samples-are-finite"), level="silver")
+_SOUND = ("blocks-fit-their-streams", "clocks-go-forward", "samples-are-finite", "limits-are-kept")
+
+
+@check("sensor", "rig", needs=_SOUND, level="silver")
 def press_is_recorded(subject: Subject) -> None:
     """What a rig gives is written to a file and read back before anybody computes with it.
 
@@ -396,7 +427,7 @@ def scene_is_not_changed(subject: Subject) -> None:
     Copy what you change: ``scene.model_copy(update=…)``.
     """
     rig, descriptor = _built(subject), subject.descriptor
-    sensor = simulated_sensors(subject.registry)[0]
+    sensor = simulated_sensors(subject)[0]
     scene = tiny_scene(labels={"told": 1})
     before = (scene.model_dump(mode="json"), sensor.model_dump(mode="json"))
     with code_of("where", subject.package):
@@ -442,7 +473,7 @@ def rig_builds(subject: Subject) -> None:
 def _built(subject: Subject, *, usage: bool = False) -> Any:
     from tactbench.core.errors import UsageError
 
-    context = RigContext(effects=tuple(subject.registry.effects))
+    context = RigContext(effects=effects_for(subject))
     with code_of("where", subject.package):
         try:
             return subject.code("where")(context)
@@ -503,11 +534,11 @@ def first_that_goes(
 
     `asked` is an effect that is included by name; "" for none.
     """
-    rig, descriptor = simulated_rig(subject.registry)
+    rig, descriptor = simulated_rig(subject)
     for scene in scenes:
         if asked:
             scene = scene.model_copy(update={"simulation": Simulation(effects=(f"+{asked}",))})
-        for sensor in simulated_sensors(subject.registry):
+        for sensor in simulated_sensors(subject):
             try:
                 with code_of(where, subject.package):
                     carried_out(rig, descriptor, sensor, scene, 1)

@@ -31,7 +31,7 @@ def _channels(spec: SensorSpec) -> Iterator[tuple[str, StreamSpec, ChannelSpec]]
             yield f"spec.streams[{stream.name}].channels[{channel.name}]", stream, channel
 
 
-@check("sensor")
+@check("sensor", needs=("json-round-trip",))
 def hdf5_round_trip(subject: Subject) -> None:
     """A recording holds the whole spec and every stream, beside the stream ``force_torque`` of a rig.
 

@@ -11,7 +11,7 @@ from tactbench.core.conformance.geometry import pressed_locally, skin_grid
 from tactbench.core.conformance.press import tiny_scene
 from tactbench.core.samples import SkinState
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.scene import ForceRamp, Indenter, Scene
+from tactbench.core.spec.scene import Indenter, Scene
 from tactbench.core.spec.sensor import SensorSpec
 
 if TYPE_CHECKING:
@@ -41,9 +41,7 @@ def scenes(draw: st.DrawFn, largest_n: float = 2.0) -> Scene:
     """Return short scenes, flat or with a cap of 5 to 30 mm, that a simulated rig carries out in tenths of a second."""
     radius = draw(st.one_of(st.none(), st.floats(5.0, 30.0)))
     indenter = Indenter() if radius is None else Indenter(radius=assumed(radius, "mm", _WHY))
-    profile: ForceRamp = tiny_scene().profile.model_copy(
-        update={"end": assumed(draw(st.floats(0.1, largest_n)), "N", _WHY)}
-    )
+    profile = tiny_scene().profile.model_copy(update={"end": assumed(draw(st.floats(0.1, largest_n)), "N", _WHY)})
     return tiny_scene(indenter=indenter, profile=profile)
 
 

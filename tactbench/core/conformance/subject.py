@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import EntryPoint
@@ -29,10 +30,20 @@ class Subject:
     rig_file: Path | None = None
     """What is opened in the mode `invasive`."""
 
-    @cached_property
+    @property
     def descriptor(self) -> Any:
         """What the plugin's hook gives in this very process."""
-        return self.asked_again()
+        return self._first[0]
+
+    @property
+    def as_it_was(self) -> dict[str, Any]:
+        """The descriptor as plain data, from before any code that it names had run."""
+        return self._first[1]
+
+    @cached_property
+    def _first(self) -> tuple[Any, dict[str, Any]]:
+        descriptor = self.asked_again()
+        return descriptor, copy.deepcopy(descriptor.model_dump())
 
     def asked_again(self) -> Any:
         """Ask the plugin's hook once more; CheckFailed if it does not give the descriptor any more."""

@@ -51,15 +51,18 @@ def metric_is_known(subject: Subject) -> None:
 def metric_has_its_unit(subject: Subject) -> None:
     """The unit stands beside every score: an error of newtons in N, a share in 1.
 
-    State the target's unit for rmse and mae, and 1 for the others.
+    State the target's unit for errors (rmse, mae, mean_euclidean_error), and 1 for the others.
     """
+    from tactbench.core.evaluation.metrics import METRICS
+
     spec = subject.descriptor.spec
     for field, unit in (("spec.unit", spec.unit), ("spec.target.unit", spec.target.unit)):
         try:
             units.parse(unit)
         except UsageError as error:
             fail(field, str(error))
-    wanted = spec.target.unit if spec.metric in ("rmse", "mae") else "1"
+    of_the_target = spec.metric in ("rmse", "mae") or METRICS[spec.metric].vector
+    wanted = spec.target.unit if of_the_target else "1"
     if units.parse(spec.unit)[1] != units.parse(wanted)[1]:
         fail("spec.unit", f"{spec.metric} of a target in {spec.target.unit} is in {wanted}, not in {spec.unit}")
 
@@ -270,7 +273,7 @@ def answer_is_not_a_feature(subject: Subject) -> None:
     Remove the target's kind from features.
     """
     spec = subject.descriptor.spec
-    if spec.target.source == "channel" and spec.target.kind in spec.features:
+    if not isinstance(spec.target, LabelTarget) and spec.target.kind in spec.features:
         fail("spec.features", f"it holds {spec.target.kind}, which is the target's kind")
     if len(set(spec.features)) < len(spec.features) or not spec.features:
         fail("spec.features", f"{spec.features}: at least one kind is needed, each once")
