@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from tactbench.devices.fault import Fault, fault_concerns
     from tactbench.devices.log import DeviceLog
     from tactbench.devices.reading import Reading
+    from tactbench.devices.row_driver import Row, RowDriver
+    from tactbench.devices.row_emulator import RowEmulator
     from tactbench.devices.sequence import SequenceCheck, Unwrap
     from tactbench.links.address import open_link
     from tactbench.links.bridge_frame import Frame, FrameDecoder, encode_frame
@@ -79,6 +81,9 @@ __all__ = [
     "Received",
     "RigCheck",
     "RigFile",
+    "Row",
+    "RowDriver",
+    "RowEmulator",
     "SceneSamples",
     "Senses",
     "Sent",
@@ -136,6 +141,8 @@ __getattr__ = on_demand(
         ),
         "tactbench.devices.log": ("DeviceLog",),
         "tactbench.devices.reading": ("Reading",),
+        "tactbench.devices.row_driver": ("Row", "RowDriver"),
+        "tactbench.devices.row_emulator": ("RowEmulator",),
         "tactbench.devices.sequence": ("SequenceCheck", "Unwrap"),
         "tactbench.links.address": ("open_link",),
         "tactbench.links.bridge_frame": (

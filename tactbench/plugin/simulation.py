@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 
 from tactbench.core.plugins.checks import Check, Verdict
 from tactbench.core.plugins.cost import CostJob, CostPoint, CostStudy
-from tactbench.core.plugins.interfaces import Explained, Reason, SimulatedPress, Transducer, TransducerFactory
+from tactbench.core.plugins.interfaces import (
+    EffectRun,
+    EffectTrack,
+    Explained,
+    Reason,
+    SimulatedPress,
+    Transducer,
+    TransducerFactory,
+)
 from tactbench.core.samples import SkinGrid, SkinState
 from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.rig import EffectDescriptor
@@ -28,6 +36,8 @@ __all__ = [
     "Creep",
     "Dome",
     "EffectDescriptor",
+    "EffectRun",
+    "EffectTrack",
     "Environment",
     "Explained",
     "FluidBackedShell",

@@ -14,6 +14,7 @@ from tests.conftest import ROOT, THIRD_PARTY
 
 DOORS = ("tactbench.plugin", "tactbench.plugin.simulation", "tactbench.plugin.devices")
 PLUGINS = [*(ROOT / "tactbench" / family for family in ("sensors", "rigs", "tasks", "estimators")), THIRD_PARTY]
+PLUGINS.append(ROOT / "examples" / "plugins")
 DOCUMENT = ROOT / "docs" / "plugin-reference.md"
 
 

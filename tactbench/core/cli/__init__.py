@@ -32,6 +32,7 @@ VERBS = {
     "rerun": ("rerun", "Compute one cell again and say whether it comes out the same, bit for bit."),
     "merge": ("merge", "Make one result folder of several, and refuse those that contradict each other."),
     "leaderboard": ("leaderboard", "Show the table of all results in a folder, in any format."),
+    "new": ("new", "Write a plugin package to start from: a sensor, rig, task, estimator or effect."),
     "compare": ("compare", "Compare two sensors, two estimators or two result folders, replicate by replicate."),
 }
 

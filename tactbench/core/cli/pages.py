@@ -120,8 +120,8 @@ def _scene(scene: Scene) -> tuple[str, str, str, str]:
     nominal = place.x.value == 0 and place.s.value == 0
     where = "nominal" if nominal else f"{place.x} along, {place.s} across"
     scatter = f", scatter {place.scatter}" if place.scatter.value else ""
-    slide = f", slides {scene.slide}" if scene.slide else ""
-    end = profile.end if profile.kind == "ramp" else f"{profile.largest_n:g} N and elsewhere"
+    slide = f", slides at {scene.slide.speed}" if scene.slide else ""
+    end = profile.end if profile.kind == "ramp" else f"{profile.largest_n:g} N, by a path"
     force = f"{profile.start.value:g} to {end}, after {profile.hold}"
     return str(scene.indenter), where + scatter, force + slide, str(profile.duration)
 

@@ -13,9 +13,10 @@ from tactbench.core.spec.recording import Emulation, PlanEntry, Scalar, StreamCl
 from tactbench.core.spec.rig import EffectDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
-from tactbench.core.spec.sensor import SensorSpec, StreamSpec
+from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, SensorSpec, StreamSpec
 
 if TYPE_CHECKING:
+    import numpy as np
     import numpy.typing as npt
 
     from tactbench.core.samples import FloatArray
@@ -156,6 +157,61 @@ class Reason(NamedTuple):
     nothing); about, if it is. None: unknown without computing it."""
     unit: str = "count"
     """Unit of `change`."""
+
+
+class EffectTrack(Protocol):
+    """The recorded channels that share one clock, as a simulation effect finds them."""
+
+    @property
+    def channels(self) -> tuple[ChannelSpec, ...]:
+        """In order of the sensor's streams."""
+
+    @property
+    def t_s(self) -> FloatArray:
+        """(n,) seconds since the recording's first sample."""
+
+    @property
+    def force_n(self) -> FloatArray:
+        """(n,) true normal force at these samples."""
+
+    @property
+    def readings(self) -> FloatArray:
+        """(n, channels) what the channels would say, in their own units; an effect changes it in place."""
+
+    @property
+    def quality(self) -> npt.NDArray[np.uint8]:
+        """(n, channels) of :class:`Quality`; an effect may set bits."""
+
+    def by_kind(self) -> Mapping[ChannelKind, Sequence[int]]:
+        """Return the columns of each kind of channel."""
+
+
+class EffectRun(Protocol):
+    """The recording in the making: what ``EffectDescriptor.where`` is called with.
+
+    The generators are the same under the same seed and names, whatever other effects draw.
+    """
+
+    @property
+    def sensor(self) -> SensorDescriptor:
+        """The sensor, with the nuisances that hold for this scene."""
+
+    @property
+    def scene(self) -> Scene:
+        """What is carried out."""
+
+    @property
+    def tracks(self) -> Sequence[EffectTrack]:
+        """The sensor's channels, clock by clock."""
+
+    def of_unit(self, *what: str) -> np.random.Generator:
+        """Return the generator of what belongs to this sensor unit, in every recording."""
+
+    def of_session(self, *what: str) -> np.random.Generator:
+        """Return the generator of what the recordings of a session share."""
+
+    def of_recording(self, *what: str) -> np.random.Generator:
+        """Return the generator of what is this recording's own."""
 
 
 class Estimator(Protocol):

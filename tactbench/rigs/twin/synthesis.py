@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import ChannelKind, ChannelSpec, FloatArray, Scalar, Scene, SensorDescriptor, load_object
-from tactbench.plugin.simulation import EffectDescriptor, Nuisances
+from tactbench.plugin.simulation import EffectDescriptor, EffectRun, Nuisances
 from tactbench.rigs.twin import draws
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.geometry import Contact
@@ -186,3 +186,8 @@ class Synthesis:
         every = [channel.name for channel in self.sensor.spec.channels(kind)]
         numbers = dict(zip(every, generator.standard_normal(len(every)), strict=True))
         return np.array([numbers[channel.name] for channel in track.channels if channel.kind == kind])
+
+
+if TYPE_CHECKING:
+    # Effects of others are written against this interface.
+    _of_others: type[EffectRun] = Synthesis

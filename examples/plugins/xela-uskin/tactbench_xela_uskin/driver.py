@@ -1,0 +1,65 @@
+"""A frame a taxel; a row is complete with the last taxel's."""
+
+import struct
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from tactbench.plugin import Quality
+from tactbench.plugin.devices import CanFrame, CanLink, Row, RowDriver, RowEmulator
+
+from tactbench_xela_uskin import STREAM, TAXELS
+
+START, FIRST, AXES = 0x200, 0x710, 3
+
+
+def encode(taxel: int, values: Sequence[float]) -> CanFrame:
+    """Return the frame of taxel 0 to 15: X, Y, Z."""
+    return CanFrame(FIRST + taxel, struct.pack(">xHHHx", *(round(value) for value in values)))
+
+
+def decode(frame: CanFrame) -> tuple[int, tuple[int, ...]] | None:
+    """Return taxel and X, Y, Z; None for a frame that is another's."""
+    taxel = frame.id - FIRST
+    if frame.extended or not 0 <= taxel < TAXELS or len(frame.data) != 8:
+        return None
+    return taxel, struct.unpack(">xHHHx", frame.data)
+
+
+class USkinDriver(RowDriver[CanLink]):
+    """One board. Taxels that were not heard since the last row are marked as missing. How it is stopped, no source says."""
+
+    stream, link_kind, defaults = STREAM, CanLink, {"board": 1}
+
+    def start(self) -> None:
+        """Let it send."""
+        self._heard: dict[int, tuple[int, ...]] = {}
+        self.link.send(CanFrame(START + self.options["board"], b"\x07\x00"))
+
+    def rows(self, received: CanFrame) -> Iterator[Row]:
+        """Return a row with the last taxel's frame."""
+        found = decode(received)
+        if found is None:
+            self.counted["other frames"] += 1
+            return
+        self._heard[found[0]] = found[1]
+        if found[0] == TAXELS - 1:
+            values = [self._heard.get(taxel, (0, 0, 0)) for taxel in range(TAXELS)]
+            missing = [Quality.GOOD if taxel in self._heard else Quality.MISSING for taxel in range(TAXELS)]
+            self._heard = {}
+            yield Row(np.ravel(values).tolist(), np.repeat(missing, AXES).tolist())
+
+
+class Emulator(RowEmulator):
+    """The board as a model: 16 frames at once, every 10 ms (assumed) from the start."""
+
+    stream, rate_hz = STREAM, 100.0
+
+    def sent(self, values: Sequence[float]) -> list[CanFrame]:
+        """Return a frame for each taxel."""
+        return [encode(taxel, values[AXES * taxel :][:AXES]) for taxel in range(TAXELS)]
+
+    def told(self, piece: bytes | CanFrame, now_s: float) -> tuple[()]:
+        """Start, if it is told so."""
+        if isinstance(piece, CanFrame) and piece.id == START + self.settings.options.get("board", 1):
+            self.sample(now_s)
+        return ()

@@ -1,0 +1,100 @@
+"""``tactbench new``: a plugin package to start from."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+import click
+
+KINDS = ("sensor", "rig", "task", "estimator", "effect")
+NAME = r"[a-z][a-z0-9]*(-[a-z0-9]+)*"
+_TESTED_WITH = {"rig": "--sensor ideal --task force --rig", "task": "--sensor ideal --task",
+                "estimator": "--sensor ideal --task force --estimator",
+                "effect": "--sensor ideal --task force --effects", "sensor": "--task force --sensor"}  # fmt: skip
+
+
+@click.command(name="new")
+@click.argument("kind", type=click.Choice(KINDS))
+@click.argument("name")
+@click.option("--into", type=click.Path(path_type=Path, file_okay=False), default=Path(), metavar="DIR",
+              help="Folder of the package; made if it is not there. Default: this one.")  # fmt: skip
+def command(kind: str, name: str, into: Path) -> None:
+    """Write an installable package with a plugin that already runs: a sensor, rig, task, estimator or effect.
+
+    NAME is lower case, with hyphens. Nothing is overwritten. See docs/tutorial.md.
+    """
+    from tactbench.core.errors import UsageError
+    from tactbench.core.plugins.registry import load_registry
+
+    check_name(kind, name)
+    family = load_registry().families()[f"{kind}s"]
+    if name in family:
+        raise UsageError(f"A {kind} called {name} is installed already.", hint="Choose another name.")
+    package = rendered(kind, name)
+    taken = [path for path in package if (into / path).exists()]
+    if taken:
+        raise UsageError(
+            f"{into / taken[0]} is there already{_and_more(taken)}.", hint="Give an empty folder: --into DIR."
+        )
+    for path, text in package.items():
+        (into / path).parent.mkdir(parents=True, exist_ok=True)
+        (into / path).write_text(text, encoding="utf-8")
+        click.echo(into / path)
+    asked = f"+{name}" if kind == "effect" else name
+    here = "" if into == Path() else f"cd {into} && "
+    click.echo(
+        f"Try next:\n  {here}pip install -e .\n  tactbench check {name}\n  tactbench run {_TESTED_WITH[kind]} {asked}",
+        err=True,
+    )
+
+
+def check_name(kind: str, name: str) -> None:
+    """Refuse a name that a plugin cannot have, or that a command line takes for something else.
+
+    Raises
+    ------
+    UsageError
+        With what is wrong and, where there is one, a name that would do.
+    """
+    import re
+
+    from tactbench.core.errors import UsageError
+
+    if re.fullmatch(NAME, name) and name != "all":
+        return
+    better = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-").lstrip("0123456789-")
+    hint = f"Perhaps {better}." if better and better != "all" else f"Call it my-{kind}, for example."
+    raise UsageError(
+        f"{name!r} is no name for a {kind}: lower-case letters, digits and single hyphens, a letter first, not `all`.",
+        hint=hint,
+    )
+
+
+def rendered(kind: str, name: str) -> dict[str, str]:
+    """Return the package's files: path -> text."""
+    from tactbench.core.plugins.hookspecs import API_VERSION
+
+    module = f"tactbench_{name.replace('-', '_')}"
+    words = {
+        "kind": kind,
+        "name": name,
+        "module": module,
+        "distribution": f"tactbench-{name}",
+        "title": name.replace("-", " ").capitalize(),
+        "api": str(API_VERSION),
+    }
+    places = {"pyproject.toml": "pyproject.toml", "README.md": "README.md", "ci.yaml": ".github/workflows/test.yaml",
+              "test.py": f"tests/test_{module}.py"}  # fmt: skip
+    found = {}
+    for folder in ("common", kind):
+        for file in sorted(files("tactbench").joinpath("templates", folder).iterdir(), key=lambda file: file.name):
+            template = file.name.removesuffix(".txt")
+            text = Template(file.read_text(encoding="utf-8")).substitute(words)
+            found[places.get(template, f"{module}/{template}")] = text
+    return found
+
+
+def _and_more(taken: list[str]) -> str:
+    return f", and {len(taken) - 1} more" if len(taken) > 1 else ""

@@ -1,0 +1,154 @@
+"""A driver of one stream, for devices that need no more than a way to turn what comes into rows."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from tactbench.core.errors import LinkError, LinkTimeout, LinkUnplugged, RigError, UnknownNameError
+from tactbench.core.samples import Block
+from tactbench.core.spec.sensor import StreamSpec
+from tactbench.devices.driver import Driver, DriverSettings
+from tactbench.links.byte_link import ByteLink
+from tactbench.links.can_link import CanLink
+from tactbench.links.datagram_link import DatagramLink
+from tactbench.links.link import Link
+
+L = TypeVar("L", ByteLink, CanLink, DatagramLink)
+
+AT_ONCE = 1000
+"""The most pieces of one `read`: a device may send faster than they are taken."""
+
+
+class Row(NamedTuple):
+    """One sample of each channel."""
+
+    values: Sequence[float]
+    """As many numbers as the stream has channels."""
+    quality: Sequence[int] | None = None
+    """A :class:`~tactbench.core.samples.Quality` each; None: all good."""
+
+
+class RowDriver(Driver, Generic[L]):
+    """One stream behind one link; a subclass says what the link is and how what comes becomes :meth:`rows`.
+
+    Rows have the time at which the host had them. A device with several streams, numbers or a clock of its own needs a
+    :class:`Driver`.
+
+    Raises
+    ------
+    UsageError
+        For an option that is not among `defaults`.
+    RigError
+        If the link is of another kind.
+    LinkError
+        If it cannot be opened.
+    """
+
+    stream: ClassVar[StreamSpec]
+    """What it reads."""
+    link_kind: type[L]
+    """ByteLink, CanLink or DatagramLink."""
+    defaults: ClassVar[Mapping[str, Any]] = {}
+    """Options of a rig file's entry, and what they are where it leaves them out."""
+
+    def __init__(self, settings: DriverSettings) -> None:
+        for name in settings.options:
+            if name not in self.defaults:
+                raise UnknownNameError("option", name, self.defaults)
+        self.options: dict[str, Any] = {**self.defaults, **settings.options}
+        self.clock = settings.clock
+        self.counted: Counter[str] = Counter()
+        """What :attr:`counts` tells: subclasses count here what they leave out."""
+        link = settings.open_link()
+        if not isinstance(link, self.link_kind):
+            link.close()
+            raise RigError(
+                f"{link.address} is a {_kind(link)}, and this device is read over a {self.link_kind.__name__}.",
+                hint="Give another address: docs/links.md lists them.",
+            )
+        self.link: L = link
+
+    @property
+    def streams(self) -> tuple[StreamSpec, ...]:
+        """The one stream."""
+        return (self.stream,)
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """What was counted, by name."""
+        return dict(self.counted)
+
+    def identify(self) -> Mapping[str, str]:
+        """Nothing, unless a subclass asks the device."""
+        return {}
+
+    def start(self) -> None:
+        """Nothing, unless a subclass has something to send."""
+
+    def ask(self) -> None:
+        """Nothing, unless a device is to be asked before its answer is read."""
+
+    @abstractmethod
+    def rows(self, received: Any) -> Iterable[Row]:
+        """Return the rows that are complete with what was received.
+
+        Parameters
+        ----------
+        received
+            Of a ByteLink or DatagramLink a ``Received`` (data, t_ns), of a CanLink a ``CanFrame``.
+        """
+
+    def read(self, timeout_s: float) -> list[Block]:
+        """Return what has come."""
+        self.ask()
+        times: list[int] = []
+        found: list[Row] = []
+        for _ in range(AT_ONCE):
+            wait_s = 0.0 if found else timeout_s
+            try:
+                link: Any = self.link
+                received = link.read(wait_s) if isinstance(link, ByteLink) else link.receive(wait_s)
+            except LinkTimeout:
+                break
+            except LinkUnplugged:
+                if found:  # what has come is handed out; the next read says that nothing comes any more
+                    break
+                raise
+            fresh = list(self.rows(received))
+            times += [received.t_ns] * len(fresh)
+            found += fresh
+            if isinstance(link, ByteLink):
+                break  # one read takes all that has come
+        if not found:
+            return []
+        data = np.array([row.values for row in found]).astype(self.stream.dtype)
+        quality = None
+        if any(row.quality is not None for row in found):
+            good = [0] * data.shape[1]
+            quality = np.array([row.quality if row.quality is not None else good for row in found], dtype=np.uint8)
+        return [Block(self.stream.name, np.array(times, dtype=np.int64), data, quality)]
+
+    def stop(self) -> None:
+        """Nothing, unless :meth:`quiet` sends something; raises nothing if the device is gone."""
+        try:
+            self.quiet()
+        except LinkError:
+            return
+
+    def quiet(self) -> None:
+        """Nothing, unless the device can be told to stop."""
+
+    def close(self) -> None:
+        """Stop, and close the link."""
+        self.stop()
+        self.link.close()
+
+
+def _kind(link: Link) -> str:
+    known = (ByteLink, CanLink, DatagramLink)
+    return next((kind.__name__ for kind in known if isinstance(link, kind)), type(link).__name__)

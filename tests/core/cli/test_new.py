@@ -1,0 +1,123 @@
+"""``tactbench new``: every kind of package, as it is made, is typed, formatted, checked and in the leaderboard."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from tactbench.core.cli.new import KINDS, rendered
+from tactbench.core.spec.rig import EffectDescriptor, EstimatorDescriptor, RigDescriptor, SensorDescriptor
+from tactbench.core.spec.sensor import ChannelSpec, DataSheet, Nuisances, SensorSpec, StreamSpec
+from tactbench.core.spec.skin import BondedLayer, SkinSheet
+from tactbench.core.spec.task import TaskSpec
+from tests.conftest import ROOT, Verbs
+
+EXPLAINED = {
+    "sensor": (SensorDescriptor, SensorSpec, StreamSpec, ChannelSpec, BondedLayer, SkinSheet, Nuisances, DataSheet),
+    "rig": (RigDescriptor,),
+    "task": (TaskSpec,),
+    "estimator": (EstimatorDescriptor,),
+    "effect": (EffectDescriptor,),
+}
+
+
+def install(folder, name):
+    """Leave what an installer leaves beside a package."""
+    module = f"tactbench_{name.replace('-', '_')}"
+    info = folder / f"{module}-0.1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: tactbench-{name}\nVersion: 0.1.0\n")
+    (info / "entry_points.txt").write_text(f"[tactbench]\n{name} = {module}\n")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A package of every kind, each in a folder of its own, named ``my-KIND``."""
+    top = tmp_path_factory.mktemp("made")
+    for kind in KINDS:
+        Verbs(top)("new", kind, f"my-{kind}", "--into", kind)
+        install(top / kind, f"my-{kind}")
+    return top
+
+
+def folders(made):
+    return tuple(str(made / kind) for kind in KINDS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_package_has_at_most_eight_files(made, kind):
+    files = [path for path in (made / kind).rglob("*") if path.is_file() and ".dist-info" not in str(path)]
+    assert 5 <= len(files) <= 8
+    (test,) = (made / kind / "tests").iterdir()
+    assert len(test.read_text().splitlines()) <= 15
+    assert not [path for path in files if "$" in path.read_text()]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_field_stands_in_the_template(kind):
+    text = "".join(rendered(kind, "pad").values())
+    missing = [f"{model.__name__}.{name}" for model in EXPLAINED[kind] for name in model.model_fields
+               if f"{name}=" not in text and name not in ("spec", "medium")]  # fmt: skip
+    assert missing == []
+
+
+def test_what_is_made_is_formatted_and_typed(made):
+    def run(*command):
+        done = subprocess.run([sys.executable, "-m", *command], cwd=made, capture_output=True, text=True, timeout=100)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+    run("ruff", "check", "--no-cache", ".")
+    run("ruff", "format", "--no-cache", "--check", ".")
+    config = made / "mypy.ini"
+    path = ":".join([str(ROOT), *folders(made)])
+    # Errors in tactbench itself are not these packages': its own check finds them.
+    config.write_text(f"[mypy]\nstrict = True\nmypy_path = {path}\n[mypy-tactbench.*]\nfollow_imports = silent\n")
+    packages = [word for kind in KINDS for word in ("-p", f"tactbench_my_{kind}")]
+    run("mypy", "--config-file", str(config), "--cache-dir", str(made / "cache"), *packages)
+
+
+def scores(shell, *arguments, made):
+    done = shell("run", "--repeats", "1", "--no-latency", "--format", "json", *arguments, plugins=folders(made))
+    rows = json.loads(done.stdout)
+    assert {row["status"] for row in rows} == {"done"}
+    return {row["estimator"]: row["score"] for row in rows}
+
+
+def test_the_sensor_runs_with_the_estimator_and_the_effect(shell, made):
+    found = scores(shell, "--sensor", "my-sensor", "--task", "force", "--estimator", "my-estimator",
+                   "--effects", "+my-effect", made=made)  # fmt: skip
+    assert found["my-estimator"] < found["mean"] / 2
+
+
+def test_the_task_runs_on_the_rig(shell, made):
+    # Its taxels all answer alike: nobody can say on which side they are touched.
+    found = scores(shell, "--sensor", "my-sensor", "--task", "my-task", "--rig", "my-rig", made=made)
+    assert 0 < found["logistic"] < 0.6
+
+
+def test_nothing_is_overwritten(verbs, tmp_path):
+    (tmp_path / "README.md").write_text("mine")
+    done = verbs("new", "task", "mine", code=2)
+    assert "README.md is there already" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["README.md"]
+    assert (tmp_path / "README.md").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("My Pad", "Perhaps my-pad"),
+        ("my_pad", "Perhaps my-pad"),
+        ("2pads", "Perhaps pads"),
+        ("all", "Call it my-sensor"),
+        ("ä", "Call it my-sensor"),
+        ("../pad", "Perhaps pad"),
+        ("biotac", "installed already"),
+    ],
+)
+def test_a_bad_name_is_named(verbs, tmp_path, name, said):
+    done = verbs("new", "sensor", name, code=2)
+    assert name in done.stderr
+    assert said in done.stderr
+    assert list(tmp_path.iterdir()) == []

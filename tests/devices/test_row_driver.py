@@ -1,0 +1,136 @@
+"""Drivers and emulators of one stream: rows with times and quality, options and links refused, the device gone."""
+
+import numpy as np
+import pytest
+
+from tactbench.devices.emulation.line import LinkFault
+from tactbench.plugin import ChannelSpec, Quality, RigError, StreamSpec, UsageError, assumed
+from tactbench.plugin.devices import (
+    ByteLink,
+    CanFrame,
+    CanLink,
+    DriverSettings,
+    EmulatedDevice,
+    EmulatedDevices,
+    EmulatorSettings,
+    LinkUnplugged,
+    Row,
+    RowDriver,
+    RowEmulator,
+)
+
+STREAM = StreamSpec(
+    name="taxels", dtype="uint8",
+    channels=tuple(ChannelSpec(name=f"t{n}", kind="taxel", lower=0, upper=255, rest=assumed(n, "count", "a test"))
+                   for n in range(3)),
+)  # fmt: skip
+
+
+class ByteDriver(RowDriver[ByteLink]):
+    stream, link_kind, defaults = STREAM, ByteLink, {"unit": 1}
+
+    def start(self):
+        self.link.write(b"+")
+
+    def quiet(self):
+        self.link.write(b"-")
+
+    def rows(self, received):
+        for start in range(0, len(received.data), 3):
+            row = received.data[start : start + 3]
+            yield Row(list(row), [Quality.SATURATED if value == 255 else Quality.GOOD for value in row])
+
+
+class ByteModel(RowEmulator):
+    stream, rate_hz = STREAM, 100.0
+
+    def sent(self, values):
+        return [bytes(map(round, values))]
+
+    def told(self, piece, now_s):
+        self.sample(now_s, on=piece == b"+")
+        return ()
+
+
+class CanDriver(RowDriver[CanLink]):
+    stream, link_kind = STREAM, CanLink
+
+    def rows(self, received):
+        return [Row(list(received.data))]
+
+
+class CanModel(RowEmulator):
+    stream, rate_hz, from_power_on = STREAM, 100.0, True
+
+    def sent(self, values):
+        return [CanFrame(1, bytes(map(round, values)))]
+
+
+def settings(senses=lambda second: {}, faults=()):
+    return EmulatorSettings(senses, np.random.default_rng(1), faults=faults)
+
+
+def on(devices, driver, **options):
+    return driver(DriverSettings(lambda: devices.open_link("pad"), options=options, clock=devices.clock))
+
+
+def test_rows_have_times_values_and_quality():
+    model = ByteModel(settings(lambda second: {"t0": 255.0 if second > 0.525 else 7.0}))
+    with EmulatedDevices({"pad": EmulatedDevice("bytes", model)}) as devices, on(devices, ByteDriver) as driver:
+        assert driver.streams == (STREAM,)
+        assert driver.read(0.5) == []  # nothing before it is started
+        began_ns = devices.clock()
+        driver.start()
+        blocks = [driver.read(0.5)[0] for _ in range(3)]
+        driver.stop()
+        assert driver.read(0.5) == []
+        assert driver.counts == {}
+    np.testing.assert_array_equal(np.concatenate([block.data for block in blocks]), [[7, 1, 2], [7, 1, 2], [255, 1, 2]])
+    times = np.concatenate([block.t_ns for block in blocks]) - began_ns
+    np.testing.assert_allclose(times, [10e6, 20e6, 30e6], atol=1)  # rounded to nanoseconds
+    assert blocks[0].data.dtype == np.uint8
+    assert [int(block.quality[0, 0]) for block in blocks] == [0, 0, Quality.SATURATED]
+
+
+def test_frames_that_wait_are_one_block():
+    with EmulatedDevices({"pad": EmulatedDevice("can", CanModel(settings()))}) as devices:
+        with on(devices, CanDriver) as driver:
+            assert driver.read(0) == []
+            devices.advance(55_000_000)
+            (block,) = driver.read(0)
+        assert block.data.tolist() == [[0, 1, 2]] * 5
+        assert block.quality is None
+
+
+def test_what_came_before_it_was_unplugged_is_handed_out():
+    class Unplugged(CanDriver):
+        def rows(self, received):
+            devices.advance(devices.clock() + 1_000_000_000)  # the frame at 20 ms comes, and the cable is pulled
+            return super().rows(received)
+
+    device = EmulatedDevice("can", CanModel(settings()), faults=(LinkFault.parse("unplug:start_s=0.025"),))
+    with EmulatedDevices({"pad": device}) as devices, on(devices, Unplugged) as driver:
+        assert driver.read(0.5)[0].data.tolist() == [[0, 1, 2]] * 2
+        with pytest.raises(LinkUnplugged):
+            driver.read(0.5)
+        driver.stop()  # raises nothing
+
+
+def test_an_unknown_option_is_refused_before_the_link_is_opened():
+    with EmulatedDevices({"pad": EmulatedDevice("bytes", ByteModel(settings()))}) as devices:
+        with pytest.raises(UsageError, match="unti"):
+            on(devices, ByteDriver, unti=2)
+        with on(devices, ByteDriver, unit=2) as driver:  # the link is free
+            assert driver.options == {"unit": 2}
+
+
+def test_a_link_of_another_kind_is_refused_and_closed():
+    with EmulatedDevices({"pad": EmulatedDevice("can", CanModel(settings()))}) as devices:
+        with pytest.raises(RigError, match="is a CanLink, and this device is read over a ByteLink"):
+            on(devices, ByteDriver)
+        on(devices, CanDriver).close()
+
+
+def test_faults_are_refused():
+    with pytest.raises(UsageError, match="late-frames"):
+        CanModel(settings(faults=("late-frames",)))
