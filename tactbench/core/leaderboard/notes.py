@@ -196,7 +196,7 @@ def _picked(key: str, value: object, row: Row) -> str:
     name, _, fold = key.partition(" of fold ")
     where = f" of fold {fold}" if fold else ""
     if name == "threshold":
-        return f"{name} = {_told(value)}{where} (of the score that {row['estimator']} gives a frame)"
+        return f"{name} = {_value_text(value)}{where} (of the score that {row['estimator']} gives a frame)"
     if name == "k":
         return f"k = {_value_text(value)} samples before the newest in the mean filter{where}"
     return f"{name.rstrip('_')} = {_value_text(value)}{where} (parameter of {row['estimator']})"
