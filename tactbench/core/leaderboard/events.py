@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.names import answer_name, sensor_name
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.tables.numbers import ABSENT
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
@@ -115,6 +115,18 @@ def _other_labels(rows: Sequence[Row]) -> list[str]:
     return (
         [visible(f"F1 with the thresholds of the labels halved … doubled: {'; '.join(finished)}.")] if finished else []
     )
+
+
+def label_notes(rows: Sequence[Row]) -> list[str]:
+    """Return the scores of answers to frames under halved and doubled thresholds of their labels."""
+    notes = []
+    for row in rows:
+        name = METRIC_NAMES.get(row["metric"], row["metric"])
+        found = [row["scores"].get(f"{name} with label thresholds {how}") for how in ("halved", "doubled")]
+        if row["status"] == "done" and not row["is_baseline"] and None not in found:
+            ends = " … ".join(_figure(one, ".3f") for one in found)
+            notes.append(f"{row['sensor']}/{row['task']}/{answer_name(row)} {ends}")
+    return [visible(f"With the thresholds of the labels halved … doubled: {'; '.join(notes)}.")] if notes else []
 
 
 def _oracles(rows: Sequence[Row]) -> list[str]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
+from tactbench.core.leaderboard.events import label_notes
 from tactbench.core.leaderboard.names import answer_name, answer_or_probe, question_name
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
 from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
@@ -60,6 +61,7 @@ def notes_of(rows: Sequence[Row], blocks: Sequence[Block]) -> list[str]:
         *_true_error_notes(rows),
         *_other_knowledge_notes(rows),
         *_stopped_notes(rows, frozenset(STATUSES) - STOPPED),
+        *label_notes(rows),
         *interval_notes(rows),
         *_chosen_notes(rows),
         *_left_out_notes(rows),
