@@ -30,9 +30,9 @@ RULES = protocol_called("deployable")
 TASK = slip.SPEC.model_copy(update={"scenes": (), "splits": ("roles", "session")})
 
 
-def run(paths, estimator="pac-band", asked=TASK, **more):
+def run(paths, estimator="pac-band", asked=TASK, split=None, **more):
     context = CellContext(
-        asked, REGISTRY.estimators[estimator], {}, "deployable", None, seed=1, clock=time.perf_counter,
+        asked, REGISTRY.estimators[estimator], {}, "deployable", split, seed=1, clock=time.perf_counter,
         **{"latency": False, **more},
     )  # fmt: skip
     return evaluate(context, paths)
@@ -163,6 +163,13 @@ def test_without_validation_recordings_a_share_of_the_training_groups_serves(tmp
     result = run(_two_sessions(tmp_path))
     assert any("no recording has the role validation" in one for one in result.remarks)
     assert result.score == 1.0
+
+
+def test_so_many_training_groups_validate_as_it_takes_to_have_slips_and_disturbances(paths):
+    result = run([path for path in paths if "validation" not in path.stem], split="shuffled")
+    assert result.folds == 5
+    assert result.events["recall"] > 0  # the highest threshold that hits the one or two slips it was chosen on
+    assert {name for name in result.chosen if name.startswith("threshold of fold shuffled fold")}
 
 
 def _two_sessions(folder):
