@@ -8,10 +8,13 @@ child processes: what their import does to its process, or how that ends, is no 
 from __future__ import annotations
 
 import importlib
+import re
+import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, Literal, TypeVar, cast
 
@@ -19,6 +22,7 @@ import pluggy
 
 from tactbench.core.errors import DuplicateNameError, PluginContractError, PluginError, UnknownNameError
 from tactbench.core.plugins import hookspecs
+from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.rig import (
     DeviceDescriptor,
     EffectDescriptor,
@@ -54,6 +58,8 @@ class Owned(Generic[D]):
     module: str
     distribution: str
     version: str
+    declared: DeclaredTask | None = None
+    """Of a task that came with recordings: what they say of it; None: a plugin's."""
 
     @property
     def ours(self) -> bool:
@@ -208,10 +214,10 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
     try:
         if isinstance(reply, BaseException):
             raise reply
-        offered = _ask(point) if reply is None else _described(reply)
+        offered = ask_plugin(point) if reply is None else _described(reply)
     except Exception as error:
         reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", None)
-        reason = reason or f"{type(error).__name__}: {error}"
+        reason = f"{reason or f'{type(error).__name__}: {error}'}{_line_in(point.module, error)}"
         registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "failed", (), reason))
         return
     brings: list[str] = []
@@ -220,6 +226,21 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
             registry.families()[family].add(Owned(descriptor, point.value, distribution, version))
             brings.append(f"{family[:-1]} {descriptor.name}")
     registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "loaded", tuple(brings)))
+
+
+def _line_in(module: str, error: Exception) -> str:
+    """Return `` (file, line N)`` of the innermost line of a plugin's own package; "" if the error is not from there."""
+    package = module.partition(".")[0]
+    text = getattr(error, "traceback_text", "") or "".join(traceback.format_exception(error))
+    own = [
+        (Path(file), line)
+        for file, line in re.findall(r'File "([^"]+)", line (\d+)', text)
+        if package in (*Path(file).parts[:-1], Path(file).stem)
+    ]
+    if not own or _is_built_in(module):
+        return ""
+    file, line = own[-1]
+    return f" ({'/'.join(file.parts[-2:])}, line {line})"
 
 
 def _described_in_children(points: Sequence[EntryPoint], timeout_s: float) -> dict[tuple[str, str], Any]:
@@ -240,7 +261,7 @@ _AT_ONCE = 4
 
 def _describe(point: tuple[str, str]) -> dict[str, list[dict[str, Any]]]:
     """Ask a plugin; return its descriptors as JSON has them."""
-    offered = _ask(EntryPoint(*point, group=hookspecs.GROUP))
+    offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
     return {family: [_plain(descriptor) for descriptor in several] for family, several in offered.items()}
 
 
@@ -257,8 +278,14 @@ def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
     return {family: [_KINDS[family].model_validate(one) for one in several] for family, several in reply.items()}
 
 
-def _ask(point: EntryPoint) -> dict[str, list[Any]]:
-    """Import one plugin and collect its descriptors, checking all of them before any is used."""
+def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
+    """Import one plugin in this process; return its descriptors by family, all of them checked.
+
+    Raises
+    ------
+    PluginError
+        If it does not keep the contract of its hooks; and whatever its own code raises.
+    """
     module = cast(ModuleType, point.load())
     written_for = getattr(module, "TACTBENCH_API", None)
     if written_for != hookspecs.API_VERSION:
