@@ -245,8 +245,11 @@ def scenes_are_named_once(subject: Subject) -> None:
         if doubled:
             fail(f"{where}[{doubled[0]}].name", "two scenes have it")
         for name in names:
-            if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
-                fail(f"{where}[{name}].name", "it is part of a file's name: letters, digits, dots and hyphens only")
+            if not re.fullmatch(r"[^\s./\\][^\s/\\]*", name):
+                fail(
+                    f"{where}[{name}].name",
+                    "it is part of a file's name: no blanks, no slashes and no dot at its beginning",
+                )
 
 
 @check("task", may_skip=True)
