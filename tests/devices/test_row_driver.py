@@ -134,3 +134,25 @@ def test_a_link_of_another_kind_is_refused_and_closed():
 def test_faults_are_refused():
     with pytest.raises(UsageError, match="late-frames"):
         CanModel(settings(faults=("late-frames",)))
+
+
+class AskedDriver(ByteDriver):
+    def ask(self):
+        self.link.write(b"?")
+
+
+class AskedModel(RowEmulator):
+    stream, answer_s = STREAM, 0.004
+
+    def sent(self, values):
+        return [bytes(map(round, values))]
+
+    def told(self, piece, now_s):
+        return self.sent(self.sensed(now_s)) if piece == b"?" else []
+
+
+def test_an_answer_takes_its_time():
+    with EmulatedDevices({"pad": EmulatedDevice("bytes", AskedModel(settings()))}) as devices:
+        with on(devices, AskedDriver) as driver:
+            times = [driver.read(0.5)[0].t_ns[0] for _ in range(3)]
+        np.testing.assert_allclose(np.diff(times), 4e6, atol=1)  # rounded to nanoseconds

@@ -218,7 +218,7 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
         if isinstance(reply, BaseException):
             raise reply
         remarks = () if reply is None else tuple(reply.pop(REMARKS))
-        offered = _ask(point) if reply is None else _described(reply)
+        offered = ask_plugin(point) if reply is None else _described(reply)
     except Exception as error:
         reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", None)
         reason = reason or f"{type(error).__name__}: {error}"
@@ -258,7 +258,7 @@ def _describe(point: tuple[str, str]) -> dict[str, Any]:
     """Ask a plugin; return its descriptors as JSON has them, and what it uses that is deprecated."""
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always", PluginDeprecationWarning)
-        offered = _ask(EntryPoint(*point, group=hookspecs.GROUP))
+        offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
     remarks = []
     for one in warned:
         if issubclass(one.category, PluginDeprecationWarning):
@@ -284,8 +284,14 @@ def _described(reply: Mapping[str, Any]) -> dict[str, list[Any]]:
     return {family: [_KINDS[family].model_validate(one) for one in several] for family, several in reply.items()}
 
 
-def _ask(point: EntryPoint) -> dict[str, list[Any]]:
-    """Import one plugin and collect its descriptors, checking all of them before any is used."""
+def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
+    """Import one plugin in this process; return its descriptors by family, all of them checked.
+
+    Raises
+    ------
+    PluginError
+        If it does not keep the contract of its hooks; and whatever its own code raises.
+    """
     module = cast(ModuleType, point.load())
     check_api_version(point.value, getattr(module, "TACTBENCH_API", None))
     manager = pluggy.PluginManager(hookspecs.GROUP)

@@ -27,7 +27,7 @@ def install(folder, name):
     module = f"tactbench_{name.replace('-', '_')}"
     info = folder / f"{module}-0.1.0.dist-info"
     info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: tactbench-{name}\nVersion: 0.1.0\n")
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: tactbench-{name}\nVersion: 0.1.0\nSummary: made\n")
     (info / "entry_points.txt").write_text(f"[tactbench]\n{name} = {module}\n")
 
 
