@@ -27,8 +27,11 @@ settings.load_profile("ci" if os.environ.get("CI") else "here")
 # before any of them is loaded; tests of several threads ask for them.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# What a fork server imports before it forks; see `fork_server`.
+# There is one fork server for each process, and it keeps what it was started with. Without scikit-learn every cell of
+# every test would import that again, which takes five times as long as the cell: so it is started before any test
+# module is imported, since some look for plugins then, in children that need less.
 forkserver.set_forkserver_preload(list(PRELOAD))
+forkserver.ensure_running()
 
 # A shell's background jobs are deaf to Ctrl-C, and so is all that they start: tests that send one would wait for ever.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
@@ -36,16 +39,6 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 ROOT = Path(__file__).resolve().parents[1]
 THIRD_PARTY = ROOT / "tests" / "third_party"
-
-
-@pytest.fixture(scope="session", autouse=True)
-def fork_server() -> None:
-    """Start the fork server with what cells need, before a test starts one that lacks it.
-
-    There is one for each process, and it keeps what it was started with: without scikit-learn every cell of every later
-    test would import that again, which takes five times as long as the cell.
-    """
-    forkserver.ensure_running()
 
 
 @pytest.fixture(scope="session")

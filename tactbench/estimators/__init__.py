@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import EstimatorDescriptor, hookimpl
+from tactbench.plugin import EstimatorDescriptor, Summary, hookimpl
 
 TACTBENCH_API = 1
 
 REGRESSION = ("regression",)
 CLASSIFICATION = ("classification",)
 BOTH = ("regression", "classification")
+EVENTS = ("events",)
 
 # k = 20 and lambda = 0.2 are what the paper's validation chose; the grid must hold them, and room on both sides.
 WINDOWS = (0, 5, 10, 20, 40)
@@ -21,7 +22,7 @@ TREES = (500, 100, 50, 10)
 @hookimpl
 def tactbench_estimators() -> list[EstimatorDescriptor]:
     """Offer the estimators."""
-    return [*_trivial(), *_linear(), *_curved(), *_forests()]
+    return [*_trivial(), *_linear(), *_curved(), *_forests(), *_slip_detectors()]
 
 
 def _trivial() -> list[EstimatorDescriptor]:
@@ -114,3 +115,48 @@ def _forests() -> list[EstimatorDescriptor]:
             ),
         ]  # fmt: skip
     return found
+
+
+def _slip_detectors() -> list[EstimatorDescriptor]:
+    code = "tactbench.estimators.slip_detectors"
+    return [
+        EstimatorDescriptor(
+            name="slip-never", title="No frame slips", kinds=EVENTS, looks_at="nothing", baseline=True, threshold=0.5,
+            where=f"{code}:never",
+        ),
+        EstimatorDescriptor(
+            name="slip-always", title="Every frame slips", kinds=EVENTS, looks_at="nothing", baseline=True,
+            threshold=0.5, where=f"{code}:always",
+        ),
+        EstimatorDescriptor(
+            name="force-ratio", title="Tangential over friction times normal force, by the reference: an oracle",
+            kinds=EVENTS, looks_at="reference", baseline=True, where=f"{code}:mean_feature",
+        ),
+        EstimatorDescriptor(
+            name="pac-band", title="Energy of the vibration stream from 30 to 200 Hz", kinds=EVENTS,
+            summaries=(Summary(measure="band-energy", band_hz=(30.0, 200.0), kinds=("ac_pressure",)),),
+            where=f"{code}:mean_feature",
+        ),
+        EstimatorDescriptor(
+            name="wavelet-energy", title="Wavelet details of the fastest stream (extra: wavelets)", kinds=EVENTS,
+            frames_by=f"{code}:wavelet_amplitudes", where=f"{code}:mean_feature", distributions=("PyWavelets",),
+        ),
+        EstimatorDescriptor(
+            name="frame-difference", title="Mean step of the taxels from sample to sample", kinds=EVENTS,
+            summaries=(Summary(measure="mean-step", kinds=("taxel",)),), where=f"{code}:mean_feature",
+        ),
+        EstimatorDescriptor(
+            name="slip-forest", title="Random forest on how much channels moved", kinds=EVENTS, linear=False,
+            params={"n_estimators": 50, "min_samples_leaf": 5, "rows": 10_000}, where=f"{code}:forest",
+            rehearsal={"n_estimators": 2},
+        ),
+        EstimatorDescriptor(
+            name="slip-svm", title="Support vectors on how much channels moved", kinds=EVENTS, linear=False,
+            params={"C": 1.0, "rows": 2_000}, where=f"{code}:support_vectors", rehearsal={},
+        ),
+        EstimatorDescriptor(
+            name="slip-spectrum", title="Logistic regression on the spectrum of the fastest stream", kinds=EVENTS,
+            linear=True, params={"C": 1.0, "rows": 10_000}, frames_by=f"{code}:spectrum", where=f"{code}:logistic",
+            rehearsal={},
+        ),
+    ]  # fmt: skip

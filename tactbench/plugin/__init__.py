@@ -22,6 +22,7 @@ from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig,
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality, StreamReadings
 from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.events import AlarmPolicy, SlipTarget
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor, SensorDescriptor, TaskDescriptor
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 __all__ = [
     "API_VERSION",
     "Acquisition",
+    "AlarmPolicy",
     "Block",
     "ChannelKind",
     "ChannelSpec",
@@ -79,6 +81,7 @@ __all__ = [
     "Scene",
     "SensorDescriptor",
     "SensorSpec",
+    "SlipTarget",
     "Source",
     "Statement",
     "StreamReadings",

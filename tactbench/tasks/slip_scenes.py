@@ -30,9 +30,9 @@ SLIP_S = 4.6
 """Length of a recording with a slip."""
 DISTURBED_S = 15.0
 """Length of a recording of disturbances: six of them are a minute and a half."""
-START_MM = 0.03
-"""How far the surface moves when a motor starts and nothing slips: less than a third of the least way that the skin of
-a BioTac follows (0.11 mm), and of the displacement that is labelled a slip."""
+START_MM = 0.02
+"""How far the surface moves when a motor starts and nothing slips: a fifth of the least way that the skin of a BioTac
+follows (0.11 mm), and of the displacement that is labelled a slip."""
 SLOT_S = 60.0
 _GOLDEN = 0.6180339887498949
 """Multiples of it modulo 1 spread evenly."""
@@ -127,7 +127,10 @@ def _planned(
         slide=slide,
         environment=Environment(
             force_noise=derived(
-                0.02, "N", "12 bits on +-10 V of a Nano17 with 3.7 N/V in its worst gauge, upper end of 8 to 20 mN"
+                8.0,
+                "mN",
+                "12 bits on +-10 V of a Nano17 give 8 to 20 mN; the unfiltered 0.7 N of the paper's set-up "
+                "would hide the ratio of the forces",
             )
         ),
         session=session,

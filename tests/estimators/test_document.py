@@ -17,7 +17,9 @@ def line(name):
 @pytest.mark.parametrize("name", sorted(BY_NAME))
 def test_every_rung_has_its_line_and_is_said_to_answer_what_it_answers(name):
     kinds = BY_NAME[name].kinds
-    said = "both" if len(kinds) == 2 else {"regression": "number", "classification": "class"}[kinds[0]]
+    said = (
+        "both" if len(kinds) == 2 else {"regression": "number", "classification": "class", "events": "event"}[kinds[0]]
+    )
     assert line(name).split("|")[2].strip() == said
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES
+from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.rig import EffectDescriptor, EstimatorDescriptor, RigDescriptor
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.task import ChannelTarget, Published, TaskSpec, VectorTarget
@@ -48,8 +49,8 @@ def task_page(task: TaskSpec) -> Page:
     facts = [
         ("question", task.question),
         ("target", _target(task)),
-        *([("one answer", f"a recording, from {task.answer_from}")] if task.answer_per == "recording" else []),
-        ("looks at", f"channels of kind {', '.join(task.features)}"),
+        *([("one answer", f"a {task.answer_per}, from {task.answer_from}")] if task.answer_per != "sample" else []),
+        ("looks at", f"channels of kind {', '.join(task.features)}{_where_there(task.optional_features)}"),
         ("metric", f"{METRIC_NAMES.get(task.metric, task.metric)}{suffix(task.unit)}, {direction} is better"),
         ("the same in practice", "nobody has said" if task.equivalence is None
                                  else f"a difference of up to {task.equivalence:g}{suffix(task.unit)}"),
@@ -74,10 +75,17 @@ MOST_PLACES = 8
 """That are named one by one."""
 
 
+def _where_there(kinds: Sequence[str]) -> str:
+    return f"; where a sensor has them {', '.join(kinds)}" if kinds else ""
+
+
 def _target(task: TaskSpec) -> str:
     if isinstance(task.target, ChannelTarget):
         name = f" {task.target.name}" if task.target.name else ""
         return f"reference channel{name} of kind {task.target.kind}, in {task.target.unit}, sample by sample"
+    if isinstance(task.target, SlipTarget):
+        what = "when slip begins" if task.kind == "events" else "stick, incipient or gross slip"
+        return f"{what}, by the reference alone; {task.target}"
     if isinstance(task.target, VectorTarget):
         names = ", ".join(task.target.names)
         return (
@@ -112,8 +120,8 @@ def _scene(scene: Scene) -> tuple[str, str, str, str]:
     nominal = place.x.value == 0 and place.s.value == 0
     where = "nominal" if nominal else f"{place.x} along, {place.s} across"
     scatter = f", scatter {place.scatter}" if place.scatter.value else ""
-    slide = f", slides {scene.slide}" if scene.slide else ""
-    end = profile.end if profile.kind == "ramp" else f"{profile.largest_n:g} N and elsewhere"
+    slide = f", slides at {scene.slide.speed}" if scene.slide else ""
+    end = profile.end if profile.kind == "ramp" else f"{profile.largest_n:g} N, by a path"
     force = f"{profile.start.value:g} to {end}, after {profile.hold}"
     return str(scene.indenter), where + scatter, force + slide, str(profile.duration)
 
@@ -142,7 +150,8 @@ def _published(one: Published, unit: str) -> Pair:
 
 def estimator_page(estimator: EstimatorDescriptor) -> Page:
     """Return what an estimator answers, and what may be set."""
-    answers = {"features": "the features", "time": "the time index alone", "nothing": "nothing"}
+    answers = {"features": "the features", "time": "the time index alone", "nothing": "nothing",
+               "reference": "the reference sensor: an oracle"}  # fmt: skip
     grid = [f"{name}: {', '.join(f'{one:g}' for one in values)}" for name, values in estimator.grid.items()]
     if estimator.window_grid != (0,):
         grid.append(f"window: {', '.join(map(str, estimator.window_grid))} samples before the newest")

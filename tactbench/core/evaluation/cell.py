@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,8 +14,10 @@ import numpy.typing as npt
 from tactbench.core.errors import DataError
 from tactbench.core.evaluation.dataset import Dataset, load_dataset
 from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, reading_delay_ms
+from tactbench.core.evaluation.event_answers import EventAnswers, Items, state_figures
 from tactbench.core.evaluation.fitting import answers as answers_of
 from tactbench.core.evaluation.fitting import fit
+from tactbench.core.evaluation.frames import band_limit, clocked, frame_features, frame_times, framed
 from tactbench.core.evaluation.interval import LEVEL, score_interval
 from tactbench.core.evaluation.leaks import leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
@@ -34,6 +36,7 @@ from tactbench.core.evaluation.splits import (
     choose_split,
     over_rows,
     used_rows,
+    with_validation,
     without_part,
 )
 from tactbench.core.evaluation.summaries import (
@@ -56,6 +59,7 @@ from tactbench.core.evaluation.vectors import vector_details
 from tactbench.core.evaluation.vote import require_answers, voted
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import Answers, FloatArray, Fold, Part
+from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
@@ -121,6 +125,10 @@ class CellResult:
     """seconds of unloaded hold that each recording was tared on, the shortest of all; None: none was tared"""
     remarks: tuple[str, ...] = ()
     """what could not be done, and why"""
+    events: Mapping[str, float] = field(default_factory=dict)
+    """figures of events, times in the unit of the name"""
+    operating_points: tuple[Mapping[str, float], ...] = ()
+    """the same at thresholds chosen on validation for several bounds of false alarms"""
 
 
 @dataclass(frozen=True)
@@ -156,8 +164,14 @@ class _Folds:
         self.metric: Metric = metric_called(context.task.metric)
         self.split: str = choose_split(context.task, self.rules, recorded, context.split)
         self.held_s = tare_s(recorded) if self.rules.tare else 0.0
-        data = summarised(recorded, context.task, self.rules)
+        if context.task.answer_per == "frame":
+            data = framed(recorded, context.task, self.rules, context.estimator)
+        else:
+            data = summarised(recorded, context.task, self.rules)
         self.data = data
+        own_threshold = context.estimator.threshold
+        self.events = EventAnswers.of(context.task, own_threshold) if context.task.kind == "events" else None
+        self.held_back: list[str] = []
         self.counts: Counter[str] = Counter(data.counts)
         self.sets: dict[Role, list[Answers]] = {}
         self.scores: dict[str, float] = {}
@@ -185,6 +199,9 @@ class _Folds:
         """Choose, fit and test on one fold, and return the fitted model; `alone`: it is the only one."""
         context, data, rules, metric, counts = self.context, self.data, self.rules, self.metric, self.counts
         estimator, clock = context.estimator, context.clock
+        if self.events and self.events.own_threshold is None and assignment.validation is None:
+            assignment = with_validation(assignment, data)
+            self.held_back.append(assignment.name)
         began = clock()
         choice = select(estimator, context.params, build, data, rules, assignment, metric, counts)
         self.search_s += clock() - began
@@ -201,9 +218,16 @@ class _Folds:
         self.fit_s += clock() - began
         n_classes = len(data.classes)
         began = clock()
-        predicted = answers_of(model, X_test, estimator.name, n_classes, fold.test.y.shape[1:])
+        shape = fold.test.y.shape[1:]
+        predicted = answers_of(model, X_test, estimator.name, 0 if self.events else n_classes, shape)
         self.predict_s += clock() - began
         self.batch_rows += len(fold.test)
+        self.n_train += len(fold.train)
+        self.folds += 1
+        self.test, self.k = fold.test, k
+        if self.events:
+            self._detect(self.events, fold, predicted, model, number, alone=alone)
+            return model
         if data.vote:
             require_answers(data, assignment.test, fold.test)
         asked, combined = self._combined(fold.test, predicted)
@@ -225,10 +249,31 @@ class _Folds:
             self.chosen.append(choice)
             self.names.append(fold.name)
             self.scores["validation"] = choice.score
-        self.n_train += len(fold.train)
-        self.folds += 1
-        self.test, self.k = fold.test, k
         return model
+
+    def _detect(
+        self, events: EventAnswers, fold: Fold, score: FloatArray, model: Estimator, number: int, *, alone: bool
+    ) -> None:
+        """Choose a threshold on validation recordings and keep what it comes to on those and on test recordings."""
+        estimator, data = self.context.estimator, self.data
+        validated = []
+        if fold.validation is not None and len(fold.validation):
+            given = answers_of(model, features_of(fold.validation, estimator), estimator.name, 0)
+            validated = events.scored(fold.validation, given, data)
+        threshold, bounds = events.choose(fold.name, validated)
+        tested = events.add(events.scored(fold.test, score, data), threshold, bounds, data)
+        self.scores[f"fold {fold.name}"] = self._keep_items("test", tested, number)
+        self.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(tested.y_true))
+        if validated and alone:
+            items = events.items([(one, events.alarms(one, threshold)) for one in validated], data)
+            self.scores["validation"] = self._keep_items("validation", items, number)
+
+    def _keep_items(self, role: Role, items: Items, number: int) -> float:
+        """Keep events and alarms as answers, and return their score."""
+        n = len(items.y_true)
+        fold, none = np.full(n, number, dtype=np.int64), np.full(n, np.nan)
+        self.sets.setdefault(role, []).append(Answers(*items[:4], fold, items.time_s, none))
+        return self.metric.of(items.y_true, items.y_pred, len(self.data.classes))
 
     def _combined(self, part: Part, predicted: npt.NDArray[Any]) -> tuple[Part, npt.NDArray[Any]]:
         """Return what is scored: rows and their answers, or recordings and what their rows' answers come to."""
@@ -312,7 +357,9 @@ def _delay(folds: _Folds, latency: Mapping[str, Any]) -> _Delay:
     looks_at, tared = folds.context.estimator.looks_at, folds.rules.tare
     parts: dict[str, float] = {}
     remarks: tuple[str, ...] = ()
-    if looks_at == "features":
+    if folds.context.task.answer_per == "frame":
+        parts, remarks = frame_delay(folds.recorded, folds.data, folds.context, folds.rules, timed=bool(latency))
+    elif looks_at == "features":
         parts, remarks = reading_delay_ms(folds.recorded, folds.rules, folds.k)
         parts = waiting_for_the_whole(parts, folds.recorded, folds.context.task, folds.rules)
         if latency:
@@ -330,6 +377,47 @@ def _delay(folds: _Folds, latency: Mapping[str, Any]) -> _Delay:
     else:
         remarks = tuple(one for one in remarks if one not in (NO_LINK, NO_RATE))  # there is no delay to speak of
     return _Delay(parts, answer_delay_ms(parts, looks_at), remarks)
+
+
+FRAMES_TIMED = 3
+"""Recordings whose features are timed: each is hundreds of frames."""
+
+
+def frame_delay(
+    recorded: Dataset, data: Dataset, context: CellContext, rules: ProtocolSpec, *, timed: bool
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return the parts of a frame's answer delay in ms, and remarks on them.
+
+    Notes
+    -----
+    ``sampling``: the wait for the next sample of the slowest stream used, or for the next frame where that is longer.
+    ``window``: half a frame's length. ``features``: those of a whole recording over its frames. A streaming detector
+    needs no less work a frame, but more calls.
+    """
+    task, looks_at = context.task, context.estimator.looks_at
+    if looks_at not in ("features", "reference") or not isinstance(task.target, SlipTarget):
+        return {}, ()
+    parts, remarks = reading_delay_ms(recorded, rules, 0)
+    used = [
+        stream.rate_hz
+        for table in recorded.tables
+        for stream in table.readings
+        if any(feature.startswith(f"{channel} ") for channel in stream.channels for feature in data.features)
+    ]
+    rates = [rate for rate in used if rate]
+    parts["sampling"] = 1e3 * max([task.target.hop_s, *(1.0 / rate for rate in rates)])
+    parts["window"] = 1e3 * task.target.window_s / 2 if looks_at == "features" else 0.0
+    if timed:
+        compute = frame_features(task, rules, context.estimator)
+        places = np.linspace(0, len(recorded.tables) - 1, FRAMES_TIMED).astype(int).tolist()
+        times = {place: frame_times(recorded.tables[place], task, rules) for place in places}
+        each_s = []
+        for place in places:
+            began = context.clock()
+            compute(recorded.tables[place], times[place])
+            each_s.append((context.clock() - began) / len(times[place].ends_ns))
+        parts["features"] = 1e3 * float(np.median(each_s))
+    return parts, remarks
 
 
 def _joined(folds: Sequence[Answers]) -> Answers:
@@ -364,6 +452,7 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
     truth = true_force(task, data, tested) if metric.kind == "regression" else None
     unit = replicates(data, task, split, y, recording, row)
     score = metric.of(y, predicted, n_classes)
+    compute_s = sum(delay.parts_ms.get(name, 0.0) for name in ("features", "prediction")) / 1e3 if latency else None
     if not np.isfinite(score):
         raise DataError(
             f"The {metric.name} of {len(y)} test rows is undefined: their labels never change.",
@@ -380,6 +469,8 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
         table = confusion(sums, n_classes).astype(np.int64)
         for label, value in zip(data.classes, class_f1(sums, n_classes), strict=True):
             scores[f"F1 of {label}"] = float(value)
+    if task.answer_per == "frame" and not folds.events:
+        scores |= state_figures(tested, data)
     if isinstance(task.target, VectorTarget):
         scores |= vector_details(task.target, y, predicted)
     # R² of labels that never change is undefined; a key that is not there says so, NaN would not even be JSON.
@@ -402,7 +493,9 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
         n_train=folds.n_train,
         n_test=len(y),
         counts=dict(folds.counts),
-        chosen=_chosen(folds.chosen, folds.names),
+        chosen=_chosen(folds.chosen, folds.names) | _thresholds(folds.events),
+        events=folds.events.figures(compute_s) if folds.events else {},
+        operating_points=folds.events.operating_points(compute_s) if folds.events else (),
         dagger=rules.uses_test_statistics,
         stamps=folds.stamps,
         search_s=folds.search_s,
@@ -427,6 +520,7 @@ def _result(folds: _Folds, latency: Mapping[str, Any], delay: _Delay) -> CellRes
             one
             for one in (
                 _one_a_recording(folds),
+                *_of_frames(folds),
                 _of_vectors(task),
                 no_floor,
                 NOT_TARED if rules.tare and not held else "",
@@ -443,10 +537,37 @@ NOT_TARED = "not tared: no recording states an unloaded hold"
 
 def _one_a_recording(folds: _Folds) -> str:
     task = folds.context.task
-    if task.answer_per == "sample":
+    if task.answer_per != "recording":
         return ""
     made_of = "its first row" if folds.rules.first_row_only else task.answer_from
     return f"one answer a recording, from {made_of}"
+
+
+def _of_frames(folds: _Folds) -> list[str]:
+    """Return what a reader of scores of frames or events must know."""
+    if folds.context.task.answer_per != "frame":
+        return []
+    remarks = [band_limit(clocked(folds.recorded.tables[0], folds.rules))]
+    if folds.held_back:
+        remarks.append("no recording has the role validation: thresholds are chosen on a share of the training groups")
+    if folds.events and any(np.isinf(one) for one in folds.events.thresholds.values()):
+        remarks.append(
+            f"{folds.context.estimator.name}: no threshold kept the bound of false alarms on validation and hit "
+            "anything: it never raises an alarm"
+        )
+    return remarks
+
+
+def _thresholds(events: EventAnswers | None) -> dict[str, float]:
+    """Return the thresholds chosen, by fold where there are several; one that is never reached is not there."""
+    if events is None or events.own_threshold is not None:
+        return {}
+    several = len(events.thresholds) > 1
+    return {
+        f"threshold of fold {name}" if several else "threshold": value
+        for name, value in events.thresholds.items()
+        if np.isfinite(value)
+    }
 
 
 def _of_vectors(task: TaskSpec) -> str:

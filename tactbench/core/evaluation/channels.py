@@ -38,14 +38,14 @@ def feature_streams(recording: Recording, task: TaskSpec) -> list[str]:
                 f"{meta.name!r}.",
                 hint="See what the sensor has with `tactbench show`.",
             )
-    return [name for name, there in kinds.items() if there & set(task.features)]
+    return [name for name, there in kinds.items() if there & set(task.looks_at)]
 
 
 def features_on(
     meta: RecordingMeta, clock: StreamData, stream: StreamData, task: TaskSpec, counts: Counter[str]
 ) -> tuple[list[str], FloatArray]:
     """Return names and (n, q) readings of one stream's features on the clock of another; NaN where there is none."""
-    picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.features]
+    picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.looks_at]
     names = [stream.spec.channels[place].name for place in picked]
     readings = numbers(stream)[:, picked]
     if stream.quality is not None:
@@ -66,7 +66,7 @@ def features_on(
 
 def own_readings(clock: StreamData, stream: StreamData, task: TaskSpec, counts: Counter[str]) -> StreamReadings:
     """Return one stream's features on its own clock, in seconds since the first row of `clock`."""
-    picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.features]
+    picked = [place for place, channel in enumerate(stream.spec.channels) if channel.kind in task.looks_at]
     data = numbers(stream)[:, picked]
     whole = np.asarray(~np.isnan(data).any(axis=1))
     if stream is not clock and not whole.all():
@@ -105,7 +105,7 @@ def channel_on(recording: Recording, target: ChannelTarget, features: StreamData
             f"The recording {recording.meta.name!r} has several {target.kind} channels: {names}.",
             hint="Name one in the task's target.",
         )
-    return on_clock(recording, features, *found[0]) * _factor(found[0][2], target.unit)
+    return on_clock(recording, features, *found[0]) * unit_factor(found[0][2], target.unit)
 
 
 Found = tuple[str, int, ChannelSpec]
@@ -141,7 +141,7 @@ def on_clock(recording: Recording, features: StreamData, name: str, place: int, 
     return aligned
 
 
-def _factor(channel: ChannelSpec, unit: str) -> float:
+def unit_factor(channel: ChannelSpec, unit: str) -> float:
     """Return what turns stored numbers into `unit`: by the channel's unit, or by its scale if that does not tell."""
     try:
         return units.conversion(channel.unit, unit)

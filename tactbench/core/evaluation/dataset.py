@@ -21,8 +21,10 @@ from tactbench.core.evaluation.channels import (
     on_clock,
     own_readings,
 )
+from tactbench.core.evaluation.slip_reference import SlipReference, slip_reference
 from tactbench.core.recording.reader import Recording, open_recording
 from tactbench.core.samples import FloatArray, IntArray, StreamData, StreamReadings
+from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.task import ChannelTarget, LabelTarget, TaskSpec, VectorTarget
 
@@ -51,7 +53,9 @@ class Table:
     groups: Mapping[str, npt.NDArray[np.str_]]
     """Labels by which rows can be kept together: name -> (n,)"""
     readings: tuple[StreamReadings, ...] = ()
-    """Every stream on its own clock, times from the first row on; read where a task summarises recordings"""
+    """Every stream on its own clock, times from the first row on; read where a task summarises recordings or frames"""
+    reference: SlipReference | None = None
+    """What the reference says about slip, on its own clock; read where a task asks for it"""
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,8 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
     if not read:
         raise DataError("No recording is left to evaluate.", hint="See what was left out with `tactbench inspect`.")
     _same_features([(meta, raw.features) for meta, raw in read])
-    classes = _classes([raw for _, raw in read]) if task.kind == "classification" else ()
+    framed = task.answer_per == "frame"
+    classes = _classes([raw for _, raw in read]) if task.kind == "classification" and not framed else ()
     if not any(raw.labelled.any() for _, raw in read):
         raise NotApplicable(
             f"Task {task.name!r} asks for {_wanted(task)}, and no recording has it.",
@@ -115,7 +120,7 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
         counts[f"of {sum(len(table.row) for table in tables)} rows have no {_wanted(task)} and were left out"] = (
             unlabelled
         )
-    whole = task.answer_per == "recording"
+    whole = task.answer_per != "sample"
     if whole:
         tables = tuple(_whole(table, task) for table in tables)
     return Dataset(
@@ -124,8 +129,8 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
 
 
 def _whole(table: Table, task: TaskSpec) -> Table:
-    """Return a recording that no group cuts; one whose answer changes is refused."""
-    if len(np.unique(table.y[table.labelled])) > 1:
+    """Return a recording that no group cuts; where it is to have one answer, one whose answer changes is refused."""
+    if task.answer_per == "recording" and len(np.unique(table.y[table.labelled])) > 1:
         raise NotApplicable(
             f"Task {task.name!r} asks one answer of each recording, and {_wanted(task)} changes within "
             f"{table.meta.name!r}.",
@@ -154,6 +159,7 @@ class _Raw:
     row: IntArray
     groups: dict[str, npt.NDArray[np.str_]]
     readings: tuple[StreamReadings, ...]
+    reference: SlipReference | None
 
 
 def _read(recording: Recording, task: TaskSpec, counts: Counter[str], repeated: dict[str, int]) -> _Raw:
@@ -189,7 +195,10 @@ def _read(recording: Recording, task: TaskSpec, counts: Counter[str], repeated: 
     if task.summaries or task.features_by:
         own = tuple(own_readings(data, stream, task, counts) for stream in streams)
     row = np.arange(len(X), dtype=np.int64)
-    raw = _Raw(names, X, y, labelled, force, time_s, row, _groups(meta, data, task), own)
+    slip = None
+    if isinstance(task.target, SlipTarget):
+        slip = slip_reference(recording, task.target, 0 if data.t_ns is None else int(data.t_ns[0]), counts)
+    raw = _Raw(names, X, y, labelled, force, time_s, row, _groups(meta, data, task), own, slip)
     whole = np.asarray(~np.isnan(X).any(axis=1))
     if not whole.all():
         for name, column in zip(names, X.T, strict=True):
@@ -203,6 +212,7 @@ def _rows(raw: _Raw, keep: npt.NDArray[np.bool_]) -> _Raw:
     return _Raw(
         raw.features, raw.X[keep], raw.y[keep], raw.labelled[keep], None if raw.force is None else raw.force[keep],
         raw.time_s[keep], raw.row[keep], {name: column[keep] for name, column in raw.groups.items()}, raw.readings,
+        raw.reference,
     )  # fmt: skip
 
 
@@ -213,6 +223,8 @@ Labels = tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]
 def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Labels:
     if isinstance(task.target, LabelTarget):
         return _label(recording.meta, task.target.name, features)
+    if isinstance(task.target, SlipTarget):  # of frames, which are made of the recording later
+        return np.zeros(len(features.data)), np.ones(len(features.data), dtype=bool)
     if isinstance(task.target, VectorTarget):
         return _vector(recording, task.target, features)
     column = channel_on(recording, task.target, features)
@@ -263,7 +275,7 @@ def _groups(meta: RecordingMeta, data: StreamData, task: TaskSpec) -> dict[str, 
     for name, column in data.annotations.items():
         own = column.dtype.kind in "iu"
         groups[name] = np.array([f"{meta.session}/{value}" if own else str(value) for value in column], dtype=np.str_)
-    if not isinstance(task.target, VectorTarget):
+    if not isinstance(task.target, SlipTarget | VectorTarget):
         groups.pop(task.target.name or "", None)
     return groups
 
@@ -290,10 +302,12 @@ def _table(meta: RecordingMeta, raw: _Raw, classes: tuple[Any, ...]) -> Table:
     if classes:
         index = {label: place for place, label in enumerate(classes)}
         y = np.array([index.get(value, -1) for value in raw.y.tolist()], dtype=np.int64)
-    return Table(meta, raw.X, y, raw.labelled, raw.force, raw.time_s, raw.row, raw.groups, raw.readings)
+    return Table(meta, raw.X, y, raw.labelled, raw.force, raw.time_s, raw.row, raw.groups, raw.readings, raw.reference)
 
 
 def _wanted(task: TaskSpec) -> str:
+    if isinstance(task.target, SlipTarget):
+        return "slip of the reference"
     if isinstance(task.target, LabelTarget):
         return task.target.name
     if isinstance(task.target, VectorTarget):

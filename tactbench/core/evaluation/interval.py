@@ -125,7 +125,7 @@ def _student(
     metric: Metric, score: float, deviation: float, freedom: float, scale: ScoreTransform, method: str
 ) -> Interval:
     """Return Student's interval of a score whose standard error on `scale` is `deviation`."""
-    if metric.kind == "classification" and score in (0.0, 1.0):
+    if metric.kind != "regression" and score in (0.0, 1.0):
         deviation = NOT_ONE
     reach = student_reach(freedom) * deviation
     ends = [float(scale.back(scale.there(score) + one * reach)) for one in (-1.0, 1.0)]
@@ -140,7 +140,7 @@ def student_reach(freedom: float) -> float:
 def _of_too_few(metric: Metric, rows: FloatArray, n_classes: int) -> Interval:
     """Return what a few rows, each a recording of its own, cannot exclude: there is no time to resample in them."""
     method = f"none: {len(rows)} recordings of one row each are too few to resample; the range of what is possible"
-    if metric.kind == "classification":
+    if metric.kind != "regression":
         return Interval(0.0, 1.0, method)
     each = metric.score(rows, n_classes)
     if not np.isfinite(each).all():  # R² of one row is undefined
@@ -178,7 +178,7 @@ def strata_of(y: npt.NDArray[Any], cluster: IntArray, n_classes: int) -> list[In
 
 def loss_of(metric: Metric, y: npt.NDArray[Any], predicted: npt.NDArray[Any]) -> FloatArray:
     """Return (n,) what each row adds to the error: its square, or whether the class is wrong."""
-    if metric.kind == "classification":
+    if metric.kind != "regression":
         return np.asarray(y != predicted, dtype=np.float64)
     squares = np.asarray((predicted - y) ** 2)
     return np.asarray(squares.sum(axis=1)) if metric.vector else squares

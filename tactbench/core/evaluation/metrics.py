@@ -111,6 +111,11 @@ def _balanced(sums: FloatArray, n_classes: int) -> FloatArray:
     return np.asarray(recall.sum(axis=-1) / (there > 0).sum(axis=-1))
 
 
+def _event_f1(sums: FloatArray, n_classes: int) -> FloatArray:
+    """Return F1 of the second class; rows are events and alarms."""
+    return class_f1(sums, n_classes)[..., 1]
+
+
 METRICS = {
     metric.name: metric
     for metric in (
@@ -121,6 +126,7 @@ METRICS = {
         Metric("accuracy", "classification", True, _pairs, _accuracy),
         Metric("balanced_accuracy", "classification", True, _pairs, _balanced),
         Metric("macro_f1", "classification", True, _pairs, _macro_f1),
+        Metric("event_f1", "events", True, _pairs, _event_f1),
     )
 }
 

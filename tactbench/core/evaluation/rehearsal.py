@@ -20,7 +20,7 @@ def rehearse(estimator: Estimator, kind: str) -> None:
     """
     rng = np.random.default_rng(0)
     X = rng.normal(size=(_ROWS, _FEATURES))
-    y = np.arange(_ROWS) % 2 if kind == "classification" else X[:, 0] + rng.normal(size=_ROWS)
+    y = np.arange(_ROWS) % 2 if kind != "regression" else X[:, 0] + rng.normal(size=_ROWS)
     with warnings.catch_warnings(), np.errstate(all="ignore"), thread_limit(1):
         warnings.simplefilter("ignore")
         estimator.fit(X, y)

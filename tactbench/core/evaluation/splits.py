@@ -328,6 +328,26 @@ def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[t
     return [(tuple(learn), tuple(last))]
 
 
+def with_validation(outer: Assignment, data: Dataset) -> Assignment:
+    """Return a fold whose training rows are parted in some to learn from and some to validate on.
+
+    Of the inner splits the first of which either part has rows of every class that the fold trains on.
+    """
+    for learn, check in inner_splits(data, outer):
+        if all(_classes_in(data, part) == _classes_in(data, outer.train) for part in (learn, check)):
+            return replace(outer, train=learn, validation=check)
+    raise DataError(
+        f"The training recordings of fold {outer.name!r} cannot be parted in some to learn from and some to choose a "
+        "threshold on, each with events.",
+        hint="Give more of them, or recordings of the role validation.",
+    )
+
+
+def _classes_in(data: Dataset, masks: Sequence[Mask]) -> set[int]:
+    tables = zip(data.tables, masks, strict=True)
+    return {int(one) for table, mask in tables for one in np.unique(table.y[mask & table.labelled])}
+
+
 def _sizes(data: Dataset, outer: Assignment, groups: str) -> Counter[str]:
     """Return how many training rows each group has."""
     sizes: Counter[str] = Counter()

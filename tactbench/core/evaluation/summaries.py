@@ -17,6 +17,7 @@ from tactbench.core.evaluation.sets import asked_for, moments
 from tactbench.core.evaluation.unloaded import hold_s
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import FloatArray, StreamReadings
+from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.summary import Summary
 from tactbench.core.spec.task import TaskSpec
@@ -26,7 +27,7 @@ Features = Mapping[str, float]
 
 def is_summarised(task: TaskSpec, rules: ProtocolSpec) -> bool:
     """Tell whether a recording becomes one row; a first row alone is one already."""
-    return bool(task.summaries or task.features_by) and not rules.first_row_only
+    return task.answer_per == "recording" and bool(task.summaries or task.features_by) and not rules.first_row_only
 
 
 def summarised(data: Dataset, task: TaskSpec, rules: ProtocolSpec) -> Dataset:
@@ -112,11 +113,9 @@ def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
         begin_s = table.meta.scene.profile.hold.to("s")
     found = []
     for stream in table.readings:
-        data, time_s = stream.data, stream.time_s
+        time_s = stream.time_s
+        data = tared_readings(stream, table.meta).data if rules.tare else stream.data
         if time_s is not None:
-            unloaded = time_s < hold_s(table.meta)
-            if rules.tare and unloaded.any():
-                data = data - data[unloaded].mean(axis=0)
             later = time_s >= begin_s
             data, time_s = data[later], time_s[later] - begin_s
         if not len(data):
@@ -128,11 +127,17 @@ def kept(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
     return tuple(found)
 
 
+def tared_readings(stream: StreamReadings, meta: RecordingMeta) -> StreamReadings:
+    """Return a stream less its mean over the recording's own unloaded hold, where it has a clock and a sample there."""
+    unloaded = stream.time_s < hold_s(meta) if stream.time_s is not None else np.zeros(0, dtype=bool)
+    return replace(stream, data=stream.data - stream.data[unloaded].mean(axis=0)) if unloaded.any() else stream
+
+
 def summary_of(stream: StreamReadings, summary: Summary, recording: str) -> FloatArray:
     """Return (channels,) numbers, from the samples in the summary's window; a filter has seen those before it too."""
     rows = _window(stream, summary, recording)
     if summary.band_hz is not None:
-        return np.asarray((_in_band(stream, summary.band_hz, recording)[rows] ** 2).mean(axis=0))
+        return np.asarray((in_band(stream, summary.band_hz, recording)[rows] ** 2).mean(axis=0))
     X = stream.data[rows]
     if summary.measure == "mean":
         return np.asarray(X.mean(axis=0))
@@ -213,7 +218,7 @@ def _window(stream: StreamReadings, summary: Summary, recording: str) -> slice:
     return slice(first, last)
 
 
-def _in_band(stream: StreamReadings, band_hz: tuple[float, float], recording: str) -> FloatArray:
+def in_band(stream: StreamReadings, band_hz: tuple[float, float], recording: str) -> FloatArray:
     """Return what a causal band-pass leaves of a stream, at rest at its first sample."""
     if stream.rate_hz is None:
         raise NotApplicable(

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.core.errors import DataError
-from tactbench.core.events.policy import AlarmPolicy, nanoseconds
 from tactbench.core.samples import IntArray
+from tactbench.core.spec.events import AlarmPolicy, nanoseconds
 
 
 def alarms(t_ns: IntArray, active: npt.NDArray[np.bool_], policy: AlarmPolicy) -> IntArray:

@@ -15,8 +15,8 @@ import numpy as np
 from tactbench.core.errors import DataError
 from tactbench.core.events.alarms import check_times, kept
 from tactbench.core.events.metrics import EventScores, GroundTruth, TimeBase, latency_s
-from tactbench.core.events.policy import AlarmPolicy, nanoseconds
 from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.spec.events import AlarmPolicy, nanoseconds
 
 
 @dataclass(frozen=True)

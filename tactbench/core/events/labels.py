@@ -6,54 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, model_validator
 
 from tactbench.core.errors import DataError
 from tactbench.core.events.alarms import check_times
-from tactbench.core.events.policy import Seconds, nanoseconds
 from tactbench.core.samples import FloatArray, IntArray
-from tactbench.core.spec.quantity import Frozen
+from tactbench.core.spec.events import SlipThresholds, nanoseconds
 
 UNDECIDED, STICK, INCIPIENT, GROSS = -1, 0, 1, 2
 """States of a frame. Undecided frames have no contact, or displacement and forces contradict each other."""
-
-
-class SlipThresholds(Frozen):
-    """Where stick, incipient and gross slip part. No field has a default."""
-
-    hold_s: Seconds = Field(gt=0)
-    """A contact rests where its displacements of this long [s] differ by no more than `gross_displacement_m`."""
-    gross_displacement_m: float = Field(gt=0, allow_inf_nan=False)
-    """Gross slip is displacement of more than this after such a hold [m]."""
-    incipient_slip_share: float = Field(gt=0, lt=1)
-    """Incipient slip begins where ``1 - c/a`` exceeds this [1]."""
-    gross_stick_ratio: float = Field(gt=0, lt=1)
-    """It ends where c/a is at or below this: by its forces the contact slips as a whole [1]."""
-    contact_force_n: float = Field(gt=0, allow_inf_nan=False)
-    """With less normal force there is no contact worth a label [N]."""
-
-    @model_validator(mode="after")
-    def _in_order(self) -> SlipThresholds:
-        if 1.0 - self.incipient_slip_share <= self.gross_stick_ratio:
-            raise ValueError("1 - incipient_slip_share must exceed gross_stick_ratio: incipient slip comes first")
-        return self
-
-    def scaled(self, factor: float) -> SlipThresholds:
-        """Return the same with displacement, slip share and stick ratio times `factor`.
-
-        How long a hold lasts and what a contact is are not scaled: they say where labels exist, not where they part.
-        """
-        names = ("gross_displacement_m", "incipient_slip_share", "gross_stick_ratio")
-        changed = {name: factor * getattr(self, name) for name in names}
-        return SlipThresholds.model_validate({**self.model_dump(), **changed})
-
-
-THRESHOLDS = SlipThresholds(
-    hold_s=0.1, gross_displacement_m=1e-4, incipient_slip_share=0.1, gross_stick_ratio=0.1, contact_force_n=0.05
-)
-"""The published ones. All five are assumed: no source was found that states them for a whole contact. They see slip
-faster than 1 mm/s, or by steps of more than 0.1 mm. What a score owes to them is shown by halving and doubling them
-(:func:`labels_at_scales`)."""
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.core.events.policy import AlarmPolicy, nanoseconds
 from tactbench.core.samples import IntArray
+from tactbench.core.spec.events import AlarmPolicy, nanoseconds
 
 
 def match(onset_ns: IntArray, alarm_ns: IntArray, policy: AlarmPolicy) -> tuple[IntArray, IntArray]:

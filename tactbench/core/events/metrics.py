@@ -12,8 +12,8 @@ import numpy as np
 
 from tactbench.core.errors import DataError
 from tactbench.core.events.matching import match
-from tactbench.core.events.policy import AlarmPolicy, nanoseconds
 from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.spec.events import AlarmPolicy, nanoseconds
 
 
 @dataclass(frozen=True)

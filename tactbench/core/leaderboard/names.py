@@ -23,6 +23,7 @@ METRIC_NAMES = {
     "macro_f1": "macro F1",
     "accuracy": "accuracy",
     "balanced_accuracy": "balanced accuracy",
+    "event_f1": "event F1",
 }
 
 

@@ -22,7 +22,7 @@ JSON_KEYS = (
     "latency_ms_p95", "latency_ms_max", "latency_n", "answer_delay_ms", "delay_parts_ms", "threads", "peak_rss_mb",
     "wall_s", "concurrency", "host", "made_by", "simulated", "emulated",
     "dagger", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "fold_sizes", "confusion",
-    "classes", "recordings", "key", "replicates",
+    "classes", "events", "operating_points", "recordings", "key", "replicates",
 )  # fmt: skip
 """Keys of a JSON row, in order."""
 
@@ -47,7 +47,7 @@ NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key
 OF_THE_MACHINE = frozenset({
     "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95",
     "latency_ms_max", "latency_n", "answer_delay_ms", "delay_parts_ms", "threads", "peak_rss_mb", "wall_s",
-    "concurrency", "host", "made_by", "search", "recordings", "key",
+    "concurrency", "host", "made_by", "search", "recordings", "key", "events", "operating_points",
 })  # fmt: skip
 """Keys that machine, place or hour decide, not the seed alone."""
 

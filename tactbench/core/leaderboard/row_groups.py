@@ -27,6 +27,8 @@ TITLES = {
     "chosen": "Chosen on validation data",
     "search": "Every candidate that was compared",
     "scores": "Other scores: by class, by fold, by other metrics",
+    "events": "Events: at the threshold that validation recordings chose",
+    "operating_points": "Events at thresholds for other bounds of false alarms",
     "delay_parts_ms": "Parts of the answer delay [ms]",
     "counts": "What was counted",
     "assumptions": "Assumed by the simulation",

@@ -37,7 +37,9 @@ def compare(rows: Iterable[Row], by: str) -> list[TextTable]:
     found = []
     for members in groups.values():
         shown = _worth_showing(members)
-        ways = _folds(shown) if by == "fold" else list(dict.fromkeys(str(row[by]) for row in shown))
+        ways = (
+            _folds(shown) if by == "fold" else list(dict.fromkeys(str(row[by]) for row in shown if row[by] is not None))
+        )
         if len(ways) > 1:
             found.append(_comparison(shown, by, ways))
     return found

@@ -13,6 +13,7 @@ from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
 from tactbench.core.leaderboard.columns import columns
+from tactbench.core.leaderboard.events import events_section, operating_points_section
 from tactbench.core.leaderboard.footer import footer_of
 from tactbench.core.leaderboard.hosts import host_letters, timing_notes
 from tactbench.core.leaderboard.lines import Line
@@ -33,7 +34,7 @@ class Table:
     columns: tuple[str, ...]
     notes: tuple[str, ...]
     sections: tuple[TextTable, ...] = ()
-    """Tables below the blocks: averages over tasks, published figures, what was probed."""
+    """Tables below the blocks: events, averages over tasks, published figures, what was probed."""
     footer: tuple[str, ...] = ()
     """Who computed this, with what, where."""
     provenance: tuple[Row, ...] = ()
@@ -73,7 +74,8 @@ def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: b
     notes = notes_of(ordered, blocks)
     if times:
         notes += timing_notes(rows, letters, known)
-    sections = (over_tasks(rows), published_section(rows), build_probe(ordered))
+    events = (events_section(ordered), operating_points_section(ordered)) if times else ()
+    sections = (*events, over_tasks(rows), published_section(rows), build_probe(ordered))
     return Table(
         blocks,
         names,

@@ -22,7 +22,8 @@ def fill_baselines(rows: Sequence[Row]) -> None:
     """Write beside every row the best trivial score of its group that used no more than the row's own answer may.
 
     A trivial answer that looks at the time of a sample knows what an answer from readings does not: a ramp that is
-    commanded alike in every recording. It is compared with answers that look at the time too, and with no others.
+    commanded alike in every recording. It is compared with answers that look at the time too, and with no others. One
+    that looks at the reference is an oracle, and no bar to anything.
     """
     by_group: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
@@ -32,7 +33,8 @@ def fill_baselines(rows: Sequence[Row]) -> None:
     for group, members in by_group.items():
         best = min if members[0]["metric"] in LOWER_IS_BETTER else max
         for timed in (False, True):
-            known = [one["score"] for one in members if timed or one.get("looks_at") != "time"]
+            knowing = {"reference"} if timed else {"reference", "time"}
+            known = [one["score"] for one in members if one.get("looks_at") not in knowing]
             bars[group, timed] = best(known, default=None)
     for row in rows:
         row["baseline"] = bars.get((_group(row), row.get("looks_at") == "time"))

@@ -9,6 +9,7 @@ from pydantic import Field
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import SensorSpec
+from tactbench.core.spec.summary import Summary
 from tactbench.core.spec.task import WHERE, TaskSpec
 
 _NAME = r"^[a-z][a-z0-9_-]*$"
@@ -100,7 +101,9 @@ class EstimatorDescriptor(Frozen):
 
     name: str = Field(pattern=_NAME)
     title: str
-    kinds: tuple[Literal["regression", "classification"], ...]
+    kinds: tuple[Literal["regression", "classification", "events"], ...]
+    """`events`: ``fit`` is given 0 or 1 a frame (whether it slips), ``predict`` gives a score a frame: an alarm needs
+    one at or above a threshold."""
     where: str = Field(pattern=WHERE)
     """``module:callable``, called as ``callable(kind=..., seed=..., threads=..., **params)``: an object with
     scikit-learn's ``fit(X, y)`` and ``predict(X)``."""
@@ -110,8 +113,17 @@ class EstimatorDescriptor(Frozen):
     """Parameters chosen on validation data, and their candidates."""
     window_grid: tuple[int, ...] = (0,)
     """Candidates for k of the mean filter over samples t-k … t, chosen together with `grid`."""
-    looks_at: Literal["features", "time", "nothing"] = "features"
-    """`time`: X is the time index alone. `nothing`: X is a column of zeros."""
+    looks_at: Literal["features", "time", "nothing", "reference"] = "features"
+    """`time`: X is the time index alone. `nothing`: X is a column of zeros. `reference`, of events alone: X is the
+    tangential force over friction times normal force, from the reference sensor: an oracle."""
+    summaries: tuple[Summary, ...] = ()
+    """Of frames: it looks at these numbers of each channel, in place of the task's own."""
+    frames_by: str | None = Field(default=None, pattern=WHERE)
+    """Of frames: ``module:callable``, called with (one stream, a :class:`tactbench.plugin.StreamReadings`; (n,) ends of
+    frames [s]; length of a frame [s]): (n, features) numbers of samples up to each end, instead of summaries. NaN is no
+    answer. It is asked of the fastest stream alone."""
+    threshold: float | None = None
+    """Of events: a threshold of its own; None: chosen on validation recordings."""
     baseline: bool = False
     """A trivial answer, shown under the results."""
     linear: bool | None = None

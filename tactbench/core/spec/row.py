@@ -16,6 +16,7 @@ LOWER_IS_BETTER = frozenset({"rmse", "mae", "mean_euclidean_error"})
 SCORES = {
     "rmse": (0.0, math.inf), "mae": (0.0, math.inf), "mean_euclidean_error": (0.0, math.inf), "r2": (-math.inf, 1.0),
     "accuracy": (0.0, 1.0), "balanced_accuracy": (0.0, 1.0), "macro_f1": (0.0, 1.0),
+    "event_f1": (0.0, 1.0),
 }  # fmt: skip
 """What scores of a metric lie between."""
 
@@ -126,6 +127,8 @@ class RowModel(BaseModel):
     fold_sizes: dict[str, Any] = {}
     confusion: list[list[Any]] | None = None
     classes: list[str | bool | int | float] = []
+    events: Numbers = {}
+    operating_points: list[Numbers] = []
     replicates: dict[str, Any] = {}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
@@ -124,9 +124,8 @@ class ForcePath(Frozen):
     @property
     def hold(self) -> Quantity:
         """How long the force stays at its start."""
-        still = next((time for time, force in zip(self.times_s[1:], self.forces_n[1:], strict=True)
-                      if force != self.forces_n[0]), self.times_s[-1])  # fmt: skip
-        return Quantity(value=still, unit="s", source=self.source)
+        still = takewhile(lambda point: point[1] == self.forces_n[0], zip(self.times_s, self.forces_n, strict=True))
+        return Quantity(value=max(time for time, _ in still), unit="s", source=self.source)
 
     @property
     def duration(self) -> Quantity:

@@ -24,7 +24,7 @@ class Summary(Frozen):
     end: float = Field(default=1.0, gt=0, allow_inf_nan=False)
     unit: Literal["recording", "s"] = "recording"
     """Of `start` and `end`: shares of each stream's samples, or seconds. Both count from the first sample that the
-    protocol keeps."""
+    protocol keeps; of a frame, shares of its length or seconds, from its beginning."""
     band_hz: tuple[float, float] | None = None
     """Ends of the band; of ``band-energy`` alone."""
     kinds: tuple[ChannelKind, ...] = ()

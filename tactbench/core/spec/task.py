@@ -8,6 +8,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from tactbench.core.spec.events import AlarmPolicy, SlipTarget
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.scene import Role, Scene
 from tactbench.core.spec.sensor import ChannelKind
@@ -120,15 +121,23 @@ class TaskSpec(Frozen):
     title: str
     question: str
     """One sentence, for people."""
-    kind: Literal["regression", "classification"]
+    kind: Literal["regression", "classification", "events"]
+    """`events`: when something begins. Detectors give every frame a score, `alarms` turns scores into alarms."""
     features: tuple[ChannelKind, ...] = ("taxel",)
     """Kinds of channels an estimator may look at."""
-    target: ChannelTarget | VectorTarget | LabelTarget
-    answer_per: Literal["sample", "recording"] = "sample"
+    optional_features: tuple[ChannelKind, ...] = ()
+    """Further kinds, of sensors that have them."""
+    target: ChannelTarget | VectorTarget | LabelTarget | SlipTarget
+    answer_per: Literal["sample", "recording", "frame"] = "sample"
     """`recording`: one class or number for each recording as a whole, made in one of the three ways that follow. The
-    target is then a label that does not change within a recording."""
+    target is then a label that does not change within a recording. `frame`: one for each window of the target's length,
+    from each channel's own samples in it."""
     summaries: tuple[Summary, ...] = ()
-    """Features of a recording: these numbers of each channel."""
+    """Features of a recording or of a frame: these numbers of each channel."""
+    alarms: AlarmPolicy | None = None
+    """Of events: how frames become alarms, and what an alarm is held against."""
+    max_false_alarms_per_minute: float | None = Field(default=None, ge=0)
+    """Of events: the threshold is that of largest recall on validation recordings with at most so many [1/min]."""
     features_by: str | None = Field(default=None, pattern=WHERE)
     """``module:callable``, called with one recording, a tuple of :class:`tactbench.plugin.StreamReadings`: features of
     the task's own, name to number, the same names for every recording. They stand behind `summaries`, or alone."""
@@ -160,6 +169,25 @@ class TaskSpec(Frozen):
     baselines: tuple[str, ...]
     """Trivial answers that stand in every table and are probed; the best of them is the bar."""
     published: tuple[Published, ...] = ()
+    beside: tuple[str, ...] = ()
+    """Tasks that are run whenever this one is asked for: the same question, to be read beside it."""
+    replicates: int | None = Field(default=None, ge=1)
+    """How often a simulated rig records and answers it anew where nobody says; None: as often as any task."""
+
+    @model_validator(mode="after")
+    def _frames_are_answered_in_one_way(self) -> TaskSpec:
+        framed = isinstance(self.target, SlipTarget)
+        if framed != (self.answer_per == "frame"):
+            raise ValueError("answer_per: frame and a target of frames belong together")
+        if framed and (not self.summaries or self.features_by or self.vote):
+            raise ValueError("answer_per: frame needs summaries, and neither features_by nor vote")
+        if framed and "in-session" in self.splits:
+            raise ValueError("split in-session cuts recordings in time; frames look back across a cut")
+        if (self.kind == "events") != (self.alarms is not None and self.max_false_alarms_per_minute is not None):
+            raise ValueError("kind: events needs alarms and max_false_alarms_per_minute, which belong to it")
+        if self.kind == "events" and not framed:
+            raise ValueError("kind: events needs a target of frames")
+        return self
 
     @model_validator(mode="after")
     def _vectors_have_a_metric_of_their_own(self) -> TaskSpec:
@@ -172,6 +200,8 @@ class TaskSpec(Frozen):
 
     @model_validator(mode="after")
     def _recordings_are_answered_in_one_way(self) -> TaskSpec:
+        if self.answer_per == "frame":
+            return self
         summarised = bool(self.summaries or self.features_by)
         if self.answer_per == "sample":
             if summarised or self.vote:
@@ -183,7 +213,7 @@ class TaskSpec(Frozen):
             raise ValueError("answer_per: recording asks for a label")
         if "in-session" in self.splits:
             raise ValueError("split in-session cuts recordings in time; answer_per: recording asks each as a whole")
-        unseen = {kind for one in self.summaries for kind in one.kinds} - set(self.features)
+        unseen = {kind for one in self.summaries for kind in one.kinds} - set(self.looks_at)
         if unseen:
             raise ValueError(f"summaries of {', '.join(sorted(unseen))}, which the task's features do not have")
         names = [one.name for one in self.summaries]
@@ -192,8 +222,20 @@ class TaskSpec(Frozen):
         return self
 
     @property
+    def looks_at(self) -> tuple[ChannelKind, ...]:
+        """Kinds of channels an estimator may look at, of sensors that have them."""
+        return (*self.features, *self.optional_features)
+
+    @property
     def answer_from(self) -> str:
-        """What an answer for a whole recording is made of; empty where answers are of samples."""
+        """What an answer is made of, and of events what it is held against; empty where answers are of samples."""
+        if self.alarms is not None:
+            return (
+                f"{self.target}; {self.alarms}; threshold by validation: at most {self.max_false_alarms_per_minute:g} "
+                "false alarms a minute"
+            )
+        if isinstance(self.target, SlipTarget):
+            return str(self.target)
         if self.vote:
             return f"the {'commonest' if self.kind == 'classification' else 'mean'} answer of its frames"
         own = [f"features by {self.features_by}"] if self.features_by else []

@@ -108,11 +108,20 @@ def _of_campaigns(done: Sequence[Row]) -> dict[str, Any]:
         "replicates": _kept(done) if len(done) >= FEWEST else {},
         "chosen": _chosen(done),
         "scores": _middle([row["scores"] for row in done]),
+        "events": _middle([row.get("events") or {} for row in done]),
+        "operating_points": _middle_points([row.get("operating_points") or [] for row in done]),
         "delay_parts_ms": parts,
         "answer_delay_ms": None if found.get("answer_delay_ms") is None else sum(parts.values()),
         "confusion": _added([row["confusion"] for row in done]),
         "counts": dict(sum((Counter(row["counts"]) for row in done), Counter[str]())),
     }
+
+
+def _middle_points(points: Sequence[Sequence[Mapping[str, float]]]) -> list[dict[str, float]]:
+    """Return the middle of each operating point; none where replicates have different numbers of them."""
+    if len({len(one) for one in points}) > 1:
+        return []
+    return [_middle(list(several)) for several in zip(*points, strict=True)]
 
 
 def _method(n: int, level: float) -> str:

@@ -44,7 +44,7 @@ def tactbench_effects() -> list[EffectDescriptor]:
             "transduction",
             "Transduction",
             "contact.stages:read_skin",
-            ("skin", "gain", "effective-force"),
+            ("skin", "gain", "effective-force", "vibration"),
             ("taxel", "reading"),
         ),
         _effect(

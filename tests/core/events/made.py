@@ -6,7 +6,7 @@ from hypothesis.extra import numpy as arrays
 
 from tactbench.core.events.curve import ScoredRecording
 from tactbench.core.events.metrics import GroundTruth
-from tactbench.core.events.policy import AlarmPolicy
+from tactbench.core.spec.events import AlarmPolicy
 
 MS = 1_000_000
 """Nanoseconds of a millisecond."""

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tactbench.core.errors import DataError
 from tactbench.core.events.alarms import alarms
-from tactbench.core.events.policy import nanoseconds
+from tactbench.core.spec.events import nanoseconds
 from tests.core.events.made import clocks, policies, policy, seconds
 
 

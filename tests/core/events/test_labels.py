@@ -13,14 +13,13 @@ from tactbench.core.events.labels import (
     GROSS,
     INCIPIENT,
     STICK,
-    THRESHOLDS,
     UNDECIDED,
-    SlipThresholds,
     at_rest,
     labels_at_scales,
     slip_labels,
     stick_ratio,
 )
+from tactbench.core.spec.events import THRESHOLDS, SlipThresholds
 from tactbench.rigs.twin.effects import partial_slip
 from tactbench.rigs.twin.effects.slip_event import Mode
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive

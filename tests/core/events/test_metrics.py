@@ -10,7 +10,7 @@ from tactbench.core.errors import DataError
 from tactbench.core.evaluation.metrics import METRICS
 from tactbench.core.events.matching import match
 from tactbench.core.events.metrics import GroundTruth, TimeBase, displacement_at_detection, score_events
-from tactbench.core.events.policy import AlarmPolicy, nanoseconds
+from tactbench.core.spec.events import AlarmPolicy, nanoseconds
 from tests.core.events.made import MS, milliseconds, policies, policy, seconds, times, truth, truths
 
 

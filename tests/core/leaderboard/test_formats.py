@@ -241,6 +241,7 @@ def test_without_times_nothing_is_left_that_a_machine_decides():
         "key": "l", "search": [{"fit_s": 1.0}], "recordings": ["elsewhere"], "sim_s": 1.0, "search_s": 1.0,
         "predict_s": 2.0, "batch_rows": 2, "latency_ms_p50": 1.0, "latency_ms_p95": 2.0, "latency_ms_max": 2.0,
         "latency_n": 3, "answer_delay_ms": 4.0, "delay_parts_ms": {"prediction": 1.0},
+        "events": {"onset latency p50 ms": 1.0}, "operating_points": [{"bound": 1.0}],
     }  # fmt: skip
     assert {key for key in JSON_KEYS if here.get(key) != there.get(key)} == OF_THE_MACHINE
     machine = [{"host": "here", "cpu": "fast", "cores": 1}], [{"host": "there", "cpu": "slow", "cores": 2}]

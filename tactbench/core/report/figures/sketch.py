@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name
 from tactbench.core.report.figures.group import Group, Panel
 from tactbench.core.report.figures.style import colour_name
+from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.task import LabelTarget, TaskSpec, VectorTarget
 
 if TYPE_CHECKING:
@@ -79,6 +80,8 @@ def _shown(row: Mapping[str, Any]) -> list[str]:
 def quantity(task: TaskSpec) -> str:
     """Return what a task asks for, in words."""
     target = task.target
+    if isinstance(target, SlipTarget):
+        return "state of slip"
     if isinstance(target, LabelTarget):
         return target.name.removesuffix(f"_{target.unit}").replace("_", " ")
     if isinstance(target, VectorTarget):

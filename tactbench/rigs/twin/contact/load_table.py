@@ -92,6 +92,15 @@ class LoadTable:
         low, high = np.clip([low_n, high_n], 0.0, self.loads_n[-1])
         return self.interpolant.steepest(float(low), float(high))
 
+    def per_mm(self, of: Callable[[FloatArray], FloatArray], force_n: FloatArray) -> FloatArray:
+        """Return how (m, k) numbers `of` a force grow with depth at (n,) forces: (n, k), chords of a fiftieth."""
+        nodes = np.linspace(0.0, float(self.loads_n[-1]), 51)
+        deeper = np.diff(self.skin(nodes).depth_mm)
+        risen = np.diff(of(nodes), axis=0)
+        chords = np.divide(risen.T, deeper, out=np.zeros_like(risen.T), where=deeper > 0)
+        middles = 0.5 * (nodes[1:] + nodes[:-1])
+        return np.column_stack([np.interp(force_n, middles, chord) for chord in chords])
+
     def skin(self, force_n: FloatArray) -> SkinCurves:
         """Return what the skin as a whole does at (m,) forces, held at the table's ends like the readings."""
         depth, radius, pressure = self.curves(np.clip(force_n, 0.0, self.loads_n[-1])).T

@@ -54,7 +54,10 @@ def watch_fluid(run: Synthesis) -> None:
 
 
 def read_skin(run: Synthesis) -> None:
-    """Add each channel's response: gain times its reading under the effective force, less its reading at rest."""
+    """Add each channel's response: gain times its reading under the effective force, less its reading at rest.
+
+    A vibration of the skin adds its size times the reading's slope with depth at that force.
+    """
     table = skin_under_load(run)
     names = read_names(run)
     for track in run.tracks:
@@ -62,7 +65,10 @@ def read_skin(run: Synthesis) -> None:
             if kind not in READ_FROM_THE_SKIN:
                 continue
             among = [names.index(track.channels[column].name) for column in own]
-            response = table(track.effective_n.get(kind, track.force_n))[:, among] - table.readings[0, among]
+            force_n = track.effective_n.get(kind, track.force_n)
+            response = table(force_n)[:, among] - table.readings[0, among]
+            if track.vibration_mm is not None:
+                response += track.vibration_mm[:, None] * table.per_mm(table, force_n)[:, among]
             if track.gain is not None:
                 response *= track.gain[own]
             track.readings[:, own] += response

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from tactbench.plugin import ChannelSpec, FloatArray, NotApplicable
 from tactbench.rigs.twin.contact.load_table import LoadTable
 from tactbench.rigs.twin.contact.stages import skin_under_load
@@ -49,13 +47,9 @@ def within_band(t_s: FloatArray, pressure_pa: FloatArray, channel: ChannelSpec) 
 
 
 def stiffness_mpa_mm(table: LoadTable, force_n: FloatArray) -> FloatArray:
-    """Return (n,) how the fluid's pressure grows with depth at (n,) loads: a chord over a fiftieth of the range."""
-    most = float(table.loads_n[-1])
-    nodes = np.linspace(0.0, most, 51)
-    curves = table.skin(nodes)
-    deeper = np.diff(curves.depth_mm)
-    chord = np.divide(np.diff(curves.fluid_pressure_mpa), deeper, out=np.zeros_like(deeper), where=deeper > 0)
-    return np.asarray(np.interp(force_n, 0.5 * (nodes[1:] + nodes[:-1]), chord))
+    """Return (n,) how the fluid's pressure grows with depth at (n,) loads."""
+    slope: FloatArray = table.per_mm(lambda loads_n: table.skin(loads_n).fluid_pressure_mpa[:, None], force_n)[:, 0]
+    return slope
 
 
 def _pa_per_count(channel: ChannelSpec) -> float:

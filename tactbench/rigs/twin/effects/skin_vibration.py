@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactbench.plugin import Quantity, assumed
-from tactbench.rigs.twin.contact.stages import skin_under_load
+from tactbench.plugin import FloatArray, Quantity, assumed
+from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, skin_under_load
 from tactbench.rigs.twin.effects.friction import mode_of
 from tactbench.rigs.twin.effects.roughness import Profile
 from tactbench.rigs.twin.effects.skin_mode import shaken
@@ -18,25 +18,35 @@ LIFT: Quantity = assumed(
 
 
 def apply(run: Synthesis) -> None:
-    """Shake the skin on every clock that is fast enough to see it: by the profile it slips over, and by stick-slip.
+    """Shake the skin on every clock that reads it: by the profile it slips over, and by stick-slip.
 
-    The indenter is held, so that the profile under the contact moves the skin, through its mode. The tangential motion
-    of stick-slip (which has swung in that mode already) lifts the skin in proportion.
+    The indenter is held where it stood when the slip began, so that the profile passing under the contact moves the
+    skin, through its mode, and with it the normal force that is measured. The tangential motion of stick-slip (which
+    has swung in that mode already) lifts the skin in proportion: dynamic pressure alone shows it, because the
+    proportion is known for a motion and not for a place.
     """
     slide = run.scene.slide
     if slide is None or run.sliding is None:
         return
     mode = mode_of(run.sensor.spec)
     lift = run.sensor.spec.parameters.get("skin_lift", LIFT).to("1")
-    profile = Profile(slide.surface, run.of_recording("roughness"))
+    profile, table = Profile(slide.surface, run.of_recording("roughness")), skin_under_load(run)
+
+    def rough(t_s: FloatArray, force_n: FloatArray, slip_mm: FloatArray) -> FloatArray:
+        radius = table.skin(force_n).contact_radius_mm
+        risen = profile.felt_mm(slip_mm, radius) - profile.felt_mm(np.zeros(slip_mm.size), radius)
+        return shaken(t_s, np.where(force_n > 0, risen, 0.0), mode)
+
     for track in run.tracks:
-        if "ac_pressure" not in track.by_kind():
+        kinds = track.by_kind()
+        if "ac_pressure" not in kinds and not kinds.keys() & set(READ_FROM_THE_SKIN):
             continue
         seen = run.sliding(track.t_s)
-        radius = skin_under_load(run).skin(track.force_n).contact_radius_mm
-        height = profile.felt_mm(seen.slip_mm, radius)
-        touched = track.force_n > 0
-        rough = shaken(track.t_s, np.where(touched, height, 0.0), mode)
-        track.vibration_mm = rough + np.where(touched, lift * seen.displacement_mm, 0.0)
+        track.vibration_mm = rough(track.t_s, track.force_n, seen.slip_mm)
+        if "ac_pressure" in kinds:
+            track.vibration_mm += np.where(track.force_n > 0, lift * seen.displacement_mm, 0.0)
+    force_n = run.load.at(run.t_s)
+    stiffness = table.per_mm(lambda force_n: force_n[:, None], force_n)[:, 0]
+    run.reference_n += stiffness * rough(run.t_s, force_n, run.sliding(run.t_s).slip_mm)
     waves = profile.wave_mm
     run.drawn.update(roughness_shortest_mm=float(waves.min()), roughness_longest_mm=float(waves.max()))

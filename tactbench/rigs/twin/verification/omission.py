@@ -25,8 +25,12 @@ def checks() -> Sequence[Check]:
     assert isinstance(twin, Twin)
     found = []
     for sensor in registry.sensors:
+        checked: list[list[Scene]] = []
         for task in registry.tasks:
             scenes = [planned.scene for planned in task.spec.scenes]
+            if scenes in checked:  # another task asks of the same recordings
+                continue
+            checked.append(scenes)
             if any(_simulated(twin, sensor, scene) for scene in scenes):
                 found.append(
                     Check(

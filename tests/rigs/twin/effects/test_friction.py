@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -140,3 +141,92 @@ def test_every_medium_has_a_shear_modulus(specs, layer):
     assert shear_modulus_mpa(specs["biotac"].skin) == pytest.approx(0.8 / 2.96 / 1.52)
     assert shear_modulus_mpa(specs["icub"].skin) == specs["icub"].skin.shear.to("MPa") / 2
     assert shear_modulus_mpa(layer(0.3)[0]) == pytest.approx(1.0 / 2.6 / 1.7)
+
+
+@pytest.mark.parametrize(("speed", "damping", "stribeck"), [(2.0, 0.05, 0.0), (10.0, 0.1, 5.0), (30.0, 0.02, 50.0)])
+def test_the_work_of_the_drive_is_stored_or_dissipated(speed, damping, stribeck):
+    """Over a hundred phases from the grip on: work = spring + rubbed + damper + the annulus of partial slip.
+
+    At the instants between phases skin and surface have one speed: the kinetic energy stays what the grip gave.
+    """
+    mode = Mode(2000.0, damping)
+    dragged = Dragged(_drive([1.0, 1.0], seconds=8.0, speed_mm_s=speed, mode=mode, stribeck_mm_s=stribeck))
+    stiffness = float(dragged.drive.stiffness[0])
+    damper = 2.0 * damping / mode.omega * stiffness
+    instants = np.sort(np.concatenate([dragged.caught_s, dragged.let_go_s]))[:101]
+    assert instants.size == 101
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    work = dissipated = 0.0
+    largest = worst = 0.0
+    for begin, until in itertools.pairwise(instants):
+        # Gauss points never ask at the instant itself, which belongs to the next phase.
+        seen = dragged(begin + (until - begin) * 0.5 * (nodes + 1.0))
+        dt = 0.5 * (until - begin) * weights
+        velocity = speed - seen.slip_mm_s
+        work += float(np.sum(seen.force_n * speed * dt))
+        dissipated += float(np.sum((seen.force_n * seen.slip_mm_s + damper * velocity**2) * dt))
+        at_begin, at_end = dragged(np.array([begin, until])).displacement_mm
+        if begin in dragged.caught_s:
+            # Mindlin's annulus: 0.6 k dx^2 of work on the way to full slip, of which the spring keeps 0.5.
+            dissipated += 0.1 * stiffness * (at_end - at_begin) ** 2
+        worst = max(worst, abs(work - dissipated - 0.5 * stiffness * at_end**2))
+        largest = max(largest, work)
+    # 60 Gauss points on (1 - s)^(3/2), whose second derivative is infinite at its end: 1e-10 of the work.
+    assert worst < 1e-9 * largest
+    assert dissipated > 0.5 * work
+
+
+def test_within_a_slip_the_mass_takes_up_what_the_spring_loses():
+    speed, damping = 10.0, 0.1
+    mode = Mode(2000.0, damping)
+    dragged = Dragged(_drive([1.0, 1.0], speed_mm_s=speed, mode=mode))
+    stiffness = float(dragged.drive.stiffness[0])
+    mass, damper = stiffness / mode.omega**2, 2.0 * damping / mode.omega * stiffness
+    begin, until = float(dragged.let_go_s[3]), float(dragged.caught_s[4])
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+
+    def stored(t_s):
+        seen = dragged(np.array([t_s]))
+        velocity = speed - seen.slip_mm_s[0]
+        return 0.5 * stiffness * float(seen.displacement_mm[0]) ** 2, 0.5 * mass * float(velocity) ** 2
+
+    at_first = stored(math.nextafter(begin, until))
+    kinetic = 0.0
+    for share in (0.25, 0.5, 0.75):
+        moment = begin + share * (until - begin)
+        seen = dragged(begin + (moment - begin) * 0.5 * (nodes + 1.0))
+        dt = 0.5 * (moment - begin) * weights
+        velocity = speed - seen.slip_mm_s
+        given = float(np.sum((seen.force_n * speed - seen.force_n * seen.slip_mm_s - damper * velocity**2) * dt))
+        now = stored(moment)
+        # 60 Gauss points on a smooth swing: rounding.
+        assert sum(now) - sum(at_first) == pytest.approx(given, abs=1e-12 * at_first[0] + 1e-15)
+        kinetic = max(kinetic, now[1])
+    # The balance is about something: the mass moves with more than a hundredth of what the spring held.
+    assert kinetic > 0.01 * at_first[0]
+
+
+@pytest.mark.parametrize("speed", [1.0, 20.0, 200.0])
+def test_steps_a_thousand_times_as_long_change_nothing(speed):
+    drive = _drive([1.0, 3.0], seconds=40.0, speed_mm_s=speed)
+    fine = np.linspace(0.0, 40.0, 400_001)
+    dragged = Dragged(drive)
+    for values, every in zip(dragged(fine[::1000]), dragged(fine), strict=True):
+        np.testing.assert_array_equal(values, every[::1000])
+
+
+@pytest.mark.parametrize("speed", [0.1, 20.0, 500.0])
+def test_a_grid_of_loads_a_thousand_times_as_coarse_blows_nothing_up(speed):
+    seen = {}
+    for step_s in (0.002, 2.0):
+        grid = np.arange(0.0, 60.0 + step_s / 2, step_s)
+        load = np.interp(grid, [0.0, 10.0, 50.0, 60.0], [1.0, 1.0, 4.0, 4.0])
+        drive = Drive(speed, 10.0, math.inf, 0.8, 0.6, 5.0, Mode(2000.0, 0.1), grid, load, 2.0 * np.cbrt(load))
+        seen[step_s] = Dragged(drive)(np.linspace(0.0, 60.0, 60_001))
+        limit = 0.8 * np.interp(np.linspace(0.0, 60.0, 60_001), grid, load)
+        assert all(np.isfinite(values).all() for values in seen[step_s])
+        # A stiffness that is straight over 2 s while the load grows by 0.15 N: (0.15/1)^2/9 of the limit.
+        assert (seen[step_s].force_n - limit).max() < (1e-4 if step_s == 0.002 else 0.0025 * limit.max())
+    # Phases of single slips drift apart; what was slipped in all does not: the skin follows by less than a millimetre.
+    apart = np.abs(seen[2.0].slip_mm - seen[0.002].slip_mm).max()
+    assert apart < 2 * seen[0.002].displacement_mm.max()

@@ -1,0 +1,268 @@
+"""Frames: windows that end at regular times, each made of every stream's own samples in it, and of none after it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from tactbench.core.errors import DataError, NotApplicable, PluginContractError
+from tactbench.core.evaluation.dataset import LARGEST, Dataset, Table
+from tactbench.core.evaluation.protocols import ProtocolSpec
+from tactbench.core.evaluation.slip_reference import SlipReference
+from tactbench.core.evaluation.summaries import in_band, tared_readings
+from tactbench.core.events.labels import GROSS, UNDECIDED
+from tactbench.core.plugins.registry import load_object
+from tactbench.core.samples import FloatArray, IntArray, StreamReadings
+from tactbench.core.spec.events import SlipTarget, nanoseconds
+from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.summary import Summary
+from tactbench.core.spec.task import TaskSpec
+
+STATES = ("stick", "incipient", "gross")
+EVENT_CLASSES = ("no event", "event")
+
+Features = tuple[tuple[str, ...], FloatArray]
+"""Names, and (frames, features) numbers; NaN where a stream has no sample in the window."""
+
+
+class FrameTimes(NamedTuple):
+    """Frames of one recording."""
+
+    ends_ns: IntArray
+    """(n,) since the first row of the sensor's clock"""
+    reference: SlipReference
+
+
+def framed(data: Dataset, task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor) -> Dataset:
+    """Return each recording as frames, with the features that `estimator` looks at.
+
+    Raises
+    ------
+    NotApplicable
+        If the protocol drops single samples, or the sensor has nothing that the estimator looks at.
+    """
+    if rules.three_sigma or rules.discard_samples or rules.first_row_only:
+        raise NotApplicable(
+            f"Protocol {rules.name!r} drops single samples; task {task.name!r} looks at windows of consecutive ones.",
+            hint="Use --protocol deployable.",
+        )
+    counts = Counter(data.counts)
+    compute = frame_features(task, rules, estimator)
+    tables, names = [], None
+    for table in data.tables:
+        one, own = _framed(table, task, rules, compute, counts)
+        if names not in (None, own):
+            raise PluginContractError(
+                f"{estimator.name} looks at other features of {table.meta.name!r} than of the recordings before.",
+                hint="Evaluate recordings with other channels apart.",
+            )
+        names = own
+        tables.append(one)
+    classes = EVENT_CLASSES if task.kind == "events" else STATES
+    return replace(data, tables=tuple(tables), features=names or (), classes=classes, counts=dict(counts))
+
+
+def frame_features(
+    task: TaskSpec, rules: ProtocolSpec, estimator: EstimatorDescriptor
+) -> Callable[[Table, FrameTimes], Features]:
+    """Return what makes the features of all frames of one recording; a detector's own code is imported here."""
+    target = _target(task)
+    own = load_object(estimator.frames_by) if estimator.frames_by else None
+    summaries = estimator.summaries or task.summaries
+
+    def compute(table: Table, frames: FrameTimes) -> Features:
+        ends_s = np.asarray(frames.ends_ns * 1e-9, dtype=np.float64)
+        if estimator.looks_at == "reference":
+            place = frames.reference.at(frames.ends_ns)
+            share = np.where(place >= 0, frames.reference.force_share[np.maximum(place, 0)], np.nan)
+            return ("tangential over friction times normal force",), share[:, None]
+        if estimator.looks_at != "features":
+            return (), np.zeros((len(ends_s), 0))
+        streams = clocked(table, rules)
+        if own is not None:
+            return _own_features(own, estimator, fastest(streams), ends_s, target.window_s)
+        names: list[str] = []
+        columns: list[FloatArray] = []
+        for stream in streams:
+            filtered: dict[tuple[float, float], FloatArray] = {}
+            for summary in summaries:
+                picked = [place for place, kind in enumerate(stream.kinds)
+                          if not summary.kinds or kind in summary.kinds]  # fmt: skip
+                if not picked:
+                    continue
+                values = stream.data
+                if summary.band_hz is not None:
+                    if summary.band_hz not in filtered:
+                        filtered[summary.band_hz] = in_band(stream, summary.band_hz, table.meta.name)
+                    values = filtered[summary.band_hz]
+                begin, end = _bounds(summary, target.window_s)
+                first, last = (
+                    np.searchsorted(_time(stream), ends_s - target.window_s + edge, side="right")
+                    for edge in (begin, end)
+                )
+                columns.append(_measured(values[:, picked], summary.measure, first, last))
+                names += [f"{stream.channels[place]} {summary.name}" for place in picked]
+        if not columns:
+            raise NotApplicable(
+                f"{estimator.name} looks at {', '.join(one.name for one in summaries)}; {table.meta.sensor.name} has "
+                f"no such channel that task {task.name!r} looks at: {band_limit(streams)}.",
+                hint="Choose another estimator.",
+            )
+        return tuple(names), np.hstack(columns)
+
+    return compute
+
+
+def band_limit(streams: Sequence[StreamReadings]) -> str:
+    """Return what the fastest stream cannot show."""
+    one = fastest(streams)
+    return f"band not observable above {(one.rate_hz or 0.0) / 2:.4g} Hz, half the rate of {one.stream}"
+
+
+def fastest(streams: Sequence[StreamReadings]) -> StreamReadings:
+    """Return the stream of the highest rate."""
+    return max(streams, key=lambda one: one.rate_hz or 0.0)
+
+
+def clocked(table: Table, rules: ProtocolSpec) -> tuple[StreamReadings, ...]:
+    """Return the streams of a recording, tared as the protocol has it; raises NotApplicable if one has no clock."""
+    streams = tuple(tared_readings(stream, table.meta) if rules.tare else stream for stream in table.readings)
+    for stream in streams:
+        if stream.time_s is None:
+            raise NotApplicable(
+                f"Frames end at times, and {stream.stream} of recording {table.meta.name!r} has no clock.",
+                hint="State the clock or the rate in the mapping.",
+            )
+        if not len(stream.data):
+            raise DataError(f"Recording {table.meta.name!r} has no sample of {stream.stream}.", hint="Leave it out.")
+    return streams
+
+
+def frame_times(table: Table, task: TaskSpec, rules: ProtocolSpec) -> FrameTimes:
+    """Return when the frames of a recording end: all that all streams fill, after the hold where it is dropped."""
+    target = _target(task)
+    reference = table.reference
+    if reference is None:
+        raise DataError(f"Recording {table.meta.name!r} was read without its reference.", hint="Report this.")
+    streams = clocked(table, rules)
+    begin_s = max(float(_time(stream)[0]) for stream in streams)
+    if rules.discard_hold and table.meta.scene is not None:
+        begin_s = max(begin_s, table.meta.scene.profile.hold.to("s"))
+    end_s = min(float(_time(stream)[-1]) for stream in streams)
+    first = nanoseconds(begin_s) + nanoseconds(target.window_s)
+    ends_ns = np.arange(first, nanoseconds(end_s) + 1, nanoseconds(target.hop_s), dtype=np.int64)
+    if not ends_ns.size:
+        raise DataError(
+            f"Recording {table.meta.name!r} is shorter than a frame of {target.window_s:g} s.", hint="Leave it out."
+        )
+    return FrameTimes(ends_ns, reference)
+
+
+def _framed(
+    table: Table,
+    task: TaskSpec,
+    rules: ProtocolSpec,
+    compute: Callable[[Table, FrameTimes], Features],
+    counts: Counter[str],
+) -> tuple[Table, tuple[str, ...]]:
+    frames = frame_times(table, task, rules)
+    names, X = compute(table, frames)
+    answered = np.asarray(~np.isnan(X).any(axis=1))
+    if not answered.all():
+        counts["frames without a sample of some stream"] += int((~answered).sum())
+    largest = float(np.max(np.abs(X), initial=0.0, where=answered[:, None]))
+    if largest > LARGEST:
+        raise DataError(
+            f"In recording {table.meta.name!r}, a feature reaches {largest:.3g}, which cannot be computed with.",
+            hint="Is a reading a fill value? State it under `sentinels` in the mapping.",
+        )
+    ends_ns, row = frames.ends_ns[answered], np.flatnonzero(answered)
+    state = frames.reference.state(ends_ns, 1.0)
+    events = task.kind == "events"
+    place = frames.reference.at(ends_ns)
+    made = replace(
+        table,
+        X=X[answered],
+        y=(state == GROSS).astype(np.int64) if events else state,
+        labelled=np.full(len(row), True) if events else state != UNDECIDED,
+        force=np.where(place >= 0, frames.reference.normal_n[np.maximum(place, 0)], np.nan),
+        time_s=np.asarray(ends_ns * 1e-9, dtype=np.float64),
+        row=row,
+        groups={name: np.full(len(row), column[0]) for name, column in table.groups.items()},
+    )
+    return made, names
+
+
+def _target(task: TaskSpec) -> SlipTarget:
+    if not isinstance(task.target, SlipTarget):
+        raise DataError(f"Task {task.name!r} has no frames.", hint="Report this.")
+    return task.target
+
+
+def _time(stream: StreamReadings) -> FloatArray:
+    if stream.time_s is None:
+        raise DataError(f"{stream.stream} has no clock.", hint="State it in the mapping.")
+    return stream.time_s
+
+
+def _bounds(summary: Summary, window_s: float) -> tuple[float, float]:
+    """Return where a summary begins and ends within a frame [s]."""
+    scale = 1.0 if summary.unit == "s" else window_s
+    return summary.start * scale, min(summary.end * scale, window_s)
+
+
+def _measured(values: FloatArray, measure: str, first: IntArray, last: IntArray) -> FloatArray:
+    """Return (frames, channels) of rows ``first .. last`` (excluded): what `summary_of` says of each window alone.
+
+    Sums are differences of running sums, counted from the first sample, so that no digit depends on later ones.
+    """
+    count = (last - first)[:, None].astype(np.float64)
+    some = count > 0
+    if measure == "range":
+        found = _extreme(np.maximum, values, first, last) - _extreme(np.minimum, values, first, last)
+    elif measure == "change":
+        found = values[np.maximum(last - 1, 0)] - values[np.minimum(first, len(values) - 1)]
+    elif measure == "mean-step":
+        steps = np.abs(np.diff(values, axis=0, prepend=values[:1]))
+        begin = np.minimum(first + 1, last)
+        found = _sums(steps, begin, last) / np.maximum(count - 1, 1)
+    elif measure == "band-energy":
+        found = _sums(values**2, first, last) / np.maximum(count, 1)
+    else:
+        centre = values[0]
+        mean = _sums(values - centre, first, last) / np.maximum(count, 1)
+        found = mean + centre
+        if measure == "deviation":
+            square = _sums((values - centre) ** 2, first, last) / np.maximum(count, 1)
+            found = np.sqrt(np.maximum(square - mean**2, 0.0))
+    return np.asarray(np.where(some, found, np.nan))
+
+
+def _sums(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
+    total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    return np.asarray(total[last] - total[first])
+
+
+def _extreme(of: np.ufunc, values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
+    padded = np.concatenate([values, values[-1:]])  # reduceat wants every place to exist
+    return np.asarray(of.reduceat(padded, np.column_stack([first, np.maximum(last, first)]).ravel(), axis=0)[::2])
+
+
+def _own_features(
+    own: Callable[..., object],
+    estimator: EstimatorDescriptor,
+    stream: StreamReadings,
+    ends_s: FloatArray,
+    window_s: float,
+) -> Features:
+    found = np.asarray(own(stream, ends_s, window_s), dtype=np.float64)
+    if found.ndim != 2 or len(found) != len(ends_s) or np.isinf(found).any():
+        raise PluginContractError(
+            f"{estimator.frames_by} gave an array of shape {found.shape} for {len(ends_s)} frames.",
+            hint="It must return (frames, features) finite numbers, or NaN where there is no answer.",
+        )
+    return tuple(f"{stream.channels[0]} {estimator.name} {place + 1}" for place in range(found.shape[1])), found

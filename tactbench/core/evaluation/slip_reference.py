@@ -1,0 +1,124 @@
+"""What the reference of a recording says about slip."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tactbench.core.errors import DataError, NotApplicable
+from tactbench.core.evaluation.alignment import require_forward
+from tactbench.core.evaluation.channels import numbers, on_clock, unit_factor
+from tactbench.core.events.labels import UNDECIDED, SlipLabels, slip_labels
+from tactbench.core.recording.reader import Recording
+from tactbench.core.samples import FloatArray, IntArray
+from tactbench.core.spec.events import SlipTarget
+
+SCALES = (1.0, 0.5, 2.0)
+"""Of the label thresholds: as stated, halved and doubled."""
+_CHANNELS = (("normal", "N"), ("tangential", "N"), ("slip", "m"))
+
+
+@dataclass(frozen=True)
+class SlipReference:
+    """The reference's samples, and what they were labelled."""
+
+    t_ns: IntArray
+    """(n,) nanoseconds since the first row of the sensor's clock"""
+    displacement_m: FloatArray
+    """(n,) of surface and carrier against each other"""
+    force_share: FloatArray
+    """(n,) tangential force over friction times normal force; 0 without contact"""
+    normal_n: FloatArray
+    """(n,)"""
+    labels: Mapping[float, SlipLabels]
+    """By scale of the thresholds; one under which nothing rests is not there"""
+    disturbance: bool
+    """Whether the recording as a whole is a disturbance that is no slip"""
+
+    def at(self, ends_ns: IntArray) -> IntArray:
+        """Return (k,) the last sample at or before each time; -1 before the first and after the last one's interval."""
+        place = np.searchsorted(self.t_ns, ends_ns, side="right") - 1
+        step = int(np.median(np.diff(self.t_ns))) if self.t_ns.size > 1 else 0
+        return np.where(ends_ns <= self.t_ns[-1] + step, place, -1).astype(np.int64)
+
+    def state(self, ends_ns: IntArray, scale: float) -> IntArray:
+        """Return (k,) states at some times; undecided where the reference has no sample."""
+        place = self.at(ends_ns)
+        return np.asarray(np.where(place >= 0, self.labels[scale].state[np.maximum(place, 0)], UNDECIDED))
+
+
+def slip_reference(recording: Recording, target: SlipTarget, first_ns: int, counts: Counter[str]) -> SlipReference:
+    """Read and label the reference of a recording.
+
+    Parameters
+    ----------
+    first_ns
+        What times count from.
+    counts
+        Told how many samples of the reference were left out.
+
+    Raises
+    ------
+    NotApplicable
+        If a channel or the coefficient of friction is missing.
+    DataError
+        If the coefficient is no number, or the surface never rests.
+    """
+    name = recording.meta.name
+    places = {called: _place(recording, called) for called, _ in _CHANNELS}
+    missing = [called for called, place in places.items() if place is None]
+    if target.friction not in recording.meta.labels:
+        missing.append(f"the label {target.friction}")
+    if missing:
+        raise NotApplicable(
+            f"Slip is labelled by the reference's normal, tangential and slip and by the label {target.friction}; "
+            f"recording {name!r} has no {', no '.join(missing)}.",
+            hint="State them in the mapping, or choose another task.",
+        )
+    clock = recording.read(places["slip"][0])  # type: ignore[index]
+    require_forward(clock, name)
+    if clock.t_ns is None:
+        raise NotApplicable(f"The reference of recording {name!r} has no clock.", hint="State it in the mapping.")
+    columns = []
+    for called, unit in _CHANNELS:
+        stream, place = places[called]  # type: ignore[misc]
+        channel = recording.stream(stream).spec.channels[place]
+        same = stream == clock.spec.name
+        column = numbers(clock)[:, place] if same else on_clock(recording, clock, stream, place, channel)
+        columns.append(column * unit_factor(channel, unit))
+    whole = ~np.isnan(columns).any(axis=0)
+    if not whole.all():
+        counts["samples of the reference left out because a channel has none"] += int((~whole).sum())
+    normal, tangential, slip = (column[whole] for column in columns)
+    t_ns = clock.t_ns[whole] - first_ns
+    try:
+        friction = float(recording.meta.labels[target.friction])
+    except ValueError as error:
+        raise DataError(
+            f"The label {target.friction} of recording {name!r} is {recording.meta.labels[target.friction]!r}.",
+            hint="Give a number.",
+        ) from error
+    labels = {}
+    for scale in SCALES:
+        try:
+            labels[scale] = slip_labels(t_ns, slip, tangential, normal, friction, target.thresholds.scaled(scale))
+        except DataError as error:
+            if scale == 1.0:
+                raise DataError(f"Recording {name!r}: {error.message}", hint=error.hint) from error
+    contact = normal >= target.thresholds.contact_force_n
+    share = np.divide(np.abs(tangential), friction * normal, out=np.zeros_like(normal), where=contact)
+    label, value = target.disturbance
+    return SlipReference(t_ns, slip, share, normal, labels, str(recording.meta.labels.get(label)) == value)
+
+
+def _place(recording: Recording, name: str) -> tuple[str, int] | None:
+    own = {stream.name for stream in recording.meta.sensor.streams}
+    for stream in recording.stream_names:
+        if stream not in own:
+            for place, channel in enumerate(recording.stream(stream).spec.channels):
+                if channel.name == name:
+                    return stream, place
+    return None

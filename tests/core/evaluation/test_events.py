@@ -1,0 +1,319 @@
+"""Events in time: frames on each stream's own clock, detectors, alarms and their figures, from recordings in files."""
+
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from tactbench.core.errors import DataError, NotApplicable, PluginContractError
+from tactbench.core.evaluation.cell import CellContext, evaluate
+from tactbench.core.evaluation.dataset import load_dataset
+from tactbench.core.evaluation.event_answers import EventAnswers
+from tactbench.core.evaluation.frames import frame_features, frame_times, framed
+from tactbench.core.evaluation.protocols import protocol_called
+from tactbench.core.evaluation.summaries import summary_of
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import StreamReadings
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.plugin import (
+    Block,
+    ChannelSpec,
+    EstimatorDescriptor,
+    SensorSpec,
+    Source,
+    StreamSpec,
+    Summary,
+    TaskSpec,
+)
+from tactbench.tasks import slip, slip_state
+
+REGISTRY = load_registry()
+RULES = protocol_called("deployable")
+TASK = slip.SPEC.model_copy(update={"scenes": (), "splits": ("roles", "session")})
+REFERENCE = StreamSpec(
+    name="reference",
+    rate_hz=500.0,
+    channels=(
+        ChannelSpec(name="normal", kind="force", unit="N"),
+        ChannelSpec(name="tangential", kind="force", unit="N"),
+        ChannelSpec(name="slip", kind="position", unit="m"),
+    ),
+)
+ONSET_S, END_S = 2.0, 4.0
+
+
+def sensor(vibration=True):
+    taxels = tuple(ChannelSpec(name=f"t{place}", kind="taxel") for place in range(2))
+    streams = [StreamSpec(name="taxels", rate_hz=100.0, channels=taxels)]
+    if vibration:
+        streams.append(StreamSpec(name="pac", rate_hz=2000.0, channels=(ChannelSpec(name="pac", kind="ac_pressure"),)))
+    return SensorSpec(
+        name="made", title="Made by hand", principle="none",
+        principle_source=Source(tag="assumed", reference="a test"), streams=tuple(streams),
+    )  # fmt: skip
+
+
+def clock(rate_hz, length_s=END_S):
+    return np.round(np.arange(0.0, length_s, 1 / rate_hz) * 1e9).astype(np.int64)
+
+
+def record(path, *, slips, seed, vibration=True, reference=True, loud=5.0, mu=0.5, **meta):
+    """Write a recording that slips at 10 mm/s from 2 s on, or is tapped; vibration rises `loud`-fold while it slips."""
+    rng = np.random.default_rng(seed)
+    streams = (REFERENCE,) if reference else ()
+    labels = {"event": "slip" if slips else "disturbance", "friction_coefficient": mu, **meta.pop("labels", {})}
+    about = RecordingMeta(
+        name=path.stem, sensor=sensor(vibration), reference=streams, rig="made", clock="device", labels=labels, **meta
+    )
+    with RecordingWriter(path, about) as writer:
+        for name, rate_hz, width in (("taxels", 100.0, 2), *((("pac", 2000.0, 1),) if vibration else ())):
+            t_ns = clock(rate_hz)
+            size = 1.0 + (loud - 1.0) * (slips & (t_ns >= ONSET_S * 1e9))
+            writer.append(Block(name, t_ns, rng.normal(size=(len(t_ns), width)) * size[:, None]))
+        if reference:
+            t_ns = clock(500.0)
+            slipping = np.maximum(t_ns * 1e-9 - ONSET_S, 0.0) * slips
+            normal = np.full(len(t_ns), 1.0)
+            tangential = np.where(slipping > 0, 0.499, np.minimum(0.5 * t_ns * 1e-9 / ONSET_S, 0.45) * slips)
+            writer.append(Block("reference", t_ns, np.column_stack([normal, tangential, 0.01 * slipping])))
+    return path
+
+
+def campaign(folder, roles=("train", "validation", "test"), number=3, **more):
+    paths = []
+    for order, role in enumerate(roles):
+        for place in range(number):
+            for slips in (True, False):
+                name = f"{role}-{place}-{'slip' if slips else 'tap'}.h5"
+                seed = 1000 * order + 10 * place + slips
+                about = {"role": role, "session": role, **more}
+                paths.append(record(folder / name, slips=slips, seed=seed, **about))
+    return paths
+
+
+def run(paths, estimator="pac-band", asked=TASK, **more):
+    context = CellContext(
+        asked, REGISTRY.estimators[estimator], {}, "deployable", None, seed=1, clock=time.perf_counter,
+        **{"latency": False, **more},
+    )  # fmt: skip
+    return evaluate(context, paths)
+
+
+@pytest.fixture(scope="module")
+def paths(tmp_path_factory):
+    return campaign(tmp_path_factory.mktemp("campaign"))
+
+
+def stream_of(n=400, rate_hz=200.0, seed=3):
+    rng = np.random.default_rng(seed)
+    time_s = np.cumsum(rng.uniform(0.2, 1.8, n)) / rate_hz  # uneven: nothing is resampled
+    return StreamReadings("made", ("a", "b"), ("taxel", "taxel"), rng.normal(40.0, 3.0, (n, 2)), time_s, rate_hz)
+
+
+@pytest.mark.parametrize(
+    "summary",
+    [
+        *(Summary(measure=one) for one in ("mean", "deviation", "range", "change", "mean-step")),
+        Summary(measure="mean-step", start=0.5),
+        Summary(measure="mean", start=0.02, end=0.06, unit="s"),
+        Summary(measure="band-energy", band_hz=(10.0, 60.0)),
+    ],
+    ids=lambda summary: summary.name,
+)
+def test_a_frame_is_the_summary_of_its_own_samples(paths, summary):
+    table = load_dataset(TASK, paths[:1]).tables[0]
+    stream = stream_of()
+    table = replace(table, readings=(stream,))
+    frames = frame_times(table, TASK, protocol_called("deployable-untared"))
+    estimator = REGISTRY.estimators["frame-difference"].model_copy(update={"summaries": (summary,)})
+    _, X = frame_features(TASK, protocol_called("deployable-untared"), estimator)(table, frames)
+    begin, end = (
+        (summary.start * 0.1, summary.end * 0.1) if summary.unit == "recording" else (summary.start, summary.end)
+    )
+    for place in range(0, len(X), 17):
+        at = frames.ends_ns[place] * 1e-9 - 0.1
+        inside = (stream.time_s > at + begin) & (stream.time_s <= at + end)
+        if summary.band_hz is not None:  # the filter has seen what came before
+            signal = pytest.importorskip("scipy.signal")
+            sections = signal.butter(2, summary.band_hz, "bandpass", fs=stream.rate_hz, output="sos")
+            expected = (signal.sosfilt(sections, stream.data - stream.data[0], axis=0)[inside] ** 2).mean(axis=0)
+        else:
+            alone = replace(stream, data=stream.data[inside], time_s=stream.time_s[inside])
+            expected = summary_of(alone, Summary(measure=summary.measure), "made")
+        np.testing.assert_allclose(X[place], expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "estimator", ["pac-band", "wavelet-energy", "frame-difference", "slip-forest", "slip-spectrum"]
+)
+def test_no_frame_knows_what_comes_after_it(paths, estimator):
+    table = load_dataset(TASK, paths[:1]).tables[0]
+    frames = frame_times(table, TASK, RULES)
+    compute = frame_features(TASK, RULES, REGISTRY.estimators[estimator])
+    later = tuple(replace(one, data=np.where((one.time_s > 2.5)[:, None], 1e3, one.data)) for one in table.readings)
+    before = frames.ends_ns <= 2_500_000_000
+    _, X = compute(table, frames)
+    _, changed = compute(replace(table, readings=later), frames)
+    assert 100 < before.sum() < len(before)
+    np.testing.assert_array_equal(X[before], changed[before])
+    assert (X[~before] != changed[~before]).any(axis=1).all()
+
+
+def test_a_detector_of_vibration_finds_every_slip_and_nothing_else(paths):
+    result = run(paths)
+    assert (result.metric, result.score, result.split) == ("event_f1", 1.0, "roles")
+    events = result.events
+    assert (events["events"], events["misses"], events["false alarms per minute"]) == (3, 0, 0)
+    # The window of 0.1 s fills with louder samples after the onset, of which 10 ms (0.1 mm) pass before the label.
+    assert -10 <= events["onset latency p50 ms"] <= 110
+    assert events["displacement at detection p50 mm"] == pytest.approx(events["onset latency p50 ms"] * 0.01, abs=0.1)
+    assert events["frame balanced accuracy"] > 0.5  # of equal thresholds the highest is taken, and loses frames
+    assert result.confusion.tolist() == [[6, 0], [0, 3]]
+    assert {point["bound"] for point in result.operating_points} >= {0.0, 1.0}
+    assert any("band not observable above 1000 Hz" in one for one in result.remarks)
+
+
+def test_the_oracle_is_right_and_the_trivial_answers_are_not(paths):
+    assert run(paths, "force-ratio").score == 1.0
+    for name in ("slip-never", "slip-always"):
+        result = run(paths, name)
+        assert result.score == 0.0
+        assert result.events["misses"] == 3
+        assert result.events["frame balanced accuracy"] == 0.5
+    assert "precision" not in run(paths, "slip-never").events
+
+
+@pytest.mark.parametrize(
+    "estimator", ["wavelet-energy", "frame-difference", "slip-forest", "slip-svm", "slip-spectrum"]
+)
+def test_every_detector_answers(paths, estimator):
+    assert run(paths, estimator).score > 0.5
+
+
+def test_a_sensor_without_vibration_is_refused_with_its_band_or_answers_by_what_it_has(tmp_path):
+    made = campaign(tmp_path, vibration=False)
+    with pytest.raises(
+        NotApplicable, match=r"made has no such channel .* band not observable above 50 Hz, half the rate"
+    ):
+        run(made)
+    assert run(made, "wavelet-energy").score > 0.5
+
+
+def test_without_vibration_the_taxels_alone_are_asked(paths):
+    with pytest.raises(NotApplicable, match="pac-band"):
+        run(paths, asked=slip.TAXELS.model_copy(update={"scenes": ()}))
+    data = load_dataset(slip.TAXELS, paths)
+    assert [one.stream for one in data.tables[0].readings] == ["taxels"]
+
+
+def test_the_threshold_comes_from_validation_alone(paths, tmp_path):
+    quiet = [path for path in paths if not path.stem.startswith("test")]
+    silent = [
+        record(tmp_path / f"test-{place}-{slips}.h5", slips=slips, seed=place, loud=1.0, role="test", session="test")
+        for place in range(3)
+        for slips in (True, False)
+    ]  # fmt: skip
+    loud, other = run(paths), run([*quiet, *silent])
+    assert loud.chosen == other.chosen
+    assert other.events["misses"] == 3  # nothing to hear in these
+    assert other.score == 0.0
+
+
+def test_without_validation_recordings_a_share_of_the_training_groups_serves(tmp_path):
+    result = run(_two_sessions(tmp_path))
+    assert any("no recording has the role validation" in one for one in result.remarks)
+    assert result.score == 1.0
+
+
+def _two_sessions(folder):
+    return [
+        record(folder / f"{session}-{place}-{slips}.h5", slips=slips, seed=100 * number + 10 * place + slips,
+               role="test" if session == "c" else "train", session=session)
+        for number, session in enumerate("abc")
+        for place in range(2)
+        for slips in (True, False)
+    ]  # fmt: skip
+
+
+def test_without_disturbances_no_threshold_can_be_chosen(paths):
+    with pytest.raises(DataError, match="no disturbance to count false alarms on"):
+        run([path for path in paths if path.stem.endswith("slip")])
+
+
+def test_what_is_missing_of_the_reference_is_named(tmp_path):
+    path = record(tmp_path / "blind.h5", slips=True, seed=1, reference=False)
+    with pytest.raises(NotApplicable, match="'blind' has no normal, no tangential, no slip"):
+        load_dataset(TASK, [path])
+
+
+def test_compute_time_delays_alarms_and_changes_no_hit(paths):
+    task, estimator = TASK, REGISTRY.estimators["pac-band"]
+    data = framed(load_dataset(task, paths[:2]), task, RULES, estimator)
+    answers = EventAnswers.of(task, 0.5)
+    found = []
+    for place, table in enumerate(data.tables):
+        one = type("Part", (), {"recording": np.full(len(table.row), place), "row": table.row})
+        found += answers.scored(one, (table.y == 1).astype(float), data)
+    answers.add(found, 0.5, (), data)
+    at_once, late = answers.figures(0.0), answers.figures(0.05)
+    assert late["onset latency p50 ms"] == pytest.approx(at_once["onset latency p50 ms"] + 50.0)
+    assert late["displacement at detection p50 mm"] == pytest.approx(at_once["displacement at detection p50 mm"] + 0.5)
+    assert late["compute s per s of signal"] == pytest.approx(5.0)
+    same = ("events", "alarms", "misses", "precision", "recall", "false alarms per minute")
+    assert [late[name] for name in same] == [at_once[name] for name in same]
+
+
+def test_latency_that_is_measured_is_in_the_events(paths):
+    result = run(paths, latency=True)
+    parts = result.delay_parts_ms
+    assert result.events["compute ms a frame"] == pytest.approx(parts["features"] + parts["prediction"])
+    assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
+
+
+def test_states_are_answered_a_frame_and_shown_under_other_thresholds(paths):
+    asked = slip_state.SPEC.model_copy(update={"scenes": ()})
+    result = run(paths, "logistic", asked)
+    assert result.classes == ("stick", "incipient", "gross")
+    assert result.score > 0.4  # a third is chance
+    assert {
+        "balanced accuracy with label thresholds halved",
+        "macro F1 with label thresholds doubled",
+    } <= result.scores.keys()
+    assert run(paths, "majority", asked).score == pytest.approx(1 / 3, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"alarms": None}, "kind: events needs alarms"),
+        ({"answer_per": "sample"}, "belong together"),
+        ({"summaries": ()}, "needs summaries"),
+        ({"splits": ("in-session",)}, "cuts recordings in time"),
+    ],
+)
+def test_a_task_that_cannot_be_carried_out_is_refused(change, match):
+    with pytest.raises(ValidationError, match=match):
+        TaskSpec.model_validate({**TASK.model_dump(), **change})
+
+
+def test_a_detector_without_its_library_is_skipped_in_words(paths, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pywt", None)
+    with pytest.raises(NotApplicable, match="PyWavelets, which is not installed"):
+        run(paths, "wavelet-energy")
+
+
+def test_code_for_features_must_give_a_line_a_frame(paths):
+    wrong = EstimatorDescriptor(
+        name="wrong", title="?", kinds=("events",), where="tactbench.estimators.slip_detectors:mean_feature",
+        frames_by=f"{__name__}:one_line",
+    )  # fmt: skip
+    with pytest.raises(PluginContractError, match=r"shape \(1, 1\) for \d+ frames"):
+        framed(load_dataset(TASK, paths[:1]), TASK, RULES, wrong)
+
+
+def one_line(stream, ends_s, window_s):
+    return np.zeros((1, 1))

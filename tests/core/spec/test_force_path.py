@@ -1,0 +1,48 @@
+"""A force that runs from point to point, beside the ramp that scenes have by default."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from tactbench.plugin import ForcePath, ForceRamp, Scene, Source
+
+WHY = Source(tag="assumed", reference="test")
+
+
+def path(times_s=(0.0, 0.5, 1.0, 2.0), forces_n=(0.0, 0.0, 3.0, 1.0)):
+    return ForcePath(times_s=times_s, forces_n=forces_n, samples=100, source=WHY)
+
+
+def test_a_path_says_of_itself_what_a_ramp_says():
+    found = path()
+    assert found.corners == ((0.0, 0.5, 1.0, 2.0), (0.0, 0.0, 3.0, 1.0))
+    assert (found.start.to("N"), found.end.to("N"), found.largest_n) == (0.0, 1.0, 3.0)
+    assert (found.hold.to("s"), found.hold_s, found.duration.to("s")) == (0.5, 0.5, 2.0)
+    assert path((0.0, 1.0), (2.0, 2.0)).hold_s == 1.0
+    assert path((0.0, 1.0), (0.0, 2.0)).hold_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("times_s", "forces_n", "why"),
+    [
+        ((0.0, 1.0), (0.0,), "one force for each time"),
+        ((0.1, 1.0), (0.0, 1.0), "ascend from 0 s"),
+        ((0.0, 1.0, 1.0), (0.0, 1.0, 2.0), "ascend from 0 s"),
+        ((0.0, 1.0), (0.0, -1.0), "greater than or equal to 0"),
+        ((0.0, float("nan")), (0.0, 1.0), "finite"),
+        ((0.0,), (0.0,), "at least 2"),
+    ],
+)
+def test_a_path_that_cannot_be_run_is_refused(times_s, forces_n, why):
+    with pytest.raises(ValidationError, match=why):
+        path(times_s, forces_n)
+
+
+def test_a_scene_keeps_its_kind_of_profile_through_a_file():
+    for profile in (path(), ForceRamp()):
+        scene = Scene(name="a", profile=profile)
+        assert Scene.model_validate_json(scene.model_dump_json()) == scene
+    assert isinstance(Scene.model_validate({"name": "a", "profile": {"samples": 5}}).profile, ForceRamp)
+    with pytest.raises(ValidationError, match="stairs"):
+        Scene.model_validate({"name": "a", "profile": {"kind": "stairs"}})
