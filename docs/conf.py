@@ -21,7 +21,7 @@ pygments_style = "friendly"
 CONTENTS = {
     "Start": ("tutorial", "glossary", "choosing", "tables", "statistics"),
     "Devices and recordings": ("hardware", "links", "emulation", "mappings", "real-recordings", "format"),
-    "Plugins": ("plugins", "hooks", "plugin-reference", "stability"),
+    "Plugins": ("plugins", "hooks", "plugin-reference", "conformance", "stability"),
     "Reference": ("commands", "sensors", "estimators", "protocols", "events", "parameters", "*"),
     "Decisions": ("decisions/*",),
 }

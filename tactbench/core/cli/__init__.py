@@ -22,6 +22,7 @@ VERBS = {
     "emulate": ("emulate", "Start emulated sensors and devices on links of this machine, pressed by a simulated rig."),
     "doctor": ("doctor", "Show ports, permissions, extras and clocks, and whether a rig's devices answer."),
     "rig": ("rig", "Say what a rig would do by its file: limits, reaction times, first bytes; moves nothing."),
+    "check": ("check", "Check whether a sensor, rig, task, estimator or effect keeps what plugins promise."),
     "inspect": ("inspect", "Show what is in a recording, and whether it is healthy."),
     "import": ("import_", "Turn foreign tables, or a log of a sensor's own tools, into recordings."),
     "twin": ("twin", "Look into the simulated rig: its plans, its errors, its likeness to real sensors."),

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, Literal, TypeVar, cast
 
@@ -221,7 +222,7 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
         offered = ask_plugin(point) if reply is None else _described(reply)
     except Exception as error:
         reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", None)
-        reason = reason or f"{type(error).__name__}: {error}"
+        reason = f"{reason or f'{type(error).__name__}: {error}'}{_line_in(point.module, error)}"
         registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "failed", (), reason))
         return
     brings: list[str] = []
@@ -232,6 +233,21 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
     registry.plugins.append(
         PluginRow(point.name, point.value, distribution, version, "loaded", tuple(brings), "", remarks)
     )
+
+
+def _line_in(module: str, error: Exception) -> str:
+    """Return `` (file, line N)`` of the innermost line of a plugin's own package; "" if the error is not from there."""
+    package = module.partition(".")[0]
+    text = getattr(error, "traceback_text", "") or "".join(traceback.format_exception(error))
+    own = [
+        (Path(file), line)
+        for file, line in re.findall(r'File "([^"]+)", line (\d+)', text)
+        if package in (*Path(file).parts[:-1], Path(file).stem)
+    ]
+    if not own or _is_built_in(module):
+        return ""
+    file, line = own[-1]
+    return f" ({'/'.join(file.parts[-2:])}, line {line})"
 
 
 def _described_in_children(points: Sequence[EntryPoint], timeout_s: float) -> dict[tuple[str, str], Any]:

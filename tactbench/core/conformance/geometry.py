@@ -1,0 +1,85 @@
+"""A sensor's skin as a transducer sees it: its grid, places on its sheet, and states that a local press would leave."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tactbench.core.samples import SkinGrid, SkinState
+from tactbench.core.spec.sensor import SensorSpec, Vector
+from tactbench.core.spec.skin import FluidBackedShell, Skin, SkinSheet
+
+if TYPE_CHECKING:
+    from tactbench.core.samples import FloatArray
+
+PATCH_MM, PATCH_CELLS = 1.25, 1.5
+"""Standard deviation of a local press: half the radius of a fingertip's contact, and no less than the grid resolves
+[cells]."""
+
+
+def sheet_of(spec: SensorSpec) -> SkinSheet | None:
+    """Return the sheet of a sensor's skin; None: it declares no skin."""
+    return None if spec.skin is None else spec.skin.sheet
+
+
+def on_sheet_mm(sheet: SkinSheet, position_m: Vector) -> tuple[float, float]:
+    """Return the axial coordinate and the arc length at which a place of the sensor's frame lies on the sheet [mm]."""
+    x_mm, y_mm, z_mm = (1e3 * part for part in position_m)
+    if sheet.outer_radius is None:
+        return x_mm, y_mm
+    return x_mm, sheet.outer_radius.to("mm") * math.atan2(y_mm, -z_mm)
+
+
+def skin_grid(sheet: SkinSheet) -> SkinGrid:
+    """Return the centres of the sheet's own cells."""
+    import numpy as np
+
+    along, across = sheet.cells
+    low, high, arc = sheet.x_min.to("mm"), sheet.x_max.to("mm"), sheet.arc.to("mm")
+    x_mm: FloatArray = low + (np.arange(along) + 0.5) * (high - low) / along
+    s_mm: FloatArray = -arc / 2 + (np.arange(across) + 0.5) * arc / across
+    return SkinGrid(x_mm=x_mm, s_mm=s_mm)
+
+
+def patch_mm(grid: SkinGrid) -> float:
+    """Return the standard deviation of a local press."""
+    return max(PATCH_CELLS * max(grid.cell_mm), PATCH_MM)
+
+
+def pressed_locally(skin: Skin, grid: SkinGrid, force_n: float, at_mm: tuple[float, float] = (0.0, 0.0)) -> SkinState:
+    """Return the state that a narrow press would leave: a bell of pressure, and a dent of the same shape.
+
+    No equation is solved: it is a state that a transducer must be able to read, and that touches one place only. The
+    dent goes a third of the way through the skin at 1 N and further in proportion, never through more than nine tenths.
+    """
+    import numpy as np
+
+    sigma = patch_mm(grid)
+    bell = np.exp(-((grid.x_mm[:, None] - at_mm[0]) ** 2 + (grid.s_mm[None, :] - at_mm[1]) ** 2) / (2 * sigma**2))
+    rest = _thickness_mm(skin, grid)
+    deepest = min(force_n / 3, 0.9)
+    deflection = deepest * bell * rest
+    least = skin.residual_film.to("mm") if isinstance(skin, FluidBackedShell) else 0.0
+    return SkinState(
+        grid=grid,
+        force_n=force_n,
+        deflection_mm=deflection,
+        pressure_mpa=force_n / (2 * math.pi * sigma**2) * bell,
+        thickness_mm=np.maximum(rest - deflection, least),
+        depth_mm=float(deflection.max()),
+        fluid_pressure_mpa=0.001 * force_n if isinstance(skin, FluidBackedShell) else 0.0,
+        contact_radius_mm=math.sqrt(5.0) * sigma if force_n else 0.0,
+        residual=0.0,
+    )
+
+
+def _thickness_mm(skin: Skin, grid: SkinGrid) -> FloatArray:
+    """Return the (nx, ns) film, foam or layer of a skin at rest."""
+    import numpy as np
+
+    if isinstance(skin, FluidBackedShell):
+        outer = skin.sheet.outer_radius
+        radius = math.inf if outer is None else outer.to("mm")
+        film: FloatArray = skin.film.at(grid.x_mm, grid.s_mm / radius)
+        return film
+    return np.full((grid.x_mm.size, grid.s_mm.size), skin.thickness.to("mm"))

@@ -1,0 +1,30 @@
+"""What this package brings passes its own checks."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import pytest
+
+from tactbench.core.conformance.check import KINDS
+from tactbench.core.conformance.run import run_checks, subjects_named
+from tactbench.core.plugins.registry import installed
+
+OURS = [
+    (kind, name)
+    for kind in KINDS
+    for name in installed().families()[f"{kind}s"].names()
+    if installed().families()[f"{kind}s"].owned(name).ours
+]
+SIMULATED = {"biotac", "icub", "ideal", "twin"}
+
+
+@pytest.mark.parametrize(("kind", "name"), OURS, ids=[f"{kind}-{name}" for kind, name in OURS])
+def test_it_passes(kind, name):
+    if "forest-fast" in name and importlib.util.find_spec("sklearnex") is None:
+        pytest.skip("needs the extra fast")
+    (subject,) = subjects_named(installed(), name, (kind,))
+    report = run_checks(subject, isolated=False)
+    assert report.ok, str(report)
+    # What moves something real, or replays, shows less without its devices and recordings.
+    assert report.level == ("bronze" if kind == "rig" and name not in SIMULATED else "silver"), str(report)
