@@ -8,6 +8,8 @@ child processes: what their import does to its process, or how that ends, is no 
 from __future__ import annotations
 
 import importlib
+import re
+import traceback
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -353,10 +355,8 @@ def check_api_version(module: str, written_for: object) -> None:
     if type(written_for) is int and written_for == spoken:
         return
     if written_for is None:
-        what, hint = (
-            f"states no TACTBENCH_API; this tactbench speaks {spoken}",
-            f"Write TACTBENCH_API = {spoken} in it.",
-        )
+        what = f"states no TACTBENCH_API; this tactbench speaks {spoken}"
+        hint = f"Write TACTBENCH_API = {spoken} in it."
     elif type(written_for) is not int:
         what = f"states TACTBENCH_API = {written_for!r}, which is no whole number; this tactbench speaks {spoken}"
         hint = f"Write TACTBENCH_API = {spoken} in it."
