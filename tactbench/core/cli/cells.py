@@ -62,6 +62,7 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
         If there is no such folder or cell, or more than one cell is meant.
     """
     from tactbench.core.cli.selection import requested_matrix
+    from tactbench.core.matrix.declared import declared_in, with_declared, with_declared_of
     from tactbench.core.matrix.keys import Keys
     from tactbench.core.matrix.naming import cell_of, meant
     from tactbench.core.matrix.plan_recordings import plan_run, request_key
@@ -71,10 +72,11 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
 
     if not out.is_dir():
         raise UsageError(f"There is no folder {out}.", hint="Name one that `tactbench run --out DIR` wrote.")
-    registry, store = installed(), Store(out)
+    store = Store(out)
     recorded = Recorded(out / "cache" / "recordings.json")
-    keys = Keys(registry)
     rows = {row["cell"]: row for row in store.rows()}
+    registry = with_declared_of(installed(), rows.values())
+    keys = Keys(registry)
     known = {name: str(row.get("key", "")) for name, row in rows.items()}
     if options is None or not any(_given(name, value) for name, value in options.items()):
         try:
@@ -96,6 +98,9 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
         was = {"sensors": (rows[given]["sensor"],), "tasks": (rows[given]["task"],), "rig": rows[given]["rig"]}
         selection |= {name: value for name, value in was.items() if not selection[name]}
     matrix, folder = requested_matrix(registry, **selection)
+    if folder is not None:
+        registry = with_declared(installed(), declared_in(folder))
+        keys = Keys(registry)
     cells, needed = plan_run(matrix, registry, keys, store, folder, recorded)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
     made = tuple(needed.requests.get(request_key(cell), ()))

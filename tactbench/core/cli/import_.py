@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from tactbench.core.recording.mapping import ImportReport
     from tactbench.core.spec.scene import Role
 
+MOST_NAMED = 12
+"""Channels of recordings that are named for what they lack; the others are added up."""
 PAIRS = "KEY=VALUE"
 
 
@@ -116,16 +118,23 @@ def summary(report: ImportReport, folder: Path) -> list[str]:
     """Return what an import did, line by line."""
     from collections import Counter
 
+    from tactbench.core.spec.declared_task import FILE
+
     lines = [
         f"{report.title}: {len(report.recordings)} recordings of {', '.join(report.sensors)}, {report.rows} rows, "
         f"from {report.files_read} files, in {folder}"
     ]
-    for recording in report.recordings:
-        for channel, count in recording.missing.items():
-            lines.append(
-                f"  {recording.name}: {channel} has no sample in {count} of {recording.rows} rows; they are marked, "
-                "and no evaluation uses them"
-            )
+    if report.tasks:
+        lines.append(f"  tasks of their own, in {folder / FILE}: {', '.join(report.tasks)}")
+    without = [(one, channel, count) for one in report.recordings for channel, count in one.missing.items()]
+    for recording, channel, count in without[:MOST_NAMED]:
+        lines.append(
+            f"  {recording.name}: {channel} has no sample in {count} of {recording.rows} rows; they are marked, "
+            "and no evaluation uses them"
+        )
+    if len(without) > MOST_NAMED:
+        every = ", ".join(f"{channel} {count}" for channel, count in report.missing.items())
+        lines.append(f"  … and so in other recordings; rows without a sample in all of them: {every}")
     for reason, count in report.excluded.items():
         names = [recording.name for recording in report.recordings if recording.excluded == reason]
         shown = ", ".join(names[:3]) + (" …" if count > 3 else "")

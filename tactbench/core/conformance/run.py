@@ -189,7 +189,7 @@ def run_checks(
     while len(outcomes) < len(checks):
         waiting = [name for name in checks if name not in outcomes]
         for name in waiting:
-            blocked = _blocked(checks[name], checks, outcomes)
+            blocked = _blocked(checks[name], outcomes)
             if blocked:
                 settle(Outcome(name, "skipped", "", blocked))
         waiting = [name for name in waiting if name not in outcomes]
@@ -219,13 +219,13 @@ class _Carrier:
 
     def __init__(self, subject: Subject, failed: Sequence[str], modes: tuple[Mode, ...]) -> None:
         self._subject = subject
-        self._checks = {one.name: one for one in checks_of(subject.kind, *modes)}
+        self._modes = modes
         self._outcomes = {name: Outcome(name, "skipped") for name in failed}
 
     def __call__(self, name: str) -> tuple[str, str, str]:
         """Return status, place and text of a check."""
-        check = self._checks[name]
-        blocked = _blocked(check, self._checks, self._outcomes)
+        (check,) = [one for one in checks_of(self._subject.kind, *self._modes) if one.name == name]
+        blocked = _blocked(check, self._outcomes)
         status, where, text = ("skipped", "", blocked) if blocked else self._tried(check)
         self._outcomes[name] = Outcome(name, status, where, text)  # type: ignore[arg-type]
         return status, where, text
@@ -255,7 +255,7 @@ def _raised_by_a_check(error: BaseException) -> bool:
     return trace is not None and trace.tb_frame.f_globals.get("__name__", "").startswith(__package__)
 
 
-def _blocked(check: Check, checks: Mapping[str, Check], outcomes: Mapping[str, Outcome]) -> str:
+def _blocked(check: Check, outcomes: Mapping[str, Outcome]) -> str:
     """Return why a check cannot be tried; "" if it can."""
     for name in check.needs:
         before = outcomes.get(name)

@@ -122,10 +122,19 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
         )
     whole = task.answer_per != "sample"
     if whole:
-        tables = tuple(_whole(table, task) for table in tables)
+        tables = tuple(_whole(_reduced(table, task), task) for table in tables)
     return Dataset(
         tables, read[0][1].features, classes, dict(counts), tuple(used), _clock_stamps(repeated), whole, bool(task.vote)
     )
+
+
+def _reduced(table: Table, task: TaskSpec) -> Table:
+    """Return a recording whose target, if it is a channel, is one number: reduced over the samples that are there."""
+    if task.answer_per != "recording" or not isinstance(task.target, ChannelTarget) or not table.labelled.any():
+        return table
+    there = table.y[table.labelled]
+    number = there.max() if task.target.reduce == "max" else there.mean()
+    return replace(table, y=np.full(len(table.y), number), labelled=np.ones(len(table.y), dtype=bool))
 
 
 def _whole(table: Table, task: TaskSpec) -> Table:
@@ -222,7 +231,8 @@ Labels = tuple[npt.NDArray[Any], npt.NDArray[np.bool_]]
 
 def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Labels:
     if isinstance(task.target, LabelTarget):
-        return _label(recording.meta, task.target.name, features)
+        found = _label(recording.meta, task.target.name, features)
+        return found if task.kind == "classification" else _as_numbers(found, task.target.name, recording.meta.name)
     if isinstance(task.target, SlipTarget):  # of frames, which are made of the recording later
         return np.zeros(len(features.data)), np.ones(len(features.data), dtype=bool)
     if isinstance(task.target, VectorTarget):
@@ -232,6 +242,20 @@ def _target(recording: Recording, task: TaskSpec, features: StreamData) -> Label
         n = len(features.data)
         return np.full(n, np.nan), np.zeros(n, dtype=bool)
     return column, ~np.isnan(column)
+
+
+def _as_numbers(found: Labels, name: str, recording: str) -> Labels:
+    """Return labels as the numbers they say: a mapping's words are texts."""
+    values, there = found
+    numbers = np.full(len(values), np.nan)
+    try:
+        numbers[there] = values[there].astype(np.float64)
+    except ValueError as error:
+        raise DataError(
+            f"In recording {recording!r}, a label {name!r} is no number: {error}.",
+            hint="Ask for a class, or correct it in the mapping.",
+        ) from error
+    return numbers, there
 
 
 def _vector(recording: Recording, target: VectorTarget, features: StreamData) -> Labels:

@@ -91,6 +91,8 @@ def reference_floor(task: TaskSpec, metric: Metric, data: Dataset, tested: Answe
     """
     if metric.name != "rmse" or not isinstance(task.target, ChannelTarget) or task.target.kind != "force":
         return None, ""
+    if task.target.reduce is not None:
+        return None, ""  # a number of many samples has not the noise of one
     holds: dict[int, UnloadedHold] = {}
     for place in np.unique(tested.recording).tolist():
         table = data.tables[place]
@@ -211,7 +213,7 @@ def true_force(task: TaskSpec, data: Dataset, tested: Answers) -> FloatArray | N
     target = task.target
     if not isinstance(target, ChannelTarget) or target.kind != "force" or target.name not in (None, "normal"):
         return None
-    if target.unit != "N":
+    if target.unit != "N" or target.reduce is not None:
         return None
     out = np.zeros(len(tested))
     for place in np.unique(tested.recording).tolist():

@@ -12,7 +12,7 @@ from tactbench.core.spec.row import FORMAT
 
 JSON_KEYS = (
     "cell", "sensor", "task", "rig", "protocol", "split", "estimator", "params", "is_baseline", "looks_at",
-    "answer_per", "answer_from",
+    "answer_per", "answer_from", "declared_task",
     "repeat", "repeats", "seed", "status", "reason", "signal", "metric", "unit", "equivalence", "reference_score",
     "score", "ci_low", "ci_high", "ci_method", "reference_floor", "score_beyond_floor", "beyond_floor_ci_low",
     "beyond_floor_ci_high",

@@ -5,7 +5,8 @@ from __future__ import annotations
 GROUPS: dict[str, tuple[str, ...]] = {
     "Configuration": (
         "cell", "key", "sensor", "task", "rig", "simulated", "emulated", "protocol", "dagger", "split", "estimator",
-        "is_baseline", "looks_at", "answer_per", "answer_from", "repeat", "repeats", "seed", "threads",
+        "is_baseline", "looks_at", "answer_per", "answer_from", "declared_task", "repeat", "repeats", "seed",
+        "threads",
     ),
     "Answer": (
         "status", "reason", "signal", "metric", "unit", "score", "ci_low", "ci_high", "ci_method",

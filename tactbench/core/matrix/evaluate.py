@@ -11,7 +11,9 @@ from typing import Any
 from tactbench.core.errors import PluginContractError
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluate_cell import (
+    Asked,
     Job,
+    asked_by,
     import_estimators,
     opening,
     reused,
@@ -22,7 +24,7 @@ from tactbench.core.matrix.evaluate_cell import (
 )
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import Keys
-from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.matrix.plan_recordings import RecordingPlan
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.recorded import Recorded, read_all, read_digest
@@ -80,7 +82,7 @@ def evaluate_all(
             continue
         found = store.finished(key_of[cell.name])
         if found is not None:
-            rows[cell.name] = reused(found, cell, installed().tasks[cell.task].spec)
+            rows[cell.name] = reused(found, cell, task_of(cell, installed()))
             store.reuse(rows[cell.name])
         else:
             jobs.append(Job(cell, tuple(paths), digests if choice.name == "dask" else ()))
@@ -118,7 +120,7 @@ def _kept(cell: Cell, outcome: Any, known: Row, recorded: Recorded, store: Store
 
     if isinstance(outcome, BaseException):
         return store.note({**unanswered(cell, outcome), **known})
-    fault = fault_in(outcome, opening(cell, installed().tasks[cell.task].spec))
+    fault = fault_in(outcome, opening(cell, task_of(cell, installed())))
     if not fault:
         row, columns = outcome
         paths = [Path(path) for path in row["recordings"]]
@@ -135,9 +137,9 @@ def _kept(cell: Cell, outcome: Any, known: Row, recorded: Recorded, store: Store
 
 def _ordered(jobs: Sequence[Job], choice: EngineChoice) -> Iterable[Job]:
     """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
-    groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
+    groups: dict[tuple[Asked, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
-        groups.setdefault((job.cell.task, job.recordings), []).append(job)
+        groups.setdefault((asked_by(job.cell), job.recordings), []).append(job)
     if choice.forks(len(jobs)):
         return shared(groups, choice.pool(1))
     if choice.here(len(jobs)):

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable, RecordingError
 from tactbench.core.evaluation.libraries import import_libraries
-from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.pool.log import printed
 from tactbench.core.pool.message import dump_error, load_error
 from tactbench.core.pool.pool import Pool
 from tactbench.core.provenance.gather import host_id
+from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.row import RowModel
 from tactbench.core.spec.task import TaskSpec
@@ -42,6 +43,9 @@ class Job(NamedTuple):
     digests: tuple[str, ...] = ()
     """Of the recordings' content, which a process on another machine compares with what it reads; none: it need not."""
 
+
+Asked = tuple[str, str]
+"""Name of a task, and what its recordings declare of it if they do."""
 
 this_host = lru_cache(maxsize=1)(host_id)
 
@@ -71,11 +75,21 @@ _prepared: set[tuple[int, str, str]] = set()
 
 
 @lru_cache(maxsize=2)
-def dataset(task: str, recordings: tuple[Path, ...]) -> Dataset:
-    """Return `recordings` as `task` needs them; forked children share what has been read here."""
+def dataset(asked: Asked, recordings: tuple[Path, ...]) -> Dataset:
+    """Return `recordings` as a task needs them; forked children share what has been read here."""
     from tactbench.core.evaluation.dataset import load_dataset
 
-    return load_dataset(installed().tasks[task].spec, recordings)
+    return load_dataset(_task(asked), recordings)
+
+
+def asked_by(cell: Cell) -> Asked:
+    """Return what decides how the recordings of a cell are read: the task's name, or what declares it."""
+    return cell.task, cell.declared_task
+
+
+def _task(asked: Asked) -> TaskSpec:
+    name, declared = asked
+    return DeclaredTask.model_validate_json(declared).spec if declared else installed().tasks[name].spec
 
 
 Solved = tuple[Row, dict[str, dict[str, Any]]]
@@ -94,7 +108,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     """
     cell, recordings, digests = job
     registry = installed()
-    task, estimator = registry.tasks[cell.task].spec, registry.estimators[cell.estimator]
+    task, estimator = task_of(cell, registry), registry.estimators[cell.estimator]
     _check_content(recordings, digests)
     folder = Path.cwd()
     try:
@@ -105,7 +119,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
 
     began = time.perf_counter()
     _seed_everything(cell.seed)
-    data = dataset(cell.task, recordings)
+    data = dataset(asked_by(cell), recordings)
     context = CellContext(
         task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
         progress=working, latency=cell.latency,
@@ -156,7 +170,8 @@ def _seed_everything(seed: int) -> None:
 
 
 FIXED = ("cell", "sensor", "task", "rig", "protocol", "estimator", "params", "is_baseline", "repeat", "repeats", "seed",
-         "simulation", "answer_per", "answer_from", "metric", "unit", "equivalence", "reference_score")  # fmt: skip
+         "simulation", "declared_task", "answer_per", "answer_from",
+         "metric", "unit", "equivalence", "reference_score")  # fmt: skip
 """What a row says of its cell: evaluating it does not change it."""
 
 
@@ -179,6 +194,7 @@ def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
         "seed": cell.seed,
         "simulation": cell.simulation.model_dump(exclude_defaults=True),
         "status": "planned",
+        "declared_task": cell.declared_task,
         "answer_per": task.answer_per,
         "answer_from": task.answer_from,
         "metric": task.metric,
@@ -213,7 +229,7 @@ def unanswered(cell: Cell, why: BaseException) -> Row:
     """Return the row of a cell that was skipped or stopped."""
     error = load_error(dump_error(why))
     registry = installed()
-    row = opening(cell, registry.tasks[cell.task].spec, simulated=registry.rigs[cell.rig].simulated)
+    row = opening(cell, task_of(cell, registry), simulated=registry.rigs[cell.rig].simulated)
     if isinstance(error, NotApplicable):
         return {**row, "status": "skipped", "reason": str(error)}
     row |= {"status": "failed", "reason": str(error).rstrip(": "), "traceback": error.traceback_text}
@@ -269,25 +285,25 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def shared(groups: Mapping[tuple[str, tuple[Path, ...]], Sequence[Job]], pool: Pool) -> Iterator[Job]:
+def shared(groups: Mapping[tuple[Asked, tuple[Path, ...]], Sequence[Job]], pool: Pool) -> Iterator[Job]:
     """Yield the cells group by task and recordings; before each group, read here what several of its cells need.
 
     A child process reads it first: what stops that is not read here, and stops each of the cells in its own process.
     """
     from tactbench.core.thread_limit import find_libraries
 
-    for (task, recordings), jobs in groups.items():
+    for (asked, recordings), jobs in groups.items():
         import_estimators(job.cell for job in jobs)
         if len(jobs) > 1:
-            ((_, outcome),) = pool.each(_is_readable, [(task, recordings)])
+            ((_, outcome),) = pool.each(_is_readable, [(asked, recordings)])
             if outcome is True:
-                dataset(task, recordings)
+                dataset(asked, recordings)
         find_libraries()
         yield from jobs
 
 
-def _is_readable(task_and_recordings: tuple[str, tuple[Path, ...]]) -> bool:
-    dataset(*task_and_recordings)
+def _is_readable(asked_and_recordings: tuple[Asked, tuple[Path, ...]]) -> bool:
+    dataset(*asked_and_recordings)
     return True
 
 
@@ -297,7 +313,7 @@ def import_estimators(cells: Iterable[Cell]) -> None:
     Those of others are imported in their cells' processes only: what an import changes there, such as a library that it
     patches, changes no other cell.
     """
-    _import({(cell.estimator, installed().tasks[cell.task].spec.kind) for cell in cells})
+    _import({(cell.estimator, task_of(cell, installed()).kind) for cell in cells})
 
 
 def import_own_estimators() -> None:

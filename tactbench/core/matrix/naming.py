@@ -78,6 +78,7 @@ def cell_of(row: Mapping[str, Any]) -> Cell:
             baseline=row["is_baseline"],
             latency=row["status"] != "done" or row.get("latency_n") is not None,
             simulation=Simulation.model_validate(row.get("simulation", {})),
+            declared_task=row.get("declared_task", ""),
         )
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise UsageError(

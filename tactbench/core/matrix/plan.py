@@ -12,6 +12,7 @@ from tactbench.core.errors import UnknownNameError, UsageError
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME, is_probe, protocol_called
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.matrix import REPLICATES, EstimatorChoice, MatrixSpec, TaskChoice
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Simulation
@@ -45,6 +46,8 @@ class Cell:
     """How a simulated rig is asked to carry out its scenes."""
     rig_file: str = ""
     """What the rig file says, as canonical JSON; empty: there is none."""
+    declared_task: str = ""
+    """What the recordings declare of the task, as JSON; empty: it is an installed one."""
 
     @cached_property
     def name(self) -> str:
@@ -53,6 +56,13 @@ class Cell:
         split = f":{self.split}" if self.split else ""
         path = (self.sensor, self.task, self.rig, f"{self.protocol}{split}", f"{self.estimator}{options}")
         return "/".join((*path, str(self.repeat)))
+
+
+def task_of(cell: Cell, registry: Registry) -> TaskSpec:
+    """Return the task of a cell, in a process that may not have seen its recordings."""
+    if cell.declared_task:
+        return DeclaredTask.model_validate_json(cell.declared_task).spec
+    return registry.tasks[cell.task].spec
 
 
 def plan_cells(
@@ -81,15 +91,17 @@ def plan_cells(
     rig_file_text = rig_file.model_dump_json() if rig_file else ""
     simulated = registry.rigs[matrix.rig].simulated
     choices = _with_those_beside(matrix.tasks, registry)
-    tasks = {choice.name: registry.tasks[choice.name].spec for choice in choices}
+    tasks = {choice.name: registry.tasks.owned(choice.name) for choice in choices}
     own = {
-        name: matrix.repeats or ((task.replicates or REPLICATES) if simulated else 1) for name, task in tasks.items()
+        name: matrix.repeats or ((owned.descriptor.spec.replicates or REPLICATES) if simulated else 1)
+        for name, owned in tasks.items()
     }
     for repeat in range(1, max(own.values()) + 1):
         for choice in choices:
-            task, repeats = tasks[choice.name], own[choice.name]
+            owned, repeats = tasks[choice.name], own[choice.name]
             if repeat > repeats:
                 continue
+            task = owned.descriptor.spec
             ways = _ways(task, choice)
             answers = _estimators(task, choice, registry)
             for sensor in sensors:
@@ -109,6 +121,7 @@ def plan_cells(
                         latency=matrix.latency,
                         simulation=matrix.simulation,
                         rig_file=rig_file_text,
+                        declared_task=owned.declared.model_dump_json() if owned.declared else "",
                     )
                     cells[cell] = None  # once, in the order in which they were asked for
     return with_probes(list(cells), registry) if matrix.probe else list(cells)
@@ -142,7 +155,7 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     planned = frozenset(every)
     for cell in cells:
         rules = protocol_called(cell.protocol)
-        task = registry.tasks[cell.task].spec
+        task = task_of(cell, registry)
         if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator not in task.baselines):
             continue
         if rules.roles_only and task.splits[:1] == ("roles",):

@@ -11,7 +11,7 @@ from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
-from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves
+from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves, task_of
 from tactbench.core.matrix.recorded import Recorded, read_all, read_sensor_and_scene
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry, installed
@@ -58,7 +58,7 @@ def requests_for(
         if needed in requests:
             continue
         requests[needed] = []
-        for planned in in_drawn_order(registry.tasks[cell.task].spec.scenes_for(needed[2]), cell.seed):
+        for planned in in_drawn_order(task_of(cell, registry).scenes_for(needed[2]), cell.seed):
             scene = planned.scene.asked(simulation)
             key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
             path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tactbench.core.matrix.declared import declared_in, with_declared
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluate import evaluate_all
 from tactbench.core.matrix.key_book import KeyBook
@@ -88,7 +89,7 @@ def run_matrix(
     choice.ready()
     progress = progress or Silence()
     with store.hold():
-        registry = installed()
+        registry = with_declared(installed(), declared_in(recordings))
         keys = Keys(registry)
         recorded = Recorded(store.folder / "cache" / "recordings.json")
         book = KeyBook(store.folder / "cache" / "keys")

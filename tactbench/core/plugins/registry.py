@@ -29,6 +29,7 @@ from tactbench.core.errors import (
     UnknownNameError,
 )
 from tactbench.core.plugins import hookspecs
+from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.rig import (
     DeviceDescriptor,
     EffectDescriptor,
@@ -66,6 +67,8 @@ class Owned(Generic[D]):
     module: str
     distribution: str
     version: str
+    declared: DeclaredTask | None = None
+    """Of a task that came with recordings: what they say of it; None: a plugin's."""
 
     @property
     def ours(self) -> bool:

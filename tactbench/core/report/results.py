@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
 from tactbench.core.leaderboard.checked import checked
+from tactbench.core.matrix.declared import with_declared_of
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.samples import Answers
 from tactbench.core.statistics.replicates import over_replicates
@@ -72,4 +73,4 @@ def open_results(store: Store, registry: Registry) -> Results:
     good = checked(rows)[0]
     known = {id(row) for row in good}
     shown = (*over_replicates(good), *(row for row in rows if id(row) not in known))
-    return Results(store, registry, shown, {str(row.get("key", "")): row for row in good})
+    return Results(store, with_declared_of(registry, shown), shown, {str(row.get("key", "")): row for row in good})

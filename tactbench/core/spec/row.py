@@ -48,6 +48,7 @@ class RowModel(BaseModel):
     cell: str
     sensor: str = ""
     task: str = ""
+    declared_task: str = ""
     rig: str = ""
     protocol: str = ""
     split: str | None = None

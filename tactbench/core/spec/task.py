@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import Field, model_validator
 
@@ -58,9 +58,11 @@ class ChannelTarget(Frozen):
     name: str | None = None
     """Which one, if a recording has several of this kind; None takes the only one or the one called `normal`."""
     unit: str = "N"
+    reduce: Literal["mean", "max"] | None = None
+    """Of `answer_per: recording`: the number of a recording is this of all its samples."""
 
 
-VECTOR_METRIC = "mean_euclidean_error"
+VECTOR_METRIC: Final = "mean_euclidean_error"
 """What a vector is scored by."""
 
 
@@ -203,14 +205,17 @@ class TaskSpec(Frozen):
         if self.answer_per == "frame":
             return self
         summarised = bool(self.summaries or self.features_by)
+        reduced = isinstance(self.target, ChannelTarget) and self.target.reduce is not None
+        if reduced and self.answer_per == "sample":
+            raise ValueError("a channel is reduced to one number for answer_per: recording alone")
         if self.answer_per == "sample":
             if summarised or self.vote:
                 raise ValueError("summaries, features_by and vote belong to answer_per: recording")
             return self
         if summarised == bool(self.vote):
             raise ValueError("answer_per: recording needs either summaries or features_by, or else vote: frames")
-        if not isinstance(self.target, LabelTarget):
-            raise ValueError("answer_per: recording asks for a label")
+        if not isinstance(self.target, LabelTarget) and not reduced:
+            raise ValueError("answer_per: recording asks for a label, or for a channel with `reduce`")
         if "in-session" in self.splits:
             raise ValueError("split in-session cuts recordings in time; answer_per: recording asks each as a whole")
         unseen = {kind for one in self.summaries for kind in one.kinds} - set(self.looks_at)

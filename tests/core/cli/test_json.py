@@ -18,6 +18,7 @@ VERBS = {
     "show": ("biotac", "icub", "force"),
     "choose": ("--task", "force"),
     "inspect": ("ideal.h5",),
+    "check": ("ideal",),
     "doctor": (),
     "rig check": (str(EXAMPLE),),
     "leaderboard": (),

@@ -22,6 +22,7 @@ from tactbench.plugin import (
     ChannelTarget,
     ForceRamp,
     Indenter,
+    LabelTarget,
     Scene,
     SensorSpec,
     Source,
@@ -29,7 +30,7 @@ from tactbench.plugin import (
     Summary,
     assumed,
 )
-from tests.core.evaluation.made import label_task, record
+from tests.core.evaluation.made import force_task, label_task, record
 
 REGISTRY = load_registry()
 MOVES = (Summary(measure="deviation"), Summary(measure="mean-step"))
@@ -348,6 +349,56 @@ def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_pa
         run(vote(), [*paths, short], estimator="logistic", protocol="karl2016")
 
 
+# --- numbers
+
+
+def pushes(folder, number=18, n=60, seed=2):
+    """Recordings that rise to a force of their own, which the first channel follows; what it rests at tells nothing."""
+    rng = np.random.default_rng(seed)
+    paths, highest = [], rng.uniform(1.0, 9.0, number)
+    for place, most in enumerate(highest):
+        force = most * np.sin(np.linspace(0, np.pi, n))
+        X = np.column_stack([10 * force, rng.normal(size=n)]) + rng.normal(0, 50.0, 2)
+        label = {"most_n": f"{force.max():.6f}"}
+        paths.append(record(folder / f"p{place:02d}.h5", X, force, trial=str(place), labels=label))
+    return paths, [float((most * np.sin(np.linspace(0, np.pi, n))).max()) for most in highest]
+
+
+def number_task(**more):
+    return force_task(**{
+        "target": ChannelTarget(kind="force", reduce="max"), "answer_per": "recording",
+        "summaries": (Summary(measure="range"),), "splits": ("recording",), "protocols": ("deployable",), **more,
+    })  # fmt: skip
+
+
+def test_a_number_of_a_recording_is_a_channel_reduced(tmp_path):
+    paths, highest = pushes(tmp_path)
+    result = run(number_task(), paths, estimator="ols")
+    assert sorted(result.sets["test"].y_true) == pytest.approx(sorted(highest))
+    assert result.score < 0.1, "the range of the first channel is ten times the force; the second is noise"
+    assert run(number_task(), paths, estimator="mean").score > 1.0
+    mean = number_task(target=ChannelTarget(kind="force", reduce="mean"))
+    expected = [one * np.sin(np.linspace(0, np.pi, 60)).mean() for one in highest]
+    # The largest of 60 samples is short of the sine's own maximum by up to (pi/118)²/2.
+    assert sorted(run(mean, paths, estimator="ols").sets["test"].y_true) == pytest.approx(sorted(expected), rel=1e-3)
+
+
+def test_a_number_of_a_recording_has_no_floor_of_a_samples_noise(tmp_path):
+    result = run(number_task(), pushes(tmp_path)[0], estimator="ols")
+    assert result.beyond is None
+    assert result.true is None
+    assert not [remark for remark in result.remarks if "floor" in remark]
+
+
+def test_a_label_that_says_a_number_can_be_asked_for_as_one(tmp_path):
+    paths, highest = pushes(tmp_path)
+    asked = number_task(target=LabelTarget(name="most_n", unit="N"))
+    assert sorted(run(asked, paths, estimator="ols").sets["test"].y_true) == pytest.approx(sorted(highest), abs=1e-6)
+    worded = record(tmp_path / "worded.h5", np.ones((60, 2)), np.ones(60), labels={"most_n": "much"})
+    with pytest.raises(DataError, match="label 'most_n' is no number"):
+        run(asked, [*paths, worded], estimator="ols")
+
+
 # --- the declaration
 
 
@@ -357,6 +408,10 @@ def test_a_vote_is_asked_under_the_papers_protocol_and_of_every_recording(tmp_pa
         ({"vote": "frames"}, "or else vote"),
         ({"summaries": ()}, "needs either"),
         ({"answer_per": "sample"}, "belong to answer_per: recording"),
+        (
+            {"answer_per": "sample", "summaries": (), "target": ChannelTarget(reduce="max")},
+            "for answer_per: recording alone",
+        ),
         ({"target": ChannelTarget()}, "asks for a label"),
         ({"splits": ("recording", "in-session")}, "cuts recordings in time"),
         ({"summaries": (MOVES[0], MOVES[0])}, "the same"),

@@ -21,6 +21,7 @@ from tactbench.core.recording.mapping.channels import MappedStream, device, fill
 from tactbench.core.recording.mapping.files import FileSet, RawRecording, find, read
 from tactbench.core.recording.mapping.model import Mapping, Word
 from tactbench.core.recording.mapping.samples import check_join, labels, samples, times
+from tactbench.core.recording.mapping.tasks import check_tasks, place_tasks, require_channels, tasks_text
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.writer import RecordingWriter
 from tactbench.core.samples import Block
@@ -64,6 +65,8 @@ class ImportReport:
     title: str
     recordings: tuple[Imported, ...]
     files_read: int
+    tasks: tuple[str, ...] = ()
+    """Names of those that the mapping declares"""
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -119,6 +122,8 @@ def import_tables(
     """
     loaded = load_yaml(mapping, Mapping)
     sensor, reference, streams = sensor_of(loaded)
+    require_channels(loaded, streams, mapping)
+    tasks = tasks_text(loaded, mapping.name)
     sets = find(loaded, mapping.parent if root is None else root)
     made: list[Imported] = []
     with _aside(out) as folder:
@@ -129,8 +134,11 @@ def import_tables(
                 made.append(_write(folder / f"{meta.name}{ENDING}", meta, loaded, raw, streams))
             if progress is not None:
                 progress(done, len(sets), next(iter(files.files.values())).shown)
+        check_tasks(out, tasks, replace=replace)
         placed = _place(made, out, replace=replace)
-    return ImportReport(loaded.title, tuple(placed), _count_files(sets))
+        place_tasks(out, folder, tasks)
+    names = tuple(task.name for task in loaded.tasks)
+    return ImportReport(loaded.title, tuple(placed), _count_files(sets), names)
 
 
 @contextmanager

@@ -10,9 +10,11 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
+from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.quantity import Frozen, Quantity, Source
 from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import ChannelKind, Vector
+from tactbench.core.spec.task import LabelTarget
 
 Column = int | str
 """A column by its place (from 0) or by its name in the header."""
@@ -316,6 +318,31 @@ class Mapping(Frozen):
     recording: RecordingNames
     streams: dict[str, StreamSource] = Field(min_length=1)
     exclude: tuple[Exclusion, ...] = ()
+    tasks: tuple[DeclaredTask, ...] = ()
+    """Questions that the recordings can be asked, beside the installed ones."""
+
+    @field_validator("tasks")
+    @classmethod
+    def _tasks_can_be_asked(cls, tasks: tuple[DeclaredTask, ...], info: ValidationInfo) -> tuple[DeclaredTask, ...]:
+        streams, recording = info.data.get("streams"), info.data.get("recording")
+        if not streams or recording is None:  # they are wrong themselves
+            return tasks
+        names = [task.name for task in tasks]
+        if len(set(names)) < len(names):
+            raise ValueError("two tasks have the same name")
+        labels = {label for stream in streams.values() for label in stream.annotations} | set(recording.labels)
+        kinds = {stream.of: set[str]() for stream in streams.values()}
+        for stream in streams.values():
+            kinds[stream.of] |= {group.kind for group in stream.channels}
+        for task in tasks:
+            _require(task, "features of kind", set(task.features), kinds["sensor"])
+            if isinstance(task.target, LabelTarget):
+                _require(task, "the label", {task.target.name}, labels)
+            else:
+                _require(task, "a target of kind", {task.target.kind}, set[str]().union(*kinds.values()))
+            groups = {split for split in task.splits if not _FEW_SHOT.fullmatch(split)}
+            _require(task, "the split", groups, {*SPLITS, *labels})
+        return tasks
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Mapping:
@@ -341,6 +368,17 @@ class Mapping(Frozen):
         if arrays and len(self.tables) > 1:
             raise ValueError(f"table {arrays[0]} is an archive and cannot be joined with others")
         return self
+
+
+SPLITS = ("roles", "session", "recording", "trial", "in-session", "shuffled")
+"""That recordings can be asked for whatever their labels are."""
+_FEW_SHOT = re.compile(r"few-shot-[1-9][0-9]{0,3}")
+
+
+def _require(task: DeclaredTask, what: str, asked: set[str], there: set[str]) -> None:
+    for name in sorted(asked - there):
+        listed = ", ".join(sorted(there)) or "none"
+        raise ValueError(f"task {task.name} asks for {what} {name}, which the mapping does not have; it has {listed}")
 
 
 def _nests(parsed: Any, *, repeated: bool) -> bool:

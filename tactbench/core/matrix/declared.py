@@ -1,0 +1,82 @@
+"""Tasks that recordings bring with them, beside those that are installed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from tactbench.core.errors import UsageError
+from tactbench.core.plugins.registry import Family, Owned, Registry
+from tactbench.core.spec import declared_task
+from tactbench.core.spec.declared_task import FILE, DeclaredTask, TaskFile
+from tactbench.core.spec.rig import TaskDescriptor
+from tactbench.core.spec.yaml_file import load_yaml
+
+
+def declared_in(folder: Path | None) -> tuple[DeclaredTask, ...]:
+    """Return the tasks of a folder of recordings and of all folders below it; hidden ones are passed over.
+
+    Raises
+    ------
+    ConfigError
+        If a file of them is wrong; the message names its line.
+    UsageError
+        If two files mean different tasks by one name.
+    """
+    found: dict[str, tuple[DeclaredTask, Path]] = {}
+    paths = sorted(folder.rglob(FILE)) if folder is not None else []
+    for path in paths:
+        if folder is None or any(part.startswith(".") for part in path.relative_to(folder).parts):
+            continue
+        for task in load_yaml(path, TaskFile).tasks:
+            known, where = found.setdefault(task.name, (task, path))
+            if known != task:
+                raise UsageError(
+                    f"The task {task.name!r} is not the same in {where} and in {path}.",
+                    hint="Name a folder below with --recordings, or rename one of the two tasks.",
+                )
+    return tuple(task for task, _ in found.values())
+
+
+def with_declared(registry: Registry, tasks: Iterable[DeclaredTask]) -> Registry:
+    """Return the registry with `tasks` in it.
+
+    Raises
+    ------
+    UsageError
+        If one has the name of a task that is installed.
+    """
+    each = {task.name: task for task in tasks}
+    if not each:
+        return registry
+    family: Family[TaskDescriptor] = Family("task")
+    for name in registry.tasks.names():
+        family.add(registry.tasks.owned(name))
+    for name, task in each.items():
+        if name in registry.tasks:
+            raise UsageError(
+                f"The task {name!r} that {FILE} beside the recordings declares has the name of an installed one.",
+                hint="Give it another name in the mapping and import once more, or in that file.",
+            )
+        family.add(Owned(TaskDescriptor(spec=task.spec), declared_task.__name__, "recordings", "", task))
+    return replace(registry, tasks=family)
+
+
+def with_declared_of(registry: Registry, rows: Iterable[Mapping[str, Any]]) -> Registry:
+    """Return the registry with the tasks that rows of results carry: the last of each name.
+
+    A row that carries none that can be read, or one of an installed task's name, adds nothing: it may come from a
+    stranger.
+    """
+    found: dict[str, DeclaredTask] = {}
+    for text in dict.fromkeys(str(row.get("declared_task") or "") for row in rows):
+        with suppress(ValidationError):
+            task = DeclaredTask.model_validate_json(text)
+            if task.name not in registry.tasks:
+                found[task.name] = task
+    return with_declared(registry, found.values())
