@@ -5,6 +5,10 @@ import shutil
 
 import pytest
 
+from tactbench.core.leaderboard.records import JSON_KEYS
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.report.results import open_results
 from tests.conftest import ROOT
 
 KEPT = sorted((ROOT / "tests" / "kept_results").glob("v*"))
@@ -44,3 +48,9 @@ def test_its_answers_are_compared(verbs, kept):
 def test_it_merges(verbs, kept):
     verbs("merge", kept, kept, "--out", "all")
     assert {name: row["score"] for name, row in rows(verbs("leaderboard", "all", "--format", "json")).items()} == SCORES
+
+
+def test_a_report_is_made_of_all_its_rows(kept, tmp_path):
+    results = open_results(Store(tmp_path / kept), load_registry())
+    assert len(results.rows) == len(SCORES)
+    assert all(set(JSON_KEYS) <= set(row) for row in results.rows)
