@@ -23,10 +23,11 @@ from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality, StreamReadings
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.events import AlarmPolicy, SlipTarget
+from tactbench.core.spec.profile import ForcePath, ForceRamp
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
 from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor, SensorDescriptor, TaskDescriptor
-from tactbench.core.spec.scene import ForcePath, ForceRamp, Indenter, Placement, Role, Scene
+from tactbench.core.spec.scene import Indenter, Placement, Role, Scene
 from tactbench.core.spec.sensor import (
     ChannelKind,
     ChannelSpec,

@@ -14,10 +14,11 @@ from tactbench.core.errors import LinkUnplugged, RecordingError, RigError
 from tactbench.core.recording.reader import content_digest, open_recording
 from tactbench.core.recording.salvage import rescue
 from tactbench.core.samples import Block
+from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import Source, assumed
 from tactbench.core.spec.recording import Emulation, PlanEntry, StreamClock, StreamCounts
 from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
-from tactbench.core.spec.scene import ForceRamp, Indenter, Scene
+from tactbench.core.spec.scene import Indenter, Scene
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
 
 TAXELS = StreamSpec(name="taxels", dtype="uint16", channels=(ChannelSpec(name="t1", kind="taxel"),))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from tactbench.core.events.labels import GROSS, INCIPIENT, STICK, THRESHOLDS, UNDECIDED, slip_labels
+from tactbench.core.events.labels import GROSS, INCIPIENT, STICK, UNDECIDED, slip_labels
+from tactbench.core.spec.events import THRESHOLDS
 from tactbench.plugin import RigContext, load_object, load_registry
 from tactbench.tasks.slip_scenes import DISTURBANCES, REFERENCE_HZ, SESSIONS, SLIP_SCENES
 

@@ -15,9 +15,10 @@ from tactbench.core.cli.screen import remark
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.samples import Block
+    from tactbench.core.spec.profile import ForceProfile
     from tactbench.core.spec.rig import SensorDescriptor
     from tactbench.core.spec.rig_file import DeviceEntry, RigFile
-    from tactbench.core.spec.scene import ForceProfile, Scene
+    from tactbench.core.spec.scene import Scene
     from tactbench.core.spec.sensor import StreamSpec
     from tactbench.devices.emulation.emulated_devices import EmulatedDevice, EmulatedDevices
     from tactbench.devices.emulation.scene_samples import SceneSamples

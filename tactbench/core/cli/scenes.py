@@ -30,8 +30,9 @@ def scene_of(
     name: str, cap_mm: float | None, force_n: float | None, seconds: float | None, sensor: SensorDescriptor | None
 ) -> Scene:
     """Return the scene the options describe; what they leave open is that of the paper. None: no sensor is pressed."""
+    from tactbench.core.spec.profile import ForceRamp
     from tactbench.core.spec.quantity import sourced
-    from tactbench.core.spec.scene import ForceRamp, Indenter, Scene
+    from tactbench.core.spec.scene import Indenter, Scene
 
     reference = "the command line"
     ramp = ForceRamp()

@@ -17,10 +17,11 @@ from tactbench.core.errors import NotApplicable, TactbenchError
 from tactbench.core.plugins.interfaces import RigContext
 from tactbench.core.plugins.registry import load_object
 from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.recording import PlanEntry
 from tactbench.core.spec.rig import EffectDescriptor, RigDescriptor, SensorDescriptor
-from tactbench.core.spec.scene import Environment, ForceRamp, Scene, Simulation
+from tactbench.core.spec.scene import Environment, Scene, Simulation
 from tactbench.core.spec.sensor import StreamSpec
 
 if TYPE_CHECKING:

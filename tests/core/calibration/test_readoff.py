@@ -5,8 +5,9 @@ import pytest
 
 from tactbench.core.calibration.readoff import commanded_n, roughness
 from tactbench.core.errors import DataError
+from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.recording import RecordingMeta
-from tactbench.core.spec.scene import ForceRamp, Scene
+from tactbench.core.spec.scene import Scene
 from tests.core.evaluation.made import sensor
 
 ONE = np.zeros(6000, dtype=np.int64)

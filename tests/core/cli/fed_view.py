@@ -13,8 +13,9 @@ import numpy as np
 from tactbench.core.cli.live import LiveView
 from tactbench.core.cli.operator import TerminalOperator
 from tactbench.core.samples import Block, Quality
+from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import sourced
-from tactbench.core.spec.scene import ForceRamp, Scene
+from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
 PAD = StreamSpec(

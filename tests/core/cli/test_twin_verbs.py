@@ -20,6 +20,18 @@ def test_a_plan_is_explained_with_reasons_costs_and_bounds(verbs):
     assert rows["creep"]["scenes"] == 3
 
 
+@pytest.mark.parametrize(("task", "slides"), [("slip", True), ("force", False)])
+def test_friction_and_vibration_are_explained_where_a_task_slides_alone(verbs, task, slides):
+    words = ("twin", "explain", "--sensor", "biotac", "--task", task, "--rounds", "0", "--no-score", "--format", "json")
+    rows = {row["effect"]: row for row in json.loads(verbs(*words).stdout)}
+    for effect, why in (
+        ("friction", "slides at 10 mm/s"),
+        ("skin-vibration", "a profile of 2 um rms passes at 1.6 Hz"),
+    ):
+        assert rows[effect]["included"] == slides
+        assert rows[effect]["reason"].startswith(why if slides else "no tangential motion: the scene does not slide")
+
+
 def test_it_ends_with_the_score_with_all_effects_beside_that_with_those_chosen(verbs):
     done = verbs("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1")
     said = done.stdout[done.stdout.index("RMSE by ols (SIM)") :]

@@ -20,8 +20,9 @@ from tactbench.core.evaluation.replication import ReplicateUnits
 from tactbench.core.plugins.registry import installed
 from tactbench.core.samples import Answers
 from tactbench.core.spec.drive import ForceLoop
+from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.scene import ForceRamp, Scene
+from tactbench.core.spec.scene import Scene
 
 from .made import force_task, label_task, record
 

@@ -13,8 +13,9 @@ from tactbench.core.evaluation.protocols import DEPLOYABLE, DEPLOYABLE_UNTARED
 from tactbench.core.evaluation.splits import make_splits
 from tactbench.core.evaluation.unloaded import hold_s, tare_s, tared, unloaded
 from tactbench.core.plugins.registry import installed
+from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
-from tactbench.core.spec.scene import ForceRamp, Scene
+from tactbench.core.spec.scene import Scene
 
 from .made import force_task, record
 

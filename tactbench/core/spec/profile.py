@@ -1,0 +1,113 @@
+"""The normal force over time that a recording is to have: a ramp, or a path from point to point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise, takewhile
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, FiniteFloat, Tag, model_validator
+
+from tactbench.core.spec.quantity import Frozen, Quantity, Source, assumed, sourced
+
+PAPER = "Karl et al. 2016, ML-based tactile sensor calibration"
+
+
+class ForceRamp(Frozen):
+    """No load for `hold_s`, then a straight rise of the normal force."""
+
+    kind: Literal["ramp"] = "ramp"
+    start: Quantity = sourced(0.0, "N", PAPER)
+    end: Quantity = sourced(5.0, "N", PAPER)
+    hold: Quantity = assumed(7.2, "s", "the paper's first 600 samples: only the initialization of the setup")
+    duration: Quantity = sourced(60.0, "s", PAPER)
+    """Whole recording, the hold included."""
+    samples: int = Field(default=5000, ge=1)
+    """Samples of the reference clock over `duration`."""
+
+    @property
+    def largest_n(self) -> float:
+        """The largest force of the profile [N]."""
+        return max(self.start.to("N"), self.end.to("N"))
+
+    @property
+    def hold_s(self) -> float:
+        """How long the force stays at its start [s]: at most the whole recording."""
+        return min(self.hold.to("s"), self.duration.to("s"))
+
+    @property
+    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Times [s] and forces [N] between which the force runs straight."""
+        start, end, duration = self.start.to("N"), self.end.to("N"), self.duration.to("s")
+        if self.hold_s >= duration:
+            return (0.0, duration), (start, start)
+        return (0.0, self.hold_s, duration), (start, start, end)
+
+
+class ForcePath(Frozen):
+    """A normal force that runs straight from point to point, as in presses, taps and ripples."""
+
+    kind: Literal["path"] = "path"
+    times_s: tuple[FiniteFloat, ...] = Field(min_length=2)
+    """(k,) ascending from 0 [s]; the last is the whole recording."""
+    forces_n: tuple[Annotated[FiniteFloat, Field(ge=0)], ...]
+    """(k,) [N]"""
+    samples: int = Field(ge=1)
+    """Samples of the reference clock over the whole recording."""
+    source: Source
+    """Why these forces."""
+
+    @model_validator(mode="after")
+    def _runs(self) -> ForcePath:
+        if len(self.times_s) != len(self.forces_n):
+            raise ValueError("a force path has one force for each time")
+        if self.times_s[0] != 0 or any(b <= a for a, b in pairwise(self.times_s)):
+            raise ValueError("the times of a force path ascend from 0 s")
+        return self
+
+    @property
+    def start(self) -> Quantity:
+        """The force at the first sample."""
+        return Quantity(value=self.forces_n[0], unit="N", source=self.source)
+
+    @property
+    def end(self) -> Quantity:
+        """The force at the end."""
+        return Quantity(value=self.forces_n[-1], unit="N", source=self.source)
+
+    @property
+    def hold(self) -> Quantity:
+        """How long the force stays at its start."""
+        still = takewhile(lambda point: point[1] == self.forces_n[0], zip(self.times_s, self.forces_n, strict=True))
+        return Quantity(value=max(time for time, _ in still), unit="s", source=self.source)
+
+    @property
+    def duration(self) -> Quantity:
+        """The whole recording."""
+        return Quantity(value=self.times_s[-1], unit="s", source=self.source)
+
+    @property
+    def largest_n(self) -> float:
+        """The largest force of the profile [N]."""
+        return max(self.forces_n)
+
+    @property
+    def hold_s(self) -> float:
+        """How long the force stays at its start [s]."""
+        return self.hold.value
+
+    @property
+    def corners(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Times [s] and forces [N] between which the force runs straight."""
+        return self.times_s, self.forces_n
+
+
+def _profile_kind(given: Any) -> str:
+    """Return which profile is meant; one that states no kind is a ramp."""
+    return str(given.get("kind", "ramp") if isinstance(given, Mapping) else getattr(given, "kind", "ramp"))
+
+
+ForceProfile = Annotated[
+    Annotated[ForceRamp, Tag("ramp")] | Annotated[ForcePath, Tag("path")], Discriminator(_profile_kind)
+]
+"""The normal force over time."""
