@@ -3,8 +3,21 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from tactbench.core.plugins.registry import Registry
+
+
+def tell_failed(registry: Registry) -> None:
+    """Say on stderr which plugins could not be used; nothing if all could."""
+    from tactbench.core.cli.screen import remark
+
+    if registry.failures or registry.refused:
+        names = [row.entry_point for row in registry.failures] + [error.message for error in registry.refused]
+        remark(f"Some plugins could not be used: {'; '.join(names)}. See `tactbench plugins`.")
 
 
 @click.command(name="plugins")
