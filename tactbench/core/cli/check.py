@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,7 @@ _KINDS = ("sensor", "rig", "task", "estimator", "effect")
               help="Which devices stand on which lines, for --invasive.")  # fmt: skip
 @click.option("--yes", is_flag=True, help="Do not ask before something is opened or moves.")
 @click.option("--all", "every", is_flag=True, help="Also list the checks that passed.")
-@click.option("--timeout", type=click.FloatRange(min=1), default=60.0, show_default=True, metavar="S",
+@click.option("--timeout", type=click.FloatRange(min=1), default=30.0, show_default=True, metavar="S",
               help="Seconds that one check may take.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
 @click.pass_context
@@ -74,6 +75,10 @@ def command(
     modes += ("recording",) if recording is not None else ()
     if recording is not None and any(one.kind != "sensor" for one in subjects):
         subjects = [one for one in subjects if one.kind == "sensor"]
+    if invasive and not yes and not sys.stdin.isatty():
+        raise UsageError(
+            "--invasive asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."
+        )
     if invasive and not yes:
         what = ", ".join(f"the {one.kind} {one.name}" for one in subjects)
         click.confirm(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from tactbench.core.cli.plugins import tell_failed
 from tactbench.core.tables.text import json_text
 
 SCENARIOS = "scenarios"
@@ -41,5 +42,4 @@ def command(family: str | None, shape: str) -> None:
         width = max((len(entry) for entry in entries), default=0)
         for entry, title in entries.items():
             click.echo(f"  {entry:<{width}}  {title}")
-    if registry.failures or registry.refused:
-        click.echo("Some plugins could not be used: see `tactbench plugins`.", err=True)
+    tell_failed(registry)

@@ -3,8 +3,21 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from tactbench.core.plugins.registry import Registry
+
+
+def tell_failed(registry: Registry) -> None:
+    """Say on stderr which plugins could not be used; nothing if all could."""
+    from tactbench.core.cli.screen import remark
+
+    if registry.failures or registry.refused:
+        names = [row.entry_point for row in registry.failures] + [error.message for error in registry.refused]
+        remark(f"Some plugins could not be used: {'; '.join(names)}. See `tactbench plugins`.")
 
 
 @click.command(name="plugins")
@@ -27,6 +40,9 @@ def command(ctx: click.Context, shape: str) -> None:
             click.secho(f"{row.entry_point:<{width}}  ", nl=False, bold=True)
             click.secho(f"{row.status:<7}", nl=False, fg="green" if row.status == "loaded" else "red")
             click.echo(f"{row.distribution} {row.version}  {brought}")
+            for remark in row.remarks:
+                click.secho(f"{'':<{width}}  remark ", nl=False, fg="yellow")
+                click.echo(remark)
         for text in refused:
             click.secho(text, fg="red")
     ctx.exit(1 if registry.failures or refused else 0)

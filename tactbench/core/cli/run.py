@@ -57,6 +57,7 @@ def command(
     check_destination(shape)
     one_thread()
     from tactbench.core.cli.operator import TerminalOperator
+    from tactbench.core.cli.plugins import tell_failed
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.files import write_tables
@@ -66,6 +67,7 @@ def command(
     from tactbench.core.plugins.registry import installed
     from tactbench.core.statistics.replicates import over_replicates
 
+    tell_failed(installed())
     matrix, folder = requested_matrix(installed(), **selection)
     choice = choice_of(matrix, engine=engine, jobs=jobs, timeout=timeout, memory=memory, scheduler=scheduler)
     store = Store(out)

@@ -37,6 +37,8 @@ def question(kind: str) -> tuple[FloatArray, npt.NDArray[Any], FloatArray, npt.N
     y = truth
     if kind == "classification":
         y = np.digitize(truth, np.quantile(truth, [1 / CLASSES, 2 / CLASSES])).astype(np.int64)
+    if kind == "events":  # which frames hold one
+        y = (truth > np.median(truth)).astype(np.int64)
     return X[:ROWS], y[:ROWS], X[ROWS:], y[ROWS:]
 
 
@@ -274,6 +276,10 @@ def it_learns(subject: Subject) -> None:
     for kind in descriptor.kinds:
         _, y, _, truth = question(kind)
         given = _answers(subject, kind, quick=False)
+        if kind == "events":  # scores, the higher the surer
+            if not given[truth == 1].mean() > given[truth == 0].mean():
+                fail("predict", "events: its scores are not higher for frames with one")
+            continue
         if kind == "regression":
             error, bar = np.sqrt(np.mean((given - truth) ** 2)), np.sqrt(np.mean((y.mean() - truth) ** 2))
         else:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, field_validator
 
+from tactbench.core.errors import UsageError
 from tactbench.core.spec import units
 
 Tag = Literal["sourced", "measured", "derived", "assumed"]
@@ -49,6 +50,29 @@ class Quantity(Frozen):
 
     def __str__(self) -> str:
         return f"{self.value:g} {self.unit}"
+
+
+def _measuring(unit: str) -> AfterValidator:
+    """Return what refuses a quantity that cannot be turned into `unit`; pydantic then names the field."""
+
+    def checked(given: Quantity) -> Quantity:
+        try:
+            given.to(unit)
+        except UsageError as error:
+            raise ValueError(f"{error.message} A quantity in {unit}, or a unit like it, is needed.") from error
+        return given
+
+    return AfterValidator(checked)
+
+
+Length = Annotated[Quantity, _measuring("mm")]
+Pressure = Annotated[Quantity, _measuring("MPa")]
+Stiffness = Annotated[Quantity, _measuring("MPa/mm")]
+"""Pressure per length."""
+Tension = Annotated[Quantity, _measuring("N/mm")]
+BendingStiffness = Annotated[Quantity, _measuring("N*mm")]
+Time = Annotated[Quantity, _measuring("s")]
+Share = Annotated[Quantity, _measuring("1")]
 
 
 def sourced(value: float, unit: str, reference: str) -> Quantity:

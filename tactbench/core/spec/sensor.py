@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from tactbench.core.errors import NotApplicable, UsageError
 from tactbench.core.spec import units
 from tactbench.core.spec.figure import RealFigure
-from tactbench.core.spec.quantity import Frozen, Quantity, Source, assumed
+from tactbench.core.spec.quantity import Frozen, Quantity, Share, Source, Time, assumed
 from tactbench.core.spec.skin import Skin
 
 ChannelKind = Literal[
@@ -54,7 +54,8 @@ class ChannelSpec(Frozen):
     sign: Literal[-1, 0, 1] = 0
     """+1: the reading rises under load; -1: it falls; 0: either, or not known."""
     position_m: Vector | None = None
-    """Place on the sensor, metres, in the sensor's frame (x towards the tip, -z towards the pad)."""
+    """Place (x, y, z) on the sensor [m], in the sensor's frame: x along the finger towards the tip, y across, -z to the
+    pad that is pressed. On the skin's sheet, x is the axial coordinate and y, or on a finger its arc, is s."""
     normal: Vector | None = None
     """Outward unit normal at that place."""
     position_source: Source | None = None
@@ -88,9 +89,9 @@ class StreamSpec(Frozen):
 class Creep(Frozen):
     """One exponential term by which the response lags behind the load."""
 
-    fraction: Quantity
+    fraction: Share
     """Share of the response that arrives late [1]."""
-    tau: Quantity
+    tau: Time
     """Its time constant [time]."""
 
 
@@ -101,7 +102,10 @@ _ANY_TIME = assumed(1.0, "s", "without effect")
 
 
 class Nuisances(Frozen):
-    """What comes on top of the physics, for all channels of one kind. Counts are the channel's own unit.
+    """What comes on top of the physics, for all channels of one kind.
+
+    Amounts are in the channel's own unit, ``count`` for raw readings, and added to readings as they are. Shares are in
+    1, time constants in a time.
 
     What is left out is 0; a warm-up or a wander needs its time constant.
     """
@@ -118,13 +122,13 @@ class Nuisances(Frozen):
     """Standard deviation of each channel's gain within one sensor unit [1]."""
     warm_up: Quantity = _NO_COUNTS
     """How far the shared rest level rises from power-on to equilibrium."""
-    warm_up_tau: Quantity = _ANY_TIME
+    warm_up_tau: Time = _ANY_TIME
     """Time constant of that rise [time]."""
     warm_up_scatter: Quantity = _NO_SHARE
     """Standard deviation of the factors with which channels follow it [1]."""
     wander: Quantity = _NO_COUNTS
     """Standard deviation of free drift (Ornstein–Uhlenbeck)."""
-    wander_tau: Quantity = _ANY_TIME
+    wander_tau: Time = _ANY_TIME
     """Its correlation time [time]."""
     step: Quantity = _NO_COUNTS
     """Step of the converter."""
@@ -258,7 +262,7 @@ class SensorSpec(Frozen):
     """How a taxel measures: resistive, capacitive, magnetic …"""
     principle_source: Source
     streams: tuple[StreamSpec, ...] = Field(min_length=1)
-    link_delay: Quantity | None = None
+    link_delay: Time | None = None
     """From a sample taken to the sample in the host: frame and bus [time]. None: nobody states it."""
     skin: Skin | None = None
     """None: the sensor cannot be simulated, only recorded or replayed."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from tactbench.core.spec.quantity import Frozen, Quantity, Source
+from tactbench.core.spec.quantity import BendingStiffness, Frozen, Length, Pressure, Share, Source, Stiffness, Tension
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,7 +25,7 @@ class Dome(Frozen):
     everywhere (Archimedes; Lambert's cylindrical projection), so that loads and volumes are the finger's.
     """
 
-    start: Quantity
+    start: Length
     """Axial coordinate at which the dome begins; towards positive x [length]."""
 
 
@@ -79,13 +79,13 @@ class SheetTable(Frozen):
 class SkinSheet(Frozen):
     """The unrolled skin: a rectangle, axial coordinate x by arc length s, s = 0 on the midline."""
 
-    x_min: Quantity
+    x_min: Length
     """Axial lower end [length]."""
-    x_max: Quantity
+    x_max: Length
     """Axial upper end [length]; towards the tip of a finger."""
-    arc: Quantity
+    arc: Length
     """Width of the sheet along the surface [length], centred on s = 0."""
-    outer_radius: Quantity | None = None
+    outer_radius: Length | None = None
     """Radius of the finger's outer surface [length]; None for a flat pad."""
     dome: Dome | None = None
     """The tip, where the finger ends in one; None: a cylinder (or a flat pad) throughout."""
@@ -93,7 +93,7 @@ class SkinSheet(Frozen):
     """How far the finger's unloaded surface lies inside that cylinder and dome; None: nowhere."""
     cells: tuple[int, int] = (48, 64)
     """Default grid, axial x arc."""
-    pad: tuple[Quantity, Quantity, Quantity] | None = None
+    pad: tuple[Length, Length, Length] | None = None
     """Active part (x_min, x_max, arc) inside soft margins; None: the whole sheet is active."""
 
 
@@ -102,24 +102,27 @@ class FluidBackedShell(Frozen):
 
     medium: Literal["fluid-backed shell"] = "fluid-backed shell"
     sheet: SkinSheet
-    young: Quantity
-    poisson: Quantity
-    thickness: Quantity
-    mid_radius: Quantity
+    young: Pressure
+    """Young's modulus of the sleeve [pressure]."""
+    poisson: Share
+    """Its Poisson's ratio, 0 to 0.5 [1]."""
+    thickness: Length
+    """Of the sleeve [length]."""
+    mid_radius: Length
     """Radius of the shell's middle surface [length]."""
-    tension: Quantity
+    tension: Tension
     """Membrane tension [force / length]."""
-    contact_stiffness: Quantity
+    contact_stiffness: Stiffness
     """Through-thickness stiffness of the skin under an indenter [pressure / length]."""
-    core_stiffness: Quantity
+    core_stiffness: Stiffness
     """Penalty of the core once the film is closed [pressure / length]."""
     film: SheetTable
     """The fluid film at rest."""
-    residual_film: Quantity
+    residual_film: Length
     """Film that asperities keep open at touch-down [length]."""
-    clamp_stiffness: Quantity
+    clamp_stiffness: Stiffness
     """Clamp at the sleeve's ends and seam [pressure / length]."""
-    clamp_length: Quantity
+    clamp_length: Length
     """Decay length of that clamp [length]."""
 
 
@@ -128,18 +131,20 @@ class FoamPad(Frozen):
 
     medium: Literal["foam pad"] = "foam pad"
     sheet: SkinSheet
-    young: Quantity
+    young: Pressure
     """Oedometric modulus of the foam [pressure]."""
-    shear: Quantity
+    shear: Pressure
     """Shear modulus of the foam [pressure]."""
-    thickness: Quantity
-    densification: Quantity
+    thickness: Length
+    """Of the foam at rest, between cover and base [length]."""
+    densification: Share
     """Strain at which the foam is solid [1]."""
-    cover_tension: Quantity
-    cover_bending: Quantity
+    cover_tension: Tension
+    """Membrane tension of the cover [force / length]."""
+    cover_bending: BendingStiffness
     """Bending stiffness of the cover [force x length]."""
-    contact_stiffness: Quantity
-    """Stiff penalty, not a material value [pressure / length]."""
+    contact_stiffness: Stiffness
+    """How stiffly the cover keeps an indenter out [pressure / length]: a penalty, no material value."""
 
 
 class BondedLayer(Frozen):
@@ -147,11 +152,15 @@ class BondedLayer(Frozen):
 
     medium: Literal["bonded layer"] = "bonded layer"
     sheet: SkinSheet
-    young: Quantity
-    poisson: Quantity
-    thickness: Quantity
-    contact_stiffness: Quantity
-    """Stiff penalty, not a material value [pressure / length]."""
+    young: Pressure
+    """Young's modulus of the layer [pressure]."""
+    poisson: Share
+    """Its Poisson's ratio, 0 to below 0.5 [1]."""
+    thickness: Length
+    """Of the layer at rest, between surface and base [length]."""
+    contact_stiffness: Stiffness
+    """How stiffly the surface keeps an indenter out [pressure / length]: a penalty, no material value. That of the
+    sensor `ideal` is 60 times its young / thickness; a soft one lets the indenter sink in and deforms no layer."""
 
 
 Skin = Annotated[FluidBackedShell | FoamPad | BondedLayer, Field(discriminator="medium")]

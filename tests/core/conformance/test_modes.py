@@ -1,0 +1,106 @@
+"""The verb: what it opens, what it says, and how it ends; and plugins that hang, crash or would be let off."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tactbench.core.conformance.check import Outcome
+from tactbench.core.conformance.run import Report, run_checks, subjects_named
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.plugins.rig_devices import emulated_device
+from tactbench.core.spec.rig_file import DeviceEntry
+from tactbench.devices.emulation.emulated_devices import EmulatedDevices
+from tests.conftest import THIRD_PARTY
+from tests.core.conformance.test_recorded import written
+
+
+def test_a_sound_plugin_ends_with_0_and_says_how_many_checks_ran(verbs):
+    done = verbs("check", "acme-pad", "--all", plugins=("good",))
+    last = done.stdout.splitlines()[-1]
+    assert last.startswith("sensor acme-pad: ran ")
+    assert "failed 0" in last
+    assert last.endswith("Level: silver.")
+    assert "skipped  9 checks: it names no driver" in done.stdout
+    assert "passed   positions-are-on-the-sheet" in done.stdout
+
+
+def test_by_the_name_of_its_plugin_all_that_it_brings_is_checked(verbs):
+    found = json.loads(verbs("check", "wired-tactile", "--format", "json", plugins=("wired",)).stdout)
+    assert {(one["kind"], one["name"], one["ok"]) for one in found["checked"]} == {
+        ("rig", "wired-rig", True), ("sensor", "wired-pad", True),
+    }  # fmt: skip
+
+
+def test_one_that_cannot_be_loaded_is_named_with_its_line(verbs):
+    done = verbs("check", "broken-tactile", plugins=("broken",), code=1)
+    assert "the vendor library is not installed (broken_tactile/__init__.py, line 1)" in done.stdout
+    asked_otherwise = verbs("check", "broken-pad", plugins=("broken",), code=1)
+    assert "There is no plugin called 'broken-pad'" in asked_otherwise.stderr
+    assert "the vendor library is not installed" in asked_otherwise.stdout
+
+
+def test_a_name_that_nothing_has_is_a_wrong_command(verbs):
+    assert "Did you mean 'ideal'" in verbs("check", "ideel", code=2).stderr
+
+
+def test_a_plugin_that_could_not_be_used_is_mentioned_by_run(verbs):
+    done = verbs("run", "--sensor", "nobody", "--task", "force", plugins=("broken",), code=2)
+    assert "Some plugins could not be used: broken." in done.stderr
+
+
+@pytest.mark.parametrize(("name", "says"), [("evil-hang", "longer than 2 s"), ("evil-abort", "SIGABRT")])
+def test_one_that_hangs_or_crashes_fails_its_check_and_ends_nothing(shell, name, says):
+    done = shell("check", name, "--timeout", "2", "--format", "json", plugins=("evil",), code=1)
+    (report,) = json.loads(done.stdout)["checked"]
+    failed = [one for one in report["checks"] if one["status"] == "failed"]
+    assert [one["check"] for one in failed] == ["answers-have-the-shape"]
+    assert says in failed[0]["text"]
+    untried = [one["text"] for one in report["checks"] if one["status"] == "skipped"]
+    assert "not tried, for answers-have-the-shape has not passed" in untried
+
+
+def test_reading_a_recording_imports_no_code_of_the_plugin(verbs, tmp_path):
+    path = written(tmp_path / "press.h5", "in grams")
+    done = verbs("check", "icub", "--recording", str(path), "--format", "json", code=1)
+    (report,) = json.loads(done.stdout)["checked"]
+    assert report["modes"] == ["recording"]
+    assert [one["check"] for one in report["checks"] if one["status"] == "failed"] == ["recording-force-is-in-newtons"]
+
+
+def test_nothing_is_opened_without_a_yes(verbs):
+    assert "--yes" in verbs("check", "icub", "--invasive", code=2).stderr
+    assert "--invasive" in verbs("check", "icub", "--rig-file", __file__, code=2).stderr
+
+
+def test_with_a_yes_a_real_line_is_opened_and_read(tmp_path):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(THIRD_PARTY / "flawed")
+        registry = load_registry()
+        (subject,) = subjects_named(registry, "sound-pad")
+        descriptor = registry.sensors["sound-pad"]
+        entry = DeviceEntry(link="emulated")
+        device = emulated_device(descriptor, "sound-pad", entry, lambda t_s: dict.fromkeys("abcd", 100.0), 1)
+        file = tmp_path / "rig.yaml"
+        with EmulatedDevices({"sound-pad": device}, time="real") as devices:
+            link = devices.addresses["sound-pad"]
+            file.write_text(f"version: 1\nrig: bench\nsensors:\n  sound-pad: {{link: {json.dumps(link)}}}\n")
+            report = run_checks(subject, modes=("invasive",), rig_file=file, isolated=False)
+    assert [(one.check, one.status) for one in report.outcomes] == [("real-device-answers", "passed")]
+
+
+def test_expected_failures_are_reported_with_their_reason():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(THIRD_PARTY / "flawed")
+        (subject,) = subjects_named(load_registry(), "excuses-its-flaw")
+        report = run_checks(subject, isolated=False)
+    assert [(one.check, one.text) for one in report.expected] == [("normals-are-unit", "the data sheet has it so")]
+    assert report.ok
+    assert report.level is None  # what bronze asks for is not there, expected or not
+
+
+def test_a_report_of_nothing_is_none():
+    report = Report("sensor", "x", ("passive",), (Outcome("json-round-trip", "passed"),))
+    assert report.level is None
+    assert "ran 1, passed 1" in str(report)

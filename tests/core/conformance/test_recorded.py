@@ -1,0 +1,94 @@
+"""Checks that read a recording alone: each variant of one fails the check that is meant for it, and no other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactbench.core.conformance.kit import checks_of
+from tactbench.core.conformance.run import run_checks, subjects_named
+from tactbench.core.plugins.registry import installed
+from tactbench.core.recording.writer import RecordingWriter
+from tactbench.core.samples import Block
+from tactbench.core.spec.recording import RecordingMeta
+from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
+
+RATE_HZ = 50.0
+FORCE = StreamSpec(
+    name="force_torque", rate_hz=RATE_HZ, channels=(ChannelSpec(name="fz", kind="force", unit="N", sign=1),)
+)
+VARIANTS = {
+    "sound": None,
+    "of another sensor": "recording-is-of-this-sensor",
+    "with a dead channel": "recording-is-healthy",
+    "with a clock that goes back": "recording-clock-goes-forward",
+    "at another rate": "recording-has-the-rate",
+    "beyond the limits": "recording-keeps-the-limits",
+    "in grams": "recording-force-is-in-newtons",
+    "of nothing": "recording-shows-a-response",
+    "with the sign turned": "recording-has-the-sign",
+}
+
+
+def written(path, variant, *, simulated=False):
+    """Write a press on an iCub fingertip, whose readings fall by 20 counts a newton."""
+    spec = installed().sensors["icub"].spec
+    n = 200
+    t_ns = (np.arange(n) / (RATE_HZ if variant != "at another rate" else 90.0) * 1e9).astype(np.int64)
+    if variant == "with a clock that goes back":
+        t_ns[120:] -= 1_000_000_000
+    force = np.interp(np.arange(n), [0, 50, n], [0.0, 0.0, 5.0])
+    sign = {"of nothing": 0.0, "with the sign turned": -1.0}.get(variant, 1.0)
+    level = 120.0 if variant == "with the sign turned" else 200.0
+    spread = np.linspace(0.5, 1.0, 12)
+    data = np.round(level - sign * 20.0 * np.outer(force, spread))
+    stream = spec.streams[0]
+    if variant == "beyond the limits":
+        stream = stream.model_copy(update={"dtype": "int16"})
+        data[7, 3] = 300.0
+    quality = np.zeros(data.shape, np.uint8)
+    if variant == "with a dead channel":
+        quality[:, 2] = 1
+    own = spec.model_copy(update={"streams": (stream,)})
+    if variant == "of another sensor":
+        own = own.model_copy(update={"name": "another"})
+    meta = RecordingMeta(name="press", sensor=own, reference=(FORCE,), rig="bench", simulated=simulated, clock="host")
+    if variant == "in grams":
+        force = force * 1000 / 9.80665
+        force[-1] = 1020.0
+    with RecordingWriter(path, meta) as writer:
+        writer.append(Block(stream.name, t_ns, data, quality=quality))
+        writer.append(Block("force_torque", t_ns, force[:, None]))
+    return path
+
+
+def report_of(path):
+    (subject,) = subjects_named(installed(), "icub", ("sensor",))
+    return run_checks(subject, modes=("recording",), recording=path, isolated=False)
+
+
+@pytest.mark.parametrize(("variant", "meant"), VARIANTS.items(), ids=list(VARIANTS))
+def test_each_is_caught_by_the_check_that_is_meant_for_it(tmp_path, variant, meant):
+    failed = report_of(written(tmp_path / "press.h5", variant)).failed
+    assert [one.check for one in failed] == ([] if meant is None else [meant])
+    assert all(one.where for one in failed)
+
+
+def test_every_check_of_a_recording_has_caught_one():
+    skips_alone = {"recording-is-of-a-real-unit"}
+    assert {one.name for one in checks_of("sensor", "recording")} - skips_alone == set(VARIANTS.values()) - {None}
+
+
+def test_a_real_unit_is_gold_and_a_simulated_one_is_not(tmp_path):
+    (subject,) = subjects_named(installed(), "icub", ("sensor",))
+    for simulated, level in ((False, "gold"), (True, "silver")):
+        path = written(tmp_path / f"{level}.h5", "sound", simulated=simulated)
+        report = run_checks(
+            subject, modes=("passive", "recording"), recording=path, isolated=False, without=("import-is-light",)
+        )
+        assert report.ok
+        assert report.level == level
+
+
+def test_without_the_passive_checks_there_is_no_level(tmp_path):
+    assert report_of(written(tmp_path / "press.h5", "sound")).level is None
