@@ -530,8 +530,8 @@ def scenes_of(observe: tuple[str, ...]) -> Iterator[Scene]:
 
 def first_that_goes(
     subject: Subject, scenes: Sequence[Scene], asked: str, where: str
-) -> tuple[Any, RigDescriptor, SensorDescriptor, Scene] | None:
-    """Return a rig, a sensor and a scene with which a simulation goes; None: every pair is not applicable.
+) -> tuple[Any, RigDescriptor, SensorDescriptor, Scene, Press] | None:
+    """Return a rig, a sensor and a scene with which a simulation goes, and the press; None: none is applicable.
 
     `asked` is an effect that is included by name; "" for none.
     """
@@ -542,12 +542,12 @@ def first_that_goes(
         for sensor in simulated_sensors(subject):
             try:
                 with code_of(where, subject.package):
-                    carried_out(rig, descriptor, sensor, scene, 1)
+                    made = carried_out(rig, descriptor, sensor, scene, 1)
             except AssertionError as error:
                 if isinstance(error.__cause__, NotApplicable):
                     continue
                 raise
-            return rig, descriptor, sensor, scene
+            return rig, descriptor, sensor, scene, made
     return None
 
 

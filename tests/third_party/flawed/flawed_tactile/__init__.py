@@ -49,6 +49,7 @@ CAUGHT_BY = {
         "driver-is-a-number": "driver-says-who-it-is",
         "driver-has-a-stream-of-its-own": "driver-streams-are-the-specs",
         "driver-goes-back-in-time": "driver-reads",
+        "driver-swaps-taxels": "driver-reads-what-is-sensed",
         "driver-doubles-samples": "driver-keeps-its-rate",
         "driver-waits-anyhow": "driver-does-not-wait-when-told-so",
         "driver-leaves-its-line-open": "driver-closes-its-line",
@@ -95,6 +96,9 @@ CAUGHT_BY = {
         "task-with-features-of-nan": "features-by-gives-features",
         "task-compared-with-nothing": "published-figures-are-comparable",
         "task-that-presses-nothing": "its-scene-is-carried-out",
+        "task-of-a-shear-that-nobody-records": "its-target-is-recorded",
+        "task-of-a-force-in-metres": "metric-has-its-unit",
+        "task-in-kilonewtons": "metric-has-its-unit",
         "task-that-asks-nothing": "docs-are-present",
     },
     "estimator": {
