@@ -108,10 +108,11 @@ class RowDriver(Driver, Generic[L]):
         self.ask()
         times: list[int] = []
         found: list[Row] = []
+        link: Any = self.link
+        until_s = link.timer() + timeout_s
         for _ in range(AT_ONCE):
-            wait_s = 0.0 if found else timeout_s
+            wait_s = 0.0 if found else max(0.0, until_s - link.timer())
             try:
-                link: Any = self.link
                 received = link.read(wait_s) if isinstance(link, ByteLink) else link.receive(wait_s)
             except LinkTimeout:
                 break
@@ -122,8 +123,6 @@ class RowDriver(Driver, Generic[L]):
             fresh = list(self.rows(received))
             times += [received.t_ns] * len(fresh)
             found += fresh
-            if isinstance(link, ByteLink):
-                break  # one read takes all that has come
         if not found:
             return []
         data = np.array([row.values for row in found]).astype(self.stream.dtype)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
@@ -28,6 +29,8 @@ class RowEmulator(ABC):
     """Rows a second while it samples; 0: only when it is asked."""
     from_power_on: ClassVar[bool] = False
     """Whether it samples without being told to."""
+    answer_s: ClassVar[float] = 1e-3
+    """Seconds that an answer takes; above 0, or the time of a host that asks again at once would stand still."""
 
     def __init__(self, settings: EmulatorSettings) -> None:
         for fault in settings.faults:
@@ -35,6 +38,7 @@ class RowEmulator(ABC):
         self.settings = settings
         self._since_s = 0.0 if self.from_power_on else math.inf
         self._rows = 0
+        self._answers: deque[Sent] = deque()
 
     @abstractmethod
     def sent(self, values: Sequence[float]) -> Iterable[bytes | CanFrame]:
@@ -55,17 +59,22 @@ class RowEmulator(ABC):
 
     def feed(self, piece: bytes | CanFrame, now_s: float) -> Sequence[Sent]:
         """Take what came from the host."""
-        before = list(self.poll(now_s))
-        return [*before, *((now_s, answer) for answer in self.told(piece, now_s))]
+        before = self.poll(now_s)
+        self._answers.extend((now_s + self.answer_s, answer) for answer in self.told(piece, now_s))
+        return before
 
     def poll(self, now_s: float) -> Sequence[Sent]:
         """Return the rows that are due."""
         found: list[Sent] = []
         while (due_s := self.next_s()) <= now_s:
-            found += [(due_s, piece) for piece in self.sent(self.sensed(due_s))]
-            self._rows += 1
+            if self._answers and self._answers[0][0] <= due_s:
+                found.append(self._answers.popleft())
+            else:
+                found += [(due_s, piece) for piece in self.sent(self.sensed(due_s))]
+                self._rows += 1
         return found
 
     def next_s(self) -> float:
-        """Return when the next row is due."""
-        return math.inf if not self.rate_hz else self._since_s + (self._rows + 1) / self.rate_hz
+        """Return when the next row or answer is due."""
+        row_s = self._since_s + (self._rows + 1) / self.rate_hz if self.rate_hz else math.inf
+        return min(row_s, self._answers[0][0]) if self._answers else row_s

@@ -17,7 +17,7 @@ from tactbench.core.errors import (
     UnknownNameError,
     UsageError,
 )
-from tactbench.core.plugins.hookspecs import hookimpl
+from tactbench.core.plugins.hookspecs import API_VERSION, hookimpl
 from tactbench.core.plugins.interfaces import Acquisition, Estimator, ReplayRig, Rig, RigContext
 from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality, StreamReadings
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from tactbench.core.samples import FloatArray
 
 __all__ = [
+    "API_VERSION",
     "Acquisition",
     "AlarmPolicy",
     "Block",

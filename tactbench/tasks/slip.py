@@ -39,8 +39,8 @@ SPEC = TaskSpec(
     protocols=("deployable", "deployable-untared"),
     splits=("roles", "session"),
     estimators=(
-        *("pac-band", "wavelet-energy", "frame-difference"),
         *("slip-forest", "slip-svm", "slip-spectrum"),
+        *("pac-band", "wavelet-energy", "frame-difference"),
     ),
     baselines=("slip-never", "slip-always", "force-ratio"),
     beside=("slip-taxels",),

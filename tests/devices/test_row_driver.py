@@ -1,5 +1,9 @@
 """Drivers and emulators of one stream: rows with times and quality, options and links refused, the device gone."""
 
+import re
+import sys
+from types import ModuleType
+
 import numpy as np
 import pytest
 
@@ -18,6 +22,7 @@ from tactbench.plugin.devices import (
     RowDriver,
     RowEmulator,
 )
+from tests.conftest import ROOT
 
 STREAM = StreamSpec(
     name="taxels", dtype="uint8",
@@ -134,3 +139,39 @@ def test_a_link_of_another_kind_is_refused_and_closed():
 def test_faults_are_refused():
     with pytest.raises(UsageError, match="late-frames"):
         CanModel(settings(faults=("late-frames",)))
+
+
+class AskedDriver(ByteDriver):
+    def ask(self):
+        self.link.write(b"?")
+
+
+class AskedModel(RowEmulator):
+    stream, answer_s = STREAM, 0.004
+
+    def sent(self, values):
+        return [bytes(map(round, values))]
+
+    def told(self, piece, now_s):
+        return self.sent(self.sensed(now_s)) if piece == b"?" else []
+
+
+def test_an_answer_takes_its_time():
+    with EmulatedDevices({"pad": EmulatedDevice("bytes", AskedModel(settings()))}) as devices:
+        with on(devices, AskedDriver) as driver:
+            times = [driver.read(0.5)[0].t_ns[0] for _ in range(3)]
+        np.testing.assert_allclose(np.diff(times), 4e6, atol=1)  # rounded to nanoseconds
+
+
+def test_the_driver_that_the_page_shows(monkeypatch):
+    page = (ROOT / "docs" / "plugins.md").read_text(encoding="utf-8")
+    for name in ("acme_tactile", "acme_line"):
+        (code,) = re.findall(rf"```python\n# {name}(?:/__init__)?\.py[^\n]*\n(.*?)```", page, re.DOTALL)
+        module = ModuleType(name)
+        monkeypatch.setitem(sys.modules, name, module)
+        exec(code, vars(module))
+    model = module.AcmeEmulator(settings(lambda second: {"t1": 300.0}))
+    with EmulatedDevices({"pad": EmulatedDevice("bytes", model)}) as devices, on(devices, module.AcmeDriver) as driver:
+        devices.advance(35_000_000)
+        (block,) = driver.read(0)
+    assert block.data.tolist() == [[0, 300, 0, 0]] * 3

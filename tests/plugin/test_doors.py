@@ -58,7 +58,8 @@ def test_a_name_is_in_one_door():
 
 def test_what_no_plugin_uses_is_in_no_door():
     offered = {(door, name) for door in DOORS for name in import_module(door).__all__}
-    assert offered - used_by_plugins() == set()
+    # A plugin states the version that it was written for, not the one that it meets.
+    assert offered - used_by_plugins() == {("tactbench.plugin", "API_VERSION")}
     assert used_by_plugins() - offered == set()
 
 

@@ -42,9 +42,10 @@ def show_ladder(
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import flat_csv, write_ladder
     from tactbench.core.leaderboard.names import METRIC_NAMES
+    from tactbench.core.matrix.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
 
-    registry = load_registry()
+    registry = with_declared(load_registry(), declared_in(recordings))
     rig = rig or ("twin" if recordings is None else "replay")
     matrix = _matrix(registry, sensor, task, rig, protocol, split, estimators or ("all",), seed, repeats)
     store = _store(out, sensor, task)

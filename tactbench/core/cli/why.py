@@ -117,6 +117,9 @@ def _rests_on(row: Row) -> list[str]:
     parts = [("score", "; ".join(texts))]
     if row.get("scores"):
         parts.append(("other scores", ", ".join(f"{name} {value:.3g}" for name, value in row["scores"].items())))
+    if row.get("events"):
+        parts.append(("events", ", ".join(f"{name} {value:.3g}" for name, value in row["events"].items())))
+        parts.append(("alarms", str(row["answer_from"])))
     if row.get("chosen"):
         parts.append(("chosen on validation data", picked(row)))
     parts.append(("samples", f"{row['n_train']} to train on, {row['n_test']} to test on, from {row['n_recordings']} "

@@ -121,7 +121,7 @@ def _cut_short(timing: Timing, rounds: int, budget_s: float) -> list[str]:
 def _other_answers(one: TimedEstimator, timing: Timing, scores: Mapping[str, float]) -> list[str]:
     """Return a note if the model that was timed is not the one whose score stands beside its times."""
     stored = scores.get(f"fold {one.fold}")
-    if timing.answers is None or stored is None:
+    if timing.answers is None or stored is None or one.metric is None:
         return []
     score = one.metric.of(one.y_test, timing.answers, one.n_classes)
     if abs(score - stored) <= SAME_SCORE * abs(stored):
@@ -151,7 +151,7 @@ def mark_fronts(rows: Sequence[Record], *, higher_is_better: bool) -> None:
     """
     sign = -1.0 if higher_is_better else 1.0
     done = [row for row in rows if row["status"] == "done"]
-    trivial = (row for row in done if row["is_baseline"] and row.get("looks_at") != "time")
+    trivial = (row for row in done if row["is_baseline"] and row.get("looks_at") not in ("time", "reference"))
     bar = min((sign * row["score"] for row in trivial), default=float("inf"))
     able = [row for row in done if not row["is_baseline"] and sign * row["score"] < bar]
     for mark, time in (("front_fit", "fit_s"), ("front_delay", "answer_delay_ms")):

@@ -105,7 +105,10 @@ def _turn(one: TimedEstimator, timing: Timing, budget_s: float, clock: Callable[
             timing.batch_s.append(_median_s(lambda: _answer(one, timing), clock))
         assert timing._model is not None
         timing.latency_s.extend(single_row_latency_s(timing._model, one.X_test, clock))
-        if one.looks_at == "features":
+        if one.features_s is not None:
+            if one.looks_at in ("features", "reference"):
+                timing.features_s.append(one.features_s(clock))
+        elif one.looks_at == "features":
             timing.features_s.extend(single_row_preparation_s(one.X_test, one.k, clock, tared=one.tared))
 
 

@@ -12,10 +12,13 @@ import numpy.typing as npt
 
 from tactbench.core.evaluation.dataset import Dataset
 from tactbench.core.evaluation.delay import reading_delay_ms
+from tactbench.core.evaluation.frames import frame_delay_ms, frame_features_s, framed
 from tactbench.core.evaluation.metrics import Metric, metric_called
 from tactbench.core.evaluation.preparation import assigned, builder, prepared
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.selection import features_of, select
+from tactbench.core.evaluation.splits import with_validation
+from tactbench.core.evaluation.summaries import without_windows
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import FloatArray
 from tactbench.core.spec.recording import RecordingMeta
@@ -36,7 +39,8 @@ class TimedEstimator:
     X_test: FloatArray
     y_test: npt.NDArray[Any]
     n_classes: int
-    metric: Metric
+    metric: Metric | None
+    """None: the score is not of rows"""
     trained_on: tuple[RecordingMeta, ...]
     """The recordings that the training rows are from."""
     looks_at: str = "features"
@@ -47,6 +51,8 @@ class TimedEstimator:
     """Parts of the answer delay that no machine decides; see `tactbench.core.evaluation.delay`."""
     remarks: tuple[str, ...] = ()
     """on these parts"""
+    features_s: Callable[[Callable[[], float]], float] | None = None
+    """Given a clock, the seconds that the features of a frame take; None: those of a row are made from readings"""
 
 
 def timed_estimator(
@@ -73,13 +79,22 @@ def timed_estimator(
         What the estimator is told it may use.
     """
     rules, metric = protocol_called(protocol), metric_called(task.metric)
+    frames = task.answer_per == "frame"
+    recorded = data
+    if frames:
+        descriptor = without_windows(descriptor, task)
+        data = framed(data, task, rules, descriptor)
     build = builder(descriptor, params, task, seed, threads)
     assignment = assigned(task, descriptor, data, split, seed)[-1]
+    if task.kind == "events" and descriptor.threshold is None and assignment.validation is None:
+        assignment = with_validation(assignment, data)
     choice = select(descriptor, params, build, data, rules, assignment, metric)
     k = choice.k if choice else descriptor.window_grid[0]
     fold = prepared(assignment, data, rules, k, Counter())
     chosen = choice.params if choice else {}
-    parts, remarks = reading_delay_ms(data, rules, k) if descriptor.looks_at == "features" else ({}, ())
+    parts, remarks = reading_delay_ms(data, rules, k) if descriptor.looks_at == "features" and not frames else ({}, ())
+    if frames:
+        parts, remarks = frame_delay_ms(recorded, data.features, task, rules, descriptor)
     return TimedEstimator(
         name=descriptor.name,
         build=lambda: build(chosen),
@@ -88,12 +103,13 @@ def timed_estimator(
         y_train=fold.train.y,
         X_test=features_of(fold.test, descriptor),
         y_test=fold.test.y,
-        n_classes=len(data.classes),
-        metric=metric,
+        n_classes=0 if task.kind == "events" else len(data.classes),
+        metric=metric if task.kind != "events" else None,
         trained_on=tuple(data.metas[place] for place in np.unique(fold.train.recording)),
         looks_at=descriptor.looks_at,
         k=k,
         tared=rules.tare,
         delay_parts_ms=parts,
         remarks=remarks,
+        features_s=(lambda clock: frame_features_s(recorded, task, rules, descriptor, clock)) if frames else None,
     )

@@ -17,7 +17,7 @@ from tactbench.core.evaluation.delay import NO_LINK, NO_RATE, answer_delay_ms, r
 from tactbench.core.evaluation.event_answers import EventAnswers, Items, state_figures
 from tactbench.core.evaluation.fitting import answers as answers_of
 from tactbench.core.evaluation.fitting import fit
-from tactbench.core.evaluation.frames import band_limit, clocked, frame_features, frame_times, framed
+from tactbench.core.evaluation.frames import band_limit, clocked, frame_delay_ms, frame_features_s, framed
 from tactbench.core.evaluation.interval import LEVEL, score_interval
 from tactbench.core.evaluation.leaks import leak_stamps
 from tactbench.core.evaluation.metrics import METRICS, Metric, class_f1, confusion, metric_called
@@ -59,7 +59,6 @@ from tactbench.core.evaluation.vectors import vector_details
 from tactbench.core.evaluation.vote import require_answers, voted
 from tactbench.core.plugins.interfaces import Estimator
 from tactbench.core.samples import Answers, FloatArray, Fold, Part
-from tactbench.core.spec.events import SlipTarget
 from tactbench.core.spec.recording import RecordingMeta
 from tactbench.core.spec.rig import EstimatorDescriptor
 from tactbench.core.spec.scene import Role
@@ -358,7 +357,11 @@ def _delay(folds: _Folds, latency: Mapping[str, Any]) -> _Delay:
     parts: dict[str, float] = {}
     remarks: tuple[str, ...] = ()
     if folds.context.task.answer_per == "frame":
-        parts, remarks = frame_delay(folds.recorded, folds.data, folds.context, folds.rules, timed=bool(latency))
+        task, estimator = folds.context.task, folds.context.estimator
+        parts, remarks = frame_delay_ms(folds.recorded, folds.data.features, task, folds.rules, estimator)
+        if latency and "window" in parts:
+            spent_s = frame_features_s(folds.recorded, task, folds.rules, estimator, folds.context.clock)
+            parts["features"] = 1e3 * spent_s
     elif looks_at == "features":
         parts, remarks = reading_delay_ms(folds.recorded, folds.rules, folds.k)
         parts = waiting_for_the_whole(parts, folds.recorded, folds.context.task, folds.rules)
@@ -377,47 +380,6 @@ def _delay(folds: _Folds, latency: Mapping[str, Any]) -> _Delay:
     else:
         remarks = tuple(one for one in remarks if one not in (NO_LINK, NO_RATE))  # there is no delay to speak of
     return _Delay(parts, answer_delay_ms(parts, looks_at), remarks)
-
-
-FRAMES_TIMED = 3
-"""Recordings whose features are timed: each is hundreds of frames."""
-
-
-def frame_delay(
-    recorded: Dataset, data: Dataset, context: CellContext, rules: ProtocolSpec, *, timed: bool
-) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the parts of a frame's answer delay in ms, and remarks on them.
-
-    Notes
-    -----
-    ``sampling``: the wait for the next sample of the slowest stream used, or for the next frame where that is longer.
-    ``window``: half a frame's length. ``features``: those of a whole recording over its frames. A streaming detector
-    needs no less work a frame, but more calls.
-    """
-    task, looks_at = context.task, context.estimator.looks_at
-    if looks_at not in ("features", "reference") or not isinstance(task.target, SlipTarget):
-        return {}, ()
-    parts, remarks = reading_delay_ms(recorded, rules, 0)
-    used = [
-        stream.rate_hz
-        for table in recorded.tables
-        for stream in table.readings
-        if any(feature.startswith(f"{channel} ") for channel in stream.channels for feature in data.features)
-    ]
-    rates = [rate for rate in used if rate]
-    parts["sampling"] = 1e3 * max([task.target.hop_s, *(1.0 / rate for rate in rates)])
-    parts["window"] = 1e3 * task.target.window_s / 2 if looks_at == "features" else 0.0
-    if timed:
-        compute = frame_features(task, rules, context.estimator)
-        places = np.linspace(0, len(recorded.tables) - 1, FRAMES_TIMED).astype(int).tolist()
-        times = {place: frame_times(recorded.tables[place], task, rules) for place in places}
-        each_s = []
-        for place in places:
-            began = context.clock()
-            compute(recorded.tables[place], times[place])
-            each_s.append((context.clock() - began) / len(times[place].ends_ns))
-        parts["features"] = 1e3 * float(np.median(each_s))
-    return parts, remarks
 
 
 def _joined(folds: Sequence[Answers]) -> Answers:

@@ -329,13 +329,19 @@ def inner_splits(data: Dataset, outer: Assignment, gap: int = 0) -> list[tuple[t
 
 
 def with_validation(outer: Assignment, data: Dataset) -> Assignment:
-    """Return a fold whose training rows are parted in some to learn from and some to validate on.
+    """Return a fold whose training recordings are parted in some to learn from and some to choose a threshold on.
 
-    Of the inner splits the first of which either part has rows of every class that the fold trains on.
+    Of the inner splits so many as it takes to validate on events and on disturbances, if there are any.
     """
-    for learn, check in inner_splits(data, outer):
-        if all(_classes_in(data, part) == _classes_in(data, outer.train) for part in (learn, check)):
-            return replace(outer, train=learn, validation=check)
+    classes, kinds = _classes_in(data, outer.train), _kinds_in(data, outer.train)
+    check = tuple(_none(data))
+    for _, more in inner_splits(data, outer):
+        check = tuple(one | other for one, other in zip(check, more, strict=True))
+        learn = tuple(mask & ~out for mask, out in zip(outer.train, check, strict=True))
+        if (_classes_in(data, check), _kinds_in(data, check)) == (classes, kinds):
+            if _classes_in(data, learn) == classes:
+                return replace(outer, train=learn, validation=check)
+            break
     raise DataError(
         f"The training recordings of fold {outer.name!r} cannot be parted in some to learn from and some to choose a "
         "threshold on, each with events.",
@@ -346,6 +352,12 @@ def with_validation(outer: Assignment, data: Dataset) -> Assignment:
 def _classes_in(data: Dataset, masks: Sequence[Mask]) -> set[int]:
     tables = zip(data.tables, masks, strict=True)
     return {int(one) for table, mask in tables for one in np.unique(table.y[mask & table.labelled])}
+
+
+def _kinds_in(data: Dataset, masks: Sequence[Mask]) -> set[bool]:
+    """Return whether recordings are disturbances, of those that the masks hold."""
+    held = [table.reference for table, mask in zip(data.tables, masks, strict=True) if mask.any()]
+    return {reference.disturbance for reference in held if reference is not None}
 
 
 def _sizes(data: Dataset, outer: Assignment, groups: str) -> Counter[str]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from tactbench.core.leaderboard.records import JSON_KEYS
 from tactbench.core.matrix.store.rows import fault_in_row
+from tactbench.core.spec.row import ReplicatedRow
 
 Row = dict[str, Any]
 
@@ -18,7 +19,8 @@ def checked(rows: Iterable[object]) -> tuple[list[Row], list[str]]:
     """Return the rows that a table can be made of, and what is wrong with each of the others, in one sentence each."""
     good: list[Row] = []
     wrong: list[str] = []
-    for row in rows:
+    for given in rows:
+        row = with_added(given) if isinstance(given, dict) else given
         trouble = (_mistyped(row) or _senseless(row)) if isinstance(row, dict) else "it is no row"
         if trouble:
             name = row.get("cell") if isinstance(row, dict) else None
@@ -26,6 +28,13 @@ def checked(rows: Iterable[object]) -> tuple[list[Row], list[str]]:
         elif isinstance(row, dict):
             good.append(row)
     return good, wrong
+
+
+def with_added(row: Row) -> Row:
+    """Return a row with the keys of `_ADDED` that it lacks, as they are before anything is known."""
+    fields = ReplicatedRow.model_fields
+    lacking = {key: fields[key].get_default() for key in _ADDED if key not in row}
+    return {**row, **lacking} if lacking else row
 
 
 def _mistyped(row: Row) -> str:
@@ -53,5 +62,7 @@ def _is_square(confusion: list[Any] | None) -> bool:
     )
 
 
+_ADDED = ("declared_task", "events", "operating_points")
+"""Keys that rows of the oldest folders lack (``tests/kept_results``); a key that is added to a row is added here."""
 _STORED = tuple(key for key in JSON_KEYS if key != "key")
 _WHOLE = frozenset({int})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.names import answer_name, sensor_name
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sensor_name
 from tactbench.core.tables.numbers import ABSENT
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
@@ -46,19 +46,19 @@ def events_section(rows: Sequence[Row]) -> TextTable | None:
     rows
         In the order of the leaderboard's lines.
     """
-    told = [row for row in rows if row["status"] == "done" and row.get("events")]
-    if not told:
+    finished = [row for row in rows if row["status"] == "done" and row.get("events")]
+    if not finished:
         return None
     lines = []
-    for row in told:
+    for row in finished:
         figures = row["events"]
         texts = [_figure(figures.get(key), form) for key, form in _FIGURES.values()]
         misses = f"{figures['misses']:g} of {figures['events']:g}" if "misses" in figures else ABSENT
         lines.append((visible(row["task"]), sensor_name(row), answer_name(row), *texts[:2], misses, *texts[2:]))
     names = list(_FIGURES)
     columns = ("task", "sensor", "estimator", *names[:2], "misses", *names[2:])
-    kinds = tuple("baseline" if row["is_baseline"] else "result" for row in told)
-    notes = (NOTE, *_policies(told), *_other_labels(told), *_oracles(told))
+    kinds = tuple("baseline" if row["is_baseline"] else "result" for row in finished)
+    notes = (NOTE, *_policies(finished), *_other_labels(finished), *_oracles(finished))
     return TextTable(TITLE, columns, tuple(lines), frozenset(columns[3:]), kinds=kinds, notes=notes)
 
 
@@ -70,10 +70,10 @@ def operating_points_section(rows: Sequence[Row]) -> TextTable | None:
     rows
         In the order of the leaderboard's lines.
     """
-    told = [row for row in rows if row["status"] == "done" and row.get("operating_points")]
-    bounds = list(dict.fromkeys(point["bound"] for row in told for point in row["operating_points"]))
+    finished = [row for row in rows if row["status"] == "done" and row.get("operating_points")]
+    bounds = list(dict.fromkeys(point["bound"] for row in finished for point in row["operating_points"]))
     lines = []
-    for row in told:
+    for row in finished:
         points = {point["bound"]: _point(point) for point in row["operating_points"]}
         texts = [points.get(bound, ABSENT) for bound in bounds]
         lines.append((visible(row["task"]), sensor_name(row), answer_name(row), *texts))
@@ -106,13 +106,27 @@ def _policies(rows: Sequence[Row]) -> list[str]:
 
 def _other_labels(rows: Sequence[Row]) -> list[str]:
     """Return the F1 of the same alarms under halved and doubled thresholds of the labels."""
-    told = [
+    finished = [
         f"{row['sensor']}/{row['task']}/{answer_name(row)} "
         + " … ".join(_figure(row["events"].get(key), ".2f") for key in _OTHER_LABELS)
         for row in rows
         if not row["is_baseline"] and any(key in row["events"] for key in _OTHER_LABELS)
     ]
-    return [visible(f"F1 with the thresholds of the labels halved … doubled: {'; '.join(told)}.")] if told else []
+    return (
+        [visible(f"F1 with the thresholds of the labels halved … doubled: {'; '.join(finished)}.")] if finished else []
+    )
+
+
+def label_notes(rows: Sequence[Row]) -> list[str]:
+    """Return the scores of answers to frames under halved and doubled thresholds of their labels."""
+    notes = []
+    for row in rows:
+        name = METRIC_NAMES.get(row["metric"], row["metric"])
+        found = [row["scores"].get(f"{name} with label thresholds {how}") for how in ("halved", "doubled")]
+        if row["status"] == "done" and not row["is_baseline"] and None not in found:
+            ends = " … ".join(_figure(one, ".3f") for one in found)
+            notes.append(f"{row['sensor']}/{row['task']}/{answer_name(row)} {ends}")
+    return [visible(f"With the thresholds of the labels halved … doubled: {'; '.join(notes)}.")] if notes else []
 
 
 def _oracles(rows: Sequence[Row]) -> list[str]:

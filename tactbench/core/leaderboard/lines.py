@@ -62,7 +62,7 @@ def line_of(row: Row, placing: Placing | None, columns: Sequence[str], letters: 
         texts |= {"#": "", "score": row["status"].upper()}
         kind: Kind = "failed" if row["status"] in STOPPED else "skipped"
         return Line(row, {name: texts.get(name, ABSENT) for name in columns}, kind)
-    texts |= {"#": _place(placing, row["is_baseline"]), "rank 95 %": _range(placing)}
+    texts |= {"#": _place(placing, row), "rank 95 %": _range(placing)}
     mark = timing_mark(row, letters)
     for name in columns:
         if name in OF_ROWS:
@@ -73,10 +73,12 @@ def line_of(row: Row, placing: Placing | None, columns: Sequence[str], letters: 
     return Line(row, {name: texts[name] for name in columns}, kind, placing)
 
 
-def _place(one: Placing | None, trivial: bool) -> str:
-    """Return the place; an answer that is no better than the trivial one has none."""
+def _place(one: Placing | None, row: Row) -> str:
+    """Return the place; an answer that is no better than the trivial one has none, nor has an oracle."""
+    if one is None and row["is_baseline"]:
+        return "oracle" if row.get("looks_at") == "reference" else "base"
     if one is None:
-        return "base" if trivial else ABSENT
+        return ABSENT
     return f"{one.place}=" if one.tied else str(one.place)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
+from tactbench.core.leaderboard.events import label_notes
 from tactbench.core.leaderboard.names import answer_name, answer_or_probe, question_name
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
 from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
@@ -60,6 +61,7 @@ def notes_of(rows: Sequence[Row], blocks: Sequence[Block]) -> list[str]:
         *_true_error_notes(rows),
         *_other_knowledge_notes(rows),
         *_stopped_notes(rows, frozenset(STATUSES) - STOPPED),
+        *label_notes(rows),
         *interval_notes(rows),
         *_chosen_notes(rows),
         *_left_out_notes(rows),
@@ -195,6 +197,8 @@ def _picked(key: str, value: object, row: Row) -> str:
     """Return a chosen parameter: k of `window_grid` with its meaning, others by name."""
     name, _, fold = key.partition(" of fold ")
     where = f" of fold {fold}" if fold else ""
+    if name == "threshold":
+        return f"{name} = {_value_text(value)}{where} (of the score that {row['estimator']} gives a frame)"
     if name == "k":
         return f"k = {_value_text(value)} samples before the newest in the mean filter{where}"
     return f"{name.rstrip('_')} = {_value_text(value)}{where} (parameter of {row['estimator']})"

@@ -90,14 +90,13 @@ def plan_cells(
     cells: dict[Cell, None] = {}
     rig_file_text = rig_file.model_dump_json() if rig_file else ""
     simulated = registry.rigs[matrix.rig].simulated
-    choices = _with_those_beside(matrix.tasks, registry)
-    tasks = {choice.name: registry.tasks.owned(choice.name) for choice in choices}
+    tasks = {choice.name: registry.tasks.owned(choice.name) for choice in matrix.tasks}
     own = {
         name: matrix.repeats or ((owned.descriptor.spec.replicates or REPLICATES) if simulated else 1)
         for name, owned in tasks.items()
     }
     for repeat in range(1, max(own.values()) + 1):
-        for choice in choices:
+        for choice in matrix.tasks:
             owned, repeats = tasks[choice.name], own[choice.name]
             if repeat > repeats:
                 continue
@@ -125,23 +124,6 @@ def plan_cells(
                     )
                     cells[cell] = None  # once, in the order in which they were asked for
     return with_probes(list(cells), registry) if matrix.probe else list(cells)
-
-
-def _with_those_beside(choices: Sequence[TaskChoice], registry: Registry) -> list[TaskChoice]:
-    """Return the tasks asked for, each with those that are to be read beside it, answered in the same way."""
-    asked = {choice.name for choice in choices}
-    return [
-        one
-        for choice in choices
-        for one in (
-            choice,
-            *(
-                choice.model_copy(update={"name": name})
-                for name in registry.tasks[choice.name].spec.beside
-                if name not in asked
-            ),
-        )
-    ]
 
 
 def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import re
 import traceback
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -20,7 +21,13 @@ from typing import Any, Generic, Literal, TypeVar, cast
 
 import pluggy
 
-from tactbench.core.errors import DuplicateNameError, PluginContractError, PluginError, UnknownNameError
+from tactbench.core.errors import (
+    DuplicateNameError,
+    PluginContractError,
+    PluginDeprecationWarning,
+    PluginError,
+    UnknownNameError,
+)
 from tactbench.core.plugins import hookspecs
 from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.rig import (
@@ -48,6 +55,8 @@ class PluginRow:
     status: Literal["loaded", "failed"]
     brings: tuple[str, ...] = ()
     reason: str = ""
+    remarks: tuple[str, ...] = ()
+    """What it uses that a later release takes away, with what to use instead."""
 
 
 @dataclass(frozen=True)
@@ -214,6 +223,7 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
     try:
         if isinstance(reply, BaseException):
             raise reply
+        remarks = () if reply is None else tuple(reply.pop(REMARKS))
         offered = ask_plugin(point) if reply is None else _described(reply)
     except Exception as error:
         reason = str(error) if isinstance(error, PluginError) else getattr(error, "message", None)
@@ -225,7 +235,9 @@ def _add(registry: Registry, point: EntryPoint, owner: tuple[str, str], reply: A
         for descriptor in descriptors:
             registry.families()[family].add(Owned(descriptor, point.value, distribution, version))
             brings.append(f"{family[:-1]} {descriptor.name}")
-    registry.plugins.append(PluginRow(point.name, point.value, distribution, version, "loaded", tuple(brings)))
+    registry.plugins.append(
+        PluginRow(point.name, point.value, distribution, version, "loaded", tuple(brings), "", remarks)
+    )
 
 
 def _line_in(module: str, error: Exception) -> str:
@@ -259,10 +271,25 @@ _AT_ONCE = 4
 """Plugins that are asked at the same time."""
 
 
-def _describe(point: tuple[str, str]) -> dict[str, list[dict[str, Any]]]:
-    """Ask a plugin; return its descriptors as JSON has them."""
-    offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
-    return {family: [_plain(descriptor) for descriptor in several] for family, several in offered.items()}
+REMARKS = "remarks"
+"""Beside the families in what a child process answers."""
+
+
+def _describe(point: tuple[str, str]) -> dict[str, Any]:
+    """Ask a plugin; return its descriptors as JSON has them, and what it uses that is deprecated."""
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always", PluginDeprecationWarning)
+        offered = ask_plugin(EntryPoint(*point, group=hookspecs.GROUP))
+    remarks = []
+    for one in warned:
+        if issubclass(one.category, PluginDeprecationWarning):
+            remarks.append(str(one.message))
+        else:
+            warnings.showwarning(one.message, one.category, one.filename, one.lineno)
+    described: dict[str, Any] = {
+        family: [_plain(descriptor) for descriptor in several] for family, several in offered.items()
+    }
+    return {**described, REMARKS: list(dict.fromkeys(remarks))}  # `from … import` asks twice for a name
 
 
 def _plain(descriptor: Any) -> dict[str, Any]:
@@ -287,12 +314,7 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
         If it does not keep the contract of its hooks; and whatever its own code raises.
     """
     module = cast(ModuleType, point.load())
-    written_for = getattr(module, "TACTBENCH_API", None)
-    if written_for != hookspecs.API_VERSION:
-        raise PluginContractError(
-            f"{point.value} states TACTBENCH_API = {written_for!r}; this tactbench speaks {hookspecs.API_VERSION}.",
-            hint=f"Write TACTBENCH_API = {hookspecs.API_VERSION} in the module, or install a fitting version.",
-        )
+    check_api_version(point.value, getattr(module, "TACTBENCH_API", None))
     manager = pluggy.PluginManager(hookspecs.GROUP)
     manager.add_hookspecs(hookspecs)
     manager.register(module, name=point.name)
@@ -322,6 +344,32 @@ def ask_plugin(point: EntryPoint) -> dict[str, list[Any]]:
                 )
         offered[family] = descriptors
     return offered
+
+
+def check_api_version(module: str, written_for: object) -> None:
+    """Compare the version that a plugin states with the one that is spoken here.
+
+    Raises
+    ------
+    PluginContractError
+        If they differ: which of the two is the older one, and what to update.
+    """
+    spoken = hookspecs.API_VERSION
+    if type(written_for) is int and written_for == spoken:
+        return
+    if written_for is None:
+        what = f"states no TACTBENCH_API; this tactbench speaks {spoken}"
+        hint = f"Write TACTBENCH_API = {spoken} in it."
+    elif type(written_for) is not int:
+        what = f"states TACTBENCH_API = {written_for!r}, which is no whole number; this tactbench speaks {spoken}"
+        hint = f"Write TACTBENCH_API = {spoken} in it."
+    elif written_for > spoken:
+        what = f"states TACTBENCH_API = {written_for}, a later version than this tactbench speaks, {spoken}"
+        hint = "Update tactbench, or install an older version of the plugin."
+    else:
+        what = f"states TACTBENCH_API = {written_for}, which is no longer spoken; this tactbench speaks {spoken}"
+        hint = "Update the plugin: docs/stability.md says what has changed."
+    raise PluginContractError(f"{module} {what}.", hint=hint)
 
 
 def _owner(point: EntryPoint) -> tuple[str, str]:

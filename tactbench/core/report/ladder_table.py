@@ -40,7 +40,8 @@ def title(about: Mapping[str, Any]) -> str:
 
 def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
     """Return one estimator's texts by column; what was not measured is left out."""
-    name = f"{row['estimator']} (trivial)" if row["is_baseline"] else row["estimator"]
+    what = "oracle" if row.get("looks_at") == "reference" else "trivial"
+    name = f"{row['estimator']} ({what})" if row["is_baseline"] else row["estimator"]
     remark = "; ".join((*([f"{row['status']}: {row['reason']}"] if row["status"] != "done" else []), *row["notes"]))
     texts = {"estimator": name, "remark": remark}
     if row["score"] is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
-from tactbench.core.leaderboard.checked import checked
+from tactbench.core.leaderboard.checked import checked, with_added
 from tactbench.core.matrix.declared import with_declared_of
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.samples import Answers
@@ -69,7 +69,7 @@ class Results:
 
 def open_results(store: Store, registry: Registry) -> Results:
     """Return what `store` holds: a row a cell, baselines beside it, and rows of other versions as they are."""
-    rows = store.rows()
+    rows = [with_added(row) for row in store.rows()]
     good = checked(rows)[0]
     known = {id(row) for row in good}
     shown = (*over_replicates(good), *(row for row in rows if id(row) not in known))

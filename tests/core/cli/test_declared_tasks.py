@@ -83,6 +83,14 @@ def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
     assert "residuals-where-deployable-session-knn-replay.png" in drawn
 
 
+def test_what_an_answer_costs_is_measured_of_a_declared_task_too(pad):
+    pad("import", "pad.yaml", "--out", "rec")
+    asked = ("--sensor", "pad", "--task", "where", "--recordings", "rec", "--estimator", "knn", "--rounds", "1")
+    rows = {row["estimator"]: row for row in json.loads(pad("cost", *asked, "--format", "json").stdout)}
+    assert rows["knn"]["score"] < rows["mean"]["score"]
+    assert rows["knn"]["fit_s"] > 0
+
+
 def test_another_question_of_the_same_recordings_is_another_cell(pad):
     pad("import", "pad.yaml", "--out", "rec")
     run = ("run", "--recordings", "rec", "--task", "where", "--no-latency", "--format", "json")

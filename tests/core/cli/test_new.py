@@ -1,6 +1,8 @@
 """``tactbench new``: every kind of package, as it is made, is typed, formatted, checked and in the leaderboard."""
 
 import json
+import os
+import re
 import subprocess
 import sys
 
@@ -27,7 +29,7 @@ def install(folder, name):
     module = f"tactbench_{name.replace('-', '_')}"
     info = folder / f"{module}-0.1.0.dist-info"
     info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: tactbench-{name}\nVersion: 0.1.0\n")
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: tactbench-{name}\nVersion: 0.1.0\nSummary: made\n")
     (info / "entry_points.txt").write_text(f"[tactbench]\n{name} = {module}\n")
 
 
@@ -75,6 +77,20 @@ def test_what_is_made_is_formatted_and_typed(made):
     config.write_text(f"[mypy]\nstrict = True\nmypy_path = {path}\n[mypy-tactbench.*]\nfollow_imports = silent\n")
     packages = [word for kind in KINDS for word in ("-p", f"tactbench_my_{kind}")]
     run("mypy", "--config-file", str(config), "--cache-dir", str(made / "cache"), *packages)
+
+
+def test_every_kind_passes_its_checks(made):
+    code = "\n".join(
+        ["from tactbench import testing", *(f"print(testing.check_{kind}('my-{kind}'), flush=True)" for kind in KINDS)]
+    )
+    path = os.pathsep.join([str(ROOT), *folders(made)])
+    env = {**os.environ, "PYTHONPATH": path, "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=made, env=env, capture_output=True, text=True, timeout=100, check=True
+    )
+    ends = re.findall(r"^(\w+) my-\w+: ran \d+, .*failed (\d+), .*Level: (\w+)", done.stdout, re.MULTILINE)
+    # Silver: nobody has measured a unit of theirs, which gold would take.
+    assert ends == [(kind, "0", "silver") for kind in KINDS], done.stdout
 
 
 def scores(shell, *arguments, made):

@@ -139,8 +139,10 @@ BAD = {
     "exits": ("raise SystemExit('good bye')", "SystemExit: good bye"),
     "misses an import": ("import no_such_module_at_all", "ModuleNotFoundError.*no_such_module_at_all"),
     "does not parse": ("def f(:", "SyntaxError"),
-    "states no version": ("", r"states TACTBENCH_API = None; this tactbench speaks 1"),
-    "is of another version": ("TACTBENCH_API = 2", r"states TACTBENCH_API = 2; this tactbench speaks 1"),
+    "states no version": ("", "states no TACTBENCH_API; this tactbench speaks 1. Write TACTBENCH_API = 1"),
+    "is of a later version": ("TACTBENCH_API = 2", "TACTBENCH_API = 2, a later version .* speaks, 1. Update tactbench"),
+    "is of an earlier version": ("TACTBENCH_API = 0", "= 0, which is no longer spoken; .* speaks 1. Update the plugin"),
+    "states no number": ("TACTBENCH_API = True", "states TACTBENCH_API = True, which is no whole number"),
     "has no hook": (HEAD, "implements none of tactbench_devices, tactbench_effects"),
     "misspells its hook": (
         HEAD + "@hookimpl\ndef tactbench_device():\n    return []",

@@ -57,6 +57,8 @@ def test_each_task_of_ours_says_what_is_practically_the_same():
         "object-identity",
         "shear-force",
         "slip-sequence",
+        "contact-location",
+        "three-axis-force",
     )
     tasks = load_registry().tasks
     assert all(tasks[name].spec.equivalence > 0 for name in ours)

@@ -37,4 +37,8 @@ SPEC = SensorSpec(
 def tactbench_sensors() -> list[SensorDescriptor]:
     """Offer the sensor: without a skin, it can be recorded and replayed, not simulated."""
     where = "tactbench_anyskin.driver"
-    return [SensorDescriptor(spec=SPEC, driver=f"{where}:build", emulator=f"{where}:Emulator", emulated_link="bytes")]
+    return [
+        SensorDescriptor(
+            spec=SPEC, driver=f"{where}:AnySkinDriver", emulator=f"{where}:Emulator", emulated_link="bytes"
+        )
+    ]

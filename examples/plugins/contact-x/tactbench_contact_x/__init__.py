@@ -18,7 +18,7 @@ SCENES = tuple(
         role=role,
         drawn_order=f"places-{role}",  # so that a place is not told by how warm the sensor is
         scene=Scene(
-            name=f"x{x_mm:+g}mm-{role}", indenter=Indenter(radius=assumed(5, "mm", WHY)), profile=SHORT,
+            name=f"place-{order}-{role}", indenter=Indenter(radius=assumed(5, "mm", WHY)), profile=SHORT,
             placement=Placement(x=assumed(x_mm, "mm", WHY)), session=role, starts_after_s=60.0 * order,
             labels={"contact_x_mm": x_mm},
         ),

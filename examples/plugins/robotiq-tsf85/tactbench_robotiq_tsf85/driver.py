@@ -58,9 +58,9 @@ class TSF85Driver(RowDriver[ByteLink]):
 
 
 class Emulator(RowEmulator):
-    """The sensor as a model: it answers each request at once with its static taxels."""
+    """The sensor as a model: it answers each request with its static taxels."""
 
-    stream = STREAM
+    stream, answer_s = STREAM, 0.005  # 61 bytes at 115200 baud
 
     def sent(self, values: Sequence[float]) -> list[bytes]:
         """Return a reply."""

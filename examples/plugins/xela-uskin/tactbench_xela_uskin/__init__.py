@@ -37,4 +37,6 @@ SPEC = SensorSpec(
 def tactbench_sensors() -> list[SensorDescriptor]:
     """Offer the sensor: without a skin, it can be recorded and replayed, not simulated."""
     where = "tactbench_xela_uskin.driver"
-    return [SensorDescriptor(spec=SPEC, driver=f"{where}:build", emulator=f"{where}:Emulator", emulated_link="can")]
+    return [
+        SensorDescriptor(spec=SPEC, driver=f"{where}:USkinDriver", emulator=f"{where}:Emulator", emulated_link="can")
+    ]

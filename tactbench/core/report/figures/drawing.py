@@ -11,7 +11,9 @@ from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.report.figures import (
     confusion,
     embedding_map,
+    latency_and_false_alarms,
     location_map,
+    one_event,
     prediction_against_time,
     residuals,
     score_by_force,
@@ -33,6 +35,7 @@ Draw = Callable[[Group, Remark], Sketch]
 FIGURES: dict[str, tuple[Draw, ...]] = {
     "regression": (prediction_against_time.draw, residuals.draw, validation_curve.draw),
     "vector": (location_map.draw, residuals.draw, validation_curve.draw),
+    "events": (one_event.draw, latency_and_false_alarms.draw),
     "classification": (confusion.draw, score_by_force.draw, embedding_map.draw, validation_curve.draw),
 }
 """By kind of task, vectors apart, in the order of a report."""

@@ -9,7 +9,7 @@ from tactbench.core.evaluation.metrics import distances
 from tactbench.core.report.figures.group import Group, Remark
 from tactbench.core.report.figures.residuals import ACROSS
 from tactbench.core.report.figures.sketch import Sketch, heading, marks, metric_name, sensors, with_unit
-from tactbench.core.report.figures.style import GREY, corner, panels
+from tactbench.core.report.figures.style import GREY, panels
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
 from tactbench.core.spec.task import VectorTarget
@@ -31,7 +31,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
     if not (isinstance(target, VectorTarget) and target.kind == "position" and len(target.names) == 2):
         raise NotApplicable("the target is no position in two coordinates")
     rows, columns = -(-len(group.panels) // ACROSS), min(len(group.panels), ACROSS)
-    figure, axes = panels(rows, columns, 2.3)
+    figure, axes = panels(rows, columns, 2.5)
     for here in axes.flat[len(group.panels) :]:
         here.set_visible(False)
     maps = [places(panel.answers["test"]) for panel in group.panels]
@@ -39,12 +39,14 @@ def draw(group: Group, remark: Remark) -> Sketch:
     for here, panel, (true, answered, error) in zip(axes.flat, group.panels, maps, strict=False):
         here.plot(*np.stack([true, answered]).transpose(2, 0, 1), "-", color=GREY, linewidth=0.6, zorder=1)
         dots = here.scatter(*true.T, c=error, s=12, vmin=0.0, vmax=most, cmap="viridis_r", linewidths=0)
-        here.set_title(panel.sensor)
+        median = f"{score(panel.row['scores'][MEDIAN_ERROR], target.unit)}{suffix(target.unit)}"
+        here.set_title(f"{panel.sensor}, median {median}")
         here.set_aspect("equal")
         here.set_xlabel(with_unit(target.names[0], target.unit))
         here.set_ylabel(with_unit(target.names[1], target.unit))
-        corner(here, f"median {score(panel.row['scores'][MEDIAN_ERROR], target.unit)}{suffix(target.unit)}")
-    figure.colorbar(dots, ax=axes[:, -1], label=with_unit("mean error", target.unit), shrink=0.8)
+    figure.colorbar(
+        dots, ax=axes, location="bottom", label=with_unit("mean error", target.unit), shrink=0.6, aspect=30
+    )  # fmt: skip
     figure.suptitle(heading(group))
     numbers = "; ".join(
         f"{panel.sensor} {metric_name(group.task)} {score(panel.row['score'], target.unit)}, median "

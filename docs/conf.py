@@ -1,0 +1,43 @@
+"""How the pages become a site (extra ``docs``): ``sphinx-build -W -b html docs BUILD``. A code host shows them, too."""
+
+from __future__ import annotations
+
+from sphinx.application import Sphinx
+
+project = "tactbench"
+copyright = "the tactbench developers"  # noqa: A001
+extensions = ["myst_parser"]
+root_doc = "index"
+source_suffix = {".md": "markdown"}
+exclude_patterns = ["_build"]
+html_theme = "alabaster"
+html_theme_options = {"description": "A benchmark of tactile sensors", "page_width": "1100px", "sidebar_width": "240px"}
+html_static_path: list[str] = []
+html_copy_source = False
+# Headings can be linked to as a code host does it; a link to none of them is an error.
+myst_heading_anchors = 4
+pygments_style = "friendly"
+
+CONTENTS = {
+    "Start": ("tutorial", "glossary", "choosing", "tables", "statistics"),
+    "Devices and recordings": ("hardware", "links", "emulation", "mappings", "real-recordings", "format"),
+    "Plugins": ("plugins", "hooks", "plugin-reference", "conformance", "stability"),
+    "Reference": ("commands", "sensors", "estimators", "protocols", "events", "parameters", "*"),
+    "Decisions": ("decisions/*",),
+}
+"""Contents of the sidebar. On a code host ``index.md`` leads to the pages, by reader."""
+
+
+def add_contents(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Append the table of contents that a site needs to the index."""
+    if docname == root_doc:
+        trees = [
+            f"```{{toctree}}\n:hidden:\n:glob:\n:caption: {caption}\n\n" + "\n".join(pages) + "\n```"
+            for caption, pages in CONTENTS.items()
+        ]
+        source[0] = "\n\n".join([source[0], *trees])
+
+
+def setup(app: Sphinx) -> None:
+    """Connect it."""
+    app.connect("source-read", add_contents)

@@ -1,0 +1,65 @@
+"""Events in time from the command line: rows, tables, why, cost and report of recordings made by hand."""
+
+import json
+
+import pytest
+
+from tests.conftest import Shell
+from tests.core.evaluation.made_slip import campaign
+
+ESTIMATORS = ("--estimator", "pac-band", "--estimator", "frame-difference")
+RUN = ("run", "--recordings", "made", "--task", "slip", *ESTIMATORS)
+
+
+@pytest.fixture(scope="module")
+def answered(tmp_path_factory):
+    shell = Shell(tmp_path_factory.mktemp("events"))
+    folder = shell.folder / "made"
+    folder.mkdir()
+    campaign(folder)
+    rows = json.loads(shell(*RUN, "--format", "json").stdout)
+    return shell, {(row["task"], row["estimator"]): row for row in rows}
+
+
+def test_a_sensor_is_scored_by_all_its_streams_and_by_its_taxels(answered):
+    _, rows = answered
+    assert {task for task, _ in rows} == {"slip", "slip-taxels"}
+    row = rows["slip", "pac-band"]
+    assert (row["metric"], row["score"], row["answer_per"]) == ("event_f1", 1.0, "frame")
+    assert row["answer_from"].startswith("frames of 0.1 s, one every 0.01 s; hit from 0.1 s before to 0.5 s after")
+    assert row["events"]["false alarms per minute"] == 0
+    # A window of 100 ms that fills with vibration, 20 ms more as the policy asks, a frame of 10 ms; then it computes.
+    assert row["events"]["onset latency p50 ms"] < 130 + row["events"]["compute ms a frame"]
+    assert {point["bound"] for point in row["operating_points"]} >= {0.0, 1.0, 50.0}
+    lacking = rows["slip-taxels", "pac-band"]
+    assert lacking["status"] == "skipped"
+    assert "band not observable above 50 Hz" in lacking["reason"]
+    assert rows["slip", "slip-never"]["baseline"] == 0.0  # the oracle is no bar
+
+
+def test_tables_and_pages_tell_of_events(answered):
+    shell, _ = answered
+    table = shell("leaderboard", "--wide", "--notes").stdout
+    assert "Events · at the threshold that validation recordings chose" in table
+    assert "Events · where more false alarms are put up with" in table
+    assert "force-ratio reads the reference sensor" in table
+    assert "F1 with the thresholds of the labels halved … doubled: made/slip/pac-band 1.00 … 1.00" in table
+    assert "  oracle  " in table
+    why = shell("why", "made/slip/replay/deployable/pac-band").stdout
+    assert "false alarms per minute 0" in why
+    assert "of the score that pac-band gives a frame" in why
+    shell("report")
+    drawn = {one.name for one in (shell.folder / "tactbench-results" / "report" / "figures").glob("*.png")}
+    assert any(name.startswith("one-event-slip-") for name in drawn)
+    assert any(name.startswith("latency-and-false-alarms-slip-") for name in drawn)
+
+
+def test_detectors_are_timed_with_the_features_of_a_frame(answered):
+    shell, _ = answered
+    chosen = ("--sensor", "made", "--recordings", "made", "--task", "slip", *ESTIMATORS)
+    rows = json.loads(shell("cost", *chosen, "--rounds", "1", "--format", "json").stdout)
+    by_name = {row["estimator"]: row for row in rows}
+    parts = by_name["pac-band"]["delay_parts_ms"]
+    assert (parts["window"], parts["sampling"]) == (50.0, 10.0)
+    assert parts["features"] > 0
+    assert by_name["pac-band"]["notes"] == []

@@ -1,0 +1,70 @@
+"""What a mapping says of a task, and what follows from it."""
+
+import pytest
+from pydantic import ValidationError
+
+from tactbench.core.matrix.declared import with_declared_of
+from tactbench.core.plugins.registry import load_registry
+from tactbench.core.spec.declared_task import DeclaredTask
+
+CHANNEL = {"source": "channel", "kind": "force", "name": "fz", "unit": "N"}
+VECTOR = {"source": "vector", "names": ["x", "y"], "unit": "mm"}
+LABEL = {"source": "label", "name": "depth", "unit": "mm"}
+SUMMARY = {"answer_per": "recording", "summaries": [{"measure": "range"}]}
+
+
+def declared(target, **more):
+    return DeclaredTask.model_validate({"name": "push", "target": target, "splits": ["session"], **more})
+
+
+@pytest.mark.parametrize(
+    ("target", "more", "kind", "metric", "unit"),
+    [
+        (CHANNEL, {}, "regression", "rmse", "N"),
+        (CHANNEL, {"metric": "r2"}, "regression", "r2", "1"),
+        ({**CHANNEL, "reduce": "max"}, SUMMARY, "regression", "rmse", "N"),
+        (VECTOR, {}, "regression", "mean_euclidean_error", "mm"),
+        (LABEL, {}, "classification", "macro_f1", "1"),
+        (LABEL, {"metric": "accuracy"}, "classification", "accuracy", "1"),
+        (LABEL, {"answer": "number"}, "regression", "rmse", "mm"),
+        (LABEL, {"answer": "number", **SUMMARY}, "regression", "rmse", "mm"),
+    ],
+)
+def test_what_is_left_out_follows_from_the_target(target, more, kind, metric, unit):
+    spec = declared(target, **more).spec
+    assert (spec.kind, spec.metric, spec.unit, spec.title) == (kind, metric, unit, "push")
+    registry = load_registry()
+    for name in (*spec.estimators, *spec.baselines):
+        assert kind in registry.estimators[name].kinds
+    assert all(registry.estimators[name].baseline for name in spec.baselines)
+
+
+@pytest.mark.parametrize(
+    ("target", "more", "says"),
+    [
+        (CHANNEL, {"answer": "number"}, "a channel is a number"),
+        (CHANNEL, {"metric": "macro_f1"}, "a number is scored by rmse, mae, r2, not by macro_f1"),
+        (VECTOR, {"metric": "rmse"}, "a vector is scored by mean_euclidean_error, not by rmse"),
+        (LABEL, {"metric": "rmse"}, "a class is scored by"),
+        (CHANNEL, SUMMARY, "or for a channel with `reduce`"),
+        ({**CHANNEL, "reduce": "max"}, {}, "for answer_per: recording alone"),
+        (CHANNEL, {"features_by": "os:system"}, "features_by"),
+        (CHANNEL, {"splits": []}, "splits"),
+        ({"name": "fz"}, {}, "source"),
+    ],
+)
+def test_a_declaration_that_makes_no_task_is_refused(target, more, says):
+    with pytest.raises(ValidationError, match=says):
+        declared(target, **more)
+
+
+def test_rows_of_a_stranger_bring_data_and_nothing_else():
+    registry = load_registry()
+    good = declared(VECTOR).model_dump_json()
+    bad = good.replace('"splits"', '"features_by":"os:system","splits"')
+    rows = [{"declared_task": one} for one in (good, bad, "{", "", good.replace('"push"', '"force"'))]
+    found = with_declared_of(registry, [*rows, {}])
+    assert set(found.tasks.names()) - set(registry.tasks.names()) == {"push"}
+    assert found.tasks["push"].spec.features_by is None
+    assert found.tasks["force"] == registry.tasks["force"]
+    assert "push" not in registry.tasks

@@ -1,0 +1,65 @@
+"""The tutorial, command by command and edit by edit: a sensor with its own geometry stands in the leaderboard.
+
+In place of ``pip install -e .`` the test leaves what an installer leaves beside a package: it needs no network.
+"""
+
+import re
+import shlex
+
+import pytest
+
+from tactbench.core.recording.reader import read_meta
+from tests.conftest import ROOT
+from tests.core.cli.test_new import install
+
+PAGE = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```(sh|python)\n(.*?)```", PAGE, re.DOTALL)
+COMMANDS = [line for kind, text in BLOCKS if kind == "sh" for line in text.splitlines()]
+CODE = [text for kind, text in BLOCKS if kind == "python"]
+INSTALL = "pip install -e ."
+
+
+def test_it_takes_at_most_ten_commands_and_forty_lines():
+    # With the one of the README that installs tactbench itself.
+    assert 1 + len(COMMANDS) <= 10
+    assert sum(bool(line.strip()) and not line.startswith("#") for text in CODE for line in text.splitlines()) <= 40
+
+
+def edit(folder, text):
+    """Change a file as the first line of a block says."""
+    told, _, code = text.partition("\n")
+    path, where = re.fullmatch(r"# (\S+): (.*)", told).groups()
+    lines = (folder / path).read_text(encoding="utf-8").splitlines(keepends=True)
+    if where.startswith("before "):
+        first = next(n for n, line in enumerate(lines) if line.startswith(where.removeprefix("before ").strip('"')))
+        lines.insert(first, code)
+    else:
+        names = where.removeprefix("in place of ").split(", ")
+        old = [next(n for n, line in enumerate(lines) if re.match(rf"\s*{name} ?=", line)) for name in names]
+        lines[old[0]] = code
+        lines = [line for n, line in enumerate(lines) if n not in old[1:]]
+    (folder / path).write_text("".join(lines), encoding="utf-8")
+
+
+@pytest.mark.timeout(300)  # two matrices and two checks of a sensor, each in processes of their own
+def test_the_page_as_it_is_written(shell, tmp_path):
+    shell.folder = tmp_path / "ring-pad"
+    shell.folder.mkdir()
+    plugins, said = (), {}
+    for kind, text in BLOCKS:
+        if kind == "python":
+            edit(shell.folder, text)
+            continue
+        for line in text.splitlines():
+            if line == INSTALL:
+                install(shell.folder, "ring-pad")
+                plugins = (str(shell.folder),)
+                continue
+            program, *words = shlex.split(line)
+            assert program == "tactbench"
+            said[line] = shell(*words, plugins=plugins).stdout
+    assert "ring-pad" in said["tactbench list sensors"]
+    assert {"ring-pad SIM", "ideal SIM"} <= set(re.findall(r"[\w-]+ SIM", said["tactbench leaderboard"]))
+    # Both runs are of one folder: the one before the edit recorded 16 taxels in a square, the one after it 19 on rings.
+    recordings = (shell.folder / "tactbench-results" / "recordings" / "ring-pad").glob("*.h5")
+    assert {len(read_meta(path).sensor.streams[0].channels) for path in recordings} == {16, 19}
