@@ -62,12 +62,12 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
         If there is no such folder or cell, or more than one cell is meant.
     """
     from tactbench.core.cli.selection import requested_matrix
-    from tactbench.core.matrix.declared import declared_in, with_declared, with_declared_of
     from tactbench.core.matrix.keys import Keys
     from tactbench.core.matrix.naming import cell_of, meant
     from tactbench.core.matrix.plan_recordings import plan_run, request_key
     from tactbench.core.matrix.recorded import Recorded
     from tactbench.core.matrix.store import Store
+    from tactbench.core.plugins.declared import declared_in, with_declared, with_declared_of
     from tactbench.core.plugins.registry import installed
 
     if not out.is_dir():

@@ -42,7 +42,7 @@ def show_ladder(
     from tactbench.core.cost.ladder import climb
     from tactbench.core.cost.ladder_file import flat_csv, write_ladder
     from tactbench.core.leaderboard.names import METRIC_NAMES
-    from tactbench.core.matrix.declared import declared_in, with_declared
+    from tactbench.core.plugins.declared import declared_in, with_declared
     from tactbench.core.plugins.registry import load_registry
 
     registry = with_declared(load_registry(), declared_in(recordings))

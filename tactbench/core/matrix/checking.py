@@ -19,7 +19,6 @@ from tactbench.core.samples import Answers
 from tactbench.core.spec.task import VECTOR_METRIC
 
 _COLUMNS = tuple(column.name for column in fields(Answers))
-_ASKED = ("y_true", "y_pred")
 
 SAME_SCORE = 1e-9
 """Relative difference of two scores of the same answers: sums of a million terms in another order, as on another kind
@@ -64,7 +63,7 @@ def _fault_in_answers(sets: Any, row: Row) -> str:
         if not (isinstance(columns, Mapping) and columns.keys() == set(_COLUMNS)):
             return f"its {role} answers are a {type(columns).__name__} without the columns of answers"
         for name, column in columns.items():
-            dimensions = 2 if name in _ASKED and row["metric"] == VECTOR_METRIC else 1
+            dimensions = 2 if name in ("y_true", "y_pred") and row["metric"] == VECTOR_METRIC else 1
             if not (isinstance(column, np.ndarray) and column.ndim == dimensions and column.dtype.kind in "biufSU"):
                 return f"its {role} answers have no plain column {name}"
         lengths = {name: len(column) for name, column in columns.items()}

@@ -11,9 +11,7 @@ from typing import Any
 from tactbench.core.errors import PluginContractError
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluate_cell import (
-    Asked,
     Job,
-    asked_by,
     import_estimators,
     opening,
     reused,
@@ -137,9 +135,9 @@ def _kept(cell: Cell, outcome: Any, known: Row, recorded: Recorded, store: Store
 
 def _ordered(jobs: Sequence[Job], choice: EngineChoice) -> Iterable[Job]:
     """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
-    groups: dict[tuple[Asked, tuple[Path, ...]], list[Job]] = {}
+    groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
-        groups.setdefault((asked_by(job.cell), job.recordings), []).append(job)
+        groups.setdefault((job.cell.declared_task or job.cell.task, job.recordings), []).append(job)
     if choice.forks(len(jobs)):
         return shared(groups, choice.pool(1))
     if choice.here(len(jobs)):

@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable, RecordingError
 from tactbench.core.evaluation.libraries import import_libraries
-from tactbench.core.matrix.plan import Cell, task_of
+from tactbench.core.matrix.plan import Cell, task_called, task_of
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.pool.log import printed
 from tactbench.core.pool.message import dump_error, load_error
 from tactbench.core.pool.pool import Pool
 from tactbench.core.provenance.gather import host_id
-from tactbench.core.spec.declared_task import DeclaredTask
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.row import RowModel
 from tactbench.core.spec.task import TaskSpec
@@ -43,9 +42,6 @@ class Job(NamedTuple):
     digests: tuple[str, ...] = ()
     """Of the recordings' content, which a process on another machine compares with what it reads; none: it need not."""
 
-
-Asked = tuple[str, str]
-"""Name of a task, and what its recordings declare of it if they do."""
 
 this_host = lru_cache(maxsize=1)(host_id)
 
@@ -75,21 +71,11 @@ _prepared: set[tuple[int, str, str]] = set()
 
 
 @lru_cache(maxsize=2)
-def dataset(asked: Asked, recordings: tuple[Path, ...]) -> Dataset:
-    """Return `recordings` as a task needs them; forked children share what has been read here."""
+def dataset(task: str, recordings: tuple[Path, ...]) -> Dataset:
+    """Return `recordings` as a task (its name, or what declares it) needs them; forked children share what is read."""
     from tactbench.core.evaluation.dataset import load_dataset
 
-    return load_dataset(_task(asked), recordings)
-
-
-def asked_by(cell: Cell) -> Asked:
-    """Return what decides how the recordings of a cell are read: the task's name, or what declares it."""
-    return cell.task, cell.declared_task
-
-
-def _task(asked: Asked) -> TaskSpec:
-    name, declared = asked
-    return DeclaredTask.model_validate_json(declared).spec if declared else installed().tasks[name].spec
+    return load_dataset(task_called(task, installed()), recordings)
 
 
 Solved = tuple[Row, dict[str, dict[str, Any]]]
@@ -119,7 +105,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
 
     began = time.perf_counter()
     _seed_everything(cell.seed)
-    data = dataset(asked_by(cell), recordings)
+    data = dataset(cell.declared_task or cell.task, recordings)
     context = CellContext(
         task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
         progress=working, latency=cell.latency,
@@ -285,25 +271,25 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def shared(groups: Mapping[tuple[Asked, tuple[Path, ...]], Sequence[Job]], pool: Pool) -> Iterator[Job]:
+def shared(groups: Mapping[tuple[str, tuple[Path, ...]], Sequence[Job]], pool: Pool) -> Iterator[Job]:
     """Yield the cells group by task and recordings; before each group, read here what several of its cells need.
 
     A child process reads it first: what stops that is not read here, and stops each of the cells in its own process.
     """
     from tactbench.core.thread_limit import find_libraries
 
-    for (asked, recordings), jobs in groups.items():
+    for (task, recordings), jobs in groups.items():
         import_estimators(job.cell for job in jobs)
         if len(jobs) > 1:
-            ((_, outcome),) = pool.each(_is_readable, [(asked, recordings)])
+            ((_, outcome),) = pool.each(_is_readable, [(task, recordings)])
             if outcome is True:
-                dataset(asked, recordings)
+                dataset(task, recordings)
         find_libraries()
         yield from jobs
 
 
-def _is_readable(asked_and_recordings: tuple[Asked, tuple[Path, ...]]) -> bool:
-    dataset(*asked_and_recordings)
+def _is_readable(task_and_recordings: tuple[str, tuple[Path, ...]]) -> bool:
+    dataset(*task_and_recordings)
     return True
 
 

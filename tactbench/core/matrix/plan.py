@@ -60,9 +60,12 @@ class Cell:
 
 def task_of(cell: Cell, registry: Registry) -> TaskSpec:
     """Return the task of a cell, in a process that may not have seen its recordings."""
-    if cell.declared_task:
-        return DeclaredTask.model_validate_json(cell.declared_task).spec
-    return registry.tasks[cell.task].spec
+    return task_called(cell.declared_task or cell.task, registry)
+
+
+def task_called(task: str, registry: Registry) -> TaskSpec:
+    """Return a task by its name, or by the JSON that declares it."""
+    return DeclaredTask.model_validate_json(task).spec if task.startswith("{") else registry.tasks[task].spec
 
 
 def plan_cells(

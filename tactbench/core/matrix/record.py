@@ -69,11 +69,9 @@ def acquire_missing(
             outcomes = _one_by_one(missing, operator)
         else:
             registry = installed()
-            own_plugins = all(
-                registry.sensors.owned(one.sensor).ours and registry.rigs.owned(one.rig).ours for one in missing
-            )
+            own = all(registry.sensors.owned(one.sensor).ours and registry.rigs.owned(one.rig).ours for one in missing)
             # What an import of somebody else's changes in its process, it changes for one recording.
-            pool = choice.pool(workers, grace_s=0.0 if simulated else GRACE_S, reuse=own_plugins)
+            pool = choice.pool(workers, grace_s=0.0 if simulated else GRACE_S, reuse=own)
             outcomes = pool.each(record, missing)
         with closing(outcomes):
             for request, outcome in outcomes:

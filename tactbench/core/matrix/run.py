@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.matrix.declared import declared_in, with_declared
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluate import evaluate_all
 from tactbench.core.matrix.key_book import KeyBook
@@ -20,6 +19,7 @@ from tactbench.core.matrix.record import acquire_missing
 from tactbench.core.matrix.recorded import Recorded
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.summary import fill_baselines, scores_text
+from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import installed
 from tactbench.core.provenance.gather import gather

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
 from tactbench.core.leaderboard.checked import checked, with_added
-from tactbench.core.matrix.declared import with_declared_of
 from tactbench.core.matrix.store import Row, Store
+from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.samples import Answers
 from tactbench.core.statistics.replicates import over_replicates
 

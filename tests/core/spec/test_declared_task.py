@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from tactbench.core.matrix.declared import with_declared_of
+from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.declared_task import DeclaredTask
 
