@@ -294,7 +294,10 @@ def limits_are_kept(subject: Subject) -> None:
             beyond = (values[:, column] < low) | (values[:, column] > high)
             if beyond.any():
                 fail(where, f"it reads {values[beyond, column][0]:g}, beyond its limits {low:g} to {high:g}")
-            at_end = (values[:, column] == low) | (values[:, column] == high)
+            # One that rests at an end has that reading without being full.
+            rest = None if channel.rest is None else channel.rest.to(channel.unit)
+            ends = [end for end in (low, high) if end != rest]
+            at_end = np.isin(values[:, column], ends)
             unmarked = at_end & ((quality[:, column] & Quality.SATURATED) == 0)
             if channel.unit == "count" and np.count_nonzero(unmarked):
                 fail(where, f"it stands at its end in row {int(np.flatnonzero(unmarked)[0])}, not marked SATURATED")

@@ -65,6 +65,8 @@ def metric_has_its_unit(subject: Subject) -> None:
             units.parse(unit)
         except UsageError as error:
             fail(field, str(error))
+    if isinstance(spec.target, LabelTarget) and "unit" not in spec.target.model_fields_set:
+        target_unit = spec.unit  # a label of which nobody says more
     of_the_target = spec.metric in ("rmse", "mae") or METRICS[spec.metric].vector
     wanted = target_unit if of_the_target else "1"
     kind = getattr(spec.target, "kind", None)

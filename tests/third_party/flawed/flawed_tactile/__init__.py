@@ -105,7 +105,7 @@ CAUGHT_BY = {
         "sound-estimator": None,
         "estimator-of-no-kind": "kinds-are-stated",
         "estimator-without-its-argument": "arguments-are-taken",
-        "estimator-with-a-grid-off-its-default": "grids-can-be-searched",
+        "estimator-with-a-candidate-twice": "grids-can-be-searched",
         "estimator-that-cannot-predict": "estimator-builds",
         "estimator-with-an-impossible-candidate": "candidates-are-accepted",
         "estimator-with-columns": "answers-have-the-shape",
