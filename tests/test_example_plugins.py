@@ -15,7 +15,7 @@ from tests.conftest import ROOT
 PACKAGES = sorted(path.parent for path in (ROOT / "examples" / "plugins").glob("*/pyproject.toml"))
 DOORS = {"tactbench.plugin", "tactbench.plugin.simulation", "tactbench.plugin.devices"}
 WITH_DRIVER, WITHOUT = 100, 40
-"""The most lines of code of a sensor: what issue a package may take of an author's time."""
+"""The most lines of code that a package of a sensor may have."""
 
 
 def sources(package):

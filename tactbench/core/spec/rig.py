@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from tactbench.core.spec.quantity import Frozen
 from tactbench.core.spec.recording import Scalar
@@ -133,6 +133,14 @@ class EstimatorDescriptor(Frozen):
     rehearsal: dict[str, Any] | None = None
     """Parameters with which it learns a few rows in no time and leaves no thread behind: it then does so once before
     cells are timed, and what its library does at its first use is in nobody's time. None: it is only built then."""
+
+    @model_validator(mode="after")
+    def _nothing_is_searched_of_detectors(self) -> EstimatorDescriptor:
+        if "events" in self.kinds and (self.grid or self.window_grid != (0,)):
+            raise ValueError(
+                "kind events chooses a threshold on validation recordings, and neither grid nor window_grid"
+            )
+        return self
 
 
 class EffectDescriptor(Frozen):

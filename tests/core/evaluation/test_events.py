@@ -243,6 +243,12 @@ def test_a_task_that_cannot_be_carried_out_is_refused(change, match):
         TaskSpec.model_validate({**TASK.model_dump(), **change})
 
 
+def test_a_detector_has_nothing_to_search():
+    given = REGISTRY.estimators["pac-band"].model_dump()
+    with pytest.raises(ValidationError, match="neither grid nor window_grid"):
+        EstimatorDescriptor.model_validate({**given, "window_grid": (0, 5)})
+
+
 def test_a_detector_without_its_library_is_skipped_in_words(paths, monkeypatch):
     monkeypatch.setitem(sys.modules, "pywt", None)
     with pytest.raises(NotApplicable, match="PyWavelets, which is not installed"):

@@ -30,6 +30,15 @@ def test_repeats_have_seeds_of_their_own(registry):
     assert sorted({(cell.repeat, cell.seed) for cell in cells}) == [(1, 1), (2, 2), (3, 3)]
 
 
+def test_a_task_may_state_how_often_it_is_recorded_anew_and_the_matrix_overrules_it(registry):
+    tasks = (TaskChoice(name="force"), TaskChoice(name="slip"))
+    assert registry.tasks["slip"].spec.replicates == 1
+    for asked, expected in ((None, {"force": 8, "slip": 1}), (3, {"force": 3, "slip": 3})):
+        cells = plan(registry, *tasks, repeats=asked)
+        assert {name: max(cell.repeat for cell in cells if cell.task == name) for name in expected} == expected
+        assert all(cell.repeats == expected[cell.task] for cell in cells)
+
+
 @pytest.mark.parametrize(
     ("choice", "says"),
     [

@@ -10,7 +10,7 @@ from tactbench.plugin.simulation import BondedLayer, Nuisances, SkinSheet
 TACTBENCH_API = 1
 WHY = "no source read so far states it"
 GUESS = Source(tag="assumed", reference=WHY)
-ROWS, COLUMNS, PITCH_MM = 7, 4, 5.0
+ROWS, COLUMNS, PITCH_MM, REST = 7, 4, 5.0, 500
 
 
 def guess(value: float, unit: str) -> Quantity:
@@ -23,7 +23,7 @@ STREAM = StreamSpec(
     dtype="uint16",  # asked, so that the host makes the rate
     channels=tuple(
         ChannelSpec(
-            name=f"r{row + 1}c{column + 1}", kind="taxel", lower=0, upper=65535, rest=guess(0, "count"), sign=1,
+            name=f"r{row + 1}c{column + 1}", kind="taxel", lower=0, upper=65535, rest=guess(REST, "count"), sign=1,
             position_m=(1e-3 * PITCH_MM * (row - 3), 1e-3 * PITCH_MM * (column - 1.5), 0.0), normal=(0.0, 0.0, 1.0),
             position_source=GUESS,
         )

@@ -6,7 +6,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, SensorSpec
 from tactbench.plugin.simulation import SkinGrid, SkinState, Transducer
 
-from tactbench_robotiq_tsf85 import PITCH_MM
+from tactbench_robotiq_tsf85 import PITCH_MM, REST
 
 
 def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> Transducer:
@@ -20,6 +20,6 @@ def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> Transduc
     ]
 
     def read(state: SkinState) -> FloatArray:
-        return np.array([gain * state.pressure_mpa[square].mean() for square in inside])
+        return np.array([REST + gain * state.pressure_mpa[square].mean() for square in inside])
 
     return read
