@@ -73,8 +73,10 @@ def command(
     modes: tuple[Mode, ...] = ("passive",) if passive or recording is None else ()
     modes += ("invasive",) if invasive else ()
     modes += ("recording",) if recording is not None else ()
-    if recording is not None and any(one.kind != "sensor" for one in subjects):
+    if recording is not None:
         subjects = [one for one in subjects if one.kind == "sensor"]
+        if not subjects and not wrong:
+            raise UsageError(f"{name} is no sensor, and a recording is of one.", hint="Leave --recording out.")
     if invasive and not yes and not sys.stdin.isatty():
         raise UsageError(
             "--invasive asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."

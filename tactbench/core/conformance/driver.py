@@ -11,9 +11,11 @@ from tactbench.core.conformance.check import CheckFailed, check, code_of, fail, 
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.errors import LinkError, RigError, TactbenchError, UsageError
 from tactbench.core.samples import Quality
+from tactbench.core.spec.sensor import ChannelSpec, SensorSpec
 
 if TYPE_CHECKING:
     from tactbench.devices.driver import Driver
+    from tactbench.devices.emulator import Senses
     from tactbench.links.link import Link
 
 READ_S = 1.0
@@ -45,7 +47,9 @@ class _Lines:
 
 
 @contextmanager
-def _emulated(subject: Subject, *faults: str, **options: Any) -> Iterator[tuple[Driver, _Lines, Any]]:
+def _emulated(
+    subject: Subject, *faults: str, senses: Senses | None = None, **options: Any
+) -> Iterator[tuple[Driver, _Lines, Any]]:
     """Open the driver on its emulator at rest, in virtual time; yield it, its lines and the clock."""
     from tactbench.core.plugins.rig_devices import emulated_device, options_of
     from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
@@ -55,7 +59,7 @@ def _emulated(subject: Subject, *faults: str, **options: Any) -> Iterator[tuple[
     descriptor = subject.descriptor
     entry = DeviceEntry(link=EMULATED, faults=faults)
     with code_of("emulator", subject.package):
-        device = emulated_device(descriptor, subject.name, entry, _at_rest(descriptor.spec), 1)
+        device = emulated_device(descriptor, subject.name, entry, senses or _at_rest(descriptor.spec), 1)
     devices = EmulatedDevices({subject.name: device})
     lines = _Lines(devices.opener(subject.name))
     given = {**options_of(descriptor, entry), **options}
@@ -71,11 +75,27 @@ def _emulated(subject: Subject, *faults: str, **options: Any) -> Iterator[tuple[
         devices.close()
 
 
-def _at_rest(spec: Any) -> Any:
-    rest = {one.name: one.rest.to(one.unit) if one.rest is not None else 0.0 for one in spec.channels()}
+def _at_rest(spec: SensorSpec) -> Senses:
+    return _constant({one.name: one.rest.to(one.unit) if one.rest is not None else 0.0 for one in spec.channels()})
+
+
+def _each_its_own(spec: SensorSpec) -> dict[str, float]:
+    """Return a reading for each channel, all different within a stream, in the middle of its range."""
+    found = {}
+    for stream in spec.streams:
+        for number, one in enumerate(stream.channels):
+            share = 0.3 + 0.4 * (number + 1) / (len(stream.channels) + 1)
+            if one.lower is not None and one.upper is not None:
+                found[one.name] = float(round(one.lower + share * (one.upper - one.lower)))
+            else:
+                found[one.name] = (one.rest.to(one.unit) if one.rest is not None else 0.0) + number + 1
+    return found
+
+
+def _constant(values: Mapping[str, float]) -> Senses:
 
     def senses(_t_s: float) -> Mapping[str, float]:
-        return rest
+        return values
 
     return senses
 
@@ -187,6 +207,42 @@ def _look_at(subject: Subject, driver: Driver, clock: Any) -> None:
     silent = [name for name, number in rows.items() if not number]
     if silent:
         fail("driver.read", f"nothing came of its stream {silent[0]} within {READ_S:g} s")
+
+
+@check("sensor", needs=("driver-reads",), level="silver")
+def driver_reads_what_is_sensed(subject: Subject) -> None:
+    """Swapped channels, bytes in the wrong order or a lost sign give plausible readings of something else.
+
+    Decode into the order of the stream's channels and into their units; the emulator must encode what its senses say.
+    """
+    import numpy as np
+
+    spec = subject.descriptor.spec
+    sensed = _each_its_own(spec)
+    channels = {one.name: one for one in spec.channels()}
+    with _emulated(subject, senses=_constant(sensed)) as (driver, _, clock):
+        driver.start()
+        rows: dict[str, list[Any]] = {stream.name: [] for stream in driver.streams}
+        for _ in _passing(clock, READ_S):
+            for block in driver.read(WAIT_S):
+                marks = np.zeros(block.data.shape, np.uint8) if block.quality is None else block.quality
+                bad = (marks & (Quality.MISSING | Quality.SUSPECT)) != 0
+                rows[block.stream].append(np.where(bad, np.nan, np.asarray(block.data, dtype=np.float64)))
+        for stream in driver.streams:
+            # The first samples may be from before.
+            read = np.nanmedian(np.concatenate(rows[stream.name]), axis=0)
+            for name, found in zip([one.name for one in stream.channels], read.tolist(), strict=True):
+                if abs(found - sensed[name]) > _near(channels[name]):
+                    others = [one for one, value in sensed.items() if abs(found - value) <= _near(channels[name])]
+                    meant = f", which is what {others[0]} senses" if others else ""
+                    fail(f"driver.read: {stream.name}.{name}", f"{found:g} where {sensed[name]:g} is sensed{meant}")
+
+
+def _near(channel: ChannelSpec) -> float:
+    """Return how far a reading may be from what is sensed: a hundredth of the range, or a quarter of a step apart."""
+    if channel.lower is None or channel.upper is None:
+        return 0.25
+    return max(1.0, 0.01 * (channel.upper - channel.lower))
 
 
 @check("sensor", needs=("driver-reads",), level="silver")
@@ -360,7 +416,8 @@ class _Present:
 
 
 CHECKS = (
-    driver_opens, driver_says_who_it_is, driver_streams_are_the_specs, driver_reads, driver_keeps_its_rate,
+    driver_opens, driver_says_who_it_is, driver_streams_are_the_specs, driver_reads,
+    driver_reads_what_is_sensed, driver_keeps_its_rate,
     driver_does_not_wait_when_told_so, driver_closes_its_line, driver_reports_unplug, driver_refuses_unknown_options,
     real_device_answers, real_rig_presses,
 )  # fmt: skip

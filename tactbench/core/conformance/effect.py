@@ -129,9 +129,8 @@ def _pressed(subject: Subject) -> tuple[Press, Any, Any, Any, Scene]:
     found = first_that_goes(subject, calling or scenes, descriptor.name, "where")
     if found is None:
         skip("no simulated sensor and scene go with it")
-    rig, of_rig, sensor, scene = found
-    with code_of("where", subject.package):
-        return carried_out(rig, of_rig, sensor, scene, 1), rig, of_rig, sensor, scene
+    rig, of_rig, sensor, scene, made = found
+    return made, rig, of_rig, sensor, scene
 
 
 @check("effect", needs=("it-says-when-it-is-called-for", "tokens-are-known", "name-can-be-asked-for"), level="silver")

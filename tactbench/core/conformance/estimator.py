@@ -126,14 +126,12 @@ def kinds_are_stated(subject: Subject) -> None:
 def grids_can_be_searched(subject: Subject) -> None:
     """Validation chooses among candidates: without one there is nothing to choose, and two equal ones cost time.
 
-    Give every parameter in grid different candidates, the default among them, and window_grid whole numbers from 0.
+    Give every parameter in grid different candidates, and window_grid whole numbers from 0.
     """
     descriptor = subject.descriptor
     for name, candidates in descriptor.grid.items():
         if not candidates or len(set(candidates)) < len(candidates):
             fail(f"grid[{name}]", f"{candidates}: at least one is needed, each once")
-        if name in descriptor.params and descriptor.params[name] not in candidates:
-            fail(f"grid[{name}]", f"the default, {descriptor.params[name]}, is not among {candidates}")
     if not descriptor.window_grid or min(descriptor.window_grid) < 0:
         fail("window_grid", f"{descriptor.window_grid}: numbers of past samples, 0 or more, are needed")
 

@@ -294,7 +294,10 @@ def limits_are_kept(subject: Subject) -> None:
             beyond = (values[:, column] < low) | (values[:, column] > high)
             if beyond.any():
                 fail(where, f"it reads {values[beyond, column][0]:g}, beyond its limits {low:g} to {high:g}")
-            at_end = (values[:, column] == low) | (values[:, column] == high)
+            # One that rests at an end has that reading without being full.
+            rest = None if channel.rest is None else channel.rest.to(channel.unit)
+            ends = [end for end in (low, high) if end != rest]
+            at_end = np.isin(values[:, column], ends)
             unmarked = at_end & ((quality[:, column] & Quality.SATURATED) == 0)
             if channel.unit == "count" and np.count_nonzero(unmarked):
                 fail(where, f"it stands at its end in row {int(np.flatnonzero(unmarked)[0])}, not marked SATURATED")
@@ -530,8 +533,8 @@ def scenes_of(observe: tuple[str, ...]) -> Iterator[Scene]:
 
 def first_that_goes(
     subject: Subject, scenes: Sequence[Scene], asked: str, where: str
-) -> tuple[Any, RigDescriptor, SensorDescriptor, Scene] | None:
-    """Return a rig, a sensor and a scene with which a simulation goes; None: every pair is not applicable.
+) -> tuple[Any, RigDescriptor, SensorDescriptor, Scene, Press] | None:
+    """Return a rig, a sensor and a scene with which a simulation goes, and the press; None: none is applicable.
 
     `asked` is an effect that is included by name; "" for none.
     """
@@ -542,12 +545,12 @@ def first_that_goes(
         for sensor in simulated_sensors(subject):
             try:
                 with code_of(where, subject.package):
-                    carried_out(rig, descriptor, sensor, scene, 1)
+                    made = carried_out(rig, descriptor, sensor, scene, 1)
             except AssertionError as error:
                 if isinstance(error.__cause__, NotApplicable):
                     continue
                 raise
-            return rig, descriptor, sensor, scene
+            return rig, descriptor, sensor, scene, made
     return None
 
 

@@ -19,6 +19,11 @@ from tactbench.core.spec.sensor import ChannelSpec, SensorSpec, StreamSpec
 LARGEST_SENSOR_M = 1.0
 """Every position is less than this from the sensor's origin: a skin of a forearm is 0.3 m, and millimetres given as
 metres are beyond it for all but the smallest."""
+OF_KIND = {
+    "force": "N", "torque": "N*m", "position": "m", "dc_pressure": "Pa", "ac_pressure": "Pa", "dc_temperature": "K",
+    "joint": "rad",
+}  # fmt: skip
+"""A unit of what a kind of channel measures."""
 _EDGE_MM = 1e-6
 """Rounding of a position in metres."""
 _UNIT_NORMAL = 1e-3
@@ -132,12 +137,8 @@ def units_are_of_the_kind(subject: Subject) -> None:
 
     Give force, torque, position and pressure channels a unit of that dimension, or ``count`` for raw readings.
     """
-    wanted = {
-        "force": "N", "torque": "N*m", "position": "m", "dc_pressure": "Pa", "ac_pressure": "Pa",
-        "dc_temperature": "K", "joint": "rad",
-    }  # fmt: skip
     for place, _, channel in _channels(subject.descriptor.spec):
-        unit = wanted.get(channel.kind)
+        unit = OF_KIND.get(channel.kind)
         if unit is None or channel.unit in ("count", "V", "mV"):
             continue
         if units.parse(channel.unit)[1] != units.parse(unit)[1]:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 
 from tactbench.core.conformance.check import check, code_of, fail, skip
-from tactbench.core.conformance.press import first_that_goes, tiny_scene
+from tactbench.core.conformance.press import SECONDS, Press, first_that_goes, tiny_scene
+from tactbench.core.conformance.sensor_spec import OF_KIND
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.errors import UnknownNameError, UsageError, nearest
 from tactbench.core.spec import units
-from tactbench.core.spec.task import LabelTarget, PlannedScene, TaskSpec
+from tactbench.core.spec.quantity import assumed
+from tactbench.core.spec.task import ChannelTarget, LabelTarget, PlannedScene, TaskSpec
 
 GROUPS = ("recording", "unit", "trial", "press", "object", "block")
 """Groups beside labels that recordings have or that mappings of this package give them."""
@@ -49,7 +52,7 @@ def metric_is_known(subject: Subject) -> None:
 
 @check("task", needs=("metric-is-known",))
 def metric_has_its_unit(subject: Subject) -> None:
-    """The unit stands beside every score: an error of newtons in N, a share in 1.
+    """The unit stands beside every score: errors are computed in the target's unit, and nobody converts them.
 
     State the target's unit for errors (rmse, mae, mean_euclidean_error), and 1 for the others.
     """
@@ -62,9 +65,14 @@ def metric_has_its_unit(subject: Subject) -> None:
             units.parse(unit)
         except UsageError as error:
             fail(field, str(error))
+    if isinstance(spec.target, LabelTarget) and "unit" not in spec.target.model_fields_set:
+        target_unit = spec.unit  # a label of which nobody says more
     of_the_target = spec.metric in ("rmse", "mae") or METRICS[spec.metric].vector
     wanted = target_unit if of_the_target else "1"
-    if units.parse(spec.unit)[1] != units.parse(wanted)[1]:
+    kind = getattr(spec.target, "kind", None)
+    if kind in OF_KIND and units.parse(target_unit)[1] != units.parse(OF_KIND[kind])[1]:
+        fail("spec.target.unit", f"a {kind} is measured in {OF_KIND[kind]}, not in {target_unit}")
+    if units.parse(spec.unit) != units.parse(wanted):
         fail("spec.unit", f"{spec.metric} of a target in {target_unit} is in {wanted}, not in {spec.unit}")
 
 
@@ -349,18 +357,48 @@ def its_scene_is_carried_out(subject: Subject) -> None:
     spec = subject.descriptor.spec
     if not spec.scenes:
         skip("it has no scenes")
-    scene = spec.scenes[0].scene
-    tiny = tiny_scene(
-        indenter=scene.indenter, placement=scene.placement, observe=scene.observe, labels=scene.labels,
-        drive=scene.drive, simulation=scene.simulation,
-    )  # fmt: skip
     # A recording of zero samples, or of a force below 0, is not found out by a shorter one.
     for place, planned in _planned(spec):
         ramp = planned.scene.profile
         if not ramp.duration.to("s") > 0 or min(ramp.start.to("N"), ramp.end.to("N"), ramp.hold.to("s")) < 0:
             fail(f"{place}.profile", "a duration above 0, and forces and a hold of 0 or more are needed")
-    if first_that_goes(subject, (tiny,), "", f"spec.scenes[{scene.name}]") is None:
+    if _pressed(subject) is None:
         skip("no sensor that can be simulated goes with it: it needs another rig, or recordings")
+
+
+@lru_cache(maxsize=2)
+def _pressed(subject: Subject) -> Press | None:
+    """Return the task's first scene, cut short, on the first simulated sensor that goes with it."""
+    scene = subject.descriptor.spec.scenes[0].scene
+    slide = scene.slide
+    if slide is not None:
+        half = assumed(SECONDS / 2, "s", "a check of plugins")
+        slide = slide.model_copy(update={"start": half, "duration": None})
+    tiny = tiny_scene(
+        indenter=scene.indenter, placement=scene.placement, observe=scene.observe, labels=scene.labels,
+        drive=scene.drive, simulation=scene.simulation, slide=slide,
+    )  # fmt: skip
+    found = first_that_goes(subject, (tiny,), "", f"spec.scenes[{scene.name}]")
+    return None if found is None else found[-1]
+
+
+@check("task", needs=("its-scene-is-carried-out",), level="silver")
+def its_target_is_recorded(subject: Subject) -> None:
+    """A target that no rig records leaves rows without an answer, after everything was recorded.
+
+    Name a channel that a rig's reference has: fz of kind force, or what its plan adds in the task's scenes.
+    """
+    spec = subject.descriptor.spec
+    targets = getattr(spec.target, "components", (spec.target,))
+    press = _pressed(subject)
+    if press is None or not all(isinstance(one, ChannelTarget) for one in targets):
+        skip("its target is no channel of the reference")
+    channels = [channel for stream in press.reference for channel in stream.channels]
+    for one in targets:
+        names = [channel.name for channel in channels if channel.kind == one.kind]
+        if not names or (one.name is not None and one.name not in names):
+            there = ", ".join(f"{channel.name} ({channel.kind})" for channel in channels)
+            fail("spec.target", f"no {one.kind} {one.name or ''} is recorded; there is {there}")
 
 
 CHECKS = (
@@ -368,4 +406,5 @@ CHECKS = (
     estimators_are_installed, baselines_are_installed, labels_are_in_the_scenes, classes_can_be_told_apart,
     roles_are_complete, scenes_are_named_once, scenes_observe_the_features, answer_is_not_a_feature,
     features_by_gives_features, published_figures_are_comparable, its_scene_is_carried_out,
+    its_target_is_recorded,
 )  # fmt: skip

@@ -22,7 +22,7 @@ def test_a_sound_plugin_ends_with_0_and_says_how_many_checks_ran(verbs):
     assert last.startswith("sensor acme-pad: ran ")
     assert "failed 0" in last
     assert last.endswith("Level: silver.")
-    assert "skipped  9 checks: it names no driver" in done.stdout
+    assert "skipped  10 checks: it names no driver" in done.stdout
     assert "passed   positions-are-on-the-sheet" in done.stdout
 
 

@@ -6,7 +6,7 @@ TACTBENCH_API = 1
 FLAWS = {
     "of-no-kind": {"kinds": ()},
     "without-its-argument": {"params": {"alpha": 1.0, "beta": 2.0}},
-    "with-a-grid-off-its-default": {"grid": {"alpha": (0.1, 10.0)}},
+    "with-a-candidate-twice": {"grid": {"alpha": (0.1, 0.1)}},
     "with-an-impossible-candidate": {"grid": {"alpha": (1.0, -1.0)}},
     "linear-by-name": {"linear": True},
     "of-a-package-unknown": {"distributions": ("no-such-distribution",)},

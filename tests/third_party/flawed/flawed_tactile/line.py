@@ -121,6 +121,11 @@ class goes_back_in_time(PadDriver):
         ]
 
 
+class swaps_taxels(PadDriver):
+    def blocks(self, rows, t_ns):
+        return super().blocks([row[::-1] for row in rows], t_ns)
+
+
 class doubles_samples(PadDriver):
     def blocks(self, rows, t_ns):
         return super().blocks(rows * 2, t_ns)

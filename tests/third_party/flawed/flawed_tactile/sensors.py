@@ -108,7 +108,7 @@ TRANSDUCERS = (
     "mirrors", "turns-the-sign", "falls-back", "is-in-grams",
 )  # fmt: skip
 DRIVERS = (
-    "opens-two-lines", "is-a-number", "has-a-stream-of-its-own", "goes-back-in-time", "doubles-samples",
+    "opens-two-lines", "is-a-number", "has-a-stream-of-its-own", "goes-back-in-time", "swaps-taxels", "doubles-samples",
     "waits-anyhow", "leaves-its-line-open", "hides-the-unplugging", "takes-any-option",
 )  # fmt: skip
 

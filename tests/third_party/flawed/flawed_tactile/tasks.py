@@ -51,6 +51,10 @@ def last(**changes):
     return (*SCENES[:-1], PlannedScene(role="test", scene=SCENES[-1].scene.model_copy(update=changes)))
 
 
+FORCE = {
+    "kind": "regression", "target": ChannelTarget(), "metric": "rmse", "unit": "N", "estimators": ("ols",),
+    "baselines": ("mean",),
+}  # fmt: skip
 NO_TIME = ForceRamp(duration=assumed(0.0, "s", "its maker"))
 FLAWS = {
     "of-no-metric": {"metric": "f1_macro"},
@@ -66,10 +70,10 @@ FLAWS = {
     "without-a-test": {"scenes": SCENES[:2]},
     "with-a-scene-twice": {"scenes": (*SCENES, SCENES[-1])},
     "that-looks-elsewhere": {"scenes": last(observe=("ac_pressure",))},
-    "that-sees-its-answer": {
-        "kind": "regression", "target": ChannelTarget(), "features": ("taxel", "force"), "metric": "rmse", "unit": "N",
-        "estimators": ("ols",), "baselines": ("mean",),
-    },
+    "that-sees-its-answer": {**FORCE, "features": ("taxel", "force")},
+    "of-a-shear-that-nobody-records": {**FORCE, "target": ChannelTarget(name="shear")},
+    "of-a-force-in-metres": {**FORCE, "target": ChannelTarget(unit="mm"), "unit": "mm"},
+    "in-kilonewtons": {**FORCE, "unit": "kN"},
     "with-features-of-nan": {
         "answer_per": "recording", "summaries": (Summary(measure="mean"),),
         "features_by": "flawed_tactile.tasks:features_of_nan",
