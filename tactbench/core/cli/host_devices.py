@@ -20,7 +20,7 @@ MULTICAST_GROUP = "239.74.163.2"
 """python-can's group for udp_multicast over IPv4 (``UdpMulticastBus.DEFAULT_GROUP_IPv4``)."""
 REQUESTED_BUFFER_BYTES = 4 << 20
 """What a datagram link asks of the system unless its address says otherwise."""
-FOR_DEVELOPERS = ("test", "dev")
+FOR_DEVELOPERS = ("docs", "test", "dev")
 """Extras that no device needs."""
 SLEEP_S = 0.005
 """Length of a sleep whose lateness is measured: half a BioTac frame."""

@@ -96,7 +96,8 @@ def test_this_machine(tmp_path):
     assert host["clock"]["sleeps"] > 10
     assert 0 <= host["clock"]["late_median_us"] <= host["clock"]["late_largest_us"]
     assert host["clock"]["step_ns"] > 0
-    assert {one["name"] for one in host["extras"]} == {"dask", "fast", "multicast", "parquet", "spi", "xlsx"}
+    offered = {"dask", "fast", "multicast", "parquet", "spi", "wavelets", "xlsx"}
+    assert {one["name"] for one in host["extras"]} == offered
     assert {"name": "wired-pad", "kind": "sensor", "driver": "wired_tactile.driver:build", "emulator": ""} in about[
         "drivers"
     ]
