@@ -34,6 +34,7 @@ VERBS = {
     "merge": ("merge", "Make one result folder of several, and refuse those that contradict each other."),
     "leaderboard": ("leaderboard", "Show the table of all results in a folder, in any format."),
     "new": ("new", "Write a plugin package to start from: a sensor, rig, task, estimator or effect."),
+    "docs": ("docs", "List the pages of documentation, or print one."),
     "compare": ("compare", "Compare two sensors, two estimators or two result folders, replicate by replicate."),
 }
 
