@@ -175,18 +175,17 @@ def positions_are_in_metres(subject: Subject) -> None:
 
 @check("sensor", needs=("positions-are-in-metres",))
 def positions_are_apart(subject: Subject) -> None:
-    """Two taxels in one place are usually a copied line; where sites have several channels, all sites have as many.
+    """Two taxels in one place are usually a copied line.
 
-    Correct position_m of one of them.
+    Correct position_m of one of them, or name the `site` that both belong to.
     """
-    places: dict[tuple[float, ...], list[str]] = {}
+    places: dict[tuple[float, ...], tuple[str, str]] = {}
     for place, _, channel in _channels(subject.descriptor.spec):
         if channel.kind == "taxel" and channel.position_m is not None:
-            places.setdefault(channel.position_m, []).append(place)
-    sizes = [len(found) for found in places.values()]
-    for found in places.values():
-        if len(found) > 1 and min(sizes) < max(sizes) and len(found) == max(sizes):
-            fail(f"{found[-1]}.position_m", f"it is also that of {found[0].rpartition('[')[2].rstrip(']')}")
+            site = channel.site or place
+            first, known = places.setdefault(channel.position_m, (place, site))
+            if known != site:
+                fail(f"{place}.position_m", f"it is also that of {first.rpartition('[')[2].rstrip(']')}")
 
 
 @check("sensor", needs=("positions-are-in-metres",))

@@ -45,7 +45,7 @@ class Property:
 def table_one(sensors: Sequence[SensorSpec]) -> list[Property]:
     """Return the paper's Table I for any sensors."""
     rows = [
-        _row("# taxels", sensors, lambda sensor: _text(str(len(sensor.channels("taxel"))))),
+        _row("# taxels", sensors, lambda sensor: _text(_number_of_taxels(sensor))),
         _row("measurement principle", sensors, lambda s: Fact(s.principle, s.principle_source.tag,
                                                               s.principle_source.reference)),
     ]  # fmt: skip
@@ -126,6 +126,11 @@ def _range(sensor: SensorSpec, kind: ChannelKind, which: str) -> Fact:
         if found is not None:
             return _sourced(str(found), found.source)
     return Fact(ABSENT)
+
+
+def _number_of_taxels(sensor: SensorSpec) -> str:
+    sites, channels = len(sensor.sites("taxel")), len(sensor.channels("taxel"))
+    return str(sites) if sites == channels else f"{sites}, of {channels} channels"
 
 
 def _of_device(sensor: SensorSpec, name: str) -> Fact:

@@ -58,6 +58,9 @@ class ChannelSpec(Frozen):
     pad that is pressed. On the skin's sheet, x is the axial coordinate and y, or on a finger its arc, is s."""
     normal: Vector | None = None
     """Outward unit normal at that place."""
+    site: str | None = Field(default=None, min_length=1)
+    """Name of the place, where several channels read it (the axes of one magnet): they state one position and normal.
+    None: the channel has a place of its own."""
     position_source: Source | None = None
     """Who states position and normal."""
     scale: Quantity | None = None
@@ -290,10 +293,30 @@ class SensorSpec(Frozen):
             raise ValueError(f"stream names must be unique in a sensor: {', '.join(streams)}")
         return self
 
+    @model_validator(mode="after")
+    def _a_site_is_one_place(self) -> SensorSpec:
+        for first, *others in self.sites():
+            for one in others:
+                for name in ("position_m", "normal"):
+                    if getattr(one, name) != getattr(first, name):
+                        raise ValueError(
+                            f"site {one.site}: {name} of {one.name} is not that of {first.name}; a site is one place"
+                        )
+        return self
+
     def channels(self, *kinds: ChannelKind) -> tuple[ChannelSpec, ...]:
         """Return the channels of the given kinds (all of them without arguments), in order of the streams."""
         every = (channel for stream in self.streams for channel in stream.channels)
         return tuple(channel for channel in every if not kinds or channel.kind in kinds)
+
+    def sites(self, *kinds: ChannelKind) -> tuple[tuple[ChannelSpec, ...], ...]:
+        """Return the channels of the given kinds by place: those of a site together, any other alone."""
+        found: dict[tuple[str, str], list[ChannelSpec]] = {}
+        for channel in self.channels(*kinds):
+            found.setdefault(("channel", channel.name) if channel.site is None else ("site", channel.site), []).append(
+                channel
+            )
+        return tuple(map(tuple, found.values()))
 
     def settable(self) -> dict[str, Quantity]:
         """Return what the sensor declares of nuisances, by the name under which a run sets it."""

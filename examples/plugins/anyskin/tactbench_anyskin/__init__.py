@@ -18,7 +18,7 @@ STREAM = StreamSpec(
     channels=tuple(
         # Fields may have either sign, and so may their answer to a press. That the library gives uT is assumed.
         ChannelSpec(name=f"m{site}{axis}", kind="dc_temperature" if axis == "t" else "taxel",
-                    unit="degC" if axis == "t" else "uT")
+                    unit="degC" if axis == "t" else "uT", site=f"m{site}")
         for site in range(1, 6)
         for axis in "txyz"
     ),

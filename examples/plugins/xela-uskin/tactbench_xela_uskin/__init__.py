@@ -17,7 +17,7 @@ STREAM = StreamSpec(
     dtype="uint16",  # nobody states the rate
     channels=tuple(
         # Z is along the normal; X and Y may answer either way. Places: no source read so far states the pitch.
-        ChannelSpec(name=f"t{taxel}{axis}", kind="taxel", lower=0, upper=65535)
+        ChannelSpec(name=f"t{taxel}{axis}", kind="taxel", lower=0, upper=65535, site=f"t{taxel}")
         for taxel in range(1, TAXELS + 1)
         for axis in "xyz"
     ),
