@@ -11,11 +11,20 @@ from multiprocessing.connection import wait
 from typing import TypeVar
 
 from tactbench.core.pool.limits import UNLIMITED, Limits
-from tactbench.core.pool.processes import interrupts_blocked, kill_orphans, own_children, set_subreaper
+from tactbench.core.pool.processes import (
+    await_fork_server_end,
+    interrupts_blocked,
+    kill_orphans,
+    own_children,
+    set_subreaper,
+)
 from tactbench.core.pool.worker import PENDING, Worker
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+_SERVER_ENDS_S = 5.0
+"""Seconds that a fork server which refuses a start may take to end: it was killed, and a busy machine is slow."""
 
 
 class Pool:
@@ -85,7 +94,7 @@ class Pool:
                             worker.begin(index, second)
                     except Exception as error:
                         if isinstance(error, ConnectionError | EOFError) and not second:
-                            # The fork server has just ended: the next start makes another.
+                            await_fork_server_end(_SERVER_ENDS_S)
                             again.append((index, item))  # type: ignore[arg-type]
                         else:  # it cannot be pickled, or the system starts no more processes
                             yield item, error  # type: ignore[misc]

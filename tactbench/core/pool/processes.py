@@ -9,6 +9,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
+from multiprocessing import connection, forkserver
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,23 @@ def die_with_parent(parent: int) -> None:
     _prctl(_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
+
+
+def await_fork_server_end(seconds: float) -> None:
+    """Wait until the fork server of this process has ended, at most so long; the next start then makes another.
+
+    One that is killed closes its socket first and ends a moment later: between the two it counts as running, and
+    refuses whoever asks.
+    """
+    pid: int | None = getattr(forkserver._forkserver, "_forkserver_pid", None)
+    if pid is None:
+        return
+    with suppress(AttributeError, OSError):  # the system has no such call, or it has ended and was reaped
+        descriptor = os.pidfd_open(pid)
+        try:
+            connection.wait([descriptor], seconds)
+        finally:
+            os.close(descriptor)
 
 
 def set_subreaper(whether: bool) -> bool:

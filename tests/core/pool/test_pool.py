@@ -291,6 +291,23 @@ def test_an_item_that_kills_the_fork_server_has_crashed_and_the_others_are_right
     assert done.stdout.split() == ["str", "Crashed", "str"]
 
 
+def test_the_end_of_a_fork_server_is_waited_for():
+    code = (
+        "import os, signal, threading\n"
+        "from multiprocessing import forkserver\n"
+        "from pathlib import Path\n"
+        "from tactbench.core.pool.processes import await_fork_server_end\n"
+        "await_fork_server_end(60)\n"  # there is none
+        "forkserver.ensure_running()\n"
+        "pid = forkserver._forkserver._forkserver_pid\n"
+        "threading.Timer(0.2, os.kill, (pid, signal.SIGKILL)).start()\n"
+        "await_fork_server_end(60)\n"
+        "print(Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout == "Z\n"
+
+
 OWNER = """
 import sys
 from pathlib import Path

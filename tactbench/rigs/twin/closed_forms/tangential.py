@@ -26,7 +26,8 @@ class CattaneoMindlin:
 
     def stick_radius_mm(self, push_n: float) -> float:
         """Return ``c = a (1 - Q / mu P)^(1/3)``; 0 once everything slips."""
-        return self.contact_radius_mm * float(math.cbrt(max(1 - push_n / (self.friction * self.normal_n), 0.0)))
+        share = math.cbrt(max(1 - push_n / (self.friction * self.normal_n), 0.0))
+        return self.contact_radius_mm * min(share, 1.0)  # the root of a number just below 1 may be rounded above it
 
     def shift_mm(self, push_n: float) -> float:
         """Return the tangential approach ``3 mu P / (4 a G*) [1 - (1 - Q/mu P)^(2/3)]``."""
