@@ -18,15 +18,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from tactbench.core.conformance.check import CheckFailed, Kind, Mode, Outcome
+from tactbench.core.conformance.check import CheckFailed, CheckOutcome, Kind, Mode
 from tactbench.core.conformance.kit import OF_THE_LIST, checks_of
-from tactbench.core.conformance.run import Report, run_checks, subjects_named
+from tactbench.core.conformance.run import CheckReport, run_checks, subjects_named
 from tactbench.core.plugins.registry import installed
 
 __all__ = [
     "CheckFailed",
+    "CheckReport",
     "PluginCheck",
-    "Report",
     "check_effect",
     "check_estimator",
     "check_rig",
@@ -50,7 +50,7 @@ class PluginCheck:
     name: str
     why: str
     cure: str
-    report: Callable[[], Report]
+    report: Callable[[], CheckReport]
 
     def __str__(self) -> str:
         return self.name
@@ -63,7 +63,7 @@ class PluginCheck:
         import pytest
 
         found = {one.check: one for one in self.report().outcomes}
-        outcome = found.get(self.name, Outcome(self.name, "failed", "checks", "it has not run"))
+        outcome = found.get(self.name, CheckOutcome(self.name, "failed", "checks", "it has not run"))
         if outcome.status == "skipped":
             pytest.skip(outcome.text)
         if outcome.status == "expected":
@@ -72,7 +72,7 @@ class PluginCheck:
             raise CheckFailed(outcome.where, f"{outcome.text}\nwhy: {self.why}\ndo:  {self.cure}")
 
 
-def _report(kind: Kind, name: str, recording: Path | None = None) -> Report:
+def _report(kind: Kind, name: str, recording: Path | None = None) -> CheckReport:
     modes: tuple[Mode, ...] = ("passive",) if recording is None else ("passive", "recording")
     (subject,) = subjects_named(installed(), name, (kind,))
     return run_checks(subject, modes=modes, recording=recording)
@@ -80,7 +80,7 @@ def _report(kind: Kind, name: str, recording: Path | None = None) -> Report:
 
 def _checks(kind: Kind, name: str, recording: Path | None = None) -> list[PluginCheck]:
     @lru_cache(maxsize=1)
-    def report() -> Report:
+    def report() -> CheckReport:
         return _report(kind, name, recording)
 
     modes: tuple[Mode, ...] = ("passive",) if recording is None else ("passive", "recording")
@@ -113,27 +113,27 @@ def effect_checks(name: str) -> list[PluginCheck]:
     return _checks("effect", name)
 
 
-def check_sensor(name: str, *, recording: Path | None = None) -> Report:
+def check_sensor(name: str, *, recording: Path | None = None) -> CheckReport:
     """Run all checks of a sensor; raises UnknownNameError if there is none of that name, and nothing for a failure."""
     return _report("sensor", name, recording)
 
 
-def check_rig(name: str) -> Report:
+def check_rig(name: str) -> CheckReport:
     """Run all checks of a rig; see `check_sensor`."""
     return _report("rig", name)
 
 
-def check_task(name: str) -> Report:
+def check_task(name: str) -> CheckReport:
     """Run all checks of a task; see `check_sensor`."""
     return _report("task", name)
 
 
-def check_estimator(name: str) -> Report:
+def check_estimator(name: str) -> CheckReport:
     """Run all checks of an estimator; see `check_sensor`."""
     return _report("estimator", name)
 
 
-def check_effect(name: str) -> Report:
+def check_effect(name: str) -> CheckReport:
     """Run all checks of an effect; see `check_sensor`."""
     return _report("effect", name)
 

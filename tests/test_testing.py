@@ -12,7 +12,7 @@ from tactbench.core.errors import UnknownNameError
 from tactbench.core.plugins.registry import installed
 from tactbench.sensors.ideal import SPEC
 from tactbench.sensors.ideal.transduction import build
-from tactbench.testing import CheckFailed, PluginCheck, Report, strategies
+from tactbench.testing import CheckFailed, CheckReport, PluginCheck, strategies
 
 ASKED = testing.estimator_checks("ols")
 
@@ -46,8 +46,8 @@ def test_a_report_raises_nothing_and_a_wrong_name_does():
     ],
 )
 def test_what_came_of_a_check_is_pytests(status, raised):
-    outcome = testing.Outcome("it-learns", status, "predict", "it does not")
-    check = PluginCheck("it-learns", "Why.", "Do.", lambda: Report("estimator", "x", ("passive",), (outcome,)))
+    outcome = testing.CheckOutcome("it-learns", status, "predict", "it does not")
+    check = PluginCheck("it-learns", "Why.", "Do.", lambda: CheckReport("estimator", "x", ("passive",), (outcome,)))
     if raised is None:
         check()
         return

@@ -11,7 +11,7 @@ import click
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
-    from tactbench.core.conformance.run import Report
+    from tactbench.core.conformance.run import CheckReport
 
 _KINDS = ("sensor", "rig", "task", "estimator", "effect")
 
@@ -100,7 +100,7 @@ def command(
     ctx.exit(1 if wrong or not all(one.ok for one in reports) or not reports else 0)
 
 
-def _plain(report: Report) -> dict[str, object]:
+def _plain(report: CheckReport) -> dict[str, object]:
     import tactbench
 
     return {
@@ -109,7 +109,7 @@ def _plain(report: Report) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _print(report: Report, every: bool) -> None:
+def _print(report: CheckReport, every: bool) -> None:
     from tactbench.core.conformance.kit import checks_of
     from tactbench.core.tables.text import visible_lines
 

@@ -94,7 +94,7 @@ def skip(text: str) -> NoReturn:
     raise CheckSkipped(text)
 
 
-class Outcome(NamedTuple):
+class CheckOutcome(NamedTuple):
     """What came of a check."""
 
     check: str

@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 from tactbench.core.conformance.check import check, code_of, fail, skip
 from tactbench.core.conformance.common import difference
-from tactbench.core.conformance.press import Press, carried_out, first_that_goes, scenes_of, simulated_sensors
+from tactbench.core.conformance.press import TrialPress, carried_out, first_that_goes, scenes_of, simulated_sensors
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.errors import UsageError, nearest
 from tactbench.core.plugins.interfaces import Reason
@@ -119,7 +119,7 @@ def the_same_scene_the_same_reason(subject: Subject) -> None:
 
 
 @lru_cache(maxsize=2)
-def _pressed(subject: Subject) -> tuple[Press, Any, Any, Any, Scene]:
+def _pressed(subject: Subject) -> tuple[TrialPress, Any, Any, Any, Scene]:
     """Return a tiny press with the effect asked for by name, and with what it was made."""
     descriptor = subject.descriptor
     decide = subject.code("called_for")

@@ -53,7 +53,7 @@ def tiny_scene(name: str = "tiny", **changes: Any) -> Scene:
 
 
 @dataclass(frozen=True)
-class Press:
+class TrialPress:
     """What a rig gave for a scene."""
 
     scene: Scene
@@ -94,14 +94,14 @@ class Press:
         return None if any(one is None for one in times) else np.concatenate([one for one in times if one is not None])
 
 
-def carried_out(rig: Any, descriptor: RigDescriptor, sensor: SensorDescriptor, scene: Scene, seed: int) -> Press:
+def carried_out(rig: Any, descriptor: RigDescriptor, sensor: SensorDescriptor, scene: Scene, seed: int) -> TrialPress:
     """Carry out a scene on a rig that was built; raises what the rig raises."""
     with rig.open(sensor, scene, seed=seed) as acquisition:
         streams, reference = tuple(acquisition.streams), tuple(acquisition.reference)
         blocks = tuple(acquisition)
         said = {"assumptions": dict(acquisition.assumptions), "drawn": dict(acquisition.drawn)}
         plan = tuple(acquisition.plan)
-    return Press(scene, sensor, descriptor, streams, reference, plan, said, blocks)
+    return TrialPress(scene, sensor, descriptor, streams, reference, plan, said, blocks)
 
 
 def effects_for(subject: Subject) -> tuple[EffectDescriptor, ...]:
@@ -149,7 +149,7 @@ def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
 
 
 @lru_cache(maxsize=6)
-def pressed(subject: Subject, seed: int = 1) -> Press:
+def pressed(subject: Subject, seed: int = 1) -> TrialPress:
     """Return the tiny press of a subject: of a sensor on a simulated rig, or of a rig on a sensor."""
     if subject.kind == "sensor":
         rig, descriptor = simulated_rig(subject)
@@ -182,7 +182,7 @@ def tiny_press_is_carried_out(subject: Subject) -> None:
     _has_samples(made, made.streams if subject.kind == "sensor" else made.every_stream)
 
 
-def _has_samples(made: Press, streams: Sequence[StreamSpec]) -> None:
+def _has_samples(made: TrialPress, streams: Sequence[StreamSpec]) -> None:
     if not streams:
         fail("streams", "the press gave no stream")
     for stream in streams:
@@ -331,7 +331,7 @@ def same_seed_same_samples(subject: Subject) -> None:
             fail(f"streams[{stream.name}]", "another press with the same seed gives other samples")
 
 
-def _pressed_anew(subject: Subject) -> Press:
+def _pressed_anew(subject: Subject) -> TrialPress:
     """Return the same press, carried out once more."""
     return pressed.__wrapped__(subject)
 
@@ -533,7 +533,7 @@ def scenes_of(observe: tuple[str, ...]) -> Iterator[Scene]:
 
 def first_that_goes(
     subject: Subject, scenes: Sequence[Scene], asked: str, where: str
-) -> tuple[Any, RigDescriptor, SensorDescriptor, Scene, Press] | None:
+) -> tuple[Any, RigDescriptor, SensorDescriptor, Scene, TrialPress] | None:
     """Return a rig, a sensor and a scene with which a simulation goes, and the press; None: none is applicable.
 
     `asked` is an effect that is included by name; "" for none.

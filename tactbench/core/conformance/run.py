@@ -13,11 +13,11 @@ from tactbench.core.conformance.check import (
     KINDS,
     Check,
     CheckFailed,
+    CheckOutcome,
     CheckSkipped,
     Kind,
     Level,
     Mode,
-    Outcome,
     line_in,
 )
 from tactbench.core.conformance.kit import FLOORS, checks_of, enough_checks_ran, expected_failures_are_checks
@@ -46,34 +46,34 @@ _SILVER: Mapping[Kind, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Report:
+class CheckReport:
     """What came of the checks of one plugin."""
 
     kind: Kind
     name: str
     modes: tuple[Mode, ...]
-    outcomes: tuple[Outcome, ...] = field(repr=False)
+    outcomes: tuple[CheckOutcome, ...] = field(repr=False)
 
-    def _named(self, status: str) -> tuple[Outcome, ...]:
+    def _named(self, status: str) -> tuple[CheckOutcome, ...]:
         return tuple(one for one in self.outcomes if one.status == status)
 
     @property
-    def passed(self) -> tuple[Outcome, ...]:
+    def passed(self) -> tuple[CheckOutcome, ...]:
         """The checks that passed."""
         return self._named("passed")
 
     @property
-    def failed(self) -> tuple[Outcome, ...]:
+    def failed(self) -> tuple[CheckOutcome, ...]:
         """The checks that failed, unexpectedly."""
         return self._named("failed")
 
     @property
-    def skipped(self) -> tuple[Outcome, ...]:
+    def skipped(self) -> tuple[CheckOutcome, ...]:
         """The checks of what the plugin lacks, with what that is."""
         return self._named("skipped")
 
     @property
-    def expected(self) -> tuple[Outcome, ...]:
+    def expected(self) -> tuple[CheckOutcome, ...]:
         """The checks that failed and are listed, with the reason that is listed."""
         return self._named("expected")
 
@@ -163,8 +163,8 @@ def run_checks(
     isolated: bool = True,
     timeout_s: float = TIMEOUT_S,
     without: Collection[str] = (),
-    done: Callable[[Outcome], None] = lambda outcome: None,
-) -> Report:
+    done: Callable[[CheckOutcome], None] = lambda outcome: None,
+) -> CheckReport:
     """Run the checks of one plugin, each within limits.
 
     Parameters
@@ -183,34 +183,34 @@ def run_checks(
     subject = replace(subject, recording=recording, rig_file=rig_file)
     checks = {one.name: one for one in checks_of(subject.kind, *modes)}
     expected = _expected(subject, isolated, timeout_s) if set(modes) != {"recording"} else {}
-    outcomes: dict[str, Outcome] = {}
+    outcomes: dict[str, CheckOutcome] = {}
 
-    def settle(outcome: Outcome) -> None:
+    def settle(outcome: CheckOutcome) -> None:
         outcomes[outcome.check] = outcome = _weighed(outcome, expected)
         done(outcome)
 
     for name in without:
         if name in checks:
-            settle(Outcome(name, "skipped", "", "it was left out"))
+            settle(CheckOutcome(name, "skipped", "", "it was left out"))
     while len(outcomes) < len(checks):
         waiting = [name for name in checks if name not in outcomes]
         for name in waiting:
             blocked = _blocked(checks[name], outcomes)
             if blocked:
-                settle(Outcome(name, "skipped", "", blocked))
+                settle(CheckOutcome(name, "skipped", "", blocked))
         waiting = [name for name in waiting if name not in outcomes]
         failed = tuple(name for name, one in outcomes.items() if one.status != "passed")
         pool = _pool(isolated, timeout_s)
         for name, given in pool.each(_Carrier(subject, failed, tuple(modes)), waiting):
             stopped = isinstance(given, BaseException)
-            settle(_stopped(name, given, subject) if stopped else Outcome(name, *given))  # type: ignore[arg-type, misc]
+            settle(_stopped(name, given, subject) if stopped else CheckOutcome(name, *given))  # type: ignore[arg-type, misc]
             if stopped:
                 break  # what needs this check is not tried in another process
     if "passive" in modes:
         for check in (_only_checks(subject, expected), _enough(subject.kind, outcomes)):
             outcomes[check.check] = check
             done(check)
-    return Report(subject.kind, subject.name, tuple(modes), tuple(outcomes.values()))
+    return CheckReport(subject.kind, subject.name, tuple(modes), tuple(outcomes.values()))
 
 
 def _pool(isolated: bool, timeout_s: float) -> Pool | InProcess:
@@ -226,14 +226,14 @@ class _Carrier:
     def __init__(self, subject: Subject, failed: Sequence[str], modes: tuple[Mode, ...]) -> None:
         self._subject = subject
         self._modes = modes
-        self._outcomes = {name: Outcome(name, "skipped") for name in failed}
+        self._outcomes = {name: CheckOutcome(name, "skipped") for name in failed}
 
     def __call__(self, name: str) -> tuple[str, str, str]:
         """Return status, place and text of a check."""
         (check,) = [one for one in checks_of(self._subject.kind, *self._modes) if one.name == name]
         blocked = _blocked(check, self._outcomes)
         status, where, text = ("skipped", "", blocked) if blocked else self._tried(check)
-        self._outcomes[name] = Outcome(name, status, where, text)  # type: ignore[arg-type]
+        self._outcomes[name] = CheckOutcome(name, status, where, text)  # type: ignore[arg-type]
         return status, where, text
 
     def _tried(self, check: Check) -> tuple[str, str, str]:
@@ -261,7 +261,7 @@ def _raised_by_a_check(error: BaseException) -> bool:
     return trace is not None and trace.tb_frame.f_globals.get("__name__", "").startswith(__package__)
 
 
-def _blocked(check: Check, outcomes: Mapping[str, Outcome]) -> str:
+def _blocked(check: Check, outcomes: Mapping[str, CheckOutcome]) -> str:
     """Return why a check cannot be tried; "" if it can."""
     for name in check.needs:
         before = outcomes.get(name)
@@ -273,17 +273,17 @@ def _blocked(check: Check, outcomes: Mapping[str, Outcome]) -> str:
     return ""
 
 
-def _stopped(name: str, error: BaseException, subject: Subject) -> Outcome:
+def _stopped(name: str, error: BaseException, subject: Subject) -> CheckOutcome:
     """Return the failure of a check that hung, crashed or came to an end that nobody foresaw."""
     text = str(error) if isinstance(error, CellStopped) else f"{type(error).__name__}: {error}"
     where = subject.module
     lines = [line.strip() for line in getattr(error, "traceback_text", "").splitlines() if subject.package in line]
     if lines:
         where = lines[0].replace('File "', "").replace('"', "")
-    return Outcome(name, "failed", where, text)
+    return CheckOutcome(name, "failed", where, text)
 
 
-def _weighed(outcome: Outcome, expected: Mapping[str, str]) -> Outcome:
+def _weighed(outcome: CheckOutcome, expected: Mapping[str, str]) -> CheckOutcome:
     """Return an outcome in the light of the failures that are expected."""
     reason = expected.get(outcome.check)
     if reason is None:
@@ -295,23 +295,23 @@ def _weighed(outcome: Outcome, expected: Mapping[str, str]) -> Outcome:
     return outcome
 
 
-def _only_checks(subject: Subject, expected: Mapping[str, str]) -> Outcome:
+def _only_checks(subject: Subject, expected: Mapping[str, str]) -> CheckOutcome:
     known = {one.name for one in checks_of(subject.kind, "passive", "invasive", "recording")}
     for name in sorted(set(expected) - known):
         where = f"{subject.module}.{LISTED}[{subject.name}][{name}]"
-        return Outcome(expected_failures_are_checks.name, "failed", where, "no check has this name")
-    return Outcome(expected_failures_are_checks.name, "passed")
+        return CheckOutcome(expected_failures_are_checks.name, "failed", where, "no check has this name")
+    return CheckOutcome(expected_failures_are_checks.name, "passed")
 
 
-def _enough(kind: Kind, outcomes: Mapping[str, Outcome]) -> Outcome:
+def _enough(kind: Kind, outcomes: Mapping[str, CheckOutcome]) -> CheckOutcome:
     # What another failure keeps from being tried is red already.
     ran = sum(one.status != "skipped" or one.text.startswith(_NOT_TRIED) for one in outcomes.values())
     if ran < FLOORS[kind]:
         reasons = "; ".join(sorted({one.text for one in outcomes.values() if one.status == "skipped"}))
-        return Outcome(
+        return CheckOutcome(
             enough_checks_ran.name, "failed", "checks", f"{ran} ran, and every {kind} can run {FLOORS[kind]}: {reasons}"
         )
-    return Outcome(enough_checks_ran.name, "passed")
+    return CheckOutcome(enough_checks_ran.name, "passed")
 
 
 def _expected(subject: Subject, isolated: bool, timeout_s: float) -> dict[str, str]:

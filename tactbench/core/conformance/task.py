@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from tactbench.core.conformance.check import check, code_of, fail, skip
-from tactbench.core.conformance.press import SECONDS, Press, first_that_goes, tiny_scene
+from tactbench.core.conformance.press import SECONDS, TrialPress, first_that_goes, tiny_scene
 from tactbench.core.conformance.sensor_spec import OF_KIND
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.errors import UnknownNameError, UsageError, nearest
@@ -367,7 +367,7 @@ def its_scene_is_carried_out(subject: Subject) -> None:
 
 
 @lru_cache(maxsize=2)
-def _pressed(subject: Subject) -> Press | None:
+def _pressed(subject: Subject) -> TrialPress | None:
     """Return the task's first scene, cut short, on the first simulated sensor that goes with it."""
     scene = subject.descriptor.spec.scenes[0].scene
     slide = scene.slide

@@ -28,7 +28,7 @@ class SlipReference:
     t_ns: IntArray
     """(n,) nanoseconds since the first row of the sensor's clock"""
     displacement_m: FloatArray
-    """(n,) of surface and carrier against each other"""
+    """(n,) of surface and skin against each other"""
     force_share: FloatArray
     """(n,) tangential force over friction times normal force; 0 without contact"""
     normal_n: FloatArray

@@ -64,7 +64,8 @@ def slip_labels(
     t_ns
         (n,) times of the reference, strictly rising [ns].
     displacement_m
-        (n,) displacement of the surface relative to the skin's carrier, along the motion: encoder and fixture [m].
+        (n,) displacement of the surface relative to the skin, along the motion [m]. An encoder between surface and
+        fixture also counts the way that the skin follows.
     tangential_n, normal_n, friction
         See :func:`stick_ratio`.
     thresholds

@@ -87,7 +87,7 @@ faster than 1 mm/s, or by steps of more than 0.1 mm. What a score owes to them i
 class SlipTarget(Frozen):
     """Whether the contact slips, frame by frame, by the reference alone.
 
-    It needs forces called `normal` and `tangential` and a length called `slip`, the displacement of surface and carrier
+    It needs forces called `normal` and `tangential` and a length called `slip`, the displacement of surface and skin
     against each other, all on one clock; and the coefficient of friction as a label of the recording.
     """
 

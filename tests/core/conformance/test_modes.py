@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from tactbench.core.conformance.check import Outcome
-from tactbench.core.conformance.run import Report, run_checks, subjects_named
+from tactbench.core.conformance.check import CheckOutcome
+from tactbench.core.conformance.run import CheckReport, run_checks, subjects_named
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.plugins.rig_devices import emulated_device
 from tactbench.core.spec.rig_file import DeviceEntry
@@ -101,6 +101,6 @@ def test_expected_failures_are_reported_with_their_reason():
 
 
 def test_a_report_of_nothing_is_none():
-    report = Report("sensor", "x", ("passive",), (Outcome("json-round-trip", "passed"),))
+    report = CheckReport("sensor", "x", ("passive",), (CheckOutcome("json-round-trip", "passed"),))
     assert report.level is None
     assert "ran 1, passed 1" in str(report)
