@@ -11,7 +11,11 @@ import click
 from tactbench.core.cli.threads import one_thread
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tactbench.core.conformance.run import CheckReport
+    from tactbench.core.conformance.subject import Subject
+    from tactbench.core.spec.rig_file import RigFile
 
 _KINDS = ("sensor", "rig", "task", "estimator", "effect")
 
@@ -50,15 +54,20 @@ def command(
     or fewer ran than every plugin of that kind can run, 2 if nothing is called NAME.
     """
     one_thread()
+    from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.screen import remark
     from tactbench.core.conformance.check import KINDS, Mode
     from tactbench.core.conformance.run import failed_plugins, plugins_named, run_checks, subjects_named
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.plugins.rig_files import load_rig_file
     from tactbench.core.tables.text import json_text
 
-    if rig_file is not None and not invasive:
-        raise UsageError("--rig-file is for --invasive.", hint="Add it, or leave the file out.")
+    if (rig_file is not None) != invasive:
+        raise UsageError(
+            "--invasive and --rig-file FILE go together: the file says which devices are opened.",
+            hint="Give both, or neither.",
+        )
     registry = load_registry()
     kinds = tuple(one for one in KINDS if kind in (None, one))
     wrong = [f"{row.entry_point}: {row.reason}" for row in plugins_named(registry, name) if row.status == "failed"]
@@ -77,17 +86,18 @@ def command(
         subjects = [one for one in subjects if one.kind == "sensor"]
         if not subjects and not wrong:
             raise UsageError(f"{name} is no sensor, and a recording is of one.", hint="Leave --recording out.")
-    if invasive and not yes and not sys.stdin.isatty():
-        raise UsageError(
-            "--invasive asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."
-        )
-    if invasive and not yes:
-        what = ", ".join(f"the {one.kind} {one.name}" for one in subjects)
-        click.confirm(
-            f"This opens lines of {what} and may move or press something. Is the rig clear?", abort=True, err=True
-        )
+    if rig_file is not None:
+        _ask(subjects, load_rig_file(rig_file, registry), yes)
     reports = [
-        run_checks(one, modes=modes, recording=recording, rig_file=rig_file, timeout_s=timeout) for one in subjects
+        run_checks(
+            one,
+            modes=modes,
+            recording=recording,
+            rig_file=rig_file,
+            operator=TerminalOperator(yes=yes),
+            timeout_s=timeout,
+        )
+        for one in subjects
     ]
     if shape == "json":
         click.echo(json_text({"failed_plugins": wrong, "checked": [_plain(one) for one in reports]}, indent=1))
@@ -98,6 +108,32 @@ def command(
         for report in reports:
             _print(report, every)
     ctx.exit(1 if wrong or not all(one.ok for one in reports) or not reports else 0)
+
+
+def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
+    """Say what is about to be opened and moved, and wait for a yes.
+
+    Raises
+    ------
+    UsageError
+        If nobody is there to say it, or the file is for another rig than the only one that is checked.
+    """
+    from tactbench.core.conformance.invasive import FORCE_N
+    from tactbench.core.errors import UsageError
+
+    rigs = [one.name for one in subjects if one.kind == "rig"]
+    if len(rigs) == len(subjects) == 1:
+        file.checked_for(rigs[0])
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise UsageError(
+            "--invasive asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."
+        )
+    what = [f"opens the line of {one.name}" for one in subjects if one.kind == "sensor" and one.name in file.sensors]
+    if file.rig in rigs:
+        what.append(f"presses {next(iter(file.sensors))} twice to {FORCE_N:g} N with the rig {file.rig}")
+    click.confirm(f"This {' and '.join(what) or 'opens nothing'}. Is the rig clear?", abort=True, err=True)
 
 
 def _plain(report: CheckReport) -> dict[str, object]:

@@ -1,15 +1,14 @@
-"""Checks of a sensor's driver: on its emulator in virtual time, so that no line is opened; or on a real line."""
+"""Checks of a sensor's driver: on its emulator in virtual time, so that no line is opened."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.conformance.check import CheckFailed, check, code_of, fail, skip
 from tactbench.core.conformance.subject import Subject
-from tactbench.core.errors import LinkError, RigError, TactbenchError, UsageError
+from tactbench.core.errors import LinkError, RigError, UsageError
 from tactbench.core.samples import Quality
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec
 
@@ -29,27 +28,28 @@ MOST_STILL = 1000
 """Reads that may come back at one moment: of a device that sends a thousand samples at once."""
 
 
-class _Lines:
+class Lines:
     """Opens a driver's line and counts: what was opened must be closed."""
 
     def __init__(self, opener: Any) -> None:
         self._opener = opener
         self.opened: list[Link] = []
 
-    def __call__(self) -> Link:
+    def __call__(self) -> Link:  # noqa: D102  (a driver's `open_link`)
         link: Link = self._opener()
         self.opened.append(link)
         return link
 
     @property
     def still_open(self) -> int:
+        """How many of them are still open."""
         return sum(not link._closed for link in self.opened)
 
 
 @contextmanager
 def _emulated(
     subject: Subject, *faults: str, senses: Senses | None = None, **options: Any
-) -> Iterator[tuple[Driver, _Lines, Any]]:
+) -> Iterator[tuple[Driver, Lines, Any]]:
     """Open the driver on its emulator at rest, in virtual time; yield it, its lines and the clock."""
     from tactbench.core.plugins.rig_devices import emulated_device, options_of
     from tactbench.core.spec.rig_file import EMULATED, DeviceEntry
@@ -61,7 +61,7 @@ def _emulated(
     with code_of("emulator", subject.package):
         device = emulated_device(descriptor, subject.name, entry, senses or _at_rest(descriptor.spec), 1)
     devices = EmulatedDevices({subject.name: device})
-    lines = _Lines(devices.opener(subject.name))
+    lines = Lines(devices.opener(subject.name))
     given = {**options_of(descriptor, entry), **options}
     driver: Driver | None = None
     try:
@@ -168,10 +168,11 @@ def driver_reads(subject: Subject) -> None:
     Return Blocks of shape (n, channels) with int64 nanoseconds that never go back.
     """
     with _emulated(subject) as (driver, _, clock):
-        _look_at(subject, driver, clock)
+        look_at(subject, driver, clock)
 
 
-def _look_at(subject: Subject, driver: Driver, clock: Any) -> None:
+def look_at(subject: Subject, driver: Driver, clock: Any) -> None:
+    """Read a driver for a while, and fail where its blocks are not as they must be."""
     import numpy as np
 
     with code_of("driver.start", subject.package):
@@ -341,83 +342,8 @@ def driver_refuses_unknown_options(subject: Subject) -> None:
     fail("driver", "it took the option 'no_such_option' without a word")
 
 
-@check("sensor", mode="invasive", level="silver", needs=("code-names-resolve",), may_skip=True)
-def real_device_answers(subject: Subject) -> None:
-    """The emulator is what the author believes the device to be; only the device knows.
-
-    Look at `tactbench doctor --rig-file FILE` for ports, permissions and what the device says.
-    """
-    from functools import partial
-
-    from tactbench.core.plugins.rig_devices import options_of
-    from tactbench.core.plugins.rig_files import load_rig_file
-    from tactbench.devices.driver import DriverSettings
-    from tactbench.links.address import open_link
-
-    descriptor = subject.descriptor
-    if subject.rig_file is None:
-        skip("no rig file is given: `--rig-file FILE` says on which line the device is")
-    if descriptor.driver is None:
-        skip("it names no driver")
-    file = load_rig_file(subject.rig_file, subject.registry)
-    if subject.name not in file.sensors:
-        fail(f"{subject.rig_file}: sensors", f"it has no entry for {subject.name}")
-    entry = file.sensors[subject.name]
-    if entry.emulated:
-        skip("the rig file says that the device is emulated")
-    import time
-
-    lines = _Lines(partial(open_link, entry.link))
-    with code_of("driver", subject.package):
-        options = options_of(descriptor, entry)
-        driver = subject.code("driver")(DriverSettings(lines, descriptor.spec.streams, options))
-    try:
-        with code_of("driver.identify", subject.package):
-            driver.identify()
-        _look_at(subject, driver, time.monotonic_ns)
-    finally:
-        with suppress(TactbenchError):
-            driver.close()
-    if lines.still_open:
-        fail("driver.close", "its link is still open afterwards")
-
-
-@check("rig", mode="invasive", level="silver", needs=("code-names-resolve",), may_skip=True)
-def real_rig_presses(subject: Subject) -> None:
-    """A rig of real devices shows only by a press whether it gives what tasks need.
-
-    Look at `tactbench rig check FILE` for limits, and at the message for what is missing.
-    """
-    from tactbench.core.conformance.press import carried_out, effects_for, tiny_scene
-    from tactbench.core.plugins.interfaces import RigContext
-    from tactbench.core.plugins.rig_files import load_rig_file
-
-    if subject.rig_file is None:
-        skip("no rig file is given: `--rig-file FILE` says which devices it has")
-    file = load_rig_file(subject.rig_file, subject.registry)
-    sensor = subject.registry.sensors[next(iter(file.sensors))]
-    context = RigContext(effects=effects_for(subject), rig_file=file, operator=_Present())
-    with code_of("where", subject.package):
-        made = carried_out(subject.code("where")(context), subject.descriptor, sensor, tiny_scene(), 1)
-    for stream in made.every_stream:
-        if not sum(len(one.data) for one in made.blocks if one.stream == stream.name):
-            fail(f"streams[{stream.name}]", "the press gave no sample of it")
-        values = made.values(stream.name)
-        if not math.isfinite(float(abs(values).max())):
-            fail(f"streams[{stream.name}]", "it holds values that are not finite")
-
-
-class _Present:
-    """Somebody who was asked before the check began."""
-
-    def asked(self, text: str) -> None:
-        """Print what is to be done."""
-        print(text)
-
-
 CHECKS = (
     driver_opens, driver_says_who_it_is, driver_streams_are_the_specs, driver_reads,
     driver_reads_what_is_sensed, driver_keeps_its_rate,
     driver_does_not_wait_when_told_so, driver_closes_its_line, driver_reports_unplug, driver_refuses_unknown_options,
-    real_device_answers, real_rig_presses,
 )  # fmt: skip

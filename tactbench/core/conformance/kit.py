@@ -9,6 +9,7 @@ from tactbench.core.conformance import (
     driver,
     effect,
     estimator,
+    invasive,
     press,
     recorded,
     sensor_spec,
@@ -20,7 +21,7 @@ from tactbench.core.conformance.subject import Subject
 
 CHECKS: tuple[Check, ...] = (
     *common.CHECKS, *sensor_spec.CHECKS, *transducer.CHECKS, *press.CHECKS, *driver.CHECKS, *task.CHECKS,
-    *estimator.CHECKS, *effect.CHECKS, *recorded.CHECKS,
+    *estimator.CHECKS, *effect.CHECKS, *recorded.CHECKS, *invasive.CHECKS,
 )  # fmt: skip
 """In the order in which they run: a check stands behind those that it needs."""
 

@@ -1,4 +1,17 @@
-"""Plugins with one flaw each, named after it; ``sound-…`` have none. `CAUGHT_BY`: the check that is meant for each."""
+"""Plugins with one flaw each, named after it; ``sound-…`` have none.
+
+`CAUGHT_BY`: the check that is meant for each. `rig_file`: those with one are checked with ``--invasive`` as well.
+"""
+
+
+def rig_file(kind, name):
+    """Return the text of the rig file with which a plugin is checked; None: it needs none."""
+    if kind == "rig" and "moving-rig" in name:
+        return f"version: 1\nrig: {name}\nsensors:\n  sound-pad: {{link: 'loop://'}}\n"
+    if name == "is-not-at-that-address":
+        return f"version: 1\nrig: bench\nsensors:\n  {name}: {{link: 'loop://'}}\n"
+    return None
+
 
 CAUGHT_BY = {
     "sensor": {
@@ -55,6 +68,7 @@ CAUGHT_BY = {
         "driver-leaves-its-line-open": "driver-closes-its-line",
         "driver-hides-the-unplugging": "driver-reports-unplug",
         "driver-takes-any-option": "driver-refuses-unknown-options",
+        "is-not-at-that-address": "real-device-answers",
     },
     "rig": {
         "sound-rig": None,
@@ -76,6 +90,12 @@ CAUGHT_BY = {
         "rig-that-changes-the-scene": "scene-is-not-changed",
         "rig-without-reasons": "plan-says-why",
         "rig-that-gives-fractions": "press-is-recorded",
+        "sound-moving-rig": None,
+        "moving-rig-that-breaks-off": "real-rig-presses",
+        "moving-rig-that-pulls": "real-rig-follows-the-profile",
+        "moving-rig-that-overshoots": "real-rig-does-not-overshoot",
+        "moving-rig-that-stays-pressed": "real-rig-lets-go",
+        "moving-rig-that-does-not-stop": "real-rig-retreats-when-stopped",
     },
     "task": {
         "sound-task": None,

@@ -124,6 +124,7 @@ def tactbench_sensors():
         SensorDescriptor(
             spec=PAD, transducer="flawed_tactile.transducers:sound", driver="flawed_tactile.line:sound", **wired
         ),
+        SensorDescriptor(spec=with_(PAD, name="is-not-at-that-address"), driver="flawed_tactile.line:sound", **wired),
         SensorDescriptor(
             spec=with_(PAD, name="names-code-that-is-not-there"), transducer="flawed_tactile.transducers:build"
         ),
