@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tactbench.core.conformance.subject import Subject
     from tactbench.core.spec.rig_file import RigFile
 
-_KINDS = ("sensor", "rig", "task", "estimator", "effect")
+_KINDS = ("sensor", "rig", "device", "task", "estimator", "effect")
 
 
 @click.command(name="check")
@@ -48,7 +48,7 @@ def command(
     timeout: float,
     shape: str,
 ) -> None:
-    """Check a sensor, rig, task, estimator or effect, or all that a plugin brings.
+    """Check a sensor, rig, device, task, estimator or effect, or all that a plugin brings.
 
     By default nothing is opened and nothing moves; docs/conformance.md lists the checks. Exit code 1 if a check failed
     or fewer ran than every plugin of that kind can run, 2 if nothing is called NAME.
@@ -130,7 +130,9 @@ def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
         raise UsageError(
             "--invasive asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."
         )
-    what = [f"opens the line of {one.name}" for one in subjects if one.kind == "sensor" and one.name in file.sensors]
+    known = {*file.sensors, *(getattr(one, "device", None) for one in file.entries().values())}
+    lines = [one.name for one in subjects if one.kind in ("sensor", "device") and one.name in known]
+    what = [f"opens the line of {name}" for name in lines]
     if file.rig in rigs:
         what.append(f"presses {next(iter(file.sensors))} twice to {FORCE_N:g} N with the rig {file.rig}")
     click.confirm(f"This {' and '.join(what) or 'opens nothing'}. Is the rig clear?", abort=True, err=True)

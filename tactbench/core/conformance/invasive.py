@@ -44,7 +44,7 @@ LARGEST = 1.5
 """Times `FORCE_N`, which the force may not exceed (assumed: a loop that overshoots by half is badly tuned)."""
 
 
-@check("sensor", mode="invasive", level="silver", needs=("code-names-resolve",), may_skip=True)
+@check("sensor", "device", mode="invasive", level="silver", needs=("code-names-resolve",), may_skip=True)
 def real_device_answers(subject: Subject) -> None:
     """The emulator is what the author believes the device to be; only the device knows.
 
@@ -57,15 +57,21 @@ def real_device_answers(subject: Subject) -> None:
     descriptor, file = subject.descriptor, _file(subject)
     if descriptor.driver is None:
         skip("it names no driver")
-    if subject.name not in file.sensors:
-        fail(f"{subject.rig_file}: sensors", f"it has no entry for {subject.name}")
-    entry = file.sensors[subject.name]
+    if isinstance(descriptor, SensorDescriptor):
+        entries = [file.sensors[subject.name]] if subject.name in file.sensors else []
+        streams = descriptor.spec.streams
+    else:
+        entries = [one for one in file.entries().values() if getattr(one, "device", None) == subject.name]
+        streams = ()
+    if not entries:
+        fail(str(subject.rig_file), f"it has no entry for {subject.name}")
+    entry = entries[0]
     if entry.emulated:
         skip("the rig file says that the device is emulated")
     lines = Lines(partial(open_link, entry.link))
     with code_of("driver", subject.package):
         options = options_of(descriptor, entry)
-        driver = subject.code("driver")(DriverSettings(lines, descriptor.spec.streams, options))
+        driver = subject.code("driver")(DriverSettings(lines, streams, options))
     try:
         with code_of("driver.identify", subject.package):
             driver.identify()

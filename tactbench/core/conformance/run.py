@@ -39,6 +39,7 @@ _PRELOAD = ("numpy", "tactbench.core.conformance.kit")
 _SILVER: Mapping[Kind, tuple[str, ...]] = {
     "sensor": ("press-is-recorded",),
     "rig": ("press-is-recorded", "real-rig-presses"),
+    "device": ("driver-reads",),
     "task": (),
     "estimator": ("answers-have-the-shape",),
     "effect": ("it-is-applied",),

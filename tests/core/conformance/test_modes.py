@@ -40,7 +40,8 @@ def test_a_sound_plugin_ends_with_0_and_says_how_many_checks_ran(verbs):
 def test_by_the_name_of_its_plugin_all_that_it_brings_is_checked(verbs):
     found = json.loads(verbs("check", "wired-tactile", "--format", "json", plugins=("wired",)).stdout)
     assert {(one["kind"], one["name"], one["ok"]) for one in found["checked"]} == {
-        ("rig", "wired-rig", True), ("sensor", "wired-pad", True),
+        ("rig", "wired-rig", True), ("sensor", "wired-pad", True), ("device", "wired-scale", True),
+        ("device", "wired-motor", True),
     }  # fmt: skip
 
 

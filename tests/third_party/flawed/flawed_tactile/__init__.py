@@ -8,6 +8,9 @@ def rig_file(kind, name):
     """Return the text of the rig file with which a plugin is checked; None: it needs none."""
     if kind == "rig" and "moving-rig" in name:
         return f"version: 1\nrig: {name}\nsensors:\n  sound-pad: {{link: 'loop://'}}\n"
+    if name == "scale-is-not-at-that-address":
+        force = f"force: {{device: {name}, link: 'loop://'}}"
+        return f"version: 1\nrig: bench\nsensors:\n  sound-pad: {{link: 'loop://'}}\n{force}\n"
     if name == "is-not-at-that-address":
         return f"version: 1\nrig: bench\nsensors:\n  {name}: {{link: 'loop://'}}\n"
     return None
@@ -96,6 +99,29 @@ CAUGHT_BY = {
         "moving-rig-that-overshoots": "real-rig-does-not-overshoot",
         "moving-rig-that-stays-pressed": "real-rig-lets-go",
         "moving-rig-that-does-not-stop": "real-rig-retreats-when-stopped",
+    },
+    "device": {
+        "sound-scale": None,
+        "sound-stage": None,
+        "scale-opens-two-lines": "driver-opens",
+        "scale-is-a-number": "driver-says-who-it-is",
+        "scale-goes-back-in-time": "driver-reads",
+        "scale-doubles-samples": "driver-keeps-its-rate",
+        "scale-waits-anyhow": "driver-does-not-wait-when-told-so",
+        "scale-leaves-its-line-open": "driver-closes-its-line",
+        "scale-hides-the-unplugging": "driver-reports-unplug",
+        "scale-takes-any-option": "driver-refuses-unknown-options",
+        "scale-shows-no-force": "force-is-in-newtons",
+        "scale-is-in-millinewtons": "force-is-in-newtons",
+        "scale-is-in-grams": "force-is-what-is-sensed",
+        "scale-turns-the-sign": "force-is-what-is-sensed",
+        "scale-swaps-axes": "force-is-what-is-sensed",
+        "scale-keeps-its-zero": "tare-takes-the-load-as-zero",
+        "scale-hides-its-end": "overload-is-marked",
+        "scale-is-not-at-that-address": "real-device-answers",
+        "stage-is-in-millimetres": "position-is-in-metres",
+        "stage-shows-no-position": "position-is-in-metres",
+        "stage-runs-off": "opening-and-reading-move-nothing",
     },
     "task": {
         "sound-task": None,
