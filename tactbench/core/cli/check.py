@@ -33,6 +33,8 @@ _KINDS = ("sensor", "rig", "device", "task", "estimator", "effect")
 @click.option("--all", "every", is_flag=True, help="Also list the checks that passed.")
 @click.option("--timeout", type=click.FloatRange(min=1), default=30.0, show_default=True, metavar="S",
               help="Seconds that one check may take.")  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="FOLDER",
+              help="Keep the level in this result folder: its tables show it beside the sensor.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
 @click.pass_context
 def command(
@@ -46,6 +48,7 @@ def command(
     yes: bool,
     every: bool,
     timeout: float,
+    out: Path | None,
     shape: str,
 ) -> None:
     """Check a sensor, rig, device, task, estimator or effect, or all that a plugin brings.
@@ -55,6 +58,7 @@ def command(
     """
     one_thread()
     from tactbench.core.cli.operator import TerminalOperator
+    from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
     from tactbench.core.conformance.check import KINDS, Mode
     from tactbench.core.conformance.run import failed_plugins, plugins_named, run_checks, subjects_named
@@ -86,6 +90,13 @@ def command(
         subjects = [one for one in subjects if one.kind == "sensor"]
         if not subjects and not wrong:
             raise UsageError(f"{name} is no sensor, and a recording is of one.", hint="Leave --recording out.")
+    if out is not None and ("passive" not in modes or not any(one.kind == "sensor" for one in subjects)):
+        raise UsageError(
+            "--out keeps the level of a sensor, and none is computed here.",
+            hint="Name a sensor, and add --passive beside --recording.",
+        )
+    if out is not None:
+        opened(out)
     if rig_file is not None:
         _ask(subjects, load_rig_file(rig_file, registry), yes)
     reports = [
@@ -99,6 +110,10 @@ def command(
         )
         for one in subjects
     ]
+    if out is not None:
+        for checked, report in zip(subjects, reports, strict=True):
+            if checked.kind == "sensor":
+                _keep(out, checked, report)
     if shape == "json":
         click.echo(json_text({"failed_plugins": wrong, "checked": [_plain(one) for one in reports]}, indent=1))
     else:
@@ -136,6 +151,26 @@ def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
     if file.rig in rigs:
         what.append(f"presses {next(iter(file.sensors))} twice to {FORCE_N:g} N with the rig {file.rig}")
     click.confirm(f"This {' and '.join(what) or 'opens nothing'}. Is the rig clear?", abort=True, err=True)
+
+
+def _keep(out: Path, checked: Subject, report: CheckReport) -> None:
+    """Write the level of a sensor into a result folder, with what tells which state of its package was checked."""
+    import tactbench
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.leaderboard.levels import identity_of, write_level
+    from tactbench.core.matrix.store.disk import writing
+    from tactbench.core.provenance.gather import gather
+
+    with writing(out):
+        path = write_level(
+            out, checked.name,
+            {
+                "level": report.level or "none", "ran": report.ran, "failed": len(report.failed),
+                "modes": list(report.modes), "kit": tactbench.__version__, "package": checked.package,
+                "identity": identity_of(checked.package, gather()),
+            },
+        )  # fmt: skip
+    remark(f"Level of {checked.name}: {path}")
 
 
 def _plain(report: CheckReport) -> dict[str, object]:
