@@ -137,7 +137,7 @@ def _ordered(jobs: Sequence[Job], choice: EngineChoice) -> Iterable[Job]:
     """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
-        groups.setdefault((job.cell.declared_task or job.cell.task, job.recordings), []).append(job)
+        groups.setdefault((job.cell.task_key, job.recordings), []).append(job)
     if choice.forks(len(jobs)):
         return shared(groups, choice.pool(1))
     if choice.here(len(jobs)):

@@ -105,7 +105,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
 
     began = time.perf_counter()
     _seed_everything(cell.seed)
-    data = dataset(cell.declared_task or cell.task, recordings)
+    data = dataset(cell.task_key, recordings)
     context = CellContext(
         task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
         progress=working, latency=cell.latency,
