@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 from tactbench.core.conformance.check import check, code_of, fail, skip
 from tactbench.core.conformance.driver import Lines, look_at
-from tactbench.core.conformance.press import FORCE_SHARE, effects_for, pressing_channel, tiny_scene
+from tactbench.core.conformance.press import FORCE_SHARE, pressing_channel
 from tactbench.core.conformance.subject import Subject
+from tactbench.core.conformance.trial_press import effects_for, tiny_scene
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.interfaces import RigContext
 from tactbench.core.plugins.rig_files import load_rig_file
