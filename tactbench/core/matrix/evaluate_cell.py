@@ -30,9 +30,6 @@ if TYPE_CHECKING:
     from tactbench.core.evaluation.cell import CellResult
     from tactbench.core.evaluation.dataset import Dataset
 
-PRELOAD = ("tactbench.core.matrix.preloaded",)
-"""Imported by the fork server of processes that cannot fork themselves."""
-
 
 class Job(NamedTuple):
     """A cell to be evaluated."""
