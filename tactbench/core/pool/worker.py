@@ -29,7 +29,7 @@ START_S = 60.0
 
 
 PRELOAD = ("tactbench.core.matrix.preloaded",)
-"""What the fork server of a process imports, once: there is one for all pools, and it keeps what it was started with."""
+"""What the fork server of a process imports, once: there is one for all pools, which keeps what it began with."""
 
 PENDING = object()
 """Says that there is no outcome yet."""
@@ -173,9 +173,11 @@ class Worker:
                 return self._stop(late)
             self._stopped = late
             self._ask_to_end()
-        elif self._limits.memory_mb is not None and self._stopped is None and self.begun:
-            if memory.taken_mb(self._process.pid, self._shared_mb) > self._limits.memory_mb:
-                return self._stop(endings.out_of_memory(self._limits))
+        elif (
+            self._limits.memory_mb is not None and self._stopped is None and self.begun
+            and memory.taken_mb(self._process.pid, self._shared_mb) > self._limits.memory_mb
+        ):  # fmt: skip
+            return self._stop(endings.out_of_memory(self._limits))
         return PENDING
 
     def _ask_to_end(self) -> None:
