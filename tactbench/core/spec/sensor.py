@@ -269,6 +269,9 @@ class SensorSpec(Frozen):
     """From a sample taken to the sample in the host: frame and bus [time]. None: nobody states it."""
     skin: Skin | None = None
     """None: the sensor cannot be simulated, only recorded or replayed."""
+    reads_shear: tuple[ChannelKind, ...] = ()
+    """Kinds of channels whose transducer looks at `tangential_displacement_mm` and `shear_mpa` of a SkinState: the twin
+    computes both only where such a channel is observed."""
     parameters: dict[str, Quantity] = Field(default_factory=dict)
     """What the sensor's own transduction needs."""
     nuisances: dict[ChannelKind, Nuisances] = Field(default_factory=dict)
