@@ -36,13 +36,14 @@ def traction_shares(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return Q/(mu P), P*/P and b at (n,) moments.
 
-    b is bounded such that no traction exceeds mu times the pressure.
+    b is bounded such that no traction exceeds mu times the pressure, one way or the other.
     """
     limit = friction * force_n
     share = np.clip(np.divide(tangential_n, limit, out=np.zeros_like(limit), where=limit > 0), -1.0, 1.0)
     inner = np.where(limit > 0, stick_ratio, 0.0) ** 3
     b = np.divide(1.0 - share, inner, out=np.zeros_like(share), where=inner > 0)
-    return share, inner, np.minimum(b, 1.0)
+    back = np.divide(1.0 + share, 1.0 - inner, out=np.ones_like(share), where=inner < 1)
+    return share, inner, np.minimum(np.minimum(b, back), 1.0)
 
 
 def dragged_state(
@@ -53,8 +54,14 @@ def dragged_state(
     outer_by: float,
     inner_by: float,
 ) -> SkinState:
-    """Return `state` with a traction ``outer_by p(state) - inner_by p(inner)`` in `direction`, and what it moves."""
-    touched = state.pressure_mpa > 0
+    """Return `state` with a traction ``outer_by p(state) - inner_by p(inner)`` in `direction`, and what it moves.
+
+    Where a pressure has fallen under more load (under a shell's dent, under a cover's edge), the inner one is cut to it
+    and the rest of it raised to the same force: no friction holds what does not press.
+    """
+    touched, inner_mpa = state.pressure_mpa > 0, np.minimum(inner.pressure_mpa, state.pressure_mpa)
+    if inner_mpa.any():
+        inner = replace(inner, pressure_mpa=inner_mpa * (inner.pressure_mpa.sum() / inner_mpa.sum()))
     shear = np.multiply.outer(np.array(direction), outer_by * state.pressure_mpa - inner_by * inner.pressure_mpa)
     moved = along.pressed(state) + outer_by * along.dragged(state, direction, touched)
     if inner_by:
