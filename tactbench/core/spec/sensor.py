@@ -297,6 +297,13 @@ class SensorSpec(Frozen):
         return self
 
     @model_validator(mode="after")
+    def _what_reads_shear_is_there(self) -> SensorSpec:
+        strange = sorted(set(self.reads_shear) - {channel.kind for channel in self.channels()})
+        if strange:
+            raise ValueError(f"reads_shear: the sensor has no channel of kind {', '.join(strange)}")
+        return self
+
+    @model_validator(mode="after")
     def _a_site_is_one_place(self) -> SensorSpec:
         for first, *others in self.sites():
             for one in others:
