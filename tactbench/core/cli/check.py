@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.threads import one_thread
+from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +56,7 @@ def command(
     By default nothing is opened and nothing moves; docs/conformance.md lists the checks. Exit code 1 if a check failed
     or fewer ran than every plugin of that kind can run, 2 if nothing is called NAME.
     """
-    one_thread()
+    keep_threads()
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark

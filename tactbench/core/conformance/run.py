@@ -28,14 +28,12 @@ from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool.in_process import InProcess
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.pool import Pool
-from tactbench.core.pool.processes import can_fork
 
 TIMEOUT_S = 30.0
 """Seconds that one check may take: the slowest of ours, a press on the largest skin, takes two."""
 LISTED = "EXPECTED_FAILURES"
 """Name in a plugin's module: by name of a descriptor, checks that fail and why they may."""
 _NOT_TRIED = "not tried, for "
-_PRELOAD = ("numpy", "tactbench.core.conformance.kit")
 _SILVER: Mapping[Kind, tuple[str, ...]] = {
     "sensor": ("press-is-recorded",),
     "rig": ("press-is-recorded", "real-rig-presses"),
@@ -231,7 +229,7 @@ def _pool(isolated: bool, timeout_s: float) -> Pool | InProcess:
     limits = Limits(timeout_s=timeout_s)
     if not isolated:
         return InProcess(limits)
-    return Pool(1, limits, reuse=True, preload=None if can_fork() else _PRELOAD)
+    return Pool(1, limits, reuse=True)
 
 
 class _Carrier:
