@@ -396,7 +396,8 @@ def real_rig_presses(subject: Subject) -> None:
         skip("no rig file is given: `--rig-file FILE` says which devices it has")
     file = load_rig_file(subject.rig_file, subject.registry)
     sensor = subject.registry.sensors[next(iter(file.sensors))]
-    context = RigContext(effects=effects_for(subject), rig_file=file, operator=_Present())
+    indenters = tuple(subject.registry.indenters)
+    context = RigContext(effects=effects_for(subject), indenters=indenters, rig_file=file, operator=_Present())
     with code_of("where", subject.package):
         made = carried_out(subject.code("where")(context), subject.descriptor, sensor, tiny_scene(), 1)
     for stream in made.every_stream:
