@@ -118,7 +118,8 @@ def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor]:
     if file.rig != subject.name:
         skip(f"the rig file is for the rig {file.rig}")
     sensor = subject.registry.sensors[next(iter(file.sensors))]
-    context = RigContext(effects=effects_for(subject), rig_file=file, operator=subject.operator)
+    indenters = tuple(subject.registry.indenters)
+    context = RigContext(effects=effects_for(subject), indenters=indenters, rig_file=file, operator=subject.operator)
     with code_of("where", subject.package):
         return _Kept(subject.code("where")(context)), sensor
 

@@ -132,7 +132,9 @@ def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     if not simulated:
         skip("no simulated rig is installed")
     descriptor = simulated[0].descriptor
-    return load_object(descriptor.where)(RigContext(effects=effects_for(subject))), descriptor
+    return load_object(descriptor.where)(
+        RigContext(effects=effects_for(subject), indenters=tuple(subject.registry.indenters))
+    ), descriptor
 
 
 def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
@@ -162,7 +164,9 @@ def pressed(subject: Subject, seed: int = 1) -> TrialPress:
             skip("no sensor that can be simulated is installed")
         sensor = simulated_sensors(subject)[0]
         with code_of("where", subject.package):
-            rig = subject.code("where")(RigContext(effects=effects_for(subject)))
+            rig = subject.code("where")(
+                RigContext(effects=effects_for(subject), indenters=tuple(subject.registry.indenters))
+            )
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
     scene = tiny_scene(observe=("taxel",) if "taxel" in kinds else kinds)
     with code_of(field, subject.package):
@@ -484,7 +488,7 @@ def rig_builds(subject: Subject) -> None:
 def _built(subject: Subject, *, usage: bool = False) -> Any:
     from tactbench.core.errors import UsageError
 
-    context = RigContext(effects=effects_for(subject))
+    context = RigContext(effects=effects_for(subject), indenters=tuple(subject.registry.indenters))
     with code_of("where", subject.package):
         try:
             return subject.code("where")(context)
