@@ -16,13 +16,12 @@ from tactbench.core.conformance.trial_press import (
     SECONDS,
     TrialPress,
     carried_out,
-    effects_for,
+    context_for,
     pressed,
     simulated_sensors,
     tiny_scene,
 )
 from tactbench.core.errors import TactbenchError
-from tactbench.core.plugins.interfaces import RigContext
 from tactbench.core.samples import Quality
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -347,7 +346,7 @@ def rig_builds(subject: Subject) -> None:
 def _built(subject: Subject, *, usage: bool = False) -> Any:
     from tactbench.core.errors import UsageError
 
-    context = RigContext(effects=effects_for(subject))
+    context = context_for(subject)
     with code_of("where", subject.package):
         try:
             return subject.code("where")(context)

@@ -117,6 +117,11 @@ def effects_for(subject: Subject) -> tuple[EffectDescriptor, ...]:
     return tuple(found)
 
 
+def context_for(subject: Subject, **devices: Any) -> RigContext:
+    """Return what a check builds a rig from: `effects_for` it, all indenters, and what it is told of devices."""
+    return RigContext(effects=effects_for(subject), indenters=tuple(subject.registry.indenters), **devices)
+
+
 def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     """Return the first simulated rig, built, those that come with this package before others."""
     registry = subject.registry
@@ -125,7 +130,7 @@ def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     if not simulated:
         skip("no simulated rig is installed")
     descriptor = simulated[0].descriptor
-    return load_object(descriptor.where)(RigContext(effects=effects_for(subject))), descriptor
+    return load_object(descriptor.where)(context_for(subject)), descriptor
 
 
 def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
@@ -155,7 +160,7 @@ def pressed(subject: Subject, seed: int = 1) -> TrialPress:
             skip("no sensor that can be simulated is installed")
         sensor = simulated_sensors(subject)[0]
         with code_of("where", subject.package):
-            rig = subject.code("where")(RigContext(effects=effects_for(subject)))
+            rig = subject.code("where")(context_for(subject))
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
     scene = tiny_scene(observe=("taxel",) if "taxel" in kinds else kinds)
     with code_of(field, subject.package):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import RigDescriptor, hookimpl
+from tactbench.plugin import IndenterDescriptor, Parameter, RigDescriptor, hookimpl
 from tactbench.plugin.simulation import EffectDescriptor
 
 TACTBENCH_API = 1
@@ -102,6 +102,36 @@ def tactbench_effects() -> list[EffectDescriptor]:
             _FORCE,
         ),
     ]
+
+
+@hookimpl
+def tactbench_indenters() -> list[IndenterDescriptor]:
+    """Offer the usual shapes. A cap and a flat surface stand in a scene as a radius or none."""
+    radius = Parameter(default=10.0, unit="mm", least=0.01, text="radius of its round side")
+    return [
+        _indenter("cap", "Spherical cap", radius=radius),
+        _indenter("flat", "Flat surface that covers the sensor"),
+        _indenter("cylinder", "Cylinder lying along x, longer than the sensor", radius=radius),
+        _indenter(
+            "edge",
+            "Wedge along x with a rounded tip, longer than the sensor",
+            wedge_angle=Parameter(
+                default=120.0, unit="deg", least=30.0, most=179.0,
+                text="between its flanks; below 90 deg the simulated rig does not stand for them",
+            ),
+            tip_radius=Parameter(default=0.5, unit="mm", text="radius of its tip; 0 is sharp"),
+        ),
+        _indenter(
+            "pin",
+            "Upright pin with a flat end",
+            radius=Parameter(default=2.0, unit="mm", least=0.01, text="radius of the pin"),
+            fillet=Parameter(default=0.0, unit="mm", text="radius of its rounded rim, at most that of the pin"),
+        ),
+    ]  # fmt: skip
+
+
+def _indenter(name: str, title: str, **dimensions: Parameter) -> IndenterDescriptor:
+    return IndenterDescriptor(name=name, title=title, where=f"{_HERE}.shapes:{name}", dimensions=dimensions)
 
 
 def _sliding() -> list[EffectDescriptor]:

@@ -141,6 +141,7 @@ def test_ctrl_c_stops_what_moves(tmp_path):
         from flawed_tactile import rig_file
         from flawed_tactile.moving import STOPPED
 
+        STOPPED.clear()
         file = tmp_path / "rig.yaml"
         file.write_text(rig_file("rig", subject.name), encoding="utf-8")
         with pytest.raises(KeyboardInterrupt):

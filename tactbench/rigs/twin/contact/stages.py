@@ -105,6 +105,19 @@ def _tables(run: Synthesis) -> _Tabulated:
     return tabulated
 
 
+def round_contact_mm(run: Synthesis, force_n: FloatArray) -> FloatArray:
+    """Return the radius of the contact under (n,) forces, for laws of a round contact.
+
+    Of a contact that is not round it is that of a circle whose load is as far from its middle; the recording says so.
+    """
+    if run.contact.shape is not None:
+        run.drawn["remark round"] = (
+            f"friction, heat and roughness take the contact of the {run.contact.shape.name} for a circle whose load is "
+            "as far from its middle"
+        )
+    return skin_under_load(run).skin(force_n).contact_radius_mm
+
+
 def bare_skin(run: Synthesis, largest_n: float) -> LoadTable:
     """Return what the skin alone does up to a load, no channel read: for those who decide upon the load.
 
