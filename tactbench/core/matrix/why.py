@@ -32,10 +32,9 @@ class Explanation:
 
 def recording_entry(request: RecordingRequest, keys: Keys) -> Entry:
     """Return what went into a recording's key, for the book."""
+    name = f"recording {request.sensor} {request.rig} {request.scene.name} {request.role} {request.seed}"
     scene = {"role": request.role, "seed": request.seed, "scene": request.scene.model_dump()}
-    return Entry(
-        _name(request), request.path.stem[-12:], scene, keys.maker(request.sensor, request.rig, request.rig_file)
-    )
+    return Entry(name, request.path.stem[-12:], scene, keys.maker(request.sensor, request.rig, request.rig_file))
 
 
 def cell_entries(
@@ -113,10 +112,6 @@ def _unmade(
         reasons.update(dict.fromkeys(found or [f"recording {request.scene.name} was removed"]))
     unmade = [f"{len(never)} of {len(requests)} recordings were never made, {never[0]} first"] if never else []
     return [*unmade, *reasons]
-
-
-def _name(request: RecordingRequest) -> str:
-    return f"recording {request.sensor} {request.rig} {request.scene.name} {request.role} {request.seed}"
 
 
 def _configuration(cell: Cell) -> Section:
