@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.options import options
-from tactbench.core.cli.scenes import press_options, scene_of
+from tactbench.core.cli.scenes import indenter_of, press_options, profile_of, scene_of
 from tactbench.core.cli.simulation import SIMULATION, simulation_of
 from tactbench.core.tables.text import command_line
 
@@ -44,6 +44,8 @@ def command(
     rig: str | None,
     rig_file: str | None,
     cap_mm: float | None,
+    indenter: str | None,
+    profile: str | None,
     force_n: float | None,
     seconds: float | None,
     slide_mm_s: float | None,
@@ -72,7 +74,8 @@ def command(
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
-    scene = scene_of(out.stem, cap_mm, force_n, seconds, descriptor)
+    shape, path = indenter_of(registry, indenter), profile_of(registry, profile)
+    scene = scene_of(out.stem, cap_mm, force_n, seconds, descriptor, shape, path)
     if slide_mm_s is not None:
         scene = _sliding(scene, slide_mm_s, descriptor)
     devices = load_rig_file(Path(rig_file), registry) if rig_file else None

@@ -61,6 +61,7 @@ def command(
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.files import write_tables
+    from tactbench.core.leaderboard.levels import with_levels
     from tactbench.core.leaderboard.side_by_side import compare
     from tactbench.core.leaderboard.table import build_table
     from tactbench.core.matrix.engine import EngineChoice
@@ -85,7 +86,7 @@ def command(
             shown=lambda rows: display.show(lambda: _so_far(rows)),
         )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
-    rows = over_replicates(outcome.rows)
+    rows = with_levels(over_replicates(outcome.rows), store.folder, store.provenance)
     table = build_table(rows, provenance)
     print_table(table, shape, view_of(store.folder, wide=wide, notes=notes))
     for by in ("protocol", "split") if shape == "table" else ():
