@@ -13,7 +13,7 @@ from tactbench.core.cli.threads import one_thread
 if TYPE_CHECKING:
     from tactbench.core.conformance.run import CheckReport
 
-_KINDS = ("sensor", "rig", "task", "estimator", "effect")
+_KINDS = ("sensor", "rig", "task", "estimator", "effect", "indenter", "profile")
 
 
 @click.command(name="check")
@@ -44,7 +44,7 @@ def command(
     timeout: float,
     shape: str,
 ) -> None:
-    """Check a sensor, rig, task, estimator or effect, or all that a plugin brings.
+    """Check a sensor, rig, task, estimator, effect, indenter or profile, or all that a plugin brings.
 
     By default nothing is opened and nothing moves; docs/conformance.md lists the checks. Exit code 1 if a check failed
     or fewer ran than every plugin of that kind can run, 2 if nothing is called NAME.

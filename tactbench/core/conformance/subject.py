@@ -17,7 +17,7 @@ from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A sensor, rig, task, estimator or effect under check, and what else is installed."""
+    """A sensor, rig, task, estimator, effect, indenter or profile under check, and what else is installed."""
 
     kind: Kind
     name: str
