@@ -27,6 +27,7 @@ __all__ = [
     "CheckFailed",
     "CheckReport",
     "PluginCheck",
+    "check_device",
     "check_effect",
     "check_estimator",
     "check_indenter",
@@ -34,6 +35,7 @@ __all__ = [
     "check_rig",
     "check_sensor",
     "check_task",
+    "device_checks",
     "effect_checks",
     "estimator_checks",
     "indenter_checks",
@@ -102,6 +104,11 @@ def rig_checks(name: str) -> list[PluginCheck]:
     return _checks("rig", name)
 
 
+def device_checks(name: str) -> list[PluginCheck]:
+    """Return the checks of a force sensor or a motor."""
+    return _checks("device", name)
+
+
 def task_checks(name: str) -> list[PluginCheck]:
     """Return the checks of a task."""
     return _checks("task", name)
@@ -135,6 +142,11 @@ def check_sensor(name: str, *, recording: Path | None = None) -> CheckReport:
 def check_rig(name: str) -> CheckReport:
     """Run all checks of a rig; see `check_sensor`."""
     return _report("rig", name)
+
+
+def check_device(name: str) -> CheckReport:
+    """Run all checks of a force sensor or a motor; see `check_sensor`."""
+    return _report("device", name)
 
 
 def check_task(name: str) -> CheckReport:

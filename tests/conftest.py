@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tactbench.core.matrix.engine import PRELOAD
+from tactbench.core.pool.worker import PRELOAD
 
 # A shared machine is slow at times: a deadline would test the machine. Continuous integration draws the same examples
 # every time, so that a red run means a change; people's own runs keep exploring.

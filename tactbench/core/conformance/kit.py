@@ -7,9 +7,11 @@ from collections.abc import Mapping
 from tactbench.core.conformance import (
     by_numbers,
     common,
+    device,
     driver,
     effect,
     estimator,
+    invasive,
     press,
     recorded,
     sensor_spec,
@@ -20,14 +22,15 @@ from tactbench.core.conformance.check import KINDS, Check, Kind, Mode, check
 from tactbench.core.conformance.subject import Subject
 
 CHECKS: tuple[Check, ...] = (
-    *common.CHECKS, *sensor_spec.CHECKS, *transducer.CHECKS, *press.CHECKS, *driver.CHECKS, *task.CHECKS,
-    *estimator.CHECKS, *effect.CHECKS, *by_numbers.CHECKS, *recorded.CHECKS,
+    *common.CHECKS, *sensor_spec.CHECKS, *transducer.CHECKS, *press.CHECKS, *driver.CHECKS, *device.CHECKS,
+    *task.CHECKS, *estimator.CHECKS, *effect.CHECKS, *by_numbers.CHECKS, *recorded.CHECKS, *invasive.CHECKS,
 )  # fmt: skip
 """In the order in which they run: a check stands behind those that it needs."""
 
 FLOORS: Mapping[Kind, int] = {
     "sensor": 11,
     "rig": 6,
+    "device": 5,
     "task": 13,
     "estimator": 14,
     "effect": 12,

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, tail, whole
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 Value = Callable[[Row], float | None]
@@ -88,6 +90,7 @@ def _p95(row: Row) -> str:
 
 
 OF_ROWS = {
+    "level": Column(lambda row: visible(str(row.get(LEVEL) or ABSENT)), lambda row: None, if_known=LEVEL),
     "score": _score("score"),
     "95 % interval": Column(row_interval, _middle("ci_low", "ci_high")),
     "beyond floor": _score("score_beyond_floor", "score_beyond_floor"),
@@ -110,23 +113,25 @@ OF_ROWS = {
 """Columns by name; the others are told by the block that a row stands in, or are names."""
 
 SHOWN = {
-    "#": "rank", "sensor": "sensor", "estimator": "estimator", "score": "score", "95 % interval": "interval",
-    "beyond floor": "beyond_floor", "95 % beyond": "beyond_floor_interval", "true error": "true_error",
-    "rank 95 %": "rank_interval", "recordings right": "recordings_right", "published": "published",
-    "baseline": "baseline", "n test": "n_test", "sessions": "sessions", "sim": "sim", "delay": "answer_delay",
-    "fit": "fit", "latency p50": "latency_p50", "p95": "latency_p95", "batch/row": "batch_row",
+    "#": "rank", "sensor": "sensor", "level": "level", "estimator": "estimator", "score": "score",
+    "95 % interval": "interval", "beyond floor": "beyond_floor", "95 % beyond": "beyond_floor_interval",
+    "true error": "true_error", "rank 95 %": "rank_interval", "recordings right": "recordings_right",
+    "published": "published", "baseline": "baseline", "n test": "n_test", "sessions": "sessions", "sim": "sim",
+    "delay": "answer_delay", "fit": "fit", "latency p50": "latency_p50", "p95": "latency_p95",
+    "batch/row": "batch_row",
 }  # fmt: skip
 """All columns in order, and what each is called where programs read its text: ``shown`` in JSON, ``shown_…`` in CSV and
 Parquet."""
 COLUMNS = tuple(SHOWN)
-NUMERIC = frozenset(COLUMNS) - {"sensor", "estimator"}
+NUMERIC = frozenset(COLUMNS) - {"sensor", "level", "estimator"}
 INTERVALS = ("95 % interval", "95 % beyond")
 IF_KNOWN = {name: column.if_known for name, column in OF_ROWS.items() if column.if_known}
-"""Columns of errors of force, whose reference errs too, and of classifications with recordings of one class each."""
+"""Columns of levels of checked sensors, of errors of force, whose reference errs too, and of classifications with
+recordings of one class each."""
 
 
 def columns(rows: Sequence[Row], *, times: bool) -> tuple[str, ...]:
     """Return the columns of a table of `rows` with times, or of one without."""
     lacking = {name for name, key in IF_KNOWN.items() if all(row.get(key) is None for row in rows)}
-    timed = {name for name, column in OF_ROWS.items() if column.timed}
+    timed = {"level"} | {name for name, column in OF_ROWS.items() if column.timed}
     return tuple(name for name in COLUMNS if name not in lacking and (times or name not in timed))

@@ -135,7 +135,7 @@ def _about_first(row: Row, first: Row | None) -> list[str]:
         return []
     beyond = _beyond_guessing(first, trivial)
     if beyond is None:
-        return [f"{first['n_test']} recordings are too few to say what the first frame tells"]
+        return ["too few recordings or replicates to say what the first frame tells"]
     if not beyond:
         return []
     unit = row["unit"]
@@ -147,7 +147,7 @@ def _about_first(row: Row, first: Row | None) -> list[str]:
 
 
 def _beyond_guessing(first: Row, trivial: float) -> bool | None:
-    """Tell whether the first frame answers better than a guess; None if there are too few recordings to tell.
+    """Tell whether the first frame answers better than a guess; None if too few recordings or replicates can tell.
 
     Classes: the exact binomial tail of so many right answers, each recording being one answer and the commonest class
     the guess. Numbers: the interval lies beyond the trivial score.
@@ -159,9 +159,9 @@ def _beyond_guessing(first: Row, trivial: float) -> bool | None:
         if guess == 1.0 or right == 0:
             return False
         return float(importlib.import_module("scipy.special").bdtrc(right - 1, n, guess)) <= TAIL
-    if first["n_test"] < FEWEST:
-        return None
     worst = first["ci_high"] if _lower_is_better(first) else first["ci_low"]
+    if first["n_test"] < FEWEST or worst is None:
+        return None
     return _skill(worst, trivial, first) > 0
 
 

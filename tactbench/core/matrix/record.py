@@ -6,7 +6,9 @@ import os
 import time
 from collections.abc import Generator, Sequence
 from contextlib import closing, suppress
+from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engine import EngineChoice
@@ -16,9 +18,11 @@ from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, request_key
 from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.recorded import stat_of
 from tactbench.core.matrix.why import recording_entry
 from tactbench.core.plugins.interfaces import Operator, Rig
 from tactbench.core.plugins.registry import installed
+from tactbench.core.pool.pool import Pool
 from tactbench.core.spec.rig_file import RigFile
 
 GRACE_S = 5.0
@@ -55,6 +59,7 @@ def acquire_missing(
         If the disk refuses them.
     """
     needs = dict.fromkeys(map(request_key, cells))
+    recorded, refused = recording_plan.recorded, dict[Path, BaseException]()
     unique = {request.path: request for need in needs for request in recording_plan.requests.get(need, ())}
     missing = [request for path, request in unique.items() if not path.exists()]
     if not missing:
@@ -71,23 +76,27 @@ def acquire_missing(
             registry = installed()
             own = all(registry.sensors.owned(one.sensor).ours and registry.rigs.owned(one.rig).ours for one in missing)
             # What an import of somebody else's changes in its process, it changes for one recording.
-            pool = choice.pool(workers, grace_s=0.0 if simulated else GRACE_S, reuse=own)
-            outcomes = pool.each(record, missing)
+            limits = replace(choice.limits, grace_s=0.0 if simulated else GRACE_S)
+            outcomes = Pool(workers, limits, reuse=own).each(record, missing)
         with closing(outcomes):
             for request, outcome in outcomes:
                 if isinstance(outcome, UnwritableError):
                     raise outcome  # the disk is no cell's fault, and refuses the next one too
                 if isinstance(outcome, BaseException):
-                    recording_plan.refused[request.path] = outcome
+                    refused[request.path] = outcome
                     _discard(request)
                 else:
-                    recording_plan.recorded.made(request.path, outcome)
+                    recorded.digests[request.path], recorded.made[request.path] = outcome, stat_of(request.path)
                 progress.advance(f"{request.sensor} {request.scene.name}", stopped=isinstance(outcome, BaseException))
     except BaseException:
         # Workers that were ended in the middle could not tidy up behind themselves.
         for request in missing:
             _discard(request)
         raise
+    for need in needs:
+        reasons = [refused[path] for path in recording_plan.paths.get(need, ()) if path in refused]
+        if reasons:
+            recording_plan.troubles.setdefault(need, reasons[0])
 
 
 def _discard(request: RecordingRequest) -> None:

@@ -277,9 +277,8 @@ def _described_in_children(points: Sequence[EntryPoint], timeout_s: float) -> di
         return {}
     from tactbench.core.pool.limits import Limits
     from tactbench.core.pool.pool import Pool
-    from tactbench.core.pool.processes import can_fork
 
-    pool = Pool(_AT_ONCE, Limits(timeout_s=timeout_s), preload=None if can_fork() else (__name__,))
+    pool = Pool(_AT_ONCE, Limits(timeout_s=timeout_s))
     return dict(pool.each(_describe, [(point.name, point.value) for point in points]))
 
 

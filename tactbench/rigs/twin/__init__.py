@@ -11,6 +11,7 @@ _HERE = "tactbench.rigs.twin"
 _DRIFT, _NOISE = ("drift",), ("noise",)
 _LOAD, _TOLD = ("load",), ("reference-force",)
 _HEAT, _FORCE = "effects.thermal_called_for", "effects.force_called_for"
+_SLIDING = "effects.called_for_sliding"
 
 
 @hookimpl
@@ -38,13 +39,14 @@ def tactbench_effects() -> list[EffectDescriptor]:
         _effect("contact", "Normal contact", "contact.stages:press_skin", ("load", "core"), ("skin",)),
         _effect("core", "Touch-down on the core", "contact.core:with_core", (), ("core",)),
         _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure", "fluid")),
+        _effect("shear", "Tangential state of the skin", "contact.stages:watch_shear", (), ("shear",), _SLIDING),
         _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
         _effect("creep", "Creep of the skin", "effects.creep:apply", ("load", "skin", "gain"), ("effective-force",)),
         _effect(
             "transduction",
             "Transduction",
             "contact.stages:read_skin",
-            ("skin", "gain", "effective-force", "vibration"),
+            ("skin", "gain", "effective-force", "vibration", "shear", "slip"),
             ("taxel", "reading"),
         ),
         _effect(
@@ -133,15 +135,14 @@ def _indenter(name: str, title: str, **dimensions: Parameter) -> IndenterDescrip
 
 
 def _sliding() -> list[EffectDescriptor]:
-    here = "effects.called_for_sliding"
     forces = ("slip", "tangential-force", "reference-force")
     shakes, hears = ("slip", "skin"), ("skin", "fluid", "vibration")
     heard = ("ac_pressure", "reading")
     return [
-        _effect("friction", "Friction", "effects.friction:apply", ("skin",), forces, here),
-        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", shakes, ("vibration",), here),
-        _effect("ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", hears, heard, here),
-        _effect("hum", "Hum of dynamic pressure", "effects.hum:apply", (), ("disturbance",), here, _NOISE),
+        _effect("friction", "Friction", "effects.friction:apply", ("skin",), forces, _SLIDING),
+        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", shakes, ("vibration",), _SLIDING),
+        _effect("ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", hears, heard, _SLIDING),
+        _effect("hum", "Hum of dynamic pressure", "effects.hum:apply", (), ("disturbance",), _SLIDING, _NOISE),
     ]
 
 

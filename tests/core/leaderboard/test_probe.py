@@ -61,7 +61,8 @@ def test_the_first_frame_of_classes(first, says):
         (5.6, {}, "the first frame alone scores 5.6000 of 1.0000 N: a part of the answer is known before"),
         (9.9, {"ci_low": 9.0, "ci_high": 10.5}, "no leak shown"),
         (12.0, {}, "no leak shown"),
-        (2.0, {"n_test": 4}, "4 recordings are too few to say what the first frame tells"),
+        (2.0, {"n_test": 4}, "too few recordings or replicates to say what the first frame tells"),
+        (2.0, {"ci_low": None, "ci_high": None}, "too few recordings or replicates to say what the first frame tells"),
     ],
 )
 def test_the_first_frame_of_numbers(first, more, says):
