@@ -27,6 +27,9 @@ settings.load_profile("ci" if os.environ.get("CI") else "here")
 # before any of them is loaded; tests of several threads ask for them.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+# Commands that tests start compile the package once, not each of them anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 # There is one fork server for each process, and it keeps what it was started with. Without scikit-learn every cell of
 # every test would import that again, which takes five times as long as the cell: so it is started before any test
 # module is imported, since some look for plugins then, in children that need less.

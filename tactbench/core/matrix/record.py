@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -21,7 +22,7 @@ from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.recorded import stat_of
 from tactbench.core.matrix.why import recording_entry
 from tactbench.core.plugins.interfaces import Operator, Rig
-from tactbench.core.plugins.registry import installed
+from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.pool.pool import Pool
 from tactbench.core.spec.rig_file import RigFile
 
@@ -75,6 +76,8 @@ def acquire_missing(
         else:
             registry = installed()
             own = all(registry.sensors.owned(one.sensor).ours and registry.rigs.owned(one.rig).ours for one in missing)
+            if own and simulated:
+                import_own_rigs({one.rig for one in missing})
             # What an import of somebody else's changes in its process, it changes for one recording.
             limits = replace(choice.limits, grace_s=0.0 if simulated else GRACE_S)
             outcomes = Pool(workers, limits, reuse=own).each(record, missing)
@@ -128,6 +131,14 @@ def _one_by_one(
             yield request, record(request, operator)
         except Exception as error:
             yield request, error
+
+
+def import_own_rigs(names: Iterable[str]) -> None:
+    """Import what recordings with our own rigs of these names need, before processes are forked that share it."""
+    for library in ("h5py", "scipy.linalg", "tactbench.core.acquisition"):
+        importlib.import_module(library)
+    for name in names:
+        load_object(installed().rigs[name].where)
 
 
 @lru_cache(maxsize=4)
