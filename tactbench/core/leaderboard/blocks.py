@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.lines import Line, line_of
+from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
 from tactbench.core.leaderboard.placing import Placing, errors, places
 from tactbench.core.leaderboard.verdict import verdict_of
