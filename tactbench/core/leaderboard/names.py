@@ -55,6 +55,11 @@ def metric_name(row: Row) -> str:
     return visible(f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}")
 
 
+def sign_of(row: Row) -> float:
+    """Return 1 where a lower score is better, else -1: a score times it is the lower the better."""
+    return 1.0 if row["metric"] in LOWER_IS_BETTER else -1.0
+
+
 def hardware_name(row: Row) -> str:
     """Return what carried out a row's scenes: the twin, emulated devices on a rig, or a rig by its name."""
     if row.get("emulated"):
