@@ -102,14 +102,7 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
 def write_tables(
     rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = (), table: Table | None = None
 ) -> tuple[Path, ...]:
-    """Write the leaderboard of `rows` into a result folder in the formats `IN_FOLDER`, whole; return the files.
-
-    Parameters
-    ----------
-    provenance
-        What is known of the runs that the rows are from.
-    table
-        The leaderboard of those rows, if it has been made.
+    """Write the leaderboard of `rows`, or `table` where it has been made, into a result folder; return the files.
 
     Raises
     ------

@@ -43,9 +43,7 @@ def origin_mark(row: Row) -> str:
 
 def answer_name(row: Row) -> str:
     """Return the estimator's name, with the parameters that are not its defaults."""
-    if not row["params"]:
-        return visible(str(row["estimator"]))
-    options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
+    options = ", ".join(f"{key}={value}" for key, value in sorted((row["params"] or {}).items()))
     return visible(f"{row['estimator']} ({options})" if options else str(row["estimator"]))
 
 
