@@ -68,7 +68,10 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
 def document(table: Table, view: View) -> list[TextTable | tuple[str, ...]]:
     """Return the tables and notes that are printed, from above."""
     sentences = (*notes(table, view), *commands(table, view))
-    return [part for part in (*grids(table, view), sentences, *sections(table, view), footer(table, view)) if part]
+    parts: tuple[TextTable | tuple[str, ...], ...] = (
+        *grids(table, view), sentences, *sections(table, view), footer(table, view),
+    )  # fmt: skip
+    return [part for part in parts if part]
 
 
 def grids(table: Table, view: View) -> list[TextTable]:
