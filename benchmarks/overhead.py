@@ -24,9 +24,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from tactbench.core.cli.threads import one_thread
+from tactbench.core.cli.threads import keep_threads
 
-one_thread()  # as the command line does, before numpy is imported: a process with threads cannot fork its cells
+keep_threads()  # as the command line does, before numpy is imported: a process with threads cannot fork its cells
 
 import trivial  # noqa: E402
 
@@ -46,9 +46,10 @@ def one(cells: int, on: str | None) -> dict[str, float]:
         from tactbench.core.matrix.run import run_matrix
         from tactbench.core.matrix.store import Store
         from tactbench.core.plugins.registry import installed
+        from tactbench.core.pool.in_process import InProcess
 
         choice = EngineChoice("in-process")
-        forked = not choice.here(cells)
+        forked = not isinstance(choice.engine(cells), InProcess)
         run_matrix(trivial.matrix(3), Store(folder / "warm"), choice=choice, recordings=shelf)  # imports
         found = {"forked": float(forked)}
         for name in ("cold", "cached"):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tactbench.core.conformance.check import KINDS
 from tactbench.core.conformance.kit import CHECKS, OF_THE_LIST
 
 DOCUMENT = Path(__file__).with_name("conformance.md")
@@ -19,7 +20,7 @@ def table() -> str:
     rows = []
     for check in (*CHECKS, *OF_THE_LIST):
         mode = "" if check.mode == "passive" else f", `--{check.mode}`"
-        of = "all" if len(check.kinds) == 5 else ", ".join(check.kinds)
+        of = "all" if len(check.kinds) == len(KINDS) else ", ".join(check.kinds)
         why, cure = (text.replace("``", "`").replace("|", "\\|") for text in (check.why, check.cure))
         rows.append(f"| `{check.name}` | {of} | {check.level}{mode} | {why} | {cure} |\n")
     return head + "".join(rows)

@@ -27,11 +27,13 @@ __all__ = [
     "CheckFailed",
     "CheckReport",
     "PluginCheck",
+    "check_device",
     "check_effect",
     "check_estimator",
     "check_rig",
     "check_sensor",
     "check_task",
+    "device_checks",
     "effect_checks",
     "estimator_checks",
     "rig_checks",
@@ -98,6 +100,11 @@ def rig_checks(name: str) -> list[PluginCheck]:
     return _checks("rig", name)
 
 
+def device_checks(name: str) -> list[PluginCheck]:
+    """Return the checks of a force sensor or a motor."""
+    return _checks("device", name)
+
+
 def task_checks(name: str) -> list[PluginCheck]:
     """Return the checks of a task."""
     return _checks("task", name)
@@ -121,6 +128,11 @@ def check_sensor(name: str, *, recording: Path | None = None) -> CheckReport:
 def check_rig(name: str) -> CheckReport:
     """Run all checks of a rig; see `check_sensor`."""
     return _report("rig", name)
+
+
+def check_device(name: str) -> CheckReport:
+    """Run all checks of a force sensor or a motor; see `check_sensor`."""
+    return _report("device", name)
 
 
 def check_task(name: str) -> CheckReport:

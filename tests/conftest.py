@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tactbench.core.matrix.engine import PRELOAD
+from tactbench.core.pool.worker import PRELOAD
 
 # A shared machine is slow at times: a deadline would test the machine. Continuous integration draws the same examples
 # every time, so that a red run means a change; people's own runs keep exploring.
@@ -26,6 +26,9 @@ settings.load_profile("ci" if os.environ.get("CI") else "here")
 # Threads of numerical libraries wait for each other in a loop: beside other work each wait costs a time slice. Set
 # before any of them is loaded; tests of several threads ask for them.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# Commands that tests start compile the package once, not each of them anew.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # There is one fork server for each process, and it keeps what it was started with. Without scikit-learn every cell of
 # every test would import that again, which takes five times as long as the cell: so it is started before any test

@@ -5,6 +5,11 @@ Their own tests need them installed: ``.ci/run`` does that. Here they are only r
 
 import ast
 import io
+import os
+import re
+import shutil
+import subprocess
+import sys
 import tokenize
 import tomllib
 
@@ -14,22 +19,13 @@ from tests.conftest import ROOT
 
 PACKAGES = sorted(path.parent for path in (ROOT / "examples" / "plugins").glob("*/pyproject.toml"))
 DOORS = {"tactbench.plugin", "tactbench.plugin.simulation", "tactbench.plugin.devices"}
+CONTRACT = ROOT / "examples" / "plugins" / "importlinter.toml"
 WITH_DRIVER, WITHOUT = 100, 40
 """The most lines of code that a package of a sensor may have."""
 
 
 def sources(package):
     return sorted(path for path in package.rglob("*.py") if "tests" not in path.parts)
-
-
-def imported(path):
-    """Return the modules that a file imports, wherever in it."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0
-            yield node.module
 
 
 def lines_of_code(path):
@@ -53,13 +49,42 @@ def test_there_are_sensors_tasks_and_effects():
     assert len(PACKAGES) >= 6
 
 
+def linted(*path):
+    """Return what import-linter says of the packages on a path."""
+    pytest.importorskip("importlinter", reason="import-linter is a tool of development")
+    code = "from importlinter.cli import lint_imports_command; lint_imports_command()"
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (*path, *PACKAGES, ROOT)))}
+    command = [sys.executable, "-c", code, "--config", str(CONTRACT), "--no-cache"]
+    return subprocess.run(command, env=env, capture_output=True, text=True, timeout=100, check=False)
+
+
+def test_they_import_the_doors_alone(tmp_path):
+    assert linted().returncode == 0, linted().stdout
+    anyskin = next(path for path in PACKAGES if path.name == "anyskin")
+    shutil.copytree(anyskin / "tactbench_anyskin", tmp_path / "tactbench_anyskin")
+    with (tmp_path / "tactbench_anyskin" / "driver.py").open("a", encoding="utf-8") as file:
+        file.write("\n\ndef late():\n    import tactbench.core.errors\n")
+    broken = linted(tmp_path)
+    assert broken.returncode == 1
+    assert "tactbench_anyskin is not allowed to import tactbench.core" in broken.stdout
+
+
+def test_the_contract_knows_every_package_and_all_of_tactbench():
+    with CONTRACT.open("rb") as file:
+        linter = tomllib.load(file)["tool"]["importlinter"]
+    (contract,) = linter["contracts"]
+    assert contract["source_modules"] == [path.name for package in PACKAGES for path in package.glob("tactbench_*")]
+    assert linter["root_packages"] == [*contract["source_modules"], "tactbench"]
+    rooms = {f"tactbench.{path.parent.name}" for path in (ROOT / "tactbench").glob("*/__init__.py")}
+    rooms |= {f"tactbench.plugin.{path.stem}" for path in (ROOT / "tactbench" / "plugin").glob("[!_]*.py")}
+    assert set(contract["forbidden_modules"]) == rooms - DOORS | {"tactbench.testing"}
+
+
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda path: path.name)
-def test_it_imports_the_doors_alone(package):
-    of_ours = {name for path in sources(package) for name in imported(path) if name.partition(".")[0] == "tactbench"}
-    assert of_ours
-    assert of_ours <= DOORS
-    tested_with = {name for path in (package / "tests").glob("*.py") for name in imported(path)}
-    assert {name for name in tested_with if name.partition(".")[0] == "tactbench"} <= DOORS | {"tactbench.testing"}
+def test_its_tests_import_the_doors_and_what_is_for_tests(package):
+    text = "".join(path.read_text(encoding="utf-8") for path in (package / "tests").glob("*.py"))
+    used = set(re.findall(r"^\s*(?:from|import) (tactbench(?:\.\w+)*)\b", text, re.MULTILINE))
+    assert used <= DOORS | {"tactbench.testing"}
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda path: path.name)

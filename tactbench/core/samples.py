@@ -141,6 +141,14 @@ class SkinState:
     """sqrt(5/2 <r²>) weighted with the contact pressure (exact for Hertz)."""
     residual: float
     """Relative residual of the solver."""
+    tangential_displacement_mm: FloatArray | None = None
+    """(2, nx, ns) how far the outer surface has moved along itself: [0] along x, [1] along s, each positive the way its
+    coordinate grows; without friction what the press squeezes aside, under a slide what that drags along as well.
+    None: the sensor's spec does not say that its transducer looks at it (`reads_shear`)."""
+    shear_mpa: FloatArray | None = None
+    """(2, nx, ns) shear traction of the indenter on the outer surface, in the same order: positive where it pulls the
+    skin the way the coordinate grows. Its sum over cells times their area is the tangential force on the sensor. Zero
+    while nothing slides: contacts are pressed without friction. None: as above."""
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,19 @@ from tactbench.core.plugins.registry import load_object, load_registry
 from tactbench.core.samples import Block, Quality, StreamReadings
 from tactbench.core.spec.drive import ForceLoop
 from tactbench.core.spec.events import AlarmPolicy, SlipTarget
+from tactbench.core.spec.force_profiles import press_hold_release, sine, staircase
+from tactbench.core.spec.parameter import Parameter
 from tactbench.core.spec.profile import ForcePath, ForceRamp
 from tactbench.core.spec.quantity import Quantity, Source, assumed, derived, measured, sourced
 from tactbench.core.spec.recording import PlanEntry, Scalar
-from tactbench.core.spec.rig import EstimatorDescriptor, RigDescriptor, SensorDescriptor, TaskDescriptor
+from tactbench.core.spec.rig import (
+    EstimatorDescriptor,
+    IndenterDescriptor,
+    ProfileDescriptor,
+    RigDescriptor,
+    SensorDescriptor,
+    TaskDescriptor,
+)
 from tactbench.core.spec.scene import Indenter, Placement, Role, Scene
 from tactbench.core.spec.sensor import (
     ChannelKind,
@@ -61,14 +70,17 @@ __all__ = [
     "ForcePath",
     "ForceRamp",
     "Indenter",
+    "IndenterDescriptor",
     "LabelTarget",
     "MissingRecordingError",
     "NotApplicable",
+    "Parameter",
     "PhysicalRange",
     "Placement",
     "PlanEntry",
     "PlannedScene",
     "PluginContractError",
+    "ProfileDescriptor",
     "Published",
     "Quality",
     "Quantity",
@@ -100,7 +112,10 @@ __all__ = [
     "load_object",
     "load_registry",
     "measured",
+    "press_hold_release",
+    "sine",
     "sourced",
+    "staircase",
 ]
 
 __getattr__ = on_demand(

@@ -2,7 +2,26 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import ChannelTarget, Indenter, PlannedScene, Published, Scene, TaskDescriptor, TaskSpec, hookimpl
+from collections.abc import Callable, Mapping
+from inspect import signature
+from typing import Any
+
+from tactbench.plugin import (
+    ChannelTarget,
+    ForcePath,
+    Indenter,
+    Parameter,
+    PlannedScene,
+    ProfileDescriptor,
+    Published,
+    Scene,
+    TaskDescriptor,
+    TaskSpec,
+    hookimpl,
+    press_hold_release,
+    sine,
+    staircase,
+)
 from tactbench.tasks import eflesh
 from tactbench.tasks.surfaces import at_places, few_shots, on_units
 
@@ -67,3 +86,52 @@ SPEC = TaskSpec(
 def tactbench_tasks() -> list[TaskDescriptor]:
     """Offer the task."""
     return [TaskDescriptor(spec=SPEC)]
+
+
+@hookimpl
+def tactbench_profiles() -> list[ProfileDescriptor]:
+    """Offer by name what a task imports from the door."""
+    above_0 = 1e-3
+    peak = {"unit": "N", "text": "the largest force"}
+    rise = {"unit": "s", "least": above_0, "text": "how long the way up to the first force takes"}
+    hold = {"unit": "s", "text": "how long nothing presses before"}
+    rate = {"unit": "Hz", "least": 1.0, "text": "samples a second of the reference clock"}
+    return [
+        _profile(
+            staircase, "staircase", "Equal steps up to a force and down again, each level held",
+            peak=peak,
+            steps={"unit": "1", "least": 1, "text": "levels above zero, a whole number"},
+            dwell={"unit": "s", "least": above_0, "text": "how long each level is held"},
+            rise={"unit": "s", "least": above_0, "text": "how long each step takes"},
+            hold=hold, rate=rate,
+        ),
+        _profile(
+            press_hold_release, "press-hold-release", "One press, held and released",
+            peak=peak, rise=rise,
+            dwell={"unit": "s", "text": "how long the force is held"},
+            release={"unit": "s", "least": above_0, "text": "how long releasing takes"},
+            rest={"unit": "s", "text": "how long nothing presses afterwards"},
+            hold=hold, rate=rate,
+        ),
+        _profile(
+            sine, "sine", "A force that swings about a mean",
+            mean={"unit": "N", "text": "about which it swings"},
+            amplitude={"unit": "N", "text": "by how much, at most the mean"},
+            frequency={"unit": "Hz", "least": 1e-3, "most": 1e3, "text": "periods a second"},
+            periods={"unit": "1", "least": 1, "text": "how many, a whole number"},
+            rise=rise, hold=hold, rate=rate,
+        ),
+    ]  # fmt: skip
+
+
+def _profile(
+    function: Callable[..., ForcePath], name: str, title: str, **parameters: Mapping[str, Any]
+) -> ProfileDescriptor:
+    """Return the descriptor of a function of the door, with the function's own defaults."""
+    own = signature(function).parameters
+    return ProfileDescriptor(
+        name=name,
+        title=title,
+        where=f"tactbench.plugin:{function.__name__}",
+        parameters={one: Parameter(default=own[one].default, **said) for one, said in parameters.items()},
+    )

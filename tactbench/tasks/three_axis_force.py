@@ -1,7 +1,7 @@
 """Normal and tangential force from taxels, from recordings with a three-axis reference.
 
-It has no scenes: electrodes and taxels of the twin do not answer to shear, and a score from them would be that of the
-normal force alone.
+It has no scenes: electrodes and taxels of the twin's own sensors do not answer to shear, and a score from them would be
+that of the normal force alone.
 """
 
 from __future__ import annotations

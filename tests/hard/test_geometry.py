@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from tactbench.plugin import RigError, assumed
 from tactbench.plugin.simulation import SkinSheet
-from tactbench.rigs.twin.geometry import BEYOND_THE_CAP_MM, STEEPEST, Contact, check_contact, gap_mm, skin_grid
+from tactbench.rigs.twin.geometry import STEEPEST, Contact, check_contact, gap_mm, skin_grid
+from tactbench.rigs.twin.shapes import BEYOND_MM
 
 SHEET = SkinSheet(
     x_min=assumed(-10, "mm", "t"), x_max=assumed(10, "mm", "t"), arc=assumed(20, "mm", "t"), cells=(40, 50)
@@ -43,7 +44,7 @@ def test_a_larger_cap_is_nowhere_further_away(first, second, x, s, finger):
     small, large = sorted((first, second))
     gaps = [gap_mm(GRID, Contact(radius, x, s), finger) for radius in (small, large)]
     # Where the smaller cap has ended, its gap is a number that stands for "never".
-    there = gaps[0] < small + BEYOND_THE_CAP_MM
+    there = gaps[0] < small + BEYOND_MM
     # Rounding of gaps of up to a few finger radii.
     assert np.all(gaps[1][there] <= gaps[0][there] + 1e-12)
 

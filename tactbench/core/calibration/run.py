@@ -14,8 +14,8 @@ from tactbench.core.calibration.journal import Journal
 from tactbench.core.calibration.placing import as_procedure
 from tactbench.core.calibration.trial import Trial, carry_out
 from tactbench.core.errors import TactbenchError
-from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.progress import Progress
+from tactbench.core.pool.pool import Pool
 from tactbench.core.provenance.gather import gather
 from tactbench.core.provenance.source import versions
 from tactbench.core.spec.calibration import CalibrationSpec
@@ -54,7 +54,7 @@ def carry_out_missing(
         # One folder for all: workers that are ended in the middle cannot tidy up behind themselves, and one may still
         # be writing when it is emptied; that must not hide the interruption.
         with tempfile.TemporaryDirectory(prefix="tactbench-draws-", ignore_cleanup_errors=True) as scratch:
-            pool = EngineChoice().pool(min(jobs, len(numbers)))
+            pool = Pool(min(jobs, len(numbers)), reuse=True)
             missing = [Trial(spec, seed, number, Path(scratch)) for number in numbers]
             for trial, outcome in pool.each(partial(_as_json, work), missing):
                 if isinstance(outcome, BaseException):

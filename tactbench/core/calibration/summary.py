@@ -40,8 +40,14 @@ class Summary:
     verdicts: tuple[SameVerdict, ...]
 
 
-def summary(result: CalibrationResult) -> Summary:
-    """Return everything; the bootstrap of sensitivities is seeded with the result's own seed."""
+def summary(result: CalibrationResult, *, sensitivity: bool = True) -> Summary:
+    """Return everything; the bootstrap of sensitivities is seeded with the result's own seed.
+
+    Parameters
+    ----------
+    sensitivity
+        Whether to compute sensitivities: by far the slowest part.
+    """
     spec, draws = result.spec, finished(result.draws)
     kept = by_fitted(spec, draws)
     rng = np.random.default_rng(np.random.SeedSequence([result.seed, 0x5E]))
@@ -55,7 +61,7 @@ def summary(result: CalibrationResult) -> Summary:
         parameters=tuple(parameter_ranges(spec, draws)),
         predictions=tuple(predictions(spec, draws)),
         findings=tuple(findings(spec, draws)),
-        sensitivities=tuple(sensitivities(spec, draws, rng)),
+        sensitivities=tuple(sensitivities(spec, draws, rng)) if sensitivity else (),
         agreements=tuple(agreements(spec, draws)),
         verdicts=tuple(same_verdicts(spec, draws)),
     )

@@ -153,7 +153,7 @@ def _spread(one: tuple[float, float, float] | None) -> str:
 
 def _beside(result: CalibrationResult, lines: Mapping[str, Sequence[Line]], earlier: CalibrationResult) -> TextTable:
     """Return published numbers and findings beside those of an earlier calibration that had them too."""
-    stats = summary(earlier)
+    stats = summary(earlier, sensitivity=False)
     before = records(stats)
     rows = [
         {"number or finding": line[title], "earlier prior": show(old, "prior"), "prior": show(line, "prior"),

@@ -47,22 +47,16 @@ class LazyGroup(click.Group):
         return list(VERBS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the verb."""
-        if cmd_name not in VERBS:
+        """Import the verb; offer the nearest one for one that is misspelt."""
+        if cmd_name.startswith("-"):
             return None
+        if cmd_name not in VERBS:
+            from tactbench.core.errors import UnknownNameError
+
+            raise UnknownNameError("command", cmd_name, VERBS)
         module = importlib.import_module(f"tactbench.core.cli.{VERBS[cmd_name][0]}")
         command: click.Command = module.command
         return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Offer the nearest verb for a misspelt one."""
-        if args and args[0] not in VERBS and not args[0].startswith("-"):
-            from tactbench.core.errors import UnknownNameError
-
-            raise UnknownNameError("command", args[0], VERBS)
-        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of verbs without importing them."""

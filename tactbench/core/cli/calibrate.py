@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.calibration_tables import CALIBRATION_FORMATS, print_calibration
-from tactbench.core.cli.threads import one_thread
+from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.calibration.result import CalibrationResult
@@ -33,7 +33,7 @@ def command(
     Prints which ranges those leave, what they predict for numbers that were held out, and how often each finding of
     the publication comes out. Interrupted, the same command goes on from there.
     """
-    one_thread()
+    keep_threads()
     from tactbench.core.calibration.result import load_result
     from tactbench.core.calibration.summary import summary
     from tactbench.core.cli.screen import remark

@@ -103,8 +103,9 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
         keys = Keys(registry)
     cells, needed = plan_run(matrix, registry, keys, store, folder, recorded)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
-    made = tuple(needed.requests.get(request_key(cell), ()))
-    return StoredCell(store, keys, recorded, cell, rows.get(cell.name), tuple(needed.paths(cell)), made)
+    need = request_key(cell)
+    paths, made = tuple(needed.paths.get(need, ())), tuple(needed.requests.get(need, ()))
+    return StoredCell(store, keys, recorded, cell, rows.get(cell.name), paths, made)
 
 
 def _given(option: str, value: Any) -> bool:

@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.threads import one_thread
+from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
-    from tactbench.core.conformance.run import CheckReport
+    from collections.abc import Sequence
 
-_KINDS = ("sensor", "rig", "task", "estimator", "effect")
+    from tactbench.core.conformance.run import CheckReport
+    from tactbench.core.conformance.subject import Subject
+    from tactbench.core.spec.rig_file import RigFile
+
+_KINDS = ("sensor", "rig", "device", "task", "estimator", "effect")
 
 
 @click.command(name="check")
@@ -29,6 +33,8 @@ _KINDS = ("sensor", "rig", "task", "estimator", "effect")
 @click.option("--all", "every", is_flag=True, help="Also list the checks that passed.")
 @click.option("--timeout", type=click.FloatRange(min=1), default=30.0, show_default=True, metavar="S",
               help="Seconds that one check may take.")  # fmt: skip
+@click.option("--out", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="FOLDER",
+              help="Keep the level in this result folder: its tables show it beside the sensor.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
 @click.pass_context
 def command(
@@ -42,23 +48,30 @@ def command(
     yes: bool,
     every: bool,
     timeout: float,
+    out: Path | None,
     shape: str,
 ) -> None:
-    """Check a sensor, rig, task, estimator or effect, or all that a plugin brings.
+    """Check a sensor, rig, device, task, estimator or effect, or all that a plugin brings.
 
     By default nothing is opened and nothing moves; docs/conformance.md lists the checks. Exit code 1 if a check failed
     or fewer ran than every plugin of that kind can run, 2 if nothing is called NAME.
     """
-    one_thread()
+    keep_threads()
+    from tactbench.core.cli.operator import TerminalOperator
+    from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
     from tactbench.core.conformance.check import KINDS, Mode
     from tactbench.core.conformance.run import failed_plugins, plugins_named, run_checks, subjects_named
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
+    from tactbench.core.plugins.rig_files import load_rig_file
     from tactbench.core.tables.text import json_text
 
-    if rig_file is not None and not invasive:
-        raise UsageError("--rig-file is for --invasive.", hint="Add it, or leave the file out.")
+    if (rig_file is not None) != invasive:
+        raise UsageError(
+            "--invasive and --rig-file FILE go together: the file says which devices are opened.",
+            hint="Give both, or neither.",
+        )
     registry = load_registry()
     kinds = tuple(one for one in KINDS if kind in (None, one))
     wrong = [f"{row.entry_point}: {row.reason}" for row in plugins_named(registry, name) if row.status == "failed"]
@@ -77,18 +90,30 @@ def command(
         subjects = [one for one in subjects if one.kind == "sensor"]
         if not subjects and not wrong:
             raise UsageError(f"{name} is no sensor, and a recording is of one.", hint="Leave --recording out.")
-    if invasive and not yes and not sys.stdin.isatty():
+    if out is not None and ("passive" not in modes or not any(one.kind == "sensor" for one in subjects)):
         raise UsageError(
-            "--invasive asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."
+            "--out keeps the level of a sensor, and none is computed here.",
+            hint="Name a sensor, and add --passive beside --recording.",
         )
-    if invasive and not yes:
-        what = ", ".join(f"the {one.kind} {one.name}" for one in subjects)
-        click.confirm(
-            f"This opens lines of {what} and may move or press something. Is the rig clear?", abort=True, err=True
-        )
+    if out is not None:
+        opened(out)
+    if rig_file is not None:
+        _ask(subjects, load_rig_file(rig_file, registry), yes)
     reports = [
-        run_checks(one, modes=modes, recording=recording, rig_file=rig_file, timeout_s=timeout) for one in subjects
+        run_checks(
+            one,
+            modes=modes,
+            recording=recording,
+            rig_file=rig_file,
+            operator=TerminalOperator(yes=yes),
+            timeout_s=timeout,
+        )
+        for one in subjects
     ]
+    if out is not None:
+        for checked, report in zip(subjects, reports, strict=True):
+            if checked.kind == "sensor":
+                _keep(out, checked, report)
     if shape == "json":
         click.echo(json_text({"failed_plugins": wrong, "checked": [_plain(one) for one in reports]}, indent=1))
     else:
@@ -98,6 +123,54 @@ def command(
         for report in reports:
             _print(report, every)
     ctx.exit(1 if wrong or not all(one.ok for one in reports) or not reports else 0)
+
+
+def _ask(subjects: Sequence[Subject], file: RigFile, yes: bool) -> None:
+    """Say what is about to be opened and moved, and wait for a yes.
+
+    Raises
+    ------
+    UsageError
+        If nobody is there to say it, or the file is for another rig than the only one that is checked.
+    """
+    from tactbench.core.conformance.invasive import FORCE_N
+    from tactbench.core.errors import UsageError
+
+    rigs = [one.name for one in subjects if one.kind == "rig"]
+    if len(rigs) == len(subjects) == 1:
+        file.checked_for(rigs[0])
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise UsageError(
+            "--invasive asks before anything moves, and nobody is there.", hint="Add --yes if all is clear."
+        )
+    known = {*file.sensors, *(getattr(one, "device", None) for one in file.entries().values())}
+    lines = [one.name for one in subjects if one.kind in ("sensor", "device") and one.name in known]
+    what = [f"opens the line of {name}" for name in lines]
+    if file.rig in rigs:
+        what.append(f"presses {next(iter(file.sensors))} twice to {FORCE_N:g} N with the rig {file.rig}")
+    click.confirm(f"This {' and '.join(what) or 'opens nothing'}. Is the rig clear?", abort=True, err=True)
+
+
+def _keep(out: Path, checked: Subject, report: CheckReport) -> None:
+    """Write the level of a sensor into a result folder, with what tells which state of its package was checked."""
+    import tactbench
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.leaderboard.levels import identity_of, write_level
+    from tactbench.core.matrix.store.disk import writing
+    from tactbench.core.provenance.gather import gather
+
+    with writing(out):
+        path = write_level(
+            out, checked.name,
+            {
+                "level": report.level or "none", "ran": report.ran, "failed": len(report.failed),
+                "modes": list(report.modes), "kit": tactbench.__version__, "package": checked.package,
+                "identity": identity_of(checked.package, gather()),
+            },
+        )  # fmt: skip
+    remark(f"Level of {checked.name}: {path}")
 
 
 def _plain(report: CheckReport) -> dict[str, object]:

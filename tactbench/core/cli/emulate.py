@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.scenes import press_options, scene_of
+from tactbench.core.cli.scenes import indenter_of, press_options, profile_of, scene_of
 from tactbench.core.cli.screen import remark
 
 if TYPE_CHECKING:
@@ -48,6 +48,8 @@ def command(
     names: tuple[str, ...],
     rig_file: Path | None,
     cap_mm: float | None,
+    indenter: str | None,
+    profile: str | None,
     force_n: float | None,
     seconds: float | None,
     presses: int | None,
@@ -75,11 +77,16 @@ def command(
     file = load_rig_file(rig_file, registry) if rig_file is not None else None
     entries = _named(registry, names) if file is None else file.entries()
     settings = {} if file is None else dict(file.emulation)
+    shape, path = indenter_of(registry, indenter), profile_of(registry, profile)
+
+    def pressed(sensor: SensorDescriptor | None) -> Scene:
+        return scene_of("press", cap_mm, force_n, seconds, sensor, shape, path)
+
     presser = Presser(
         registry,
         settings.get("physics", "twin") if physics is None else physics,
-        {name: scene_of("press", cap_mm, force_n, seconds, registry.sensors[name]) for name in _sensors(entries)},
-        scene_of("press", cap_mm, force_n, seconds, None),
+        {name: pressed(registry.sensors[name]) for name in _sensors(entries)},
+        pressed(None),
         settings.get("seed", 1) if seed is None else seed,
     )
     emulate(registry, with_faults(entries, faults), presser, file, can=can, presses=presses, out=write_rig_file)
@@ -152,7 +159,8 @@ class Presser:
         descriptor = self.registry.rigs[self.physics]
         if not descriptor.simulated:
             raise UsageError(f"The rig {self.physics!r} is not simulated.", hint="Use twin.")
-        self._rig = load_object(descriptor.where)(RigContext(effects=tuple(self.registry.effects)))
+        context = RigContext(effects=tuple(self.registry.effects), indenters=tuple(self.registry.indenters))
+        self._rig = load_object(descriptor.where)(context)
         self._drawn: dict[str, SceneSamples] = {}
 
     def draw(self, number: int) -> None:

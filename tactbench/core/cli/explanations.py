@@ -66,7 +66,8 @@ def print_explanations(
         If the rig cannot simulate the sensor in any of the scenes.
     """
     sensor = registry.sensors[sensor_name]
-    rig: Explaining = load_object(registry.rigs[rig_name].where)(RigContext(effects=tuple(registry.effects)))
+    context = RigContext(effects=tuple(registry.effects), indenters=tuple(registry.indenters))
+    rig: Explaining = load_object(registry.rigs[rig_name].where)(context)
     if not hasattr(rig, "explain"):
         raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Choose another with --rig.")
     scenes = _scenes(registry, task_name, scene_name, simulation)

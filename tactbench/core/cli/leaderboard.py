@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tactbench.core.cli.comparisons import print_comparisons
+from tactbench.core.cli.options import options
 from tactbench.core.cli.results import opened, provenance_of, shown_rows
-from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, format_of, print_table, view_of, view_options
+from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, VIEW, format_of, print_table, view_of
 from tactbench.core.leaderboard.axes import AXES
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def _filters(command: Any) -> Any:
 @click.option("--best", type=click.IntRange(min=1), is_flag=False, flag_value=1, metavar="[N]",
               help="Only the first N answers of each sensor in each block; N is 1 where it is left out.")  # fmt: skip
 @click.option("--columns", metavar="A,B,…", help="These columns, for example sensor,score,cell.")
-@view_options
+@options(*VIEW)
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS),
               help="How it is shown; default: table, or what the name of the file given with --to says.")  # fmt: skip
 @click.option("--to", "-o", "to", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",

@@ -8,14 +8,14 @@ from tactbench.core.cli.plugins import tell_failed
 from tactbench.core.tables.text import json_text
 
 SCENARIOS = "scenarios"
-FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", SCENARIOS)
+FAMILIES = ("sensors", "rigs", "devices", "tasks", "estimators", "effects", "indenters", "profiles", SCENARIOS)
 
 
 @click.command(name="list")
 @click.argument("family", type=click.Choice(FAMILIES), required=False)
 @click.option("--format", "shape", type=click.Choice(("table", "json")), default="table", show_default=True)
 def command(family: str | None, shape: str) -> None:
-    """List sensors, rigs, devices (force sensors, motors), tasks, estimators, effects and sensors' scenarios."""
+    """List what is installed: devices are force sensors and motors, scenarios are of sensors."""
     from tactbench.core.plugins.registry import load_registry
 
     registry = load_registry()

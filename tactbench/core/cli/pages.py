@@ -1,9 +1,9 @@
-"""What `show` prints of a task, rig, estimator or effect: a short page of titled lines and small tables."""
+"""What `show` prints of all but sensors: a short page of titled lines and small tables."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +11,15 @@ from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.evaluation.protocols import PROTOCOLS
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES
 from tactbench.core.spec.events import SlipTarget
-from tactbench.core.spec.rig import EffectDescriptor, EstimatorDescriptor, RigDescriptor
+from tactbench.core.spec.parameter import Parameter
+from tactbench.core.spec.rig import (
+    DeviceDescriptor,
+    EffectDescriptor,
+    EstimatorDescriptor,
+    IndenterDescriptor,
+    ProfileDescriptor,
+    RigDescriptor,
+)
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.task import ChannelTarget, Published, TaskSpec, VectorTarget
 from tactbench.core.tables.numbers import suffix
@@ -190,6 +198,37 @@ def effect_page(effect: EffectDescriptor) -> Page:
     return Page(f"Effect {effect.name}: {effect.title}", [Section("", facts)])
 
 
+def indenter_page(indenter: IndenterDescriptor) -> Page:
+    """Return by which dimensions an indenter is given."""
+    return _given_by(f"Indenter {indenter.name}: {indenter.title}", "--indenter", indenter, indenter.dimensions)
+
+
+def profile_page(profile: ProfileDescriptor) -> Page:
+    """Return by which parameters a force profile is given."""
+    return _given_by(f"Profile {profile.name}: {profile.title}", "--profile", profile, profile.parameters)
+
+
+def _given_by(
+    title: str, option: str, descriptor: IndenterDescriptor | ProfileDescriptor, numbers: Mapping[str, Parameter]
+) -> Page:
+    asked = ",".join(f"{name}={one.default:g}" for name, one in numbers.items())
+    facts = [
+        ("asked for", f"tactbench record {option} {descriptor.name}{f':{asked}' if asked else ''}"),
+        ("code", descriptor.where),
+    ]
+    page = Page(title, [Section("", facts)])
+    if numbers:
+        lines = [(name, f"{one.default:g}", one.unit, one.range, one.text) for name, one in numbers.items()]
+        page.sections.append(Section("Given by", lines, ("name", "default", "unit", "may be", "what it is")))
+    return page
+
+
+def device_page(device: DeviceDescriptor) -> Page:
+    """Return what a device is for, and where its code is."""
+    facts = [("used for", device.kind), ("driver", device.driver), ("emulator", device.emulator or "none")]
+    return Page(f"Device {device.name}: {device.title}", [Section("", facts)])
+
+
 def page_of(descriptor: Any) -> Page:
     """Return the page of a descriptor of any kind but a sensor."""
     if isinstance(descriptor, EstimatorDescriptor):
@@ -198,4 +237,10 @@ def page_of(descriptor: Any) -> Page:
         return rig_page(descriptor)
     if isinstance(descriptor, EffectDescriptor):
         return effect_page(descriptor)
+    if isinstance(descriptor, IndenterDescriptor):
+        return indenter_page(descriptor)
+    if isinstance(descriptor, ProfileDescriptor):
+        return profile_page(descriptor)
+    if isinstance(descriptor, DeviceDescriptor):
+        return device_page(descriptor)
     return task_page(descriptor.spec)

@@ -82,14 +82,12 @@ class Lines:
         now_s = self._clock()
         if self._done == self._total or self._total <= _FEW or now_s - self._printed_s >= _QUIET_S:
             self._printed_s = now_s
-            remark(f"{self._stage}: {self._done}/{self._total} {what}{self._beside(now_s)}")
-
-    def _beside(self, now_s: float) -> str:
-        texts = [f"{self._stopped} stopped"] if self._stopped else []
-        left = self._total - self._done
-        if left:
-            texts.append(f"about {duration((now_s - self._began_s) / self._done * left)} to go")
-        return f" ({', '.join(texts)})" if texts else ""
+            texts = [f"{self._stopped} stopped"] if self._stopped else []
+            left = self._total - self._done
+            if left:
+                texts.append(f"about {duration((now_s - self._began_s) / self._done * left)} to go")
+            more = f" ({', '.join(texts)})" if texts else ""
+            remark(f"{self._stage}: {self._done}/{self._total} {what}{more}")
 
     def working(self, what: str) -> None:
         """Say nothing: what is under way is no line."""

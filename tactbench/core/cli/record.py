@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.scenes import press_options, scene_of
-from tactbench.core.cli.simulation import simulation_of, simulation_options
+from tactbench.core.cli.options import options
+from tactbench.core.cli.scenes import indenter_of, press_options, profile_of, scene_of
+from tactbench.core.cli.simulation import SIMULATION, simulation_of
 from tactbench.core.tables.text import command_line
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 @press_options
 @click.option("--slide-mm-s", type=click.FloatRange(min=0, min_open=True), metavar="V",
               help="Slide towards the tip at this speed, from the middle on; vibration is recorded too.")  # fmt: skip
-@simulation_options
+@options(*SIMULATION)
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N")
 @click.option(
     "--out", required=True, type=click.Path(path_type=Path), metavar="FILE", help="The recording, a .h5 file."
@@ -43,6 +44,8 @@ def command(
     rig: str | None,
     rig_file: str | None,
     cap_mm: float | None,
+    indenter: str | None,
+    profile: str | None,
     force_n: float | None,
     seconds: float | None,
     slide_mm_s: float | None,
@@ -71,7 +74,8 @@ def command(
 
     registry = load_registry()
     descriptor = registry.sensors[sensor]
-    scene = scene_of(out.stem, cap_mm, force_n, seconds, descriptor)
+    shape, path = indenter_of(registry, indenter), profile_of(registry, profile)
+    scene = scene_of(out.stem, cap_mm, force_n, seconds, descriptor, shape, path)
     if slide_mm_s is not None:
         scene = _sliding(scene, slide_mm_s, descriptor)
     devices = load_rig_file(Path(rig_file), registry) if rig_file else None

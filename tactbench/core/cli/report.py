@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.threads import one_thread
+from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.report.calibrated import Calibrated
@@ -48,7 +48,7 @@ def command(
 
     The published numbers are printed beside ours.
     """
-    one_thread()
+    keep_threads()
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.threads import one_thread
+from tactbench.core.cli.threads import keep_threads
 from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def command(ctx: click.Context, cell: str, out: Path, shape: str) -> None:
 
     Exit code 0: identical; 1: something differs, or it fails; 2: usage.
     """
-    one_thread()
+    keep_threads()
     from tactbench.core.cli.cells import find_cell
     from tactbench.core.cli.screen import remark
 

@@ -39,6 +39,7 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
     from tactbench.core.cli.screen import remark
     from tactbench.core.errors import UsageError
     from tactbench.core.leaderboard.checked import checked
+    from tactbench.core.leaderboard.levels import with_levels
     from tactbench.core.statistics.replicates import over_replicates
     from tactbench.core.tables.text import cut, visible
 
@@ -53,7 +54,7 @@ def shown_rows(store: Store) -> list[dict[str, Any]]:
         remark(f"Left out: {one}")
     if len(messages) > _MOST_PRINTED:
         remark(f"Left out: {len(messages) - _MOST_PRINTED} more rows.")
-    return over_replicates(rows)
+    return with_levels(over_replicates(rows), store.folder, store.provenance)
 
 
 def provenance_of(store: Store, rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.engines import choice_of, engine_options
-from tactbench.core.cli.selection import requested_matrix, selecting_options
+from tactbench.core.cli.options import ENGINE, options
+from tactbench.core.cli.selection import SELECTING, requested_matrix
 from tactbench.core.cli.tables import (
     DEFAULT_FOLDER,
     TABLE_FORMATS,
+    VIEW,
     check_destination,
     print_table,
     view_of,
-    view_options,
 )
-from tactbench.core.cli.threads import one_thread
+from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.matrix.engine import EngineName
@@ -26,14 +26,13 @@ if TYPE_CHECKING:
 
 
 @click.command(name="run")
-@selecting_options
-@engine_options
+@options(*SELECTING, *ENGINE)
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_FOLDER, show_default=True,
               metavar="DIR", help="Where results lie; what is there already is reused.")  # fmt: skip
 @click.option("--yes", is_flag=True, help="Ask nobody: what has to be done at a rig of real devices is done.")
 @click.option("--format", "shape", type=click.Choice(TABLE_FORMATS), default="table", show_default=True,
               help="How the leaderboard is printed.")  # fmt: skip
-@view_options
+@options(*VIEW)
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -55,21 +54,30 @@ def command(
     Without options: the whole of benchmarks.yaml. Options select from it or replace its choices.
     """
     check_destination(shape)
-    one_thread()
+    keep_threads()
+    from tactbench.core.cli.comparisons import print_comparisons
     from tactbench.core.cli.operator import TerminalOperator
     from tactbench.core.cli.plugins import tell_failed
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
     from tactbench.core.leaderboard.formats import write_tables
+    from tactbench.core.leaderboard.levels import with_levels
+    from tactbench.core.leaderboard.side_by_side import compare
     from tactbench.core.leaderboard.table import build_table
+    from tactbench.core.matrix.engine import EngineChoice
     from tactbench.core.matrix.run import run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
+    from tactbench.core.pool.limits import Limits
     from tactbench.core.statistics.replicates import over_replicates
 
     tell_failed(installed())
     matrix, folder = requested_matrix(installed(), **selection)
-    choice = choice_of(matrix, engine=engine, jobs=jobs, timeout=timeout, memory=memory, scheduler=scheduler)
+    limits = Limits(  # what the options leave open, the matrix file says
+        timeout_s=matrix.timeout_s if timeout is None else timeout,
+        memory_mb=matrix.memory_mb if memory is None else memory,
+    )
+    choice = EngineChoice(engine or "isolated", jobs, limits, scheduler)
     store = Store(out)
     with progress() as display:
         outcome = run_matrix(
@@ -78,11 +86,12 @@ def command(
             shown=lambda rows: display.show(lambda: _so_far(rows)),
         )  # fmt: skip
     provenance = provenance_of(store, outcome.rows)
-    rows = over_replicates(outcome.rows)
+    rows = with_levels(over_replicates(outcome.rows), store.folder, store.provenance)
     table = build_table(rows, provenance)
     print_table(table, shape, view_of(store.folder, wide=wide, notes=notes))
-    if shape == "table":
-        _side_by_side(rows)
+    for by in ("protocol", "split") if shape == "table" else ():
+        if compare(rows, by):  # once more, side by side
+            print_comparisons(rows, by, "table")
     write_tables(rows, store.folder, provenance, table)
     _farewell(outcome, rows, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
@@ -97,16 +106,6 @@ def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
     from tactbench.core.tables.terminal import plain_text
 
     return plain_text(grids(build_table(over_replicates(rows)), DEFAULT_VIEW), console().width)
-
-
-def _side_by_side(rows: Sequence[Mapping[str, Any]]) -> None:
-    """Print what was asked under several protocols or splits once more, side by side."""
-    from tactbench.core.cli.comparisons import print_comparisons
-    from tactbench.core.leaderboard.side_by_side import compare
-
-    for by in ("protocol", "split"):
-        if compare(rows, by):
-            print_comparisons(rows, by, "table")
 
 
 def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path, shape: str) -> None:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.simulation import simulation_of, simulation_options
+from tactbench.core.cli.simulation import SIMULATION, simulation_of
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
     from tactbench.core.spec.matrix import MatrixSpec
 
-_OPTIONS = (
+SELECTING = (
     click.option("--sensor", "sensors", multiple=True, metavar="NAME", help="Sensor to test; may be repeated."),
     click.option("--task", "tasks", multiple=True, metavar="NAME", help="Question to ask; may be repeated."),
     click.option("--rig", metavar="NAME", help="What carries out the scenes: twin (default), replay …"),
@@ -35,15 +35,9 @@ _OPTIONS = (
                  help="Also ask what the recordings give away: first frame alone, shuffled rows."),
     click.option("--latency/--no-latency", default=None,
                  help="Measure how long one row takes, up to 0.3 s a cell. Default: yes."),
-    simulation_options,
+    *SIMULATION,
 )  # fmt: skip
-
-
-def selecting_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options to a verb, which passes them on to `matrix_asked`."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+"""Given to `requested_matrix`."""
 
 
 def requested_matrix(

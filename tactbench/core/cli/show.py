@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 )
 @click.option("--format", "shape", type=click.Choice(("table", "json", "md")), default="table", show_default=True)
 def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
-    """Show sensors side by side (the paper's Table I and their data sheets), or a task, rig, estimator or effect."""
+    """Show sensors side by side (the paper's Table I and their data sheets), or anything else that is installed."""
     from tactbench.core.errors import UnknownNameError, UsageError
     from tactbench.core.plugins.registry import load_registry
 
@@ -32,7 +32,7 @@ def command(names: tuple[str, ...], everything: bool, shape: str) -> None:
     for name in names:
         if not any(name in family for family in families.values()):
             known = [known for family in families.values() for known in family.names()]
-            raise UnknownNameError("sensor, rig, task, estimator or effect", name, known)
+            raise UnknownNameError("plugin", name, known)
     only_sensors = all(name in registry.sensors for name in names)
     if shape == "md" and not only_sensors:
         raise UsageError("Only sensors can be shown as Markdown.", hint="Leave --format out, or take --format json.")

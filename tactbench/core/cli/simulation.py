@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,22 +14,19 @@ if TYPE_CHECKING:
     from tactbench.core.spec.sensor import SensorSpec
 
 
-def simulation_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --effects, --rung, --tolerance, --scenario and --set to a verb; they are given to `simulation_of`."""
-    for option in (
-        click.option("--set", "nuisances", multiple=True, metavar="NAME=X",
-                     help="Another value of a nuisance, in the unit of its name: placement_scatter_mm=0.3; may be "
-                     "repeated."),
-        click.option("--tolerance", type=click.FloatRange(min=0, min_open=True), metavar="X",
-                     help="Largest error of a simulated channel, in its unit: the cheapest rung that keeps it."),
-        click.option("--rung", metavar="NAME", help="Rung of the ladder of contact solvers; see docs/twin.md."),
-        click.option("--effects", metavar="LIST",
-                     help="Effects to include or leave out whatever the plan says: +creep,-drift. +all, -all."),
-        click.option("--scenario", metavar="NAME",
-                     help="A way of handling the sensor that its spec states by name; see `tactbench list scenarios`."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
+SIMULATION = (
+    click.option("--scenario", metavar="NAME",
+                 help="A way of handling the sensor that its spec states by name; see `tactbench list scenarios`."),
+    click.option("--effects", metavar="LIST",
+                 help="Effects to include or leave out whatever the plan says: +creep,-drift. +all, -all."),
+    click.option("--rung", metavar="NAME", help="Rung of the ladder of contact solvers; see docs/twin.md."),
+    click.option("--tolerance", type=click.FloatRange(min=0, min_open=True), metavar="X",
+                 help="Largest error of a simulated channel, in its unit: the cheapest rung that keeps it."),
+    click.option("--set", "nuisances", multiple=True, metavar="NAME=X",
+                 help="Another value of a nuisance, in the unit of its name: placement_scatter_mm=0.3; may be "
+                 "repeated."),
+)  # fmt: skip
+"""Given to `simulation_of`."""
 
 
 def simulation_of(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -21,19 +20,13 @@ FOR_PEOPLE = ("table", "md", "latex")
 NO_TEXT = ("parquet", "xlsx")
 DEFAULT_FOLDER = Path("tactbench-results")
 
-_VIEW_OPTIONS = (
+VIEW = (
     click.option(
         "--wide", is_flag=True, help="All columns. Default: eight; in LaTeX what one column of a paper holds."
     ),
     click.option("--notes", is_flag=True, help="All notes and the whole provenance. Default: the first three."),
 )
-
-
-def view_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options that say how much of a table is printed."""
-    for option in reversed(_VIEW_OPTIONS):
-        command = option(command)
-    return command
+"""Given to `view_of`."""
 
 
 def view_of(folder: Path, *, wide: bool, notes: bool, columns: str | None = None, shape: str = "table") -> View:

@@ -5,16 +5,11 @@ from __future__ import annotations
 import os
 
 
-def one_thread() -> None:
-    """Keep numerical libraries at one thread, as the table's times state; before any of them is imported.
+def keep_threads(number: int = 1) -> None:
+    """Keep numerical libraries at `number` threads, at one as the table's times state; before any is imported.
 
     Several threads would also sum in another order on another machine. Whoever sets these variables means it.
     """
-    keep_threads(1)
-
-
-def keep_threads(number: int) -> None:
-    """Keep numerical libraries at `number` threads; before any of them is imported."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, str(number))
     # scikit-learn imports pandas where it is, pandas imports Arrow, and Arrow's allocator would start a thread of its

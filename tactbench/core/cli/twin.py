@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tactbench.core.cli.simulation import simulation_options
-from tactbench.core.cli.threads import one_thread
+from tactbench.core.cli.options import options
+from tactbench.core.cli.simulation import SIMULATION
+from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.registry import Registry
@@ -34,7 +35,7 @@ def command() -> None:
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, metavar="N",
               help="Of the recordings that are scored.")  # fmt: skip
 @click.option("--format", "shape", type=click.Choice(FORMATS), default="table", show_default=True)
-@simulation_options
+@options(*SIMULATION)
 def explain(
     sensor: str,
     task: str,
@@ -55,7 +56,7 @@ def explain(
 
     It ends with the task's score with the effects chosen beside that with all of them, and what leaving out saved.
     """
-    one_thread()
+    keep_threads()
     from tactbench.core.cli.explanations import print_explanations
     from tactbench.core.cli.simulation import simulation_of
     from tactbench.core.plugins.registry import load_registry
@@ -95,7 +96,7 @@ def verify(
 
     Exit code 1 if an oracle fails. A miss against real sensors is printed with its cause and is no failure.
     """
-    one_thread()
+    keep_threads()
     from pathlib import Path
 
     from tactbench.core.cli.verdicts import carry_out, likeness_checks, oracle_checks, print_verdicts

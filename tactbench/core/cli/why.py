@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.selection import selecting_options
-from tactbench.core.cli.threads import one_thread
+from tactbench.core.cli.options import options
+from tactbench.core.cli.selection import SELECTING
+from tactbench.core.cli.threads import keep_threads
 from tactbench.core.tables.text import json_text, visible
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _REASONS = 20
 @click.argument("cell", metavar="CELL")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
               metavar="DIR", help="The result folder.")  # fmt: skip
-@selecting_options
+@options(*SELECTING)
 @click.option("--format", "shape", type=click.Choice(("text", "json")), default="text", show_default=True)
 def command(cell: str, out: Path, shape: str, **options: Any) -> None:
     """Say why a cell would be reused or computed, what its score rests on, and how it ended.
@@ -33,7 +34,7 @@ def command(cell: str, out: Path, shape: str, **options: Any) -> None:
     CELL is its name as tables show it, a part that only one cell has, or how its key begins; of the replicates of a
     cell the first is meant. Without options the cell is asked for as it was; with `run`'s options, as they ask for it.
     """
-    one_thread()
+    keep_threads()
     from tactbench.core.cli.cells import find_cell
 
     found = find_cell(out, cell, options)

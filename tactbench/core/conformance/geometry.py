@@ -46,11 +46,20 @@ def patch_mm(grid: SkinGrid) -> float:
     return max(PATCH_CELLS * max(grid.cell_mm), PATCH_MM)
 
 
-def pressed_locally(skin: Skin, grid: SkinGrid, force_n: float, at_mm: tuple[float, float] = (0.0, 0.0)) -> SkinState:
+def pressed_locally(
+    skin: Skin,
+    grid: SkinGrid,
+    force_n: float,
+    at_mm: tuple[float, float] = (0.0, 0.0),
+    dragged: tuple[float, float] | None = None,
+) -> SkinState:
     """Return the state that a narrow press would leave: a bell of pressure, and a dent of the same shape.
 
     No equation is solved: it is a state that a transducer must be able to read, and that touches one place only. The
     dent goes a third of the way through the skin at 1 N and further in proportion, never through more than nine tenths.
+    `dragged` is the tangential force over the normal one, along x and s, for a sensor that reads shear: it moves the
+    dent by a third of that share of its depth, and the press alone moves the skin away from its middle by as much;
+    None: nobody looks along the skin.
     """
     import numpy as np
 
@@ -59,6 +68,12 @@ def pressed_locally(skin: Skin, grid: SkinGrid, force_n: float, at_mm: tuple[flo
     rest = _thickness_mm(skin, grid)
     deepest = min(force_n / 3, 0.9)
     deflection = deepest * bell * rest
+    moved, shear = None, None
+    if dragged is not None:
+        outwards = np.stack(np.broadcast_arrays(grid.x_mm[:, None] - at_mm[0], grid.s_mm[None, :] - at_mm[1])) / sigma
+        way = np.array(dragged)[:, None, None]
+        moved = (outwards + way) * deflection / 3
+        shear = way * force_n / (2 * math.pi * sigma**2) * bell
     least = skin.residual_film.to("mm") if isinstance(skin, FluidBackedShell) else 0.0
     return SkinState(
         grid=grid,
@@ -70,6 +85,8 @@ def pressed_locally(skin: Skin, grid: SkinGrid, force_n: float, at_mm: tuple[flo
         fluid_pressure_mpa=0.001 * force_n if isinstance(skin, FluidBackedShell) else 0.0,
         contact_radius_mm=math.sqrt(5.0) * sigma if force_n else 0.0,
         residual=0.0,
+        tangential_displacement_mm=moved,
+        shear_mpa=shear,
     )
 
 

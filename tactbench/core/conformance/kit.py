@@ -6,9 +6,11 @@ from collections.abc import Mapping
 
 from tactbench.core.conformance import (
     common,
+    device,
     driver,
     effect,
     estimator,
+    invasive,
     press,
     recorded,
     sensor_spec,
@@ -19,12 +21,12 @@ from tactbench.core.conformance.check import KINDS, Check, Kind, Mode, check
 from tactbench.core.conformance.subject import Subject
 
 CHECKS: tuple[Check, ...] = (
-    *common.CHECKS, *sensor_spec.CHECKS, *transducer.CHECKS, *press.CHECKS, *driver.CHECKS, *task.CHECKS,
-    *estimator.CHECKS, *effect.CHECKS, *recorded.CHECKS,
+    *common.CHECKS, *sensor_spec.CHECKS, *transducer.CHECKS, *press.CHECKS, *driver.CHECKS, *device.CHECKS,
+    *task.CHECKS, *estimator.CHECKS, *effect.CHECKS, *recorded.CHECKS, *invasive.CHECKS,
 )  # fmt: skip
 """In the order in which they run: a check stands behind those that it needs."""
 
-FLOORS: Mapping[Kind, int] = {"sensor": 11, "rig": 6, "task": 13, "estimator": 14, "effect": 12}
+FLOORS: Mapping[Kind, int] = {"sensor": 11, "rig": 6, "device": 5, "task": 13, "estimator": 14, "effect": 12}
 """Passive checks that every plugin of a kind can run, whatever it leaves out: fewer, and nothing was proved."""
 
 

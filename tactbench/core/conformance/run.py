@@ -23,26 +23,26 @@ from tactbench.core.conformance.check import (
 from tactbench.core.conformance.kit import FLOORS, checks_of, enough_checks_ran, expected_failures_are_checks
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.errors import CellStopped, UnknownNameError
+from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
 from tactbench.core.pool.in_process import InProcess
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.pool import Pool
-from tactbench.core.pool.processes import can_fork
 
 TIMEOUT_S = 30.0
 """Seconds that one check may take: the slowest of ours, a press on the largest skin, takes two."""
 LISTED = "EXPECTED_FAILURES"
 """Name in a plugin's module: by name of a descriptor, checks that fail and why they may."""
 _NOT_TRIED = "not tried, for "
-_PRELOAD = ("numpy", "tactbench.core.conformance.kit")
 _SILVER: Mapping[Kind, tuple[str, ...]] = {
     "sensor": ("press-is-recorded",),
-    "rig": ("press-is-recorded",),
+    "rig": ("press-is-recorded", "real-rig-presses"),
+    "device": ("driver-reads",),
     "task": (),
     "estimator": ("answers-have-the-shape",),
     "effect": ("it-is-applied",),
 }
-"""Checks that must have run for silver: a plugin without them is not worse, it has shown less."""
+"""Checks of which one must have run for silver: a plugin without any is not worse, it has shown less."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,8 @@ class CheckReport:
         unmet = {checks[name].level for name, one in status.items() if one in ("failed", "expected") and name in checks}
         if "bronze" in unmet:
             return None
-        silver = "silver" not in unmet and all(status.get(name) == "passed" for name in _SILVER[self.kind])
+        asked = _SILVER[self.kind]
+        silver = "silver" not in unmet and (not asked or any(status.get(name) == "passed" for name in asked))
         if not silver:
             return "bronze"
         real = status.get("recording-is-of-a-real-unit") == "passed" and "gold" not in unmet
@@ -160,6 +161,7 @@ def run_checks(
     modes: Sequence[Mode] = ("passive",),
     recording: Path | None = None,
     rig_file: Path | None = None,
+    operator: Operator | None = None,
     isolated: bool = True,
     timeout_s: float = TIMEOUT_S,
     without: Collection[str] = (),
@@ -173,14 +175,17 @@ def run_checks(
         Which checks. Where only a recording is read, the plugin's code is not imported.
     recording, rig_file
         What the modes `recording` and `invasive` read.
+    operator
+        Who stands at the rig in the mode `invasive`; None: nobody.
     isolated
-        Whether in a child process; else in this one, for plugins that are trusted.
+        Whether in a child process; else in this one, for plugins that are trusted. Checks of the mode `invasive` are
+        always run in this one, and without a limit of time: an interrupt must reach the rig.
     without
         Names of checks that are left out: they are reported as skipped.
     done
         Called with every outcome.
     """
-    subject = replace(subject, recording=recording, rig_file=rig_file)
+    subject = replace(subject, recording=recording, rig_file=rig_file, operator=operator)
     checks = {one.name: one for one in checks_of(subject.kind, *modes)}
     expected = _expected(subject, isolated, timeout_s) if set(modes) != {"recording"} else {}
     outcomes: dict[str, CheckOutcome] = {}
@@ -192,20 +197,23 @@ def run_checks(
     for name in without:
         if name in checks:
             settle(CheckOutcome(name, "skipped", "", "it was left out"))
-    while len(outcomes) < len(checks):
-        waiting = [name for name in checks if name not in outcomes]
+    while waiting := [name for name, one in checks.items() if one.mode != "invasive" and name not in outcomes]:
         for name in waiting:
             blocked = _blocked(checks[name], outcomes)
             if blocked:
                 settle(CheckOutcome(name, "skipped", "", blocked))
         waiting = [name for name in waiting if name not in outcomes]
-        failed = tuple(name for name, one in outcomes.items() if one.status != "passed")
         pool = _pool(isolated, timeout_s)
-        for name, given in pool.each(_Carrier(subject, failed, tuple(modes)), waiting):
+        for name, given in pool.each(_Carrier(subject, _not_passed(outcomes), tuple(modes)), waiting):
             stopped = isinstance(given, BaseException)
             settle(_stopped(name, given, subject) if stopped else CheckOutcome(name, *given))  # type: ignore[arg-type, misc]
             if stopped:
                 break  # what needs this check is not tried in another process
+    here = _Carrier(subject, _not_passed(outcomes), tuple(modes))
+    for name, one in checks.items():
+        if name not in outcomes:
+            blocked = _blocked(one, outcomes)
+            settle(CheckOutcome(name, *(("skipped", "", blocked) if blocked else here(name))))
     if "passive" in modes:
         for check in (_only_checks(subject, expected), _enough(subject.kind, outcomes)):
             outcomes[check.check] = check
@@ -213,11 +221,15 @@ def run_checks(
     return CheckReport(subject.kind, subject.name, tuple(modes), tuple(outcomes.values()))
 
 
+def _not_passed(outcomes: Mapping[str, CheckOutcome]) -> tuple[str, ...]:
+    return tuple(name for name, one in outcomes.items() if one.status != "passed")
+
+
 def _pool(isolated: bool, timeout_s: float) -> Pool | InProcess:
     limits = Limits(timeout_s=timeout_s)
     if not isolated:
         return InProcess(limits)
-    return Pool(1, limits, reuse=True, preload=None if can_fork() else _PRELOAD)
+    return Pool(1, limits, reuse=True)
 
 
 class _Carrier:

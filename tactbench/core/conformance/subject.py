@@ -12,12 +12,13 @@ from typing import Any
 from tactbench.core.conformance.check import CheckFailed, Kind
 from tactbench.core.errors import PluginError
 from tactbench.core.plugins import hookspecs
+from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
 
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A sensor, rig, task, estimator or effect under check, and what else is installed."""
+    """A sensor, rig, device, task, estimator or effect under check, and what else is installed."""
 
     kind: Kind
     name: str
@@ -29,6 +30,8 @@ class Subject:
     """What is read in the mode `recording`."""
     rig_file: Path | None = None
     """What is opened in the mode `invasive`."""
+    operator: Operator | None = None
+    """Who stands at the rig in the mode `invasive`."""
 
     @property
     def descriptor(self) -> Any:

@@ -25,6 +25,8 @@ READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
 GENTLE_N = 1.0
 OVERLOAD_N = 100.0
 """A hundred times the gentle press: beyond what any fingertip is pressed with on purpose."""
+SHEAR = 0.3
+"""Tangential over normal force of a press that is dragged: what skin sticks to on most surfaces."""
 MOST_PRESSED = 6
 """Channels that are pressed, evenly spread over the sensor's list: a wrong axis shows at each of them."""
 REST_SHARE = 0.01
@@ -69,11 +71,18 @@ def _read(subject: Subject, state: SkinState, wanted: tuple[str, ...] | None = N
         return transducer(state)
 
 
-def _state(subject: Subject, force_n: float, at_mm: tuple[float, float] | None = None) -> SkinState:
+def _state(
+    subject: Subject,
+    force_n: float,
+    at_mm: tuple[float, float] | None = None,
+    dragged: tuple[float, float] = (0.0, 0.0),
+) -> SkinState:
     spec = subject.descriptor.spec
     sheet = spec.skin.sheet
     middle = ((sheet.x_min.to("mm") + sheet.x_max.to("mm")) / 2, 0.0)
-    return pressed_locally(spec.skin, skin_grid(sheet), force_n, middle if at_mm is None else at_mm)
+    return pressed_locally(
+        spec.skin, skin_grid(sheet), force_n, middle if at_mm is None else at_mm, dragged if spec.reads_shear else None
+    )
 
 
 @lru_cache(maxsize=32)
@@ -343,6 +352,36 @@ def more_load_more_response(subject: Subject) -> None:
         fail("transducer", text)
 
 
+@check("sensor", needs=("it-answers-to-a-press",), level="silver")
+def shear_turns_with_its_direction(subject: Subject) -> None:
+    """What is dragged the other way moves the other way; a size without its sign tells no direction.
+
+    Read tangential_displacement_mm and shear_mpa with their signs: [0] along x, [1] along s. Or leave reads_shear out.
+    """
+    import numpy as np
+
+    if not subject.descriptor.spec.reads_shear:
+        skip("its spec names no kind of channel that reads shear")
+    names = _names(wanted_channels(subject))
+    at_mm = _places(subject)[0][1] if _places(subject) else None
+
+    def added(x: float, s: float) -> FloatArray:
+        given = np.asarray(_read(subject, _state(subject, GENTLE_N, at_mm, (x, s))), dtype=np.float64)
+        return np.asarray(given - _response(subject, GENTLE_N, at_mm) - _at_rest(subject))
+
+    felt = False
+    for axis, there, back in (("x", added(SHEAR, 0), added(-SHEAR, 0)), ("s", added(0, SHEAR), added(0, -SHEAR))):
+        strongest = int(np.argmax(np.abs(there - back) + np.abs(there + back)))
+        felt = felt or bool(there[strongest] or back[strongest])
+        if there[strongest] * back[strongest] > 0:
+            fail(
+                f"channel {names[strongest]}",
+                f"dragged along {axis} it changes by {there[strongest]:+.3g}, dragged back by {back[strongest]:+.3g}",
+            )
+    if not felt:
+        fail("spec.reads_shear", "dragged along x or s, no channel changes")
+
+
 def _places(subject: Subject) -> list[tuple[list[str], tuple[float, float]]]:
     """Return the names of the taxels at some places on the sheet, with these [mm]."""
     sites = _sites(subject)
@@ -366,4 +405,5 @@ CHECKS = (
     transducer_builds, transducer_leaves_the_spec_alone, readings_have_the_shape, finite_at_zero_load,
     finite_over_range, rest_is_as_stated, order_follows_wanted, same_state_same_reading, state_is_not_changed,
     it_answers_to_a_press, response_is_where_it_is_pressed, sign_is_as_stated, more_load_more_response,
+    shear_turns_with_its_direction,
 )  # fmt: skip

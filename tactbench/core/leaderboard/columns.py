@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from tactbench.core.leaderboard.hosts import timing_mark
+from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.names import answer_name, sensor_name
 from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, tail, whole
+from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 Value = Callable[[Row], float | None]
@@ -96,6 +98,7 @@ _ENDS = _middle("beyond_floor_ci_low", "beyond_floor_ci_high")
 _ALL: dict[str, Column | str] = {
     "#": "rank",
     "sensor": "sensor",
+    "level": Column("level", lambda row: visible(str(row.get(LEVEL) or ABSENT)), lambda row: None, if_known=LEVEL),
     "estimator": "estimator",
     "score": _score("score", "score"),
     "95 % interval": Column("interval", row_interval, _middle("ci_low", "ci_high")),
@@ -122,16 +125,17 @@ _ALL: dict[str, Column | str] = {
 OF_ROWS = {name: one for name, one in _ALL.items() if isinstance(one, Column)}
 SHOWN = {name: one.shown if isinstance(one, Column) else one for name, one in _ALL.items()}
 COLUMNS = tuple(_ALL)
-NUMERIC = frozenset(COLUMNS) - {"sensor", "estimator"}
+NUMERIC = frozenset(COLUMNS) - {"sensor", "level", "estimator"}
 INTERVALS = ("95 % interval", "95 % beyond")
 IF_KNOWN = {name: column.if_known for name, column in OF_ROWS.items() if column.if_known}
-"""Columns of errors of force, whose reference errs too, and of classifications with recordings of one class each."""
+"""Columns of levels of checked sensors, of errors of force, whose reference errs too, and of classifications with
+recordings of one class each."""
 
 
 def columns(rows: Sequence[Row], *, times: bool) -> tuple[str, ...]:
     """Return the columns of a table of `rows` with times, or of one without."""
     lacking = {name for name, key in IF_KNOWN.items() if all(row.get(key) is None for row in rows)}
-    timed = {name for name, column in OF_ROWS.items() if column.timed}
+    timed = {"level"} | {name for name, column in OF_ROWS.items() if column.timed}
     return tuple(name for name in COLUMNS if name not in lacking and (times or name not in timed))
 
 

@@ -21,13 +21,13 @@ Row = Mapping[str, Any]
 
 CELL = "cell"
 """The column of cells' names, as `why` and `rerun` take them."""
-DEFAULT = ("#", "sensor", "estimator", "score", "95 % interval", "published", "delay", "fit")
-OF_FLOOR = ("#", "sensor", "estimator", "score", "beyond floor", "95 % beyond", "published", "delay")
+DEFAULT = ("#", "sensor", "level", "estimator", "score", "95 % interval", "published", "delay", "fit")
+OF_FLOOR = ("#", "sensor", "level", "estimator", "score", "beyond floor", "95 % beyond", "published", "delay")
 """Where a block has errors beyond the floor of the reference: what its ranks go by, with its interval."""
 MOST_NOTES = 3
 _FIRST_TO_GO = (
     "cell", "batch/row", "p95", "sessions", "n test", "sim", "baseline", "latency p50", "rank 95 %", "fit",
-    "true error", "95 % interval", "published", "delay", "95 % beyond",
+    "true error", "level", "95 % interval", "published", "delay", "95 % beyond",
 )  # fmt: skip
 """Columns that a terminal does without, in this order; those that were asked for by name are never left out."""
 

@@ -15,7 +15,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
-from multiprocessing import forkserver, resource_tracker
+from multiprocessing import resource_tracker
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
@@ -27,7 +27,6 @@ from distributed.core import Status  # noqa: TID253
 from distributed.versions import VersionMismatchWarning  # noqa: TID253
 
 from tactbench.core.errors import Crashed, EngineError, UsageError
-from tactbench.core.matrix.evaluate_cell import PRELOAD
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.message import dump_error, load_error, pack, unpack
@@ -173,7 +172,7 @@ def carry_out(request: bytes) -> bytes:
         return at_work and task is not None and task.state != "cancelled"
 
     concurrency = on_host.get(worker.address, worker.state.nthreads)
-    pool = Pool(1, limits, preload=PRELOAD, is_needed=is_needed)
+    pool = Pool(1, limits, is_needed=is_needed)
     for _, outcome in pool.each(partial(_in_folder, folder, concurrency, work), [item]):
         if isinstance(outcome, BaseException):
             return pack({"error": dump_error(outcome)})
@@ -211,8 +210,6 @@ class SameEnvironment(WorkerPlugin):
         """Compare the environments; raise UsageError if they differ."""
         multiprocessing.current_process().daemon = False  # a daemon of `multiprocessing` may have no children
         os.environ.update(self._threads)
-        multiprocessing.get_context("forkserver").set_forkserver_preload(list(PRELOAD))
-        forkserver.ensure_running()  # before the registry starts one for plugins
         set_subreaper(True)  # what a crashed cell leaves behind becomes a child of this process, and is ended
         found = differences(self._expected, environment(installed()))
         self.differs = bool(found)

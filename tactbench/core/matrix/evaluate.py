@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import PluginContractError
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluate_cell import (
     Job,
+    dataset,
     import_estimators,
     opening,
     reused,
-    shared,
     solve,
     this_host,
     unanswered,
@@ -23,14 +23,22 @@ from tactbench.core.matrix.evaluate_cell import (
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell, task_of
-from tactbench.core.matrix.plan_recordings import RecordingPlan
+from tactbench.core.matrix.plan_recordings import RecordingPlan, request_key
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.matrix.recorded import Recorded, read_all, read_digest
 from tactbench.core.matrix.store import NotPlainError, Row, Store
 from tactbench.core.matrix.why import beside, cell_entries
 from tactbench.core.plugins.registry import installed
+from tactbench.core.pool.in_process import InProcess
+from tactbench.core.pool.limits import Limits
+from tactbench.core.pool.pool import Pool
+from tactbench.core.pool.processes import can_fork
 from tactbench.core.samples import Answers
 from tactbench.core.spec.status import STOPPED
+from tactbench.core.thread_limit import find_libraries
+
+if TYPE_CHECKING:
+    from tactbench.core.matrix.dask import Dask
 
 
 def evaluate_all(
@@ -58,20 +66,21 @@ def evaluate_all(
     rows, computed
         By name of the cell; how many were not found finished.
     """
-    recorded = recording_plan.recorded
+    recorded, paths = recording_plan.recorded, recording_plan.paths
     rows: dict[str, Row] = {}
     key_of: dict[str, str] = {}
     jobs: list[Job] = []
     stopped: list[tuple[Cell, BaseException]] = []
     """Cells without their recordings."""
-    needed = {path: None for cell in cells if not recording_plan.trouble(cell) for path in recording_plan.paths(cell)}
-    unreadable = read_all(read_digest, recorded.unread(needed, "digest"), recorded, choice)
+    troubles = recording_plan.troubles
+    needed = {path: None for need in map(request_key, cells) if need not in troubles for path in paths[need]}
+    unreadable = read_all(read_digest, recorded.unread(needed, "digest"), recorded, choice.limits)
     for cell in cells:
-        paths = recording_plan.paths(cell)
-        trouble = recording_plan.trouble(cell) or next((unreadable[one] for one in paths if one in unreadable), None)
+        need = request_key(cell)
+        trouble = troubles.get(need) or next((unreadable[path] for path in paths[need] if path in unreadable), None)
         if trouble is None:
             try:
-                digests = tuple(recorded.digest(path) for path in paths)
+                digests = tuple(recorded.digest(path) for path in paths[need])
                 key_of[cell.name] = keys.of_cell(cell, digests)
             except Exception as error:
                 trouble = error
@@ -83,10 +92,11 @@ def evaluate_all(
             rows[cell.name] = reused(found, cell, task_of(cell, installed()))
             store.reuse(rows[cell.name])
         else:
-            jobs.append(Job(cell, tuple(paths), digests if choice.name == "dask" else ()))
+            jobs.append(Job(cell, tuple(paths[need]), digests if choice.name == "dask" else ()))
     computed = len(jobs) + len(stopped)
+    engine = choice.engine(len(jobs))
     if computed:
-        progress.begin(stage, computed, alone=choice.here(len(jobs)))
+        progress.begin(stage, computed, alone=isinstance(engine, InProcess))
     keyed = ((job.cell, key_of[job.cell.name], job.recordings) for job in jobs)
     book.write(cell_entries(keyed, keys, recorded, store.folder))
     for cell, trouble in stopped:
@@ -94,9 +104,10 @@ def evaluate_all(
         rows[cell.name] = store.note({**unanswered(cell, trouble), **known})
         progress.advance(cell.name, stopped=rows[cell.name]["status"] in STOPPED)
     for _ in range(2):  # a cell may have written over the shard of an earlier one, which is then computed again
-        here = choice.here(len(jobs))
-        work = partial(solve, concurrency=choice.concurrency(len(jobs)), working=progress.working if here else None)
-        with closing(choice.engine(len(jobs)).each(work, _ordered(jobs, choice))) as outcomes:
+        engine = choice.engine(len(jobs))
+        working = progress.working if isinstance(engine, InProcess) else None
+        work = partial(solve, concurrency=max(1, min(choice.jobs, len(jobs))), working=working)
+        with closing(engine.each(work, _ordered(jobs, engine, choice.limits))) as outcomes:
             for job, outcome in outcomes:
                 known = {"key": key_of[job.cell.name], "made_by": made_by, "host": this_host()}
                 rows[job.cell.name] = _kept(job.cell, outcome, known, recorded, store)
@@ -133,13 +144,28 @@ def _kept(cell: Cell, outcome: Any, known: Row, recorded: Recorded, store: Store
     return store.note({**unanswered(cell, refused), **known})
 
 
-def _ordered(jobs: Sequence[Job], choice: EngineChoice) -> Iterable[Job]:
-    """Return `jobs` so that those with the same recordings come together; forked cells then share what was read."""
+def _ordered(jobs: Sequence[Job], engine: Pool | InProcess | Dask, limits: Limits) -> Iterator[Job]:
+    """Yield `jobs` group by group of one task and the same recordings.
+
+    Before each group, what cells share that are forked off this process is imported and read here. A child process
+    reads it first: what stops that is not read here, and stops each of the cells in its own process.
+    """
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
         groups.setdefault((job.cell.declared_task or job.cell.task, job.recordings), []).append(job)
-    if choice.forks(len(jobs)):
-        return shared(groups, choice.pool(1))
-    if choice.here(len(jobs)):
-        import_estimators(job.cell for job in jobs)
-    return [job for group in groups.values() for job in group]
+    forks = isinstance(engine, Pool) and can_fork()
+    for (task, recordings), members in groups.items():
+        if forks or isinstance(engine, InProcess):
+            kinds = ((job.cell.estimator, task_of(job.cell, installed()).kind) for job in members)
+            import_estimators(kinds)
+        if forks and len(members) > 1:
+            ((_, readable),) = Pool(1, limits, reuse=True).each(_is_readable, [(task, recordings)])
+            if readable is True:
+                dataset(task, recordings)
+        find_libraries()
+        yield from members
+
+
+def _is_readable(task_and_recordings: tuple[str, tuple[Path, ...]]) -> bool:
+    dataset(*task_and_recordings)
+    return True

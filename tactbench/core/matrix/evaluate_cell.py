@@ -6,7 +6,7 @@ import os
 import platform
 import random
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from functools import lru_cache
@@ -20,7 +20,6 @@ from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.pool.log import printed
 from tactbench.core.pool.message import dump_error, load_error
-from tactbench.core.pool.pool import Pool
 from tactbench.core.provenance.gather import host_id
 from tactbench.core.spec.recording import RecordingMeta, Scalar
 from tactbench.core.spec.row import RowModel
@@ -29,9 +28,6 @@ from tactbench.core.spec.task import TaskSpec
 if TYPE_CHECKING:
     from tactbench.core.evaluation.cell import CellResult
     from tactbench.core.evaluation.dataset import Dataset
-
-PRELOAD = ("tactbench.core.matrix.preloaded",)
-"""Imported by the fork server of processes that cannot fork themselves."""
 
 
 class Job(NamedTuple):
@@ -95,16 +91,21 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     cell, recordings, digests = job
     registry = installed()
     task, estimator = task_of(cell, registry), registry.estimators[cell.estimator]
-    _check_content(recordings, digests)
+    if digests:
+        _check_content(recordings, digests)
     folder = Path.cwd()
     try:
         prepare(cell.estimator, task.kind)
     finally:
         os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
+    import numpy as np
+
     from tactbench.core.evaluation.cell import CellContext, evaluate
 
     began = time.perf_counter()
-    _seed_everything(cell.seed)
+    # The global generators get the cell's seed: who draws from them shall not depend on the cells before.
+    random.seed(cell.seed)
+    np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that others draw from)
     data = dataset(cell.declared_task or cell.task, recordings)
     context = CellContext(
         task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
@@ -134,7 +135,7 @@ def _check_content(recordings: Sequence[Path], digests: Sequence[str]) -> None:
     """Raise EngineError if this process sees other recordings than the run does."""
     from tactbench.core.recording.reader import content_digest
 
-    for path, digest in zip(recordings, digests, strict=False):
+    for path, digest in zip(recordings, digests, strict=True):
         try:
             if content_digest(path) == digest:
                 continue
@@ -145,14 +146,6 @@ def _check_content(recordings: Sequence[Path], digests: Sequence[str]) -> None:
             f"The worker on {platform.node()} cannot compute this cell: {why}.",
             hint="Every worker must see the files of the run, unchanged, at the same paths.",
         )
-
-
-def _seed_everything(seed: int) -> None:
-    """Give the global generators the cell's seed: who draws from them shall not depend on the cells before."""
-    import numpy as np
-
-    random.seed(seed)
-    np.random.seed(seed % 2**32)  # noqa: NPY002  (it is this old generator that others draw from)
 
 
 FIXED = ("cell", "sensor", "task", "rig", "protocol", "estimator", "params", "is_baseline", "repeat", "repeats", "seed",
@@ -271,47 +264,13 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def shared(groups: Mapping[tuple[str, tuple[Path, ...]], Sequence[Job]], pool: Pool) -> Iterator[Job]:
-    """Yield the cells group by task and recordings; before each group, read here what several of its cells need.
-
-    A child process reads it first: what stops that is not read here, and stops each of the cells in its own process.
-    """
-    from tactbench.core.thread_limit import find_libraries
-
-    for (task, recordings), jobs in groups.items():
-        import_estimators(job.cell for job in jobs)
-        if len(jobs) > 1:
-            ((_, outcome),) = pool.each(_is_readable, [(task, recordings)])
-            if outcome is True:
-                dataset(task, recordings)
-        find_libraries()
-        yield from jobs
-
-
-def _is_readable(task_and_recordings: tuple[str, tuple[Path, ...]]) -> bool:
-    dataset(*task_and_recordings)
-    return True
-
-
-def import_estimators(cells: Iterable[Cell]) -> None:
-    """Prepare each of our own estimators that `cells` use, once.
+def import_estimators(estimators: Iterable[tuple[str, str]]) -> None:
+    """Prepare each of our own estimators among `estimators` (name, kind of question), and the libraries of every cell.
 
     Those of others are imported in their cells' processes only: what an import changes there, such as a library that it
     patches, changes no other cell.
     """
-    _import({(cell.estimator, task_of(cell, installed()).kind) for cell in cells})
-
-
-def import_own_estimators() -> None:
-    """Prepare all of our own estimators."""
-    _import({(one.name, kind) for one in installed().estimators for kind in one.kinds})
-
-
-def _import(estimators: set[tuple[str, str]]) -> None:
-    from tactbench.core.thread_limit import find_libraries
-
     import_libraries()
-    for estimator, kind in sorted(estimators):
+    for estimator, kind in sorted(set(estimators)):
         if installed().estimators.owned(estimator).ours:
             prepare(estimator, kind)
-    find_libraries()

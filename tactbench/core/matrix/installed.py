@@ -31,7 +31,13 @@ def rig_of(
     descriptor = registry.rigs[name]
     if rig_file is not None:
         rig_file.checked_for(name)
-    context = RigContext(effects=tuple(registry.effects), recordings=recordings, rig_file=rig_file, operator=operator)
+    context = RigContext(
+        effects=tuple(registry.effects),
+        indenters=tuple(registry.indenters),
+        recordings=recordings,
+        rig_file=rig_file,
+        operator=operator,
+    )
     with failing_as(f"The rig {name!r} could not be built"):
         built: Rig | ReplayRig = load_object(descriptor.where)(context)
     if not (hasattr(built, "open") or hasattr(built, "recordings")):

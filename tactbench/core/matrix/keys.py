@@ -47,7 +47,7 @@ class Keys:
         self.sources = SourceDigests()
         """Digests of the owners' packages."""
         self._answers: dict[tuple[str, str], Fixed] = {}
-        self._makers: dict[tuple[str, str, str], Fixed] = {}
+        self._makers: dict[tuple[str, str, str, str | None], Fixed] = {}
         self._data: dict[tuple[str, ...], str] = {}
 
     def of_cell(self, cell: Cell, data: Sequence[str]) -> str:
@@ -77,15 +77,16 @@ class Keys:
     def of_recording(self, sensor: str, rig: str, scene: Scene, role: Role, seed: int, rig_file: str = "") -> str:
         """Return the key of a recording that `rig` is to make of `scene`."""
         own = [scene.model_dump(), role, seed]
-        return _digest(f"{self.maker(sensor, rig, rig_file).digest} {_canonical(own)}")
+        return _digest(f"{self.maker(sensor, rig, rig_file, scene.indenter.shape).digest} {_canonical(own)}")
 
-    def maker(self, sensor: str, rig: str, rig_file: str = "") -> Fixed:
-        """Return what all recordings by one rig of one sensor share.
+    def maker(self, sensor: str, rig: str, rig_file: str = "", shape: str | None = None) -> Fixed:
+        """Return what all recordings by one rig of one sensor share, with one `shape` of indenter if a scene names one.
 
         What real devices gave is no less true once the code that read them has changed: of them it is sensor, rig and
         rig file alone, so that nobody has to press everything again.
         """
-        if (sensor, rig, rig_file) not in self._makers:
+        made = sensor, rig, rig_file, shape
+        if made not in self._makers:
             devices = RigFile.model_validate_json(rig_file) if rig_file else None
             if devices is not None and not devices.emulated:
                 return _apart(sensor={"name": sensor}, rig={"name": rig, "file": rig_file})
@@ -96,15 +97,21 @@ class Keys:
             modules += [] if devices is None else self._behind(devices)
             for effect in effects:
                 modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
-            self._makers[sensor, rig, rig_file] = _fixed(
+            named = {}
+            if shape is not None and shape in self._registry.indenters:  # of an unknown one the rig itself complains
+                body = self._registry.indenters.owned(shape)
+                modules += [body.module, body.descriptor.where]
+                named["indenter"] = body.descriptor.model_dump(exclude={"title"})
+            self._makers[made] = _fixed(
                 self.sources.behind(modules, "recording"),
                 (),
                 sensor=maker.descriptor.model_dump(),
                 rig=carrier.descriptor.model_dump(),
                 effects={owner.descriptor.name: owner.descriptor.model_dump() for owner in effects},
                 **({"rig file": {"says": rig_file}} if rig_file else {}),
+                **named,
             )
-        return self._makers[sensor, rig, rig_file]
+        return self._makers[made]
 
     def _behind(self, devices: RigFile) -> list[str]:
         """Return where the code of the devices of a rig file is, and of the simulation that moves the emulated ones."""

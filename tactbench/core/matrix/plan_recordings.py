@@ -8,7 +8,6 @@ from pathlib import Path
 
 from tactbench.core.errors import MissingRecordingError, NotApplicable, TactbenchError, UnknownNameError, UsageError
 from tactbench.core.evaluation.few_shot import shots
-from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves, task_of
@@ -16,6 +15,8 @@ from tactbench.core.matrix.recorded import Recorded, read_all, read_sensor_and_s
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.plugins.rig_files import load_rig_file
+from tactbench.core.pool.limits import UNLIMITED, Limits
+from tactbench.core.pool.pool import Pool
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene, Simulation
@@ -117,30 +118,10 @@ class RecordingPlan:
     """What is known of recordings, those made now among them."""
     requests: dict[RequestKey, list[RecordingRequest]] = field(default_factory=dict)
     """What a rig has to record."""
-    replayed: dict[RequestKey, list[Path]] = field(default_factory=dict)
-    """What exists already."""
+    paths: dict[RequestKey, list[Path]] = field(default_factory=dict)
+    """Where the recordings lie, or will lie."""
     troubles: dict[RequestKey, BaseException] = field(default_factory=dict)
     """Why there are no recordings, or not all of them."""
-    refused: dict[Path, BaseException] = field(default_factory=dict)
-    """Recordings that could not be made, and why."""
-
-    def paths(self, cell: Cell) -> list[Path]:
-        """Return the recordings of a cell."""
-        key = request_key(cell)
-        return self.replayed.get(key) or [request.path for request in self.requests.get(key, ())]
-
-    def trouble(self, cell: Cell) -> BaseException | None:
-        """Return why a cell cannot have its recordings, if so."""
-        key = request_key(cell)
-        if key in self.troubles:
-            return self.troubles[key]
-        paths = self.paths(cell)
-        if not paths:
-            return NotApplicable(
-                f"Task {cell.task!r} has no scenes for rig {cell.rig!r}, and there are no recordings of it.",
-                hint="Use --rig replay --recordings DIR.",
-            )
-        return next((self.refused[path] for path in paths if path in self.refused), None)
 
 
 def plan_run(
@@ -150,7 +131,7 @@ def plan_run(
     store: Store,
     recordings: Path | None,
     recorded: Recorded,
-    choice: EngineChoice | None = None,
+    limits: Limits = UNLIMITED,
 ) -> tuple[list[Cell], RecordingPlan]:
     """Return the cells of `matrix`, and where their recordings come from.
 
@@ -161,29 +142,40 @@ def plan_run(
     UsageError
         If the matrix asks for something that is not there.
     """
-    chosen = choice or EngineChoice()
+    recording_plan = RecordingPlan(recorded)
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     if not registry.rigs[matrix.rig].simulated:  # a simulated one replays nothing: it is built when it has to record
-        ((_, paths),) = chosen.pool(1).each(_replayed, [(matrix.rig, recordings, rig_file)])
-        if isinstance(paths, TactbenchError) and paths.exit_code == UsageError.exit_code:
-            raise paths  # the user's to mend
+        ((_, paths),) = Pool(1, limits, reuse=True).each(_replayed, [(matrix.rig, recordings, rig_file)])
         if isinstance(paths, BaseException):
-            return _without_rig(matrix, registry, recorded, paths)
+            users = isinstance(paths, TactbenchError) and paths.exit_code == UsageError.exit_code
+            if users or not matrix.sensors:
+                raise paths  # the user's to mend, or of cells that nobody can name
+            cells = plan_cells(matrix, matrix.sensors, registry)
+            recording_plan.troubles = {request_key(cell): paths for cell in cells}
+            return cells, recording_plan
         if paths is not None:
-            return _from_replay(matrix, registry, [Path(path) for path in paths], recorded, chosen)
-    cells = plan_cells(matrix, _named(matrix, registry), registry, rig_file)
+            return _from_replay(matrix, registry, [Path(path) for path in paths], recording_plan, limits)
+    if not matrix.sensors:
+        raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
+    cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry, rig_file)
     for task in {cell.task for cell in cells}:
-        _known_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
-    return cells, RecordingPlan(recorded, requests_for(cells, registry, keys, store, matrix.simulation))
+        _check_splits(registry.tasks[task].spec, [cell.split for cell in cells if cell.task == task])
+    recording_plan.requests = requests_for(cells, registry, keys, store, matrix.simulation)
+    for key, made in recording_plan.requests.items():
+        recording_plan.paths[key] = [request.path for request in made]
+        if not made:
+            recording_plan.troubles[key] = _no_scenes(key, matrix)
+    return cells, recording_plan
 
 
 def _from_replay(
-    matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], recorded: Recorded, choice: EngineChoice
+    matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], recording_plan: RecordingPlan, limits: Limits
 ) -> tuple[list[Cell], RecordingPlan]:
     """Return the cells of recordings that exist; a child process reads them, so that a damaged one breaks nothing."""
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
-    broken = read_all(read_sensor_and_scene, recorded.unread(paths, "sensor"), recorded, choice)
+    recorded = recording_plan.recorded
+    broken = read_all(read_sensor_and_scene, recorded.unread(paths, "sensor"), recorded, limits)
     scenes: dict[str, dict[Path, str | None]] = {}
     unreadable: dict[str, dict[Path, BaseException]] = {}
     for path in paths:
@@ -197,25 +189,23 @@ def _from_replay(
         if name not in known:
             raise UnknownNameError("sensor in these recordings", name, known)
     cells = plan_cells(matrix, matrix.sensors or known, registry)
-    recording_plan = RecordingPlan(recorded)
     for key in dict.fromkeys(request_key(cell) for cell in cells):
         sensor, task, split, _ = key
-        recording_plan.replayed[key], trouble = _serving(
+        recording_plan.paths[key], trouble = _serving(
             registry.tasks[task].spec, split, scenes.get(sensor, {}), unreadable.get(sensor, {}), registry
         )
         if trouble is not None:
             recording_plan.troubles[key] = trouble
+        elif not recording_plan.paths[key]:
+            recording_plan.troubles[key] = _no_scenes(key, matrix)
     return cells, recording_plan
 
 
-def _without_rig(
-    matrix: MatrixSpec, registry: Registry, recorded: Recorded, trouble: BaseException
-) -> tuple[list[Cell], RecordingPlan]:
-    """Return the cells of a rig that cannot be used; every one of them says why."""
-    if not matrix.sensors:
-        raise trouble
-    cells = plan_cells(matrix, matrix.sensors, registry)
-    return cells, RecordingPlan(recorded, troubles={request_key(cell): trouble for cell in cells})
+def _no_scenes(key: RequestKey, matrix: MatrixSpec) -> NotApplicable:
+    return NotApplicable(
+        f"Task {key[1]!r} has no scenes for rig {matrix.rig!r}, and there are no recordings of it.",
+        hint="Use --rig replay --recordings DIR.",
+    )
 
 
 def _replayed(arguments: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
@@ -228,13 +218,7 @@ def _replayed(arguments: tuple[str, Path | None, RigFile | None]) -> list[str] |
         return [str(path) for path in rig.recordings()]
 
 
-def _named(matrix: MatrixSpec, registry: Registry) -> list[str]:
-    if not matrix.sensors:
-        raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
-    return [registry.sensors[name].name for name in matrix.sensors]
-
-
-def _known_splits(task: TaskSpec, splits: Sequence[str | None]) -> None:
+def _check_splits(task: TaskSpec, splits: Sequence[str | None]) -> None:
     """Refuse a split that no recording of this task's scenes can be asked for, before any is made."""
     labels = {label for planned in task.scenes for label in planned.scene.labels}
     few = (FEW_SHOT,) if any(shots(name) for name in task.splits) else ()

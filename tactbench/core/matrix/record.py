@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing, suppress
+from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 from tactbench.core.errors import UnwritableError
 from tactbench.core.matrix.engine import EngineChoice
@@ -16,9 +19,11 @@ from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, request_key
 from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.recorded import stat_of
 from tactbench.core.matrix.why import recording_entry
 from tactbench.core.plugins.interfaces import Operator, Rig
-from tactbench.core.plugins.registry import installed
+from tactbench.core.plugins.registry import installed, load_object
+from tactbench.core.pool.pool import Pool
 from tactbench.core.spec.rig_file import RigFile
 
 GRACE_S = 5.0
@@ -55,6 +60,7 @@ def acquire_missing(
         If the disk refuses them.
     """
     needs = dict.fromkeys(map(request_key, cells))
+    recorded, refused = recording_plan.recorded, dict[Path, BaseException]()
     unique = {request.path: request for need in needs for request in recording_plan.requests.get(need, ())}
     missing = [request for path, request in unique.items() if not path.exists()]
     if not missing:
@@ -70,24 +76,30 @@ def acquire_missing(
         else:
             registry = installed()
             own = all(registry.sensors.owned(one.sensor).ours and registry.rigs.owned(one.rig).ours for one in missing)
+            if own and simulated:
+                import_own_rigs({one.rig for one in missing})
             # What an import of somebody else's changes in its process, it changes for one recording.
-            pool = choice.pool(workers, grace_s=0.0 if simulated else GRACE_S, reuse=own)
-            outcomes = pool.each(record, missing)
+            limits = replace(choice.limits, grace_s=0.0 if simulated else GRACE_S)
+            outcomes = Pool(workers, limits, reuse=own).each(record, missing)
         with closing(outcomes):
             for request, outcome in outcomes:
                 if isinstance(outcome, UnwritableError):
                     raise outcome  # the disk is no cell's fault, and refuses the next one too
                 if isinstance(outcome, BaseException):
-                    recording_plan.refused[request.path] = outcome
+                    refused[request.path] = outcome
                     _discard(request)
                 else:
-                    recording_plan.recorded.made(request.path, outcome)
+                    recorded.digests[request.path], recorded.made[request.path] = outcome, stat_of(request.path)
                 progress.advance(f"{request.sensor} {request.scene.name}", stopped=isinstance(outcome, BaseException))
     except BaseException:
         # Workers that were ended in the middle could not tidy up behind themselves.
         for request in missing:
             _discard(request)
         raise
+    for need in needs:
+        reasons = [refused[path] for path in recording_plan.paths.get(need, ()) if path in refused]
+        if reasons:
+            recording_plan.troubles.setdefault(need, reasons[0])
 
 
 def _discard(request: RecordingRequest) -> None:
@@ -119,6 +131,14 @@ def _one_by_one(
             yield request, record(request, operator)
         except Exception as error:
             yield request, error
+
+
+def import_own_rigs(names: Iterable[str]) -> None:
+    """Import what recordings with our own rigs of these names need, before processes are forked that share it."""
+    for library in ("h5py", "scipy.linalg", "tactbench.core.acquisition"):
+        importlib.import_module(library)
+    for name in names:
+        load_object(installed().rigs[name].where)
 
 
 @lru_cache(maxsize=4)

@@ -1,78 +1,125 @@
-"""What recordings say, each file read once: its content digest, and what it is a recording of."""
+"""What recordings say, each file read once: its content digest, and what it is a recording of.
+
+What was read is remembered by the file's size, times and inode, as git's index does. The memory is only ever a short
+cut: it may be lost, and what it cannot vouch for is read again.
+"""
 
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.remembered import Facts, FileMemory
+from tactbench.core.files import read_regular, replace_file
+from tactbench.core.pool.limits import Limits
+from tactbench.core.pool.pool import Pool
+
+Facts = Mapping[str, str | None]
+
+_FORMAT = "tactbench-memory 2"
+
+_TICK_NS = 50_000_000
+"""A time stamp of a disk moves on every 10 ms at the latest (Linux, HZ = 100); five times that."""
+_COARSE_TICK_NS = 2_000_000_000
+"""FAT counts in steps of two seconds, some network disks in whole ones."""
 
 
 class Recorded:
-    """Recordings, by path.
+    """Facts about recordings.
 
     Parameters
     ----------
     memory
         A JSON file that remembers what was read, so that a run in which nothing is new opens none; it may be lost.
     clock
-        As for `FileMemory`.
+        Nanoseconds since the epoch, as disks count them.
+
+    Notes
+    -----
+    The trap of such memories: a file changed twice within one tick of the disk's clock looks the same after both. So
+    facts are only written down about files that had been at rest for longer than a tick when they were read; younger
+    ones, and those from the future after a clock stepped back, are read again the next time.
     """
 
     def __init__(self, memory: Path, clock: Callable[[], int] = time.time_ns) -> None:
-        self._memory = FileMemory(memory, clock)
-        self._digests: dict[Path, str] = {}
-        self._made: dict[Path, os.stat_result | None] = {}
+        self.digests: dict[Path, str] = {}
+        """Of the content, known in this run."""
+        self.made: dict[Path, os.stat_result | None] = {}
+        """What recordings that were made in this run looked like then."""
+        self._path = memory
+        self._clock = clock
+        self._files: dict[str, list[Any]] = {}
+        self._fresh = False
+        try:
+            content = json.loads(read_regular(memory, 2**28))
+            if content["format"] == _FORMAT:
+                self._files = {name: entry for name, entry in content["files"].items() if _is_entry(entry)}
+        except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
+            pass
+
+    def facts(self, stat: os.stat_result | None) -> Facts:
+        """Return what is known about the file that looks like `stat`; nothing if it looks otherwise now, or is none."""
+        if stat is None:
+            return {}
+        name, *looks = _looks(stat)
+        entry = self._files.get(name)
+        return entry[3] if entry is not None and entry[:3] == looks else {}
+
+    def learn(self, before: os.stat_result | None, after: os.stat_result | None, facts: Facts) -> None:
+        """Remember `facts`, read between `before` and `after`, if the file did not change and was at rest."""
+        if before is None or after is None or _looks(before) != _looks(after):
+            return
+        tick = _COARSE_TICK_NS if before.st_mtime_ns % 1_000_000_000 == 0 else _TICK_NS
+        if self._clock() - max(before.st_mtime_ns, before.st_ctime_ns) <= tick:
+            return
+        name, *looks = _looks(before)
+        self._files[name] = [*looks, {**self.facts(before), **facts}]
+        self._fresh = True
 
     def unread(self, paths: Iterable[Path], fact: str) -> list[Path]:
         """Return those of `paths` that would have to be opened for the `fact`: ``digest`` or ``sensor``."""
-        return [path for path in paths if path not in self._digests and fact not in self._memory.facts(stat_of(path))]
-
-    def learn(self, path: Path, facts: Facts, before: os.stat_result | None) -> None:
-        """Take in what was read of a recording, perhaps in another process, which looked like `before` until then."""
-        if facts.get("digest"):
-            self._digests[path] = str(facts["digest"])
-        self._memory.learn(before, stat_of(path), facts)
+        return [path for path in paths if path not in self.digests and fact not in self.facts(stat_of(path))]
 
     def digest(self, path: Path) -> str:
         """Return the content digest of a recording; raises RecordingError if it cannot be read."""
-        if path not in self._digests:
+        if path not in self.digests:
             before = stat_of(path)
-            facts = self._memory.facts(before)
-            self.learn(path, facts if facts.get("digest") else read_digest(path), before)
-        return self._digests[path]
+            facts = self.facts(before)
+            if not facts.get("digest"):
+                facts = read_digest(path)
+                self.learn(before, stat_of(path), facts)
+            self.digests[path] = str(facts["digest"])
+        return self.digests[path]
 
     def sensor_and_scene(self, path: Path) -> tuple[str, str | None]:
         """Return sensor and scene of a recording; raises RecordingError if it cannot be read.
 
         There is no scene where nobody planned it, for example that of an imported table.
         """
-        facts = self._memory.facts(stat_of(path))
+        before = stat_of(path)
+        facts = self.facts(before)
         if facts.get("sensor") is None:
-            before = stat_of(path)
             facts = read_sensor_and_scene(path)
-            self.learn(path, facts, before)
+            self.learn(before, stat_of(path), facts)
         return str(facts["sensor"]), facts["scene"]
-
-    def made(self, path: Path, digest: str) -> None:
-        """Note the digest of a recording that was made now, as its writer computed it."""
-        self._digests[path] = digest
-        self._made[path] = stat_of(path)
-
-    @property
-    def number_made(self) -> int:
-        """How many recordings were made now."""
-        return len(self._made)
 
     def save(self) -> None:
         """Write what was learned; a folder that cannot be written only costs time."""
-        for path, before in self._made.items():
-            self._memory.learn(before, stat_of(path), {"digest": self._digests[path]})
-        self._memory.save()
+        for path, before in self.made.items():
+            self.learn(before, stat_of(path), {"digest": self.digests[path]})
+        if not self._fresh:
+            return
+        content = json.dumps({"format": _FORMAT, "files": self._files}, separators=(",", ":")).encode()
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(self._path, content, sync=False)  # what a power cut takes costs time
+        except OSError:
+            return
+        self._fresh = False
 
 
 def read_digest(path: Path) -> Facts:
@@ -99,7 +146,7 @@ def stat_of(path: Path) -> os.stat_result | None:
 
 
 def read_all(
-    read: Callable[[Path], Facts], paths: Sequence[Path], recorded: Recorded, choice: EngineChoice
+    read: Callable[[Path], Facts], paths: Sequence[Path], recorded: Recorded, limits: Limits
 ) -> dict[Path, BaseException]:
     """Have `recorded` learn what `read` finds in every path; return what stopped it where it did.
 
@@ -111,9 +158,25 @@ def read_all(
     importlib.import_module("h5py")  # once here, not once in every process that reads
     before = {path: stat_of(path) for path in paths}
     failed: dict[Path, BaseException] = {}
-    for path, facts in choice.pool(1).each(read, paths):
+    for path, facts in Pool(1, limits, reuse=True).each(read, paths):
         if isinstance(facts, BaseException):
             failed[path] = facts
-        else:
-            recorded.learn(path, facts, before[path])
+            continue
+        recorded.learn(before[path], stat_of(path), facts)
+        if facts.get("digest"):
+            recorded.digests[path] = str(facts["digest"])
     return failed
+
+
+def _looks(stat: os.stat_result) -> tuple[str, int, int, int]:
+    """Return which file it is, not by its path (a folder that is handed on names none), and its size and times."""
+    return f"{stat.st_dev:x}:{stat.st_ino:x}", stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns
+
+
+def _is_entry(entry: object) -> bool:
+    return (
+        isinstance(entry, list)
+        and len(entry) == 4
+        and isinstance(entry[3], dict)
+        and all(value is None or isinstance(value, str) for value in entry[3].values())
+    )

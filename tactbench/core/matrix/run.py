@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,7 @@ from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluate import evaluate_all
 from tactbench.core.matrix.key_book import KeyBook
 from tactbench.core.matrix.keys import Keys
-from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.plan_recordings import RecordingPlan, plan_run
+from tactbench.core.matrix.plan_recordings import plan_run, request_key
 from tactbench.core.matrix.progress import Progress, Silence
 from tactbench.core.matrix.record import acquire_missing
 from tactbench.core.matrix.recorded import Recorded
@@ -85,20 +86,25 @@ def run_matrix(
     FolderError
         If another run holds the folder, or the disk refuses; what was finished before is kept.
     """
-    choice = (choice or EngineChoice()).checked()
-    choice.ready()
+    choice = choice or EngineChoice()
+    choice.check()
     progress = progress or Silence()
     with store.hold():
         registry = with_declared(installed(), declared_in(recordings))
         keys = Keys(registry)
         recorded = Recorded(store.folder / "cache" / "recordings.json")
         book = KeyBook(store.folder / "cache" / "keys")
-        cells, recording_plan = plan_run(matrix, registry, keys, store, recordings, recorded, choice)
+        cells, recording_plan = plan_run(matrix, registry, keys, store, recordings, recorded, choice.limits)
         provenance = gather(keys.sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
         made_by = store.begin(provenance)
         rows: list[Row] = []
         computed = 0
-        rounds = _rounds(cells, choice, recording_plan)
+        # Between replicates nothing is under way, so that a table can be shown. A cluster takes seconds to start, and
+        # recordings that exist are read once: all at once there.
+        rounds = [cells]
+        if recording_plan.requests and choice.name != "dask":
+            number_of = attrgetter("repeat")
+            rounds = [list(some) for _, some in groupby(sorted(cells, key=number_of), key=number_of)]
         for number, some in enumerate(rounds, 1):
             prefix = f"replicate {number} of {len(rounds)}: " if len(rounds) > 1 else ""
             acquire_missing(recording_plan, some, book, keys, choice, progress, operator, stage=f"{prefix}recording")
@@ -114,19 +120,5 @@ def run_matrix(
         if files:
             store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
             store.write("scores.json", scores_text(rows))
-    used = {cell.name: tuple(recording_plan.paths(cell)) for cell in cells}
-    return Outcome(tuple(rows), provenance, computed, recorded.number_made, used)
-
-
-def _rounds(cells: Sequence[Cell], choice: EngineChoice, recording_plan: RecordingPlan) -> list[list[Cell]]:
-    """Return the cells of each replicate that has to be recorded; all at once where recordings exist already.
-
-    Between rounds nothing is under way, so that a table can be shown. On a cluster, which takes seconds to start, all
-    replicates are one round.
-    """
-    if choice.name == "dask" or not recording_plan.requests:
-        return [list(cells)]
-    rounds: dict[int, list[Cell]] = {}
-    for cell in cells:
-        rounds.setdefault(cell.repeat, []).append(cell)
-    return list(rounds.values())
+    used = {cell.name: tuple(recording_plan.paths.get(request_key(cell), ())) for cell in cells}
+    return Outcome(tuple(rows), provenance, computed, len(recorded.made), used)

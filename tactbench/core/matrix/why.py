@@ -33,9 +33,8 @@ class Explanation:
 def recording_entry(request: RecordingRequest, keys: Keys) -> Entry:
     """Return what went into a recording's key, for the book."""
     scene = {"role": request.role, "seed": request.seed, "scene": request.scene.model_dump()}
-    return Entry(
-        _name(request), request.path.stem[-12:], scene, keys.maker(request.sensor, request.rig, request.rig_file)
-    )
+    maker = keys.maker(request.sensor, request.rig, request.rig_file, request.scene.indenter.shape)
+    return Entry(_name(request), request.path.stem[-12:], scene, maker)
 
 
 def cell_entries(

@@ -1,4 +1,4 @@
-"""The six hooks: the whole door fits on this screen.
+"""The eight hooks: the whole door fits on this screen.
 
 Each hook returns descriptors: a name, a spec, and *where* the code is as an import string, so that listing plugins
 imports nothing heavy.
@@ -14,6 +14,8 @@ from tactbench.core.spec.rig import (
     DeviceDescriptor,
     EffectDescriptor,
     EstimatorDescriptor,
+    IndenterDescriptor,
+    ProfileDescriptor,
     RigDescriptor,
     SensorDescriptor,
     TaskDescriptor,
@@ -58,3 +60,13 @@ def tactbench_estimators() -> Sequence[EstimatorDescriptor]:  # type: ignore[emp
 @hookspec
 def tactbench_effects() -> Sequence[EffectDescriptor]:  # type: ignore[empty-body]
     """Return the simulation effects this plugin brings."""
+
+
+@hookspec
+def tactbench_indenters() -> Sequence[IndenterDescriptor]:  # type: ignore[empty-body]
+    """Return the shapes of indenters this plugin brings."""
+
+
+@hookspec
+def tactbench_profiles() -> Sequence[ProfileDescriptor]:  # type: ignore[empty-body]
+    """Return the force profiles this plugin brings."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from tactbench.core.samples import Block, SkinGrid, SkinState
 from tactbench.core.spec.recording import Emulation, PlanEntry, Scalar, StreamClock, StreamCounts
-from tactbench.core.spec.rig import EffectDescriptor, SensorDescriptor
+from tactbench.core.spec.rig import EffectDescriptor, IndenterDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Scene
 from tactbench.core.spec.sensor import ChannelKind, ChannelSpec, SensorSpec, StreamSpec
@@ -237,6 +237,8 @@ class RigContext:
 
     effects: tuple[EffectDescriptor, ...] = ()
     """All installed effects; the twin plans with them."""
+    indenters: tuple[IndenterDescriptor, ...] = ()
+    """All installed shapes of indenters; the twin presses with them."""
     recordings: Path | None = None
     """Folder given by ``--recordings``."""
     rig_file: RigFile | None = None

@@ -34,13 +34,23 @@ from tactbench.core.spec.rig import (
     DeviceDescriptor,
     EffectDescriptor,
     EstimatorDescriptor,
+    IndenterDescriptor,
+    ProfileDescriptor,
     RigDescriptor,
     SensorDescriptor,
     TaskDescriptor,
 )
 
 D = TypeVar(
-    "D", SensorDescriptor, RigDescriptor, DeviceDescriptor, TaskDescriptor, EstimatorDescriptor, EffectDescriptor
+    "D",
+    SensorDescriptor,
+    RigDescriptor,
+    DeviceDescriptor,
+    TaskDescriptor,
+    EstimatorDescriptor,
+    EffectDescriptor,
+    IndenterDescriptor,
+    ProfileDescriptor,
 )
 
 
@@ -137,10 +147,12 @@ class Registry:
     tasks: Family[TaskDescriptor] = field(default_factory=lambda: Family("task"))
     estimators: Family[EstimatorDescriptor] = field(default_factory=lambda: Family("estimator"))
     effects: Family[EffectDescriptor] = field(default_factory=lambda: Family("effect"))
+    indenters: Family[IndenterDescriptor] = field(default_factory=lambda: Family("indenter"))
+    profiles: Family[ProfileDescriptor] = field(default_factory=lambda: Family("profile"))
     plugins: list[PluginRow] = field(default_factory=list)
 
     def families(self) -> Mapping[str, Family[Any]]:
-        """Return the six families by the name of their hook's plural."""
+        """Return the families by the name of their hook's plural."""
         return {
             "sensors": self.sensors,
             "rigs": self.rigs,
@@ -148,6 +160,8 @@ class Registry:
             "tasks": self.tasks,
             "estimators": self.estimators,
             "effects": self.effects,
+            "indenters": self.indenters,
+            "profiles": self.profiles,
         }
 
     @property
@@ -168,6 +182,8 @@ _KINDS: dict[str, type[Any]] = {
     "tasks": TaskDescriptor,
     "estimators": EstimatorDescriptor,
     "effects": EffectDescriptor,
+    "indenters": IndenterDescriptor,
+    "profiles": ProfileDescriptor,
 }
 
 
@@ -261,9 +277,8 @@ def _described_in_children(points: Sequence[EntryPoint], timeout_s: float) -> di
         return {}
     from tactbench.core.pool.limits import Limits
     from tactbench.core.pool.pool import Pool
-    from tactbench.core.pool.processes import can_fork
 
-    pool = Pool(_AT_ONCE, Limits(timeout_s=timeout_s), preload=None if can_fork() else (__name__,))
+    pool = Pool(_AT_ONCE, Limits(timeout_s=timeout_s))
     return dict(pool.each(_describe, [(point.name, point.value) for point in points]))
 
 

@@ -115,7 +115,7 @@ def physics_of(file: RigFile, registry: Registry, effects: tuple[EffectDescripto
         raise UsageError(
             f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."
         )
-    rig: Rig = load_object(descriptor.where)(RigContext(effects=effects))
+    rig: Rig = load_object(descriptor.where)(RigContext(effects=effects, indenters=tuple(registry.indenters)))
     return rig
 
 

@@ -16,9 +16,5 @@ class Limits:
     grace_s: float = 0.0
     """Seconds between being asked to end and being ended: a real device has to be closed."""
 
-    def exceeded(self, spent_s: float) -> bool:
-        """Return whether so many seconds are more than allowed."""
-        return self.timeout_s is not None and spent_s > self.timeout_s
-
 
 UNLIMITED = Limits()

@@ -8,9 +8,10 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import lru_cache
 from io import TextIOWrapper
-from typing import Any, TextIO
+from typing import TextIO
+
+from tactbench.core.pool.processes import c_library
 
 LOG_BYTES = 64 * 2**10
 """Of what a cell prints, so much is kept: the last."""
@@ -56,7 +57,7 @@ def cut_back(log: int) -> None:
         return
     before = status.st_size - LOG_BYTES
     with suppress(AttributeError):
-        if before > 0 and not _c_library().fallocate(log, _KEEP_SIZE_AND_PUNCH_HOLE, _Offset(0), _Offset(before)):
+        if before > 0 and not c_library().fallocate(log, _KEEP_SIZE_AND_PUNCH_HOLE, _Offset(0), _Offset(before)):
             return
     kept = os.pread(log, LOG_BYTES, max(0, before))
     os.ftruncate(log, 0)
@@ -69,12 +70,7 @@ def flush() -> None:
         with suppress(Exception):
             stream.flush()
     with suppress(Exception):
-        _c_library().fflush(None)
-
-
-@lru_cache(maxsize=1)
-def _c_library() -> Any:
-    return ctypes.CDLL(None)
+        c_library().fflush(None)
 
 
 def printed() -> str:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import lru_cache
+from mmap import PAGESIZE
 from pathlib import Path
 
-from tactbench.core.pool.processes import descendants
+from tactbench.core.pool.processes import c_library, descendants
 
 MB = 2**20
 
@@ -19,7 +18,7 @@ def resident_mb(pid: int) -> float:
     """Return the resident memory of a process, MB; 0 where it is not known."""
     try:
         with open(f"/proc/{pid}/statm", "rb") as file:  # noqa: PTH123  (often, and quicker)
-            return int(file.read().split()[1]) * _page() / MB
+            return int(file.read().split()[1]) * PAGESIZE / MB
     except (OSError, IndexError, ValueError):
         return 0.0
 
@@ -61,8 +60,16 @@ def data_limit(memory_mb: int | None) -> Iterator[None]:
 
 def oom_kills() -> int:
     """Return how many processes the system has ended so far because memory was short; it only ever rises."""
+    counters = ["/proc/vmstat"]
+    with suppress(OSError):  # the files in which the control groups of this process count, in both versions of them
+        for line in Path("/proc/self/cgroup").read_text().splitlines():
+            _, controllers, group = line.split(":", 2)
+            if controllers == "":
+                counters.append(f"/sys/fs/cgroup{group}/memory.events")
+            elif "memory" in controllers.split(","):
+                counters.append(f"/sys/fs/cgroup/memory{group}/memory.oom_control")
     found = 0
-    for path in ("/proc/vmstat", *_own_counters()):
+    for path in counters:
         with suppress(OSError):
             found += sum(int(count) for count in re.findall(r"^oom_kill (\d+)$", Path(path).read_text(), re.MULTILINE))
     return found
@@ -74,20 +81,6 @@ def first_to_go() -> None:
         adjustment = os.open("/proc/self/oom_score_adj", os.O_WRONLY)  # a file of Python's would cost five times that
         os.write(adjustment, b"1000")
         os.close(adjustment)
-
-
-@lru_cache(maxsize=1)
-def _own_counters() -> tuple[str, ...]:
-    """Return the files in which the control groups of this process count, in both versions of them."""
-    found: list[str] = []
-    with suppress(OSError):
-        for line in Path("/proc/self/cgroup").read_text().splitlines():
-            _, controllers, group = line.split(":", 2)
-            if controllers == "":
-                found.append(f"/sys/fs/cgroup{group}/memory.events")
-            elif "memory" in controllers.split(","):
-                found.append(f"/sys/fs/cgroup/memory{group}/memory.oom_control")
-    return tuple(found)
 
 
 def _proportional_mb(pid: int) -> float:
@@ -106,7 +99,7 @@ _KCMP_VM = 1
 def _have_one_memory(one: int, other: int) -> bool:
     """Return whether two processes share all of their memory; False where the system does not say."""
     number = _KCMP.get(os.uname().machine)
-    return number is not None and _libc().syscall(number, one, other, _KCMP_VM, 0, 0) == 0
+    return number is not None and c_library().syscall(number, one, other, _KCMP_VM, 0, 0) == 0
 
 
 def _data_bytes() -> int:
@@ -115,13 +108,3 @@ def _data_bytes() -> int:
         if match := re.search(r"^VmData:\s+(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE):
             return int(match[1]) * 1024
     return 0
-
-
-@lru_cache(maxsize=1)
-def _libc() -> ctypes.CDLL:
-    return ctypes.CDLL(None)
-
-
-@lru_cache(maxsize=1)
-def _page() -> int:
-    return os.sysconf("SC_PAGE_SIZE")

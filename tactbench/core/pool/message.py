@@ -35,27 +35,10 @@ def pack(message: dict[str, Any]) -> bytes:
     """
     arrays: list[npt.NDArray[Any]] = []
     text = json.dumps(_plain(message, arrays)).encode()
-    content = _saved(arrays) if arrays else b""
-    return _HEADER.pack(_MAGIC, len(text), len(content)) + text + content
-
-
-def _saved(arrays: list[npt.NDArray[Any]]) -> bytes:
-    import numpy as np
-
-    file = BytesIO()
+    content = BytesIO()
     for array in arrays:
-        np.save(file, array, allow_pickle=False)
-    return file.getvalue()
-
-
-def _loaded(content: bytes) -> list[npt.NDArray[Any]]:
-    import numpy as np
-
-    file = BytesIO(content)
-    found = []
-    while file.tell() < len(content):
-        found.append(np.load(file, allow_pickle=False))
-    return found
+        sys.modules["numpy"].save(content, array, allow_pickle=False)
+    return _HEADER.pack(_MAGIC, len(text), content.tell()) + text + content.getvalue()
 
 
 def _plain(value: Any, arrays: list[npt.NDArray[Any]]) -> Any:
@@ -142,8 +125,14 @@ def unpack(content: bytes) -> dict[str, Any]:
 
 
 def _read(text: bytes, arrays: bytes) -> dict[str, Any]:
+    loaded: list[npt.NDArray[Any]] = []
+    content = BytesIO(arrays)
     try:
-        message = _restored(json.loads(text), _loaded(arrays) if arrays else [])
+        while content.tell() < len(arrays):
+            import numpy as np
+
+            loaded.append(np.load(content, allow_pickle=False))
+        message = _restored(json.loads(text), loaded)
     except Exception as error:
         raise ValueError(f"{type(error).__name__}: {error}") from error
     if not isinstance(message, dict):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import wait
 from typing import TypeVar
@@ -13,9 +14,10 @@ from typing import TypeVar
 from tactbench.core.pool.limits import UNLIMITED, Limits
 from tactbench.core.pool.processes import (
     await_fork_server_end,
+    can_fork,
+    children,
     interrupts_blocked,
     kill_orphans,
-    own_children,
     set_subreaper,
 )
 from tactbench.core.pool.worker import PENDING, Worker
@@ -40,9 +42,9 @@ class Pool:
         Whether a process gets another item once it is through with one, which then finds what that has loaded. All
         items are taken before the first begins. Else each has a process of its own, which shares what this process
         holds when the item is taken, if it forks.
-    preload
-        None: this process forks, which must have one thread. Else a fork server of `multiprocessing` does, which first
-        imports these modules; work and items are pickled.
+    fork
+        Whether this process forks, which must have one thread. Else a fork server of `multiprocessing` does, which
+        has imported `PRELOAD`; work and items are pickled. None: it forks where it may.
     is_needed
         Asked while items are at work whether anybody still waits for them; the iteration ends where nobody does.
 
@@ -58,13 +60,13 @@ class Pool:
         limits: Limits = UNLIMITED,
         *,
         reuse: bool = False,
-        preload: Sequence[str] | None = None,
+        fork: bool | None = None,
         is_needed: Callable[[], bool] = lambda: True,
     ) -> None:
         self._jobs = jobs
         self._limits = limits
         self._reuse = reuse
-        self._preload = preload
+        self._fork = fork
         self._is_needed = is_needed
 
     def each(self, work: Callable[[T], R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
@@ -80,6 +82,7 @@ class Pool:
         """Items whose processes ended before they had begun."""
         busy: list[Worker] = []
         idle: list[Worker] = []
+        fork = can_fork() if self._fork is None else self._fork
         with _children_of_items(busy, idle) as spared:
             while True:
                 while len(busy) < self._jobs:
@@ -89,7 +92,7 @@ class Pool:
                         break
                     try:
                         with interrupts_blocked():
-                            worker = idle.pop() if idle else Worker(work, every or [item], self._limits, self._preload)
+                            worker = idle.pop() if idle else Worker(work, every or [item], self._limits, fork)
                             busy.append(worker)
                             worker.begin(index, second)
                     except Exception as error:
@@ -138,7 +141,7 @@ def _children_of_items(busy: list[Worker], idle: list[Worker]) -> Iterator[set[i
     spared: set[int] = set()
     try:
         with interrupts_blocked():
-            spared |= own_children()
+            spared |= children(os.getpid())
             before = set_subreaper(True)
         yield spared
     finally:

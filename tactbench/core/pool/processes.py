@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import signal
@@ -11,7 +12,6 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache
 from multiprocessing import connection, forkserver
 from pathlib import Path
-from typing import Any
 
 # prctl(2)
 _SET_PDEATHSIG, _SET_CHILD_SUBREAPER, _GET_CHILD_SUBREAPER = 1, 36, 37
@@ -34,7 +34,8 @@ def can_fork() -> bool:
 
 def die_with_parent(parent: int) -> None:
     """Have this process killed when its parent ends, however that ends; end it now if that has happened already."""
-    _prctl(_SET_PDEATHSIG, signal.SIGKILL)
+    with suppress(AttributeError, OSError):
+        c_library().prctl(_SET_PDEATHSIG, ctypes.c_ulong(signal.SIGKILL), 0, 0, 0)
     if os.getppid() != parent:
         os._exit(1)
 
@@ -58,12 +59,10 @@ def await_fork_server_end(seconds: float) -> None:
 
 def set_subreaper(whether: bool) -> bool:
     """Have orphans below this process become its children, or not; return what it was before."""
-    import ctypes
-
     value = ctypes.c_int(0)
     with suppress(AttributeError, OSError):
-        _c_library().prctl(_GET_CHILD_SUBREAPER, ctypes.byref(value), 0, 0, 0)
-    _prctl(_SET_CHILD_SUBREAPER, int(whether))
+        c_library().prctl(_GET_CHILD_SUBREAPER, ctypes.byref(value), 0, 0, 0)
+        c_library().prctl(_SET_CHILD_SUBREAPER, ctypes.c_ulong(whether), 0, 0, 0)
     return bool(value.value)
 
 
@@ -103,7 +102,7 @@ def kill_orphans(spared: set[int]) -> None:
     """
     for _ in range(_GENERATIONS):
         known = spared | {one.pid for one in multiprocessing.active_children()}
-        orphans = {pid for pid in own_children() - known if _foreign(pid)}
+        orphans = {pid for pid in children(os.getpid()) - known if _foreign(pid)}
         if not orphans:
             return
         for pid in orphans:
@@ -120,24 +119,20 @@ def _foreign(pid: int) -> bool:
         return False
 
 
-def own_children() -> set[int]:
-    """Return the children of this process."""
-    return set(_children(os.getpid()))
-
-
 def descendants(pid: int) -> list[int]:
     """Return the processes below `pid`, itself not among them."""
     found: list[int] = []
-    for child in _children(pid):
+    for child in children(pid):
         found += [child, *descendants(child)]
     return found
 
 
-def _children(pid: int) -> list[int]:
-    found: list[int] = []
+def children(pid: int) -> set[int]:
+    """Return the children of a process."""
+    found: set[int] = set()
     try:
         for task in os.listdir(f"/proc/{pid}/task"):  # noqa: PTH208  (names, and quicker)
-            found += [int(word) for word in Path(f"/proc/{pid}/task/{task}/children").read_text().split()]
+            found |= {int(word) for word in Path(f"/proc/{pid}/task/{task}/children").read_text().split()}
     except OSError:
         pass  # it has ended, or the system does not tell
     return found
@@ -161,14 +156,6 @@ def interrupts_blocked() -> Iterator[None]:
 
 
 @lru_cache(maxsize=1)
-def _c_library() -> Any:
-    import ctypes
-
+def c_library() -> ctypes.CDLL:
+    """Return the C library of this process."""
     return ctypes.CDLL(None)
-
-
-def _prctl(option: int, value: int) -> None:
-    import ctypes
-
-    with suppress(AttributeError, OSError):
-        _c_library().prctl(option, ctypes.c_ulong(value), 0, 0, 0)

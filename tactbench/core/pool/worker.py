@@ -28,11 +28,11 @@ START_S = 60.0
 """Seconds that a process may take to begin with its item: a fork server imports libraries first."""
 
 
-class Pending:
-    """Says that there is no outcome yet."""
+PRELOAD = ("tactbench.core.matrix.preloaded",)
+"""What the fork server of a process imports, once: there is one for all pools, which keeps what it began with."""
 
-
-PENDING = Pending()
+PENDING = object()
+"""Says that there is no outcome yet."""
 
 
 class Worker:
@@ -46,8 +46,8 @@ class Worker:
         What it may be given, by index. With `work` it is inherited where this process forks, and else pickled.
     limits
         What one item may take.
-    preload
-        Modules that a fork server imports once; None: this process forks.
+    fork
+        Whether this process forks; else a fork server does.
 
     Raises
     ------
@@ -55,9 +55,7 @@ class Worker:
         If a fork server is used, and `work` or `items` cannot be pickled.
     """
 
-    def __init__(
-        self, work: Callable[[Any], Any], items: Sequence[Any], limits: Limits, preload: Sequence[str] | None
-    ) -> None:
+    def __init__(self, work: Callable[[Any], Any], items: Sequence[Any], limits: Limits, fork: bool) -> None:
         self.items = items
         self.index = 0
         """Of the item that it is busy with."""
@@ -66,15 +64,15 @@ class Worker:
         self._limits = limits
         self._stopped: CellStopped | None = None
         """Why it was told to end."""
-        context: Any = multiprocessing.get_context("fork" if preload is None else "forkserver")
-        if preload:
-            context.set_forkserver_preload(list(preload))
+        context: Any = multiprocessing.get_context("fork" if fork else "forkserver")
+        if not fork:
+            context.set_forkserver_preload(list(PRELOAD))
         log = Connection(open_log())
         self._log: Connection[Any, Any] = log
         self.connection, child_end = multiprocessing.Pipe()
         flush()
         try:
-            parent = os.getpid() if preload is None else None
+            parent = os.getpid() if fork else None
             self._process = context.Process(target=run_child, args=(work, items, child_end, log, limits, parent))
             self._process.start()
         except BaseException:
@@ -85,7 +83,7 @@ class Worker:
             child_end.close()
         os.set_blocking(self.connection.fileno(), False)
         self._inbox = Inbox(self.connection.fileno())
-        self._shared_mb = memory.resident_mb(os.getpid()) if preload is None else 0.0
+        self._shared_mb = memory.resident_mb(os.getpid()) if fork else 0.0
         """What it holds without having taken it."""
         self._kills = memory.oom_kills()
 
@@ -123,10 +121,12 @@ class Worker:
         try:
             message = self._inbox.message()
             if message is not None and "begun" in message:
-                self._note_beginning()
+                self.begun = True
+                self._began_s = time.monotonic()
+                self._ends_s = None if self._limits.timeout_s is None else self._began_s + self._limits.timeout_s
                 message = self._inbox.message()
             if message is not None:
-                return self._result(message) if self._stopped is None else self._stop(self._stopped)
+                return self._result(message)
         except (ValueError, KeyError, TypeError) as error:
             return self._stop(endings.garbled(error))
         if over:
@@ -137,13 +137,10 @@ class Worker:
                 return self._stop(endings.silenced())
         return self._limited()
 
-    def _note_beginning(self) -> None:
-        self.begun = True
-        self._began_s = time.monotonic()
-        self._ends_s = None if self._limits.timeout_s is None else self._began_s + self._limits.timeout_s
-
     def _result(self, message: dict[str, Any]) -> Any:
-        if self._limits.exceeded(float(message["spent_s"])):
+        if self._stopped is not None:
+            return self._stop(self._stopped)
+        if self._limits.timeout_s is not None and float(message["spent_s"]) > self._limits.timeout_s:
             return self._stop(endings.too_slow(self._limits))
         return load_error(message["error"], self._printed()) if "error" in message else message["value"]
 
@@ -176,13 +173,12 @@ class Worker:
                 return self._stop(late)
             self._stopped = late
             self._ask_to_end()
-        elif self._stopped is None and self.begun and self._takes_too_much():
+        elif (
+            self._limits.memory_mb is not None and self._stopped is None and self.begun
+            and memory.taken_mb(self._process.pid, self._shared_mb) > self._limits.memory_mb
+        ):  # fmt: skip
             return self._stop(endings.out_of_memory(self._limits))
         return PENDING
-
-    def _takes_too_much(self) -> bool:
-        most = self._limits.memory_mb
-        return most is not None and memory.taken_mb(self._process.pid, self._shared_mb) > most
 
     def _ask_to_end(self) -> None:
         self._ends_s = time.monotonic() + self._limits.grace_s

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import DataError
 from tactbench.core.leaderboard.checked import checked, with_added
+from tactbench.core.leaderboard.levels import with_levels
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.plugins.declared import with_declared_of
 from tactbench.core.samples import Answers
@@ -72,5 +73,6 @@ def open_results(store: Store, registry: Registry) -> Results:
     rows = [with_added(row) for row in store.rows()]
     good = checked(rows)[0]
     known = {id(row) for row in good}
-    shown = (*over_replicates(good), *(row for row in rows if id(row) not in known))
+    over = with_levels(over_replicates(good), store.folder, store.provenance)
+    shown = (*over, *(row for row in rows if id(row) not in known))
     return Results(store, with_declared_of(registry, shown), shown, {str(row.get("key", "")): row for row in good})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tactbench.core.errors import TactbenchError
+from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.recording.reader import read_meta
 from tactbench.core.report.datasheet import details, sensor_table, table_one
 from tactbench.core.report.section import ReportData, Section
@@ -25,7 +26,7 @@ def sensors_section(subject: ReportData) -> Section:
         if spec is None
     )
     if not specs:
-        return Section("sensors", title, missing=unknown or ("No cell names a sensor.",))
+        return Section("sensors", title, notes=_levels(subject), missing=unknown or ("No cell names a sensor.",))
     return Section(
         "sensors",
         title,
@@ -37,8 +38,15 @@ def sensors_section(subject: ReportData) -> Section:
             sensor_table(name, specs, properties, with_source=True).compact()
             for name, properties in (("Sensor comparison", table_one(specs)), ("Readings", details(specs)[:_READINGS]))
         ),
-        notes=unknown,
+        notes=(*_levels(subject), *unknown),
     )
+
+
+def _levels(subject: ReportData) -> tuple[str, ...]:
+    """Return what `tactbench check` has found of each sensor, in a sentence; nothing where none was checked."""
+    found = {str(row["sensor"]): str(row[LEVEL]) for row in subject.rows if LEVEL in row}
+    listed = ", ".join(f"{name} {level}" for name, level in found.items())
+    return (f"Levels that `tactbench check` has computed: {listed}.",) if found else ()
 
 
 def _spec(name: str, subject: ReportData) -> SensorSpec | None:

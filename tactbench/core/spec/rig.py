@@ -1,12 +1,14 @@
-"""What a sensor, a device, a rig, an estimator and an effect are, without loading their code."""
+"""What plugins bring, without loading their code."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from tactbench.core.spec.quantity import Frozen
+from tactbench.core.spec.parameter import Parameter, values_of
+from tactbench.core.spec.quantity import Frozen, Quantity
 from tactbench.core.spec.recording import Scalar
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.summary import Summary
@@ -156,3 +158,42 @@ class EffectDescriptor(Frozen):
     """``module:callable``, called with (Scene, SensorSpec): a Reason; light, no numerics."""
     groups: tuple[str, ...] = ()
     """Words that stand for several effects at once in a scene's ``simulation.effects``: ``drift``, ``noise``."""
+
+
+class IndenterDescriptor(Frozen):
+    """A shape of an indenter, and where its height is computed."""
+
+    name: str = Field(pattern=_NAME)
+    title: str
+    where: str = Field(pattern=WHERE)
+    """``module:callable``, called as ``callable(x_mm, y_mm, **dimensions)`` with two arrays that broadcast: the height
+    of the body above its lowest point [mm], finite everywhere and 0 at (0, 0). Where a flank is vertical, or there is
+    no body, it is large: 50 mm or more."""
+    dimensions: dict[str, Parameter] = Field(default_factory=dict)
+    """What it is given by, each as a keyword in the parameter's unit."""
+
+    @model_validator(mode="after")
+    def _angle_is_the_scenes(self) -> IndenterDescriptor:
+        if "angle" in self.dimensions:
+            raise ValueError("dimensions: angle is how a scene turns the shape; call it something else")
+        return self
+
+    def sizes(self, given: Mapping[str, Quantity]) -> dict[str, float]:
+        """Return every dimension, each in its unit: as `given`, or by default; raises UsageError naming one."""
+        return values_of(f"The indenter {self.name!r}", self.dimensions, given)
+
+
+class ProfileDescriptor(Frozen):
+    """A normal force over time that has a name, and where it is computed."""
+
+    name: str = Field(pattern=_NAME)
+    title: str
+    where: str = Field(pattern=WHERE)
+    """``module:callable``, called as ``callable(**parameters)``: a :class:`tactbench.plugin.ForcePath`. A scene, and
+    with it a recording, holds this path and not the profile's name."""
+    parameters: dict[str, Parameter] = Field(default_factory=dict)
+    """What it is given by, each as a keyword in the parameter's unit."""
+
+    def values(self, given: Mapping[str, Quantity]) -> dict[str, float]:
+        """Return every parameter, each in its unit: as `given`, or by default; raises UsageError naming one."""
+        return values_of(f"The profile {self.name!r}", self.parameters, given)

@@ -10,8 +10,10 @@ from pydantic import (
     BeforeValidator,
     Field,
     FiniteFloat,
+    SerializerFunctionWrapHandler,
     ValidationError,
     field_serializer,
+    model_serializer,
     model_validator,
 )
 
@@ -29,13 +31,54 @@ Role = Literal["train", "validation", "test"]
 
 
 class Indenter(Frozen):
-    """The body pressed on the sensor: flat, or a spherical cap."""
+    """The body pressed on the sensor: flat, a spherical cap, or of a shape that a plugin defines."""
 
     radius: Quantity | None = None
-    """Radius of the cap [length]; None is a flat surface."""
+    """Radius of the cap [length]; None is a flat surface, or another shape."""
+    shape: str | None = None
+    """Name of an installed shape (``tactbench list indenters``); None: a cap if there is a radius, or else flat.
+    ``cap`` and ``flat`` may be written, and are read as these."""
+    dimensions: dict[str, Quantity] = Field(default_factory=dict)
+    """Of the shape, by name; one that is left out has the default of the shape."""
+    angle: Quantity = assumed(0.0, "deg", "the shape's own axes are those of the sensor")
+    """By how much the shape is turned about the press axis, from x towards s [angle]."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _cap_and_flat(cls, given: Any) -> Any:
+        """Read the shapes cap and flat as the radius that says the same, so that there is one way to store them."""
+        if not isinstance(given, Mapping) or given.get("shape") not in ("cap", "flat"):
+            return given
+        own, dimensions = dict(given), dict(given.get("dimensions") or {})
+        if own.pop("shape") == "cap":
+            own.setdefault("radius", dimensions.pop("radius", None))
+            if own["radius"] is None:
+                raise ValueError("dimensions: a cap is given by its radius, and none is given")
+        return {**own, "dimensions": dimensions}
+
+    @model_validator(mode="after")
+    def _is_one_body(self) -> Indenter:
+        if self.shape is not None and self.radius is not None:
+            raise ValueError(f"radius: it is that of a cap; give the dimensions of {self.shape!r} under dimensions")
+        if self.shape is None and self.dimensions:
+            body = "a flat surface" if self.radius is None else "a cap"
+            raise ValueError(f"dimensions: {body} has none of {', '.join(self.dimensions)}; name a shape")
+        if self.angle.to("rad") and self.shape is None:
+            raise ValueError(f"angle: {self.angle} is given; a cap and a flat surface are the same from all sides")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _as_ever(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what a cap and a flat surface do not need: they are stored as they were before shapes."""
+        stored: dict[str, Any] = serialize(self)
+        return stored if self.shape is not None else {"radius": stored["radius"]}
 
     def __str__(self) -> str:
-        return f"cap R {self.radius}" if self.radius else "flat"
+        if self.shape is None:
+            return f"cap R {self.radius}" if self.radius else "flat"
+        sizes = ", ".join(f"{name} {size}" for name, size in self.dimensions.items())
+        turned = f"turned by {self.angle}" if self.angle.value else ""
+        return ", ".join(filter(None, (f"{self.shape} {sizes}".strip(), turned)))
 
 
 class Placement(Frozen):

@@ -269,6 +269,9 @@ class SensorSpec(Frozen):
     """From a sample taken to the sample in the host: frame and bus [time]. None: nobody states it."""
     skin: Skin | None = None
     """None: the sensor cannot be simulated, only recorded or replayed."""
+    reads_shear: tuple[ChannelKind, ...] = ()
+    """Kinds of channels whose transducer looks at `tangential_displacement_mm` and `shear_mpa` of a SkinState: the twin
+    computes both only where such a channel is observed."""
     parameters: dict[str, Quantity] = Field(default_factory=dict)
     """What the sensor's own transduction needs."""
     nuisances: dict[ChannelKind, Nuisances] = Field(default_factory=dict)
@@ -291,6 +294,13 @@ class SensorSpec(Frozen):
         streams = [stream.name for stream in self.streams]
         if len(set(streams)) != len(streams):
             raise ValueError(f"stream names must be unique in a sensor: {', '.join(streams)}")
+        return self
+
+    @model_validator(mode="after")
+    def _what_reads_shear_is_there(self) -> SensorSpec:
+        strange = sorted(set(self.reads_shear) - {channel.kind for channel in self.channels()})
+        if strange:
+            raise ValueError(f"reads_shear: the sensor has no channel of kind {', '.join(strange)}")
         return self
 
     @model_validator(mode="after")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactbench.plugin import RigDescriptor, hookimpl
+from tactbench.plugin import IndenterDescriptor, Parameter, RigDescriptor, hookimpl
 from tactbench.plugin.simulation import EffectDescriptor
 
 TACTBENCH_API = 1
@@ -11,6 +11,7 @@ _HERE = "tactbench.rigs.twin"
 _DRIFT, _NOISE = ("drift",), ("noise",)
 _LOAD, _TOLD = ("load",), ("reference-force",)
 _HEAT, _FORCE = "effects.thermal_called_for", "effects.force_called_for"
+_SLIDING = "effects.called_for_sliding"
 
 
 @hookimpl
@@ -38,13 +39,14 @@ def tactbench_effects() -> list[EffectDescriptor]:
         _effect("contact", "Normal contact", "contact.stages:press_skin", ("load", "core"), ("skin",)),
         _effect("core", "Touch-down on the core", "contact.core:with_core", (), ("core",)),
         _effect("fluid-pressure", "Fluid pressure", "contact.stages:watch_fluid", ("skin",), ("dc_pressure", "fluid")),
+        _effect("shear", "Tangential state of the skin", "contact.stages:watch_shear", (), ("shear",), _SLIDING),
         _effect("gain", "Scatter of gains", "effects.gain:apply", (), ("gain",)),
         _effect("creep", "Creep of the skin", "effects.creep:apply", ("load", "skin", "gain"), ("effective-force",)),
         _effect(
             "transduction",
             "Transduction",
             "contact.stages:read_skin",
-            ("skin", "gain", "effective-force", "vibration"),
+            ("skin", "gain", "effective-force", "vibration", "shear", "slip"),
             ("taxel", "reading"),
         ),
         _effect(
@@ -102,16 +104,45 @@ def tactbench_effects() -> list[EffectDescriptor]:
     ]
 
 
+@hookimpl
+def tactbench_indenters() -> list[IndenterDescriptor]:
+    """Offer the usual shapes. A cap and a flat surface stand in a scene as a radius or none."""
+    radius = Parameter(default=10.0, unit="mm", least=0.01, text="radius of its round side")
+    return [
+        _indenter("cap", "Spherical cap", radius=radius),
+        _indenter("flat", "Flat surface that covers the sensor"),
+        _indenter("cylinder", "Cylinder lying along x, longer than the sensor", radius=radius),
+        _indenter(
+            "edge",
+            "Wedge along x with a rounded tip, longer than the sensor",
+            wedge_angle=Parameter(
+                default=120.0, unit="deg", least=30.0, most=179.0,
+                text="between its flanks; below 90 deg the simulated rig does not stand for them",
+            ),
+            tip_radius=Parameter(default=0.5, unit="mm", text="radius of its tip; 0 is sharp"),
+        ),
+        _indenter(
+            "pin",
+            "Upright pin with a flat end",
+            radius=Parameter(default=2.0, unit="mm", least=0.01, text="radius of the pin"),
+            fillet=Parameter(default=0.0, unit="mm", text="radius of its rounded rim, at most that of the pin"),
+        ),
+    ]  # fmt: skip
+
+
+def _indenter(name: str, title: str, **dimensions: Parameter) -> IndenterDescriptor:
+    return IndenterDescriptor(name=name, title=title, where=f"{_HERE}.shapes:{name}", dimensions=dimensions)
+
+
 def _sliding() -> list[EffectDescriptor]:
-    here = "effects.called_for_sliding"
     forces = ("slip", "tangential-force", "reference-force")
     shakes, hears = ("slip", "skin"), ("skin", "fluid", "vibration")
     heard = ("ac_pressure", "reading")
     return [
-        _effect("friction", "Friction", "effects.friction:apply", ("skin",), forces, here),
-        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", shakes, ("vibration",), here),
-        _effect("ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", hears, heard, here),
-        _effect("hum", "Hum of dynamic pressure", "effects.hum:apply", (), ("disturbance",), here, _NOISE),
+        _effect("friction", "Friction", "effects.friction:apply", ("skin",), forces, _SLIDING),
+        _effect("skin-vibration", "Skin vibration", "effects.skin_vibration:apply", shakes, ("vibration",), _SLIDING),
+        _effect("ac-pressure", "Dynamic pressure", "effects.ac_pressure:apply", hears, heard, _SLIDING),
+        _effect("hum", "Hum of dynamic pressure", "effects.hum:apply", (), ("disturbance",), _SLIDING, _NOISE),
     ]
 
 

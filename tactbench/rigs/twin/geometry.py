@@ -13,15 +13,12 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, Indenter, RigError
 from tactbench.plugin.simulation import Dome, SheetTable, SkinGrid, SkinSheet
+from tactbench.rigs.twin.shapes import Shape, sag_mm
 
 STEEPEST = 1.0
 """Largest slope of an indenter, 45 degrees: the gap is taken along the press axis and the deflection along the skin's
 normal, which agree for gentle slopes only."""
-RIM = 0.999
-"""Share of its radius up to which a cap exists: at its rim the flank is vertical, and no height field can touch it."""
 _FEWEST_CELLS = 4
-BEYOND_THE_CAP_MM = 50.0
-"""How far above its radius a cap is put where it does not exist: large, finite, and never touched."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +26,7 @@ class Contact:
     """Where and with what the skin is pressed."""
 
     radius_mm: float
-    """Radius of the cap; infinite for a flat surface."""
+    """Radius of the cap; infinite for a flat surface and for another shape."""
     x_mm: float
     """Apex along the finger, in the sheet's coordinates."""
     s_mm: float
@@ -38,6 +35,8 @@ class Contact:
     """Slope of the indenter along the finger [1]."""
     tilt_s: float = 0.0
     """Slope of the indenter across the finger [1]."""
+    shape: Shape | None = None
+    """What is neither flat nor a cap."""
 
 
 def skin_grid(sheet: SkinSheet, cells: tuple[int, int] | None = None) -> SkinGrid:
@@ -87,7 +86,7 @@ def outer_radius_mm(sheet: SkinSheet) -> float:
 
 
 def radius_mm(indenter: Indenter) -> float:
-    """Return the cap's radius; infinite for a flat surface."""
+    """Return the cap's radius; infinite for a flat surface and for another shape."""
     return math.inf if indenter.radius is None else indenter.radius.to("mm")
 
 
@@ -110,7 +109,8 @@ def gap_mm(
         fall = np.zeros((1, 1))
     else:
         x, y, fall = _around(grid, contact, outer_radius_mm, dome, relief)
-    gap: FloatArray = fall + _sag(x**2 + y**2, contact.radius_mm)
+    own = sag_mm(x**2 + y**2, contact.radius_mm) if contact.shape is None else contact.shape.height_mm(x, y)
+    gap: FloatArray = fall + own
     if contact.tilt_x or contact.tilt_s:
         gap = gap + contact.tilt_x * x + contact.tilt_s * y
         gap = gap - gap.min()
@@ -167,14 +167,6 @@ def _meridian(x_mm: FloatArray, radius: float, dome: Dome | None) -> tuple[Float
     return np.arcsin(np.clip((x_mm - start) / radius, 0.0, 1.0)), np.minimum(x_mm, start + radius)
 
 
-def _sag(r2: FloatArray, radius: float) -> FloatArray:
-    if math.isinf(radius):
-        return np.zeros_like(r2)
-    exists = r2 < (RIM * radius) ** 2
-    inside = np.where(exists, r2, 0.0)
-    return np.where(exists, inside / (radius + np.sqrt(radius**2 - inside)), radius + BEYOND_THE_CAP_MM)
-
-
 def check_contact(grid: SkinGrid, contact: Contact) -> None:
     """Refuse a contact the grid cannot resolve or that misses the skin.
 
@@ -182,8 +174,9 @@ def check_contact(grid: SkinGrid, contact: Contact) -> None:
     ------
     RigError
         If the cap's radius is below a cell, where a contact would live in one cell and follow the mesh and not the
-        physics; if it is tilted by more than 45 degrees; or if its apex is off the sheet, where the periodic sheet
-        would answer for the wrong side.
+        physics; if another shape has risen by more than a cell at a cell from its axis (which says the same of a cap);
+        if it is tilted by more than 45 degrees; or if its apex is off the sheet, where the periodic sheet would answer
+        for the wrong side.
     """
     dx, ds = grid.cell_mm
     if not contact.radius_mm >= max(dx, ds):
@@ -192,6 +185,8 @@ def check_contact(grid: SkinGrid, contact: Contact) -> None:
             "the contact would be one cell wide whatever the load.",
             hint=f"Use a radius of at least {3 * max(dx, ds):.1f} mm, or a sensor spec with more cells.",
         )
+    if contact.shape is not None:
+        _check_resolved(contact.shape, max(dx, ds))
     slope = math.hypot(contact.tilt_x, contact.tilt_s)
     if not slope <= STEEPEST:
         raise RigError(
@@ -205,4 +200,16 @@ def check_contact(grid: SkinGrid, contact: Contact) -> None:
             f"The contact point x = {contact.x_mm:.2f} mm, s = {contact.s_mm:.2f} mm lies outside the skin "
             f"(x from {x_low:.2f} to {x_high:.2f} mm, |s| up to {s_high:.2f} mm).",
             hint="Correct the scene's placement, or contact_x and contact_s among the sensor's parameters.",
+        )
+
+
+def _check_resolved(shape: Shape, cell_mm: float) -> None:
+    around = np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
+    risen = float(shape.height_mm(cell_mm * np.cos(around), cell_mm * np.sin(around)).max())
+    if not risen <= cell_mm * (1 + 1e-9):  # rounding of a flank at exactly 45 degrees
+        sizes = ", ".join(f"{name} {value:g}" for name, value in shape.sizes)
+        raise RigError(
+            f"The indenter {shape.name!r} ({sizes}) rises by {risen:.3g} mm within {cell_mm:.2f} mm, a cell of the "
+            f"skin; up to {cell_mm:.2f} mm, 45 degrees, can be pressed.",
+            hint="Use a blunter or wider one, or a sensor spec with more cells.",
         )

@@ -34,3 +34,24 @@ def compliance_shape(q: FloatArray, poisson: float) -> FloatArray:
     high = (a * (1 - decay2) / 2 - 2 * big * decay) / (a * (1 + decay2) / 2 + (2 * big**2 + c) * decay)
     shape: FloatArray = np.where(small, low, high)
     return shape
+
+
+def shear_shapes(q: FloatArray, poisson: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return how far the layer's surface moves along itself under waves: shapes of ``q = k h``, each over ``G k``.
+
+    - under pressure, along the wave: ``C = [(1-2nu) (3-4nu) (cosh 2q - 1) - 2q²] / 2D``. A wave of pressure
+      ``p cos kx`` moves the surface by ``-C p sin kx / (G k)``: towards the pressed place where C > 0. C is 0.5 - nu
+      for short waves (Boussinesq), ``-q²/2`` for long ones in an incompressible layer: what is squeezed out flows away;
+    - under a traction along the wave: ``(1-nu) [(3-4nu) sinh 2q + 2q] / D``, 1 - nu for short waves;
+    - under a traction along the crests: ``tanh q``, 1 for short waves.
+
+    D is the denominator of :func:`compliance_shape`. For long waves both tractions give ``q``: simple shear.
+    """
+    q = np.asarray(q, dtype=np.float64)
+    a, c = 3 - 4 * poisson, 5 - 12 * poisson + 8 * poisson**2
+    # Numerators and D times e^-2q.
+    decay = np.exp(-2 * q)
+    denominator = a * (1 + decay**2) / 2 + (2 * q**2 + c) * decay
+    squeezed = ((1 - 2 * poisson) * a * np.expm1(-2 * q) ** 2 / 2 - 2 * q**2 * decay) / (2 * denominator)
+    along = (1 - poisson) * (-a * np.expm1(-4 * q) / 2 + 2 * q * decay) / denominator
+    return squeezed, along, np.tanh(q)

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from tactbench.plugin import ChannelSpec, FloatArray, NotApplicable, RigError, Scene, SensorDescriptor, SensorSpec
+from tactbench.plugin import (
+    ChannelSpec,
+    FloatArray,
+    IndenterDescriptor,
+    NotApplicable,
+    RigError,
+    Scene,
+    SensorDescriptor,
+    SensorSpec,
+)
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity, rung
 from tactbench.rigs.twin.geometry import Contact, radius_mm
 from tactbench.rigs.twin.planner import Plan
+from tactbench.rigs.twin.shapes import shape_of
 from tactbench.rigs.twin.stated_numbers import MOST_SAMPLES, check_numbers
 from tactbench.rigs.twin.synthesis import Load, Synthesis, Track
 
@@ -18,13 +29,23 @@ _OWN_CLOCK_FROM = 2.0
 """A stream this many times faster than the sensor's slowest keeps its own clock: it is there to see fast things."""
 
 
-def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidelity: Fidelity = DEFAULT) -> Synthesis:
-    """Return the recording of `scene` before any effect is applied.
+def prepare(
+    sensor: SensorDescriptor,
+    scene: Scene,
+    seed: int,
+    plan: Plan,
+    fidelity: Fidelity = DEFAULT,
+    indenters: Sequence[IndenterDescriptor] = (),
+) -> Synthesis:
+    """Return the recording of `scene` before any effect is applied; `indenters` are the shapes that it may name.
 
     Raises
     ------
     RigError
-        If a number of the scene is none, or its force profile or its clocks cannot be carried out.
+        If a number of the scene is none, its force profile or its clocks cannot be carried out, or its indenter is of
+        no installed shape.
+    UsageError
+        If the shape has no such dimension.
     NotApplicable
         If the sensor declares no skin, or no scenario of the name that the scene's simulation asks for.
     """
@@ -38,7 +59,7 @@ def prepare(sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidel
         t_s=t_s,
         load=load,
         tracks=tuple(_tracks(sensor.spec, scene, plan, t_s, load)),
-        contact=Contact(radius_mm(scene.indenter), 0.0, 0.0),
+        contact=Contact(radius_mm(scene.indenter), 0.0, 0.0, shape=shape_of(scene.indenter, indenters)),
         reference_n=load.at(t_s),
         lent=dict(plan.lent),
         asked=frozenset(entry.effect for entry in plan.entries if entry.asked and entry.included),
@@ -58,10 +79,15 @@ def handled(sensor: SensorDescriptor, scene: Scene) -> SensorDescriptor:
 
 
 def carried_out(
-    sensor: SensorDescriptor, scene: Scene, seed: int, plan: Plan, fidelity: Fidelity = DEFAULT
+    sensor: SensorDescriptor,
+    scene: Scene,
+    seed: int,
+    plan: Plan,
+    fidelity: Fidelity = DEFAULT,
+    indenters: Sequence[IndenterDescriptor] = (),
 ) -> Synthesis:
     """Return the recording of `scene` with every effect of its plan applied; raises what they raise."""
-    run = prepare(sensor, scene, seed, plan, fidelity)
+    run = prepare(sensor, scene, seed, plan, fidelity, indenters)
     for effect in plan.stages:
         run.apply(effect)
     return run
@@ -128,7 +154,7 @@ def _place(run: Synthesis) -> Contact:
     x, s = commanded_x + off_x, commanded_s + off_s
     run.drawn.update(placed_x_mm=float(x), placed_s_mm=float(s))
     tilt_x, tilt_s = (math.tan(tilt.to("rad")) for tilt in (placement.tilt_x, placement.tilt_s))
-    return Contact(run.contact.radius_mm, float(x), float(s), tilt_x, tilt_s)
+    return replace(run.contact, x_mm=float(x), s_mm=float(s), tilt_x=tilt_x, tilt_s=tilt_s)
 
 
 def commanded_place_mm(spec: SensorSpec, scene: Scene) -> tuple[float, float]:

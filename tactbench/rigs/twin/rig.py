@@ -15,6 +15,7 @@ from tactbench.plugin import (
     Block,
     ChannelSpec,
     FloatArray,
+    IndenterDescriptor,
     NotApplicable,
     PlanEntry,
     RigContext,
@@ -32,6 +33,7 @@ from tactbench.rigs.twin.contact_point import contact_point
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
 from tactbench.rigs.twin.planner import Plan, plan_scene
 from tactbench.rigs.twin.preparation import carried_out, commanded_place_mm, handled
+from tactbench.rigs.twin.shapes import shape_of
 from tactbench.rigs.twin.synthesis import Synthesis
 
 ROWS_PER_BLOCK = 1000
@@ -103,11 +105,19 @@ class Twin:
         All installed effects; a plan takes from them what a scene calls for.
     fidelity
         How finely contacts are resolved.
+    indenters
+        All installed shapes of indenters.
     """
 
-    def __init__(self, effects: Sequence[EffectDescriptor], fidelity: Fidelity = DEFAULT) -> None:
+    def __init__(
+        self,
+        effects: Sequence[EffectDescriptor],
+        fidelity: Fidelity = DEFAULT,
+        indenters: Sequence[IndenterDescriptor] = (),
+    ) -> None:
         self.effects = tuple(effects)
         self.fidelity = fidelity
+        self.indenters = tuple(indenters)
 
     def plan(self, sensor: SensorDescriptor, scene: Scene) -> Plan:
         """Return the plan of a scene without carrying it out.
@@ -120,6 +130,7 @@ class Twin:
                 f"{sensor.name} declares no {missing}: it can be recorded or replayed, not simulated.",
                 hint="Declare a skin and a transducer in the sensor's plugin.",
             )
+        shape_of(scene.indenter, self.indenters)  # what no rung could press is refused before anything is made
         return plan_scene(self.effects, scene, handled(sensor, scene).spec)
 
     @contextmanager
@@ -134,18 +145,18 @@ class Twin:
             If the contact cannot be resolved or solved.
         """
         plan = self.plan(sensor, scene)
-        yield _acquisition(carried_out(sensor, scene, seed, plan, self.fidelity), plan)
+        yield _acquisition(carried_out(sensor, scene, seed, plan, self.fidelity, self.indenters), plan)
 
     def explain(self, sensor: SensorDescriptor, scene: Scene, *, rounds: int = 0) -> Sequence[Explained]:
         """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""
         from tactbench.rigs.twin.costing import explained
 
-        return explained(self.effects, handled(sensor, scene), scene, self.plan(sensor, scene), rounds)
+        return explained(self.effects, self.indenters, handled(sensor, scene), scene, self.plan(sensor, scene), rounds)
 
 
 def build(context: RigContext) -> Twin:
-    """Return the twin with the installed effects."""
-    return Twin(context.effects)
+    """Return the twin with the installed effects and indenters."""
+    return Twin(context.effects, indenters=context.indenters)
 
 
 def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
@@ -186,6 +197,7 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         assumptions={
             "contact_x_mm": contact_x,
             "contact_s_mm": contact_s,
+            **_sizes(run),
             **_stated(run.scene, run.sensor.spec),
             **_asked(run.scene),
         },
@@ -193,6 +205,12 @@ def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:
         samples=samples,
         run=run,
     )
+
+
+def _sizes(run: Synthesis) -> dict[str, Scalar]:
+    """Return the dimensions of an indenter that is neither flat nor a cap: a scene may leave them to its shape."""
+    shape = run.contact.shape
+    return {} if shape is None else {f"indenter {name}": size for name, size in shape.sizes}
 
 
 def _along_the_slide(run: Synthesis) -> dict[str, tuple[ChannelSpec, FloatArray]]:

@@ -122,6 +122,8 @@ class Synthesis:
     """(n,) what the force sensor says; starts at the true force."""
     fluid_pressure: bool = False
     """Somebody looks at the pressure of the fluid."""
+    tangential: bool = False
+    """Somebody looks at what the skin does along itself."""
     reference_more: dict[str, tuple[ChannelSpec, FloatArray]] = field(default_factory=dict)
     """Further channels of the force sensor's stream, by name: (n,) on the reference clock."""
     sliding: Callable[[FloatArray], Tangential] | None = None

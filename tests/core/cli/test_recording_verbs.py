@@ -94,6 +94,32 @@ def test_record_a_slide(verbs):
     assert "stick_ratio" in json.dumps(about)
 
 
+def test_record_a_shape_and_a_profile_by_name(verbs):
+    press = "press-hold-release:peak=2,rest=1,rate=20"
+    asked = ("record", "--sensor", "ideal", "--indenter", "cylinder:radius=4,angle=90", "--profile", press)
+    assert "cylinder radius 4 mm, turned by 90 deg" in verbs(*asked, "--out", "line.h5").stdout
+    (about,) = json.loads(verbs("inspect", "line.h5", "--format", "json").stdout)
+    assert about["meta"]["labels"] == {"indenter": "cylinder"}
+    assert about["meta"]["assumptions"]["indenter radius"] == 4.0
+    assert about["meta"]["scene"]["profile"]["kind"] == "path"
+    assert "press-hold-release (peak 2 N" in about["meta"]["scene"]["profile"]["source"]["reference"]
+    for wrong, says in (
+        (("--indenter", "knob"), "Known: cap, cylinder, edge, flat, pin."),
+        (("--indenter", "pin:radius=wide"), "radius of 'pin' is given as 'wide', and a number is expected"),
+        (("--indenter", "pin", "--cap-mm", "5"), "both say what is pressed"),
+        (("--profile", "sine", "--force-n", "5"), "are of the ramp"),
+    ):
+        assert says in verbs("record", "--sensor", "ideal", *wrong, "--out", "no.h5", code=2).stderr
+
+
+def test_what_is_pressed_and_how_is_listed_and_shown(verbs):
+    assert "cylinder  Cylinder lying along x" in verbs("list", "indenters").stdout
+    assert "sine                A force that swings" in verbs("list", "profiles").stdout
+    shown = verbs("show", "edge", "sine", "net-ft").stdout
+    assert "--indenter edge:wedge_angle=120,tip_radius=0.5" in shown
+    assert "by how much, at most the mean" in shown
+
+
 def test_a_rig_that_cannot_record(verbs):
     done = verbs("record", "--sensor", "icub", "--rig", "replay", "--out", "press.h5", code=2)
     assert "cannot record" in done.stderr

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+import yaml
 
 from tactbench.core.conformance.check import CheckOutcome
 from tactbench.core.conformance.run import CheckReport, run_checks, subjects_named
@@ -14,6 +15,16 @@ from tactbench.core.spec.rig_file import DeviceEntry
 from tactbench.devices.emulation.emulated_devices import EmulatedDevices
 from tests.conftest import THIRD_PARTY
 from tests.core.conformance.test_recorded import written
+from tests.rigs.parallel_manipulator.spring import EXAMPLE, example
+
+QUICK = {
+    "sensors__biotac": ...,
+    "force__options__rate_hz": 250.0,
+    "settings__force_loop__rate_hz": 50.0,
+    "settings__touch__settle_s": 0.3,
+    "settings__heights__stand_off_mm": 1.0,
+}
+"""Less to compute than in the example's own press."""
 
 
 def test_a_sound_plugin_ends_with_0_and_says_how_many_checks_ran(verbs):
@@ -29,7 +40,8 @@ def test_a_sound_plugin_ends_with_0_and_says_how_many_checks_ran(verbs):
 def test_by_the_name_of_its_plugin_all_that_it_brings_is_checked(verbs):
     found = json.loads(verbs("check", "wired-tactile", "--format", "json", plugins=("wired",)).stdout)
     assert {(one["kind"], one["name"], one["ok"]) for one in found["checked"]} == {
-        ("rig", "wired-rig", True), ("sensor", "wired-pad", True),
+        ("rig", "wired-rig", True), ("sensor", "wired-pad", True), ("device", "wired-scale", True),
+        ("device", "wired-motor", True),
     }  # fmt: skip
 
 
@@ -70,8 +82,70 @@ def test_reading_a_recording_imports_no_code_of_the_plugin(verbs, tmp_path):
 
 
 def test_nothing_is_opened_without_a_yes(verbs):
-    assert "--yes" in verbs("check", "icub", "--invasive", code=2).stderr
+    asked = verbs("check", "parallel-manipulator", "--invasive", "--rig-file", str(EXAMPLE), code=2)
+    assert "nobody is there" in asked.stderr
+    assert "--yes" in asked.stderr
+    assert asked.stdout == ""
+
+
+def test_an_invasive_check_needs_the_rig_file_of_that_rig(verbs):
+    assert "--rig-file" in verbs("check", "icub", "--invasive", code=2).stderr
     assert "--invasive" in verbs("check", "icub", "--rig-file", __file__, code=2).stderr
+    other = verbs("check", "bench", "--invasive", "--rig-file", str(EXAMPLE), "--yes", code=2)
+    assert "The rig file is for the rig 'parallel-manipulator'" in other.stderr
+
+
+def of_the_press(done):
+    """Return status and text of the checks that press."""
+    (report,) = json.loads(done.stdout)["checked"]
+    return {one["check"]: (one["status"], one["text"]) for one in report["checks"] if "real-rig" in one["check"]}
+
+
+def quick(tmp_path, **changes):
+    """Write a rig file of an emulated press without a manipulator."""
+    path = tmp_path / "rig.yaml"
+    path.write_text(yaml.safe_dump(example(**QUICK, **changes)), encoding="utf-8")
+    return str(path)
+
+
+def test_an_emulated_rig_presses_lets_go_and_retreats(verbs, tmp_path):
+    done = verbs("check", "parallel-manipulator", "--invasive", "--rig-file", quick(tmp_path), "--yes",
+                 "--format", "json")  # fmt: skip
+    assert {status for status, _ in of_the_press(done).values()} == {"passed"}
+    assert len(of_the_press(done)) == 5
+    assert json.loads(done.stdout)["checked"][0]["level"] == "silver"
+
+
+def test_a_press_that_the_guard_ends_fails_and_is_not_repeated(verbs, tmp_path):
+    file = quick(tmp_path, force__faults=["saturated:start_s=8"])
+    done = verbs("check", "parallel-manipulator", "--invasive", "--rig-file", file, "--yes", "--format", "json", code=1)
+    found = of_the_press(done)
+    status, text = found.pop("real-rig-presses")
+    assert status == "failed"
+    assert "force sensor is saturated" in text
+    assert {status for status, _ in found.values()} == {"skipped"}
+
+
+def test_a_hand_at_the_bench_is_not_expected_to_follow(verbs):
+    file = str(EXAMPLE.with_name("bench-emulated.yaml"))
+    done = verbs("check", "bench", "--invasive", "--rig-file", file, "--yes", "--format", "json")
+    found = of_the_press(done)
+    assert found.pop("real-rig-presses") == ("passed", "")
+    assert set(found.values()) == {("skipped", "nothing in it moves by itself: a hand presses")}
+
+
+def test_ctrl_c_stops_what_moves(tmp_path):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(THIRD_PARTY / "flawed")
+        (subject,) = subjects_named(load_registry(), "moving-rig-that-is-interrupted")
+        from flawed_tactile import rig_file
+        from flawed_tactile.moving import STOPPED
+
+        file = tmp_path / "rig.yaml"
+        file.write_text(rig_file("rig", subject.name), encoding="utf-8")
+        with pytest.raises(KeyboardInterrupt):
+            run_checks(subject, modes=("invasive",), rig_file=file)
+    assert STOPPED == ["stopped by hand"]
 
 
 def test_with_a_yes_a_real_line_is_opened_and_read(tmp_path):

@@ -14,10 +14,11 @@ from tactbench.core.plugins.registry import load_registry
 from tests.conftest import THIRD_PARTY
 
 SHELF = THIRD_PARTY / "flawed"
-CAUGHT_BY = runpy.run_path(str(SHELF / "flawed_tactile" / "__init__.py"))["CAUGHT_BY"]
+PACKAGE = runpy.run_path(str(SHELF / "flawed_tactile" / "__init__.py"))
+CAUGHT_BY = PACKAGE["CAUGHT_BY"]
 ROWS = [(kind, name, meant) for kind, flaws in CAUGHT_BY.items() for name, meant in flaws.items()]
-NOT_SHELVED = ("recording", "invasive")
-"""Modes whose checks look at files and lines: test_recorded.py, test_modes.py."""
+NOT_SHELVED = ("recording",)
+"""Modes whose checks look at files: test_recorded.py."""
 
 
 @pytest.fixture(scope="module")
@@ -29,11 +30,26 @@ def registry():
 
 
 @pytest.mark.parametrize(("kind", "name", "meant"), ROWS, ids=[name for _, name, _ in ROWS])
-def test_each_is_caught_by_the_check_that_is_meant_for_it(registry, kind, name, meant):
+def test_each_is_caught_by_the_check_that_is_meant_for_it(registry, tmp_path, kind, name, meant):
     (subject,) = subjects_named(registry, name, (kind,))
-    report = run_checks(subject, isolated=False)
+    rig_file = written_for(tmp_path, kind, name)
+    report = run_checks(subject, modes=modes_with(rig_file), rig_file=rig_file, isolated=False)
     assert [one.check for one in report.failed] == ([] if meant is None else [meant])
     assert all(one.where and one.text for one in report.failed)
+
+
+def written_for(folder, kind, name):
+    """Write the rig file of a plugin of the shelf and return its path; None: it needs none."""
+    text = PACKAGE["rig_file"](kind, name)
+    if text is None:
+        return None
+    path = folder / "rig.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def modes_with(rig_file):
+    return ("passive",) if rig_file is None else ("passive", "invasive")
 
 
 def test_every_check_has_caught_one():

@@ -20,7 +20,7 @@ from tactbench.core.events.labels import (
     stick_ratio,
 )
 from tactbench.core.spec.events import THRESHOLDS, SlipThresholds
-from tactbench.rigs.twin.effects import partial_slip
+from tactbench.rigs.twin import partial_slip
 from tactbench.rigs.twin.effects.slip_event import Mode
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
 from tests.core.events.made import MS, clocks, seconds

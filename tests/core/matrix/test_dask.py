@@ -104,16 +104,16 @@ def cluster(tmp_path_factory):
 def test_an_address_without_a_scheduler_is_refused(monkeypatch):
     monkeypatch.setattr(dask, "CONNECT_S", 1.0)
     with pytest.raises(UsageError, match=r"tcp://127\.0\.0\.1:1\b.*dask scheduler"):
-        EngineChoice("dask", scheduler="tcp://127.0.0.1:1").ready()
+        EngineChoice("dask", scheduler="tcp://127.0.0.1:1").check()
     with pytest.raises(UsageError, match="dask scheduler"):
         list(Dask(1, LIMITS, "tcp://127.0.0.1:1").each(square, [1]))
     with pytest.raises(UsageError, match="tcp://HOST"):
-        EngineChoice("dask", scheduler="nonsense://here").ready()
+        EngineChoice("dask", scheduler="nonsense://here").check()
 
 
 def test_a_scheduler_without_workers_is_refused(cluster, monkeypatch):
     monkeypatch.setattr(dask, "GATHER_S", 0.2)
-    EngineChoice("dask", scheduler=cluster.address).ready()
+    EngineChoice("dask", scheduler=cluster.address).check()
     with pytest.raises(UsageError, match=r"no worker.*dask worker"):
         list(Dask(1, LIMITS, cluster.address).each(square, [1]))
 

@@ -10,18 +10,11 @@ from tactbench.core.pool.pool import Pool
 
 def test_one_cell_in_process_is_really_here():
     assert isinstance(EngineChoice("in-process").engine(1), InProcess)
-    assert EngineChoice("in-process").here(1)
     assert isinstance(EngineChoice("in-process").engine(2), Pool)
     assert isinstance(EngineChoice().engine(1), Pool)
-
-
-def test_a_cell_is_timed_beside_as_many_as_there_are():
-    assert EngineChoice("isolated", jobs=4).concurrency(9) == 4
-    assert EngineChoice("isolated", jobs=4).concurrency(3) == 3
-    assert EngineChoice("in-process").concurrency(9) == 1
 
 
 @pytest.mark.parametrize("choice", [EngineChoice("in-process", jobs=2), EngineChoice(scheduler="tcp://127.0.0.1:1")])
 def test_what_does_not_go_together_is_refused(choice):
     with pytest.raises(UsageError):
-        choice.checked()
+        choice.check()

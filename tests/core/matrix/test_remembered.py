@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.matrix.remembered import FileMemory
+from tactbench.core.matrix.recorded import Recorded
 
 LATER_NS = 10**10
 
@@ -18,7 +18,7 @@ def later():
 
 
 def learnt(path, file, clock=later):
-    memory = FileMemory(path, clock)
+    memory = Recorded(path, clock)
     stat = file.stat()
     memory.learn(stat, file.stat(), {"digest": file.read_text()})
     memory.save()
@@ -34,11 +34,11 @@ def file(tmp_path):
 
 def test_a_file_at_rest_is_remembered(tmp_path, file):
     learnt(tmp_path / "memory", file)
-    assert FileMemory(tmp_path / "memory").facts(file.stat()) == {"digest": "a"}
+    assert Recorded(tmp_path / "memory").facts(file.stat()) == {"digest": "a"}
 
 
 def test_facts_of_a_file_are_learnt_bit_by_bit(tmp_path, file):
-    memory = FileMemory(tmp_path / "memory", later)
+    memory = Recorded(tmp_path / "memory", later)
     memory.learn(file.stat(), file.stat(), {"digest": "a"})
     memory.learn(file.stat(), file.stat(), {"sensor": "s", "scene": None})
     assert memory.facts(file.stat()) == {"digest": "a", "sensor": "s", "scene": None}
@@ -48,7 +48,7 @@ def test_facts_of_a_file_are_learnt_bit_by_bit(tmp_path, file):
     "clock", [time.time_ns, lambda: time.time_ns() - LATER_NS], ids=["young", "clock stepped back"]
 )
 def test_a_young_file_or_one_from_the_future_is_not_remembered(tmp_path, file, clock):
-    memory = FileMemory(tmp_path / "memory", clock)
+    memory = Recorded(tmp_path / "memory", clock)
     file.write_text("b")
     memory.learn(file.stat(), file.stat(), {"digest": "b"})
     assert memory.facts(file.stat()) == {}
@@ -58,9 +58,9 @@ def test_a_disk_that_counts_whole_seconds_needs_longer_rest(tmp_path, file):
     os.utime(file, ns=(0, file.stat().st_mtime_ns // 10**9 * 10**9))
     second_ns = 10**9
     learnt(tmp_path / "memory", file, lambda: file.stat().st_ctime_ns + second_ns)
-    assert FileMemory(tmp_path / "memory").facts(file.stat()) == {}
+    assert Recorded(tmp_path / "memory").facts(file.stat()) == {}
     learnt(tmp_path / "memory", file, lambda: file.stat().st_ctime_ns + 3 * second_ns)
-    assert FileMemory(tmp_path / "memory").facts(file.stat()) == {"digest": "a"}
+    assert Recorded(tmp_path / "memory").facts(file.stat()) == {"digest": "a"}
 
 
 def test_other_bytes_of_the_same_length_with_the_old_time_put_back_are_noticed(tmp_path, file):
@@ -68,7 +68,7 @@ def test_other_bytes_of_the_same_length_with_the_old_time_put_back_are_noticed(t
     file.write_text("b")
     os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
     assert (file.stat().st_size, file.stat().st_mtime_ns) == (stat.st_size, stat.st_mtime_ns)
-    assert FileMemory(tmp_path / "memory").facts(file.stat()) == {}
+    assert Recorded(tmp_path / "memory").facts(file.stat()) == {}
 
 
 def test_another_file_renamed_into_the_place_is_noticed(tmp_path, file):
@@ -77,11 +77,11 @@ def test_another_file_renamed_into_the_place_is_noticed(tmp_path, file):
     other.write_text("b")
     os.utime(other, ns=(stat.st_atime_ns, stat.st_mtime_ns))
     other.replace(file)
-    assert FileMemory(tmp_path / "memory").facts(file.stat()) == {}
+    assert Recorded(tmp_path / "memory").facts(file.stat()) == {}
 
 
 def test_a_file_that_changed_while_it_was_read_is_not_remembered(tmp_path, file):
-    memory = FileMemory(tmp_path / "memory", later)
+    memory = Recorded(tmp_path / "memory", later)
     before = file.stat()
     file.write_text("longer")
     memory.learn(before, file.stat(), {"digest": "a"})
@@ -103,7 +103,7 @@ def test_whatever_happens_and_however_coarse_the_disk_counts_a_fact_is_true(tmp_
     path = tmp_path_factory.getbasetemp() / "coarse"
     path.unlink(missing_ok=True)
     now, changed, content = [1_700_000_000_123_456_789], 1_700_000_000_123_456_789, 0
-    memory = FileMemory(path, lambda: now[0])
+    memory = Recorded(path, lambda: now[0])
     for step in steps:
         if step == "write":
             changed, content = now[0], content + 1
@@ -111,7 +111,7 @@ def test_whatever_happens_and_however_coarse_the_disk_counts_a_fact_is_true(tmp_
             memory.learn(seen(1, changed, tick_ns), seen(1, changed, tick_ns), {"digest": str(content)})
         elif step == "save":
             memory.save()
-            memory = FileMemory(path, lambda: now[0])
+            memory = Recorded(path, lambda: now[0])
         else:
             now[0] += step
         assert memory.facts(seen(1, changed, tick_ns)).get("digest", str(content)) == str(content)
@@ -124,9 +124,9 @@ def test_whatever_happens_and_however_coarse_the_disk_counts_a_fact_is_true(tmp_
 )
 def test_a_memory_that_is_rubbish_is_as_good_as_none(tmp_path, file, content):
     (tmp_path / "memory").write_bytes(content)
-    assert FileMemory(tmp_path / "memory").facts(file.stat()) == {}
+    assert Recorded(tmp_path / "memory").facts(file.stat()) == {}
     learnt(tmp_path / "memory", file)
-    assert FileMemory(tmp_path / "memory").facts(file.stat()) == {"digest": "a"}
+    assert Recorded(tmp_path / "memory").facts(file.stat()) == {"digest": "a"}
 
 
 @pytest.mark.parametrize("entry", [None, 3, [], [1, 2, 3], [1, 2, 3, "text"], [1, 2, 3, {"digest": 4}]])
@@ -138,7 +138,7 @@ def test_an_entry_of_another_shape_is_passed_over(tmp_path, file, entry):
         [stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, {"digest": 4}] if entry == [] else entry
     )
     (tmp_path / "memory").write_text(json.dumps(content))
-    assert FileMemory(tmp_path / "memory").facts(file.stat()) == {}
+    assert Recorded(tmp_path / "memory").facts(file.stat()) == {}
 
 
 def test_what_was_not_asked_for_is_kept(tmp_path, file):
@@ -146,7 +146,7 @@ def test_what_was_not_asked_for_is_kept(tmp_path, file):
     other.write_text("b")
     learnt(tmp_path / "memory", other)
     learnt(tmp_path / "memory", file)
-    memory = FileMemory(tmp_path / "memory")
+    memory = Recorded(tmp_path / "memory")
     assert (memory.facts(file.stat()), memory.facts(other.stat())) == ({"digest": "a"}, {"digest": "b"})
 
 

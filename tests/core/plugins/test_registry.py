@@ -38,7 +38,7 @@ def tactbench_sensors():
     return [sensor("pad")]
 """
 )
-ALL_SIX = (
+EVERYTHING = (
     HEAD
     + """
 @hookimpl
@@ -47,13 +47,13 @@ def tactbench_sensors():
 
 @hookimpl
 def tactbench_rigs():
-    return (RigDescriptor(name="press", title="a press", where="six:build"),)
+    return (RigDescriptor(name="press", title="a press", where="every:build"),)
 
 @hookimpl
 def tactbench_devices():
     return [
-        DeviceDescriptor(name="scale", title="a scale", kind="force", driver="six:build"),
-        DeviceDescriptor(name="pad", title="a motor", kind="motor", driver="six:build"),
+        DeviceDescriptor(name="scale", title="a scale", kind="force", driver="every:build"),
+        DeviceDescriptor(name="pad", title="a motor", kind="motor", driver="every:build"),
     ]
 
 @hookimpl
@@ -62,11 +62,20 @@ def tactbench_tasks():
 
 @hookimpl
 def tactbench_estimators():
-    return [EstimatorDescriptor(name="guess", title="a guess", kinds=("regression",), where="six:build")]
+    return [EstimatorDescriptor(name="guess", title="a guess", kinds=("regression",), where="every:build")]
 
 @hookimpl
 def tactbench_effects():
     return []
+
+@hookimpl
+def tactbench_indenters():
+    size = Parameter(default=1.0, unit="mm", text="its size")
+    return [IndenterDescriptor(name="knob", title="a knob", where="every:build", dimensions={"size": size})]
+
+@hookimpl
+def tactbench_profiles():
+    return [ProfileDescriptor(name="tap", title="a tap", where="every:build")]
 """
 )
 
@@ -111,16 +120,17 @@ def test_there_is_a_hook_for_each_kind_and_no_other():
 
 
 def test_a_plugin_may_bring_every_kind_of_thing(site):
-    registry = site.install("six", ALL_SIX, version="2.1").load()
+    registry = site.install("every", EVERYTHING, version="2.1").load()
     (row,) = registry.plugins
-    assert (row.status, row.reason, row.distribution, row.version) == ("loaded", "", "six", "2.1")
+    assert (row.status, row.reason, row.distribution, row.version) == ("loaded", "", "every", "2.1")
     assert set(row.brings) == {
         "sensor pad", "rig press", "device scale", "device pad", "task push", "estimator guess",
+        "indenter knob", "profile tap",
     }  # fmt: skip
     names = {kind: family.names() for kind, family in registry.families().items()}
     assert names == {
         "sensors": ["pad"], "rigs": ["press"], "devices": ["pad", "scale"], "tasks": ["push"],
-        "estimators": ["guess"], "effects": [],
+        "estimators": ["guess"], "effects": [], "indenters": ["knob"], "profiles": ["tap"],
     }  # fmt: skip
     assert registry.refused == []  # a sensor and a device may share a name
     assert isinstance(registry.devices["scale"], DeviceDescriptor)
@@ -153,7 +163,7 @@ BAD = {
     "returns nothing": (PAD.replace('return [sensor("pad")]', "pass"), "tactbench_sensors of bad returned None"),
     "returns no descriptor": (PAD.replace('return [sensor("pad")]', "return [IDEAL]"), "returned SensorSpec, not Sens"),
     "returns another kind": (
-        ALL_SIX + "\n@hookimpl\ndef tactbench_effects():\n    return tactbench_rigs()",
+        EVERYTHING + "\n@hookimpl\ndef tactbench_effects():\n    return tactbench_rigs()",
         "tactbench_effects of bad returned RigDescriptor, not EffectDescriptor",
     ),
 }
@@ -169,7 +179,7 @@ def test_a_plugin_that_fails_is_a_row_and_the_others_are_loaded(site, code):
     assert failed.reason
     assert re.search(reason, failed.reason), failed.reason
     # Nothing of a plugin is used unless all of it is right.
-    assert [len(family.names()) for family in registry.families().values()] == [1, 0, 0, 0, 0, 0]
+    assert [len(family.names()) for family in registry.families().values()] == [1, 0, 0, 0, 0, 0, 0, 0]
 
 
 ENDS = {
@@ -213,7 +223,7 @@ def test_a_descriptor_from_a_child_process_is_the_one_that_the_plugin_gave(site)
     code += """
 @hookimpl
 def tactbench_estimators():
-    return [EstimatorDescriptor(name="guess", title="a guess", kinds=("regression",), where="six:build",
+    return [EstimatorDescriptor(name="guess", title="a guess", kinds=("regression",), where="every:build",
                                 params={"a": 1, "b": (1.5, float("inf")), "c": None, "d": "x"}, grid={"a": (1, 2.5)})]
 """
     registry = site.install("pad-maker", code).load()
@@ -240,9 +250,9 @@ def test_a_name_given_twice_is_refused_naming_both_and_the_rest_is_used(site):
 
 
 def test_a_device_named_twice_is_refused_as_well(site):
-    scales = ALL_SIX.replace('"pad", title="a motor", kind="motor"', '"scale", title="another", kind="force"')
-    (refused,) = site.install("six", scales).load().refused
-    assert "device 'scale' is defined by six (six) and six (six)" in str(refused)
+    scales = EVERYTHING.replace('"pad", title="a motor", kind="motor"', '"scale", title="another", kind="force"')
+    (refused,) = site.install("every", scales).load().refused
+    assert "device 'scale' is defined by every (every) and every (every)" in str(refused)
 
 
 def test_an_entry_point_found_twice_counts_once(site):
@@ -260,7 +270,7 @@ def test_rows_stand_in_the_order_of_entry_points(site):
 
 
 def test_an_unknown_name_comes_with_those_that_are_known(site):
-    registry = site.install("six", ALL_SIX).load()
+    registry = site.install("every", EVERYTHING).load()
     with pytest.raises(UnknownNameError, match="no device called 'scael'") as error:
         registry.devices["scael"]
     assert error.value.hint == "Did you mean 'scale'? Known: pad, scale."

@@ -5,14 +5,17 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import pytest
 
 from tactbench.core.errors import Crashed, NotApplicable, OutOfMemory, Raised, TimedOut
 from tactbench.core.pool.in_process import InProcess
 from tactbench.core.pool.limits import Limits
-from tactbench.core.pool.pool import Pool
+from tactbench.core.pool.pool import Pool as EitherPool
 from tests.core.pool.works import work
+
+Pool = partial(EitherPool, fork=True)  # the clock of a test's timeout is a thread
 
 LIMITS = Limits(timeout_s=1.0, memory_mb=64)
 PATIENT = Limits(timeout_s=60.0, memory_mb=64)

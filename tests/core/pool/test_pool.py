@@ -6,15 +6,15 @@ import stat
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from tactbench.core.errors import Crashed, OutOfMemory, TimedOut
-from tactbench.core.evaluation.libraries import EVERY_CELL
 from tactbench.core.pool import processes
 from tactbench.core.pool.limits import Limits
-from tactbench.core.pool.pool import Pool
+from tactbench.core.pool.pool import Pool as EitherPool
 from tests.core.pool.patience import ending, gone, pause, until
 from tests.core.pool.remote_work import misbehave, square
 from tests.core.pool.works import flees, leaves, work
@@ -37,9 +37,9 @@ def pool(request):
 def nobody_and_nothing_left():
     """Whatever a test does: no process and no descriptor stays."""
     open_ones = Path("/proc/self/fd")
-    children, descriptors = processes.own_children(), len(list(open_ones.iterdir()))
+    children, descriptors = processes.children(os.getpid()), len(list(open_ones.iterdir()))
     yield
-    assert processes.own_children() == children
+    assert processes.children(os.getpid()) == children
     assert len(list(open_ones.iterdir())) <= descriptors
 
 
@@ -51,7 +51,7 @@ def test_an_item_is_taken_once_the_last_outcome_was_dealt_with():
 
 
 def test_nobody_is_beside_an_item_that_is_the_only_one_at_work():
-    strangers = processes.own_children()
+    strangers = processes.children(os.getpid())
 
     def alone(item):
         children = Path(f"/proc/{os.getppid()}/task/{os.getppid()}/children").read_text().split()
@@ -241,7 +241,7 @@ def test_children_that_the_system_would_reap_by_itself_are_heard():
 
 def served(jobs, limits=LIMITS):
     """A pool of a process that has threads."""
-    return Pool(jobs, limits, preload=EVERY_CELL)
+    return EitherPool(jobs, limits, fork=False)
 
 
 @pytest.fixture(scope="module")
@@ -282,9 +282,11 @@ class TestForkServer:
 
 def test_an_item_that_kills_the_fork_server_has_crashed_and_the_others_are_right():
     code = (
+        "from multiprocessing import forkserver\n"
         "from tests.core.pool.remote_work import misbehave\n"
         "from tactbench.core.pool.pool import Pool\n"
-        "for item, outcome in Pool(1, preload=()).each(misbehave, ['fine', 'kill-parent', 'fine']):\n"
+        "forkserver.ensure_running()\n"  # with nothing imported beforehand
+        "for item, outcome in Pool(1, fork=False).each(misbehave, ['fine', 'kill-parent', 'fine']):\n"
         "    print(type(outcome).__name__)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
@@ -310,13 +312,17 @@ def test_the_end_of_a_fork_server_is_waited_for():
 
 OWNER = """
 import sys
+from multiprocessing import forkserver
 from pathlib import Path
 from tactbench.core.pool.pool import Pool
 from tests.core.pool.remote_work import wait_for
-preload = () if sys.argv[2] == "served" else None
-for _ in Pool(1, preload=preload).each(wait_for, [(Path(sys.argv[1]), Path("/no/such/file"))]):
+if sys.argv[2] == "served":
+    forkserver.ensure_running()  # with nothing imported beforehand
+for _ in Pool(1, fork=sys.argv[2] == "forked").each(wait_for, [(Path(sys.argv[1]), Path("/no/such/file"))]):
     pass
 """
+
+Pool = partial(EitherPool, fork=True)  # the clock of a test's timeout is a thread
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])

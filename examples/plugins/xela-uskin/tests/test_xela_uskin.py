@@ -6,6 +6,7 @@ from tactbench.plugin import Quality
 from tactbench.plugin.devices import CanFrame, DriverSettings, EmulatedDevice, EmulatedDevices, EmulatorSettings
 from tactbench.testing import sensor_checks
 
+from tactbench_xela_uskin import REST
 from tactbench_xela_uskin.driver import Emulator, USkinDriver, decode, encode
 
 VECTORS = [
@@ -52,6 +53,6 @@ def test_a_taxel_that_is_not_heard_is_missing():
     ):
         driver.start()
         (block,) = driver.read(0.5)
-    np.testing.assert_array_equal(block.data[0, :3], [0, 0, 300])
+    np.testing.assert_array_equal(block.data[0, :3], [REST, REST, 300])
     assert np.flatnonzero(block.quality[0]).tolist() == [12, 13, 14]
     assert set(block.quality[0, 12:15]) == {Quality.MISSING}

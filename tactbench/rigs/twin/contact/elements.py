@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import BondedLayer, SkinState
 from tactbench.rigs.twin.boundary_elements.contact import press
@@ -9,6 +11,7 @@ from tactbench.rigs.twin.boundary_elements.kernels import Layer
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import Coreless, at_rest
 from tactbench.rigs.twin.geometry import Contact
+from tactbench.rigs.twin.shapes import BEYOND_MM
 
 
 class ElementsPress(Coreless):
@@ -30,7 +33,8 @@ class ElementsPress(Coreless):
         self.medium = medium
         self.contact = contact
         self.solves = 0
-        self._gap = gap_mm
+        # A flank of another shape than a cap is no surface: its height would be a mean with that of its neighbours.
+        self._gap = gap_mm if contact.shape is None else np.where(gap_mm < BEYOND_MM, gap_mm, np.inf)
         self._least_gap = float(gap_mm.min())
         self._layer = Layer(skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm"))
 

@@ -36,8 +36,8 @@ def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
     if tolerance is None:
         return
     # The place of a recording's contact scatters by a tenth of a millimetre: that changes no rung's error much.
-    spec, radius = run.sensor.model_dump_json(), run.contact.radius_mm
-    text = f"{spec}|{radius}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}"
+    spec, body = run.sensor.model_dump_json(), (run.contact.radius_mm, run.contact.shape)
+    text = f"{spec}|{body}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}"
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key not in _CHOSEN:
         if len(_CHOSEN) >= _MOST_KEPT:

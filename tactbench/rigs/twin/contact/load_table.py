@@ -127,14 +127,15 @@ class _Builder:
 
     def interpolant(self, touch_down: tuple[float, float] | None, without: float | None = None) -> Interpolant:
         loads = [load for load in sorted(self.nodes) if load != without]
-        return _through(loads, [self.nodes[load][1] for load in loads], touch_down)
+        return through(loads, [self.nodes[load][1] for load in loads], touch_down)
 
     def curves(self, touch_down: tuple[float, float] | None) -> Interpolant:
         loads = sorted(self.nodes)
-        return _through(loads, [_scalars(self.nodes[load][0]) for load in loads], touch_down)
+        return through(loads, [_scalars(self.nodes[load][0]) for load in loads], touch_down)
 
 
-def _through(loads: list[float], values: list[FloatArray], touch_down: tuple[float, float] | None) -> Interpolant:
+def through(loads: list[float], values: list[FloatArray], touch_down: tuple[float, float] | None) -> Interpolant:
+    """Return what runs through (channels,) `values` at `loads`, with breaks where the core is touched."""
     if touch_down is None:
         return Interpolant(np.array(loads), np.stack(values))
     breaks = [loads.index(load) for load in touch_down]

@@ -45,7 +45,14 @@ def reader_of(run: Synthesis, names: list[str], fidelity: Fidelity) -> Read:
     skin = _skin(run)
     if not names:
         return no_channels
-    return _reader(run.sensor, skin_grid(skin.sheet, fidelity.cells(skin.sheet)), names, fidelity)
+    grid = skin_grid(skin.sheet, fidelity.cells(skin.sheet))
+    read = _reader(run.sensor, grid, names, fidelity)
+    if not (run.tangential or run.sensor.spec.reads_shear):
+        return read
+    from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
+
+    along = tangential_of(skin, grid) if run.tangential else None
+    return lambda state: read(state if state.shear_mpa is not None else pressed_state(state, along))
 
 
 def _skin(run: Synthesis) -> Skin:

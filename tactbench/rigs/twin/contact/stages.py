@@ -7,6 +7,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import check_contact, outer_radius_mm, pad_of, skin_grid
 from tactbench.rigs.twin.synthesis import Settled, Synthesis
 
+if TYPE_CHECKING:
+    from tactbench.rigs.twin.contact.slide_table import SlideTable
+
 READ_FROM_THE_SKIN = ("taxel", "dc_pressure")
 """Kinds of channels a sensor's transducer answers for."""
 _MOST_TABLES = 64
@@ -26,6 +30,7 @@ _MOST_TABLES = 64
 @dataclass(frozen=True)
 class _Tabulated:
     table: LoadTable
+    slide: SlideTable | None
     touched_core: bool
     closing_mm: float
     film_mm: float
@@ -53,13 +58,19 @@ def watch_fluid(run: Synthesis) -> None:
     run.fluid_pressure = True
 
 
+def watch_shear(run: Synthesis) -> None:
+    """Ask for what the skin does along itself with every solved load."""
+    run.tangential = True
+
+
 def read_skin(run: Synthesis) -> None:
     """Add each channel's response: gain times its reading under the effective force, less its reading at rest.
 
-    A vibration of the skin adds its size times the reading's slope with depth at that force.
+    A slide adds what its tangential force changes in a reading at that normal force, a vibration of the skin its size
+    times the reading's slope with depth there.
     """
-    table = skin_under_load(run)
-    names = read_names(run)
+    tabulated, names = _tables(run), read_names(run)
+    table, slide = tabulated.table, tabulated.slide
     for track in run.tracks:
         for kind, own in track.by_kind().items():
             if kind not in READ_FROM_THE_SKIN:
@@ -67,6 +78,9 @@ def read_skin(run: Synthesis) -> None:
             among = [names.index(track.channels[column].name) for column in own]
             force_n = track.effective_n.get(kind, track.force_n)
             response = table(force_n)[:, among] - table.readings[0, among]
+            if slide is not None and run.sliding is not None:
+                seen = run.sliding(track.t_s)
+                response += slide(force_n, track.force_n, seen.force_n, seen.stick_ratio)[:, among]
             if track.vibration_mm is not None:
                 response += track.vibration_mm[:, None] * table.per_mm(table, force_n)[:, among]
             if track.gain is not None:
@@ -79,12 +93,29 @@ def skin_under_load(run: Synthesis) -> LoadTable:
 
     Whether the fluid's pressure belongs to it must be settled before it is first asked for.
     """
+    return _tables(run).table
+
+
+def _tables(run: Synthesis) -> _Tabulated:
     largest, names = run.load.largest_n, read_names(run)
     if run.scene.simulation.tolerance is not None and run.rung_error is None:
         choose_rung(run, names, largest)
     tabulated = _tabulated(run, names, largest)
     _report(run, tabulated)
-    return tabulated.table
+    return tabulated
+
+
+def round_contact_mm(run: Synthesis, force_n: FloatArray) -> FloatArray:
+    """Return the radius of the contact under (n,) forces, for laws of a round contact.
+
+    Of a contact that is not round it is that of a circle whose load is as far from its middle; the recording says so.
+    """
+    if run.contact.shape is not None:
+        run.drawn["remark round"] = (
+            f"friction, heat and roughness take the contact of the {run.contact.shape.name} for a circle whose load is "
+            "as far from its middle"
+        )
+    return skin_under_load(run).skin(force_n).contact_radius_mm
 
 
 def bare_skin(run: Synthesis, largest_n: float) -> LoadTable:
@@ -104,6 +135,7 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     spec, asked = run.sensor.model_dump_json(), run.scene.simulation.tolerance
     text = (
         f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{asked}|{only_skin}"
+        f"|{run.tangential}|{_slide(run)}"
     )
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
@@ -138,18 +170,34 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
         most_nodes=fidelity.most_nodes,
         clock=run.clock,
     )
+    slide, skin = _slide(run), run.sensor.spec.skin
+    began = run.clock()
+    sliding = None
+    if names and skin is not None and slide is not None:
+        from tactbench.rigs.twin.contact.slide_table import build_slide_table
+
+        sliding = build_slide_table(press, read, table, skin, *slide)
+    slide_s = run.clock() - began
     medium = press.medium
     closing = press.closing_at(largest) if medium.has_core else 0.0
     film = float(medium.rest_thickness_mm.min()) - medium.least_thickness_mm
-    skin = run.sensor.spec.skin
     sheet = None if skin is None else skin.sheet
     outer_mm = math.inf if sheet is None else outer_radius_mm(sheet)
     if within_reach:
         check_reach(press, largest, outer_mm)
     pad = None if sheet is None else pad_of(sheet, medium.grid)
     said = remarks(press, table.loads_n.tolist(), outer_mm, pad)
-    tabulated = _Tabulated(table, press.touched_core, closing, film, said)
-    return tabulated, prepared_s + table.read_s if names else 0.0
+    tabulated = _Tabulated(table, sliding, press.touched_core, closing, film, said)
+    return tabulated, prepared_s + table.read_s + slide_s if names else 0.0
+
+
+def _slide(run: Synthesis) -> tuple[tuple[float, float], float] | None:
+    """Return a slide's direction and static friction; None if nothing slides or nobody looks along the skin."""
+    slide = run.scene.slide
+    if slide is None or not run.tangential or not run.load.largest_n > 0:
+        return None
+    angle = slide.direction.to("rad")
+    return (math.cos(angle), math.sin(angle)), slide.surface.static_friction.to("1")
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])

@@ -14,7 +14,8 @@ import numpy.typing as npt
 from tactbench.plugin import FloatArray, RigError, Scalar
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress
-from tactbench.rigs.twin.geometry import RIM, STEEPEST
+from tactbench.rigs.twin.geometry import STEEPEST
+from tactbench.rigs.twin.shapes import RIM
 
 RESOLVED_CELLS = 3.0
 """Contact radius, in cells, from which a contact follows the physics and not the mesh. Measured on the ideal grid
@@ -64,35 +65,42 @@ def remarks(
     Returns
     -------
     dict
-        ``contact_radius_cells``: radius of the contact in cells, from its area; ``resolved_above_n``: the least of
-        `loads_n` at which it is at least :data:`RESOLVED_CELLS`; and one sentence under each ``remark …`` that applies.
+        ``contact_radius_cells``: radius of the contact in cells, from its area, or half its width where the indenter
+        is neither a cap nor flat; ``resolved_above_n``: the least of `loads_n` at which it is at least
+        :data:`RESOLVED_CELLS`; and one sentence under each ``remark …`` that applies.
     """
     loads = sorted(load for load in loads_n if load > 0)
     if not loads:
         return {}
     force = loads[-1]
     pressure = press(force).pressure_mpa
-    found: dict[str, Scalar] = {"contact_radius_cells": _radius_cells(pressure)}
+    shape = press.contact.shape
+    cells = _radius_cells if shape is None else _narrow_cells
+    found: dict[str, Scalar] = {"contact_radius_cells": cells(pressure)}
     for load in loads:
-        if _radius_cells(press(load).pressure_mpa) >= RESOLVED_CELLS:
+        if cells(press(load).pressure_mpa) >= RESOLVED_CELLS:
             found["resolved_above_n"] = load
             break
     else:
         found["remark contact"] = (
-            f"the contact is {_radius_cells(pressure):.1f} cells in radius at {force:g} N; below {RESOLVED_CELLS:g} "
+            f"the contact is {cells(pressure):.1f} cells in radius at {force:g} N; below {RESOLVED_CELLS:g} "
             "it follows the mesh"
         )
     if force > HELD_AGAINST_N:
         found["remark load"] = f"{force:g} N is beyond the {HELD_AGAINST_N:g} N the model has been held against"
     found |= _too_deep(press.medium, press(force).deflection_mm)
     radius, reach = press.contact.radius_mm, float(_from_apex_mm(press, outer_radius_mm)[pressure > 0].max())
-    if reach >= radius * math.sin(math.atan(STEEPEST)):
+    if shape is not None:
+        steepest = _steepest(press, outer_radius_mm, pressure > 0)
+        if steepest > STEEPEST * (1 + 1e-6):  # a flank of 45 degrees, by differences
+            found["remark flank"] = f"the {shape.name} touches where its flank has a slope of {steepest:.2g}"
+    elif reach >= radius * math.sin(math.atan(STEEPEST)):
         found["remark flank"] = (
             f"the contact reaches {reach:.2g} mm from the axis of a cap of radius {radius:g} mm, where its flank is "
             "steeper than 45 degrees"
         )
     share = float(pressure[~_active(pressure.shape, pad)].sum() / pressure.sum())
-    if math.isfinite(radius) and share > AT_THE_EDGE:
+    if (math.isfinite(radius) or shape is not None) and share > AT_THE_EDGE:
         found["remark edge"] = f"{100 * share:.0f} % of the load stands on the margin, outside the active skin"
     return found
 
@@ -101,13 +109,34 @@ def _radius_cells(pressure: FloatArray) -> float:
     return math.sqrt(np.count_nonzero(pressure) / math.pi)
 
 
-def _from_apex_mm(press: AnyPress, outer_radius_mm: float) -> FloatArray:
-    """Return the (nx, ns) distance from the cap's axis."""
+def _narrow_cells(pressure: FloatArray) -> float:
+    """Return the shorter half-axis of the ellipse whose cells scatter as those that are touched do, in cells."""
+    places = np.argwhere(pressure > 0)
+    scatter = np.atleast_2d(np.cov(places.T, bias=True)) + np.eye(2) / 12  # a cell is a square
+    return 2.0 * math.sqrt(float(np.linalg.eigvalsh(scatter)[0]))
+
+
+def _from_axis_mm(press: AnyPress, outer_radius_mm: float) -> tuple[FloatArray, FloatArray]:
+    """Return the (nx, 1) and (1, ns) distances from the indenter's axis, along and across."""
     grid, contact = press.medium.grid, press.contact
     across = grid.s_mm - contact.s_mm
     if math.isfinite(outer_radius_mm):
         across = outer_radius_mm * np.sin(across / outer_radius_mm)
-    return np.hypot(grid.x_mm[:, None] - contact.x_mm, across[None, :])
+    return grid.x_mm[:, None] - contact.x_mm, across[None, :]
+
+
+def _from_apex_mm(press: AnyPress, outer_radius_mm: float) -> FloatArray:
+    """Return the (nx, ns) distance from the indenter's axis."""
+    return np.hypot(*_from_axis_mm(press, outer_radius_mm))
+
+
+def _steepest(press: AnyPress, outer_radius_mm: float, touched: npt.NDArray[np.bool_]) -> float:
+    """Return the largest slope of the indenter's shape where it is touched."""
+    shape = press.contact.shape
+    if shape is None:
+        return 0.0
+    along, across = np.broadcast_arrays(*_from_axis_mm(press, outer_radius_mm))
+    return float(shape.slope(along[touched], across[touched]).max())
 
 
 def _active(shape: tuple[int, ...], pad: npt.NDArray[np.bool_] | None) -> npt.NDArray[np.bool_]:

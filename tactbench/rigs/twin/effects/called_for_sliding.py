@@ -1,4 +1,4 @@
-"""Whether a scene calls for friction, vibration and dynamic pressure: predicates without numerics."""
+"""Whether a scene calls for friction, shear, vibration and dynamic pressure: predicates without numerics."""
 
 from __future__ import annotations
 
@@ -33,6 +33,19 @@ def friction(scene: Scene, sensor: SensorSpec) -> Reason:
     return found._replace(
         text=f"{found.text}; friction {surface.static_friction.to('1'):g} to {surface.kinetic_friction.to('1'):g}"
     )
+
+
+def shear(scene: Scene, sensor: SensorSpec) -> Reason:
+    """Answer whether an observed channel looks at what the skin does along itself."""
+    if sensor.skin is None:
+        return Reason(False, f"{sensor.name} declares no skin", 0.0)
+    if not scene.profile.largest_n > 0:
+        return Reason(False, "the scene has no load: 0 N throughout", 0.0)
+    looking = [kind for kind in sensor.reads_shear if kind in scene.observe]
+    if not looking:
+        return Reason(False, "no observed channel looks along the skin", 0.0)
+    slides = "; the slide drags it" if _slides(scene, sensor).called_for else ""
+    return Reason(True, f"{' and '.join(looking)} look at how a press moves the skin along itself{slides}")
 
 
 def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactbench.rigs.twin.contact.stages import skin_under_load
+from tactbench.rigs.twin.contact.stages import round_contact_mm
 from tactbench.rigs.twin.effects.heated_core import HeatedCore, disc_conductance_w_per_k
 from tactbench.rigs.twin.synthesis import Synthesis
 
@@ -14,8 +14,6 @@ def apply(run: Synthesis) -> None:
     conductivity = run.sensor.spec.parameters.get("contact_conductivity")
     if core is None or indenter is None or conductivity is None:
         return
-    table = skin_under_load(run)
     for track in run.tracks:
-        radius = table.skin(track.force_n).contact_radius_mm
-        conductance = disc_conductance_w_per_k(radius, conductivity.to("W/m/K"))
+        conductance = disc_conductance_w_per_k(round_contact_mm(run, track.force_n), conductivity.to("W/m/K"))
         track.warmth_k = core.warmth(run.scene, track.t_s, conductance, indenter.to("degC"))

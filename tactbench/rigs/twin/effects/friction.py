@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from tactbench.plugin import ChannelSpec, Quantity, SensorSpec, assumed, derived
-from tactbench.rigs.twin.contact.stages import skin_under_load
-from tactbench.rigs.twin.effects.partial_slip import shear_modulus_mpa, sliding_stiffness
+from tactbench.rigs.twin.contact.stages import round_contact_mm
 from tactbench.rigs.twin.effects.slip_event import Mode
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
+from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffness
 from tactbench.rigs.twin.synthesis import Synthesis
 
 GRID_HZ = 500.0
@@ -44,7 +44,7 @@ def apply(run: Synthesis) -> None:
     duration = run.scene.profile.duration.to("s")
     grid = np.linspace(0.0, duration, max(2, math.ceil(duration * GRID_HZ) + 1))
     load = run.load.at(grid)
-    radius = skin_under_load(run).skin(load).contact_radius_mm
+    radius = round_contact_mm(run, load)
     start = slide.start.to("s")
     drive = Drive(
         speed_mm_s=slide.speed.to("mm/s"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactbench.plugin import FloatArray, Quantity, assumed
-from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, skin_under_load
+from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, round_contact_mm, skin_under_load
 from tactbench.rigs.twin.effects.friction import mode_of
 from tactbench.rigs.twin.effects.roughness import Profile
 from tactbench.rigs.twin.effects.skin_mode import shaken
@@ -33,7 +33,7 @@ def apply(run: Synthesis) -> None:
     profile, table = Profile(slide.surface, run.of_recording("roughness")), skin_under_load(run)
 
     def rough(t_s: FloatArray, force_n: FloatArray, slip_mm: FloatArray) -> FloatArray:
-        radius = table.skin(force_n).contact_radius_mm
+        radius = round_contact_mm(run, force_n)
         risen = profile.felt_mm(slip_mm, radius) - profile.felt_mm(np.zeros(slip_mm.size), radius)
         return shaken(t_s, np.where(force_n > 0, risen, 0.0), mode)
 

@@ -22,8 +22,8 @@ import numpy.typing as npt
 
 from tactbench.plugin import FloatArray
 from tactbench.rigs.twin.effects.bristle import COULOMB_MM_S, NOTHING_MM, bristle_below, coefficient
-from tactbench.rigs.twin.effects.partial_slip import share_of_force, stick_ratio
 from tactbench.rigs.twin.effects.slip_event import Mode, deflection_after, is_caught, slip_s, swing
+from tactbench.rigs.twin.partial_slip import share_of_force, stick_ratio
 from tactbench.rigs.twin.synthesis import Tangential
 
 REST, STICK, SLIP, SLIDE, HELD = range(5)

@@ -11,6 +11,7 @@ import numpy as np
 
 from tactbench.plugin import FloatArray, PlanEntry, RigContext, Scene, SensorDescriptor, TactbenchError, load_registry
 from tactbench.plugin.simulation import Check, Verdict
+from tactbench.rigs.twin.fidelity import DEFAULT
 from tactbench.rigs.twin.preparation import carried_out
 from tactbench.rigs.twin.rig import Twin, build
 
@@ -21,7 +22,7 @@ _LAST = "converter"
 def checks() -> Sequence[Check]:
     """Return one check for every installed sensor and task whose scenes the twin can carry out."""
     registry = load_registry()
-    twin = build(RigContext(effects=tuple(registry.effects)))
+    twin = build(RigContext(effects=tuple(registry.effects), indenters=tuple(registry.indenters)))
     assert isinstance(twin, Twin)
     found = []
     for sensor in registry.sensors:
@@ -81,7 +82,7 @@ def _verdicts(twin: Twin, sensor: SensorDescriptor, scenes: Sequence[Scene]) -> 
 def _readings(twin: Twin, sensor: SensorDescriptor, scene: Scene) -> tuple[list[FloatArray], float]:
     plan = twin.plan(sensor, scene)
     stages = tuple(effect for effect in plan.stages if effect.name != _LAST)
-    run = carried_out(sensor, scene, 1, replace(plan, stages=stages))
+    run = carried_out(sensor, scene, 1, replace(plan, stages=stages), DEFAULT, twin.indenters)
     entries = plan.settled(run.settled)
     return [track.readings for track in run.tracks], sum(_bound(entry) for entry in entries)
 

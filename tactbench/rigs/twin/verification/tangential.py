@@ -10,10 +10,10 @@ import numpy as np
 from tactbench.plugin import FloatArray
 from tactbench.plugin.simulation import Check, Verdict
 from tactbench.rigs.twin.effects.bristle import bristle, coefficient
-from tactbench.rigs.twin.effects.partial_slip import share_of_force, sliding_stiffness, stick_ratio
 from tactbench.rigs.twin.effects.skin_mode import shaken
 from tactbench.rigs.twin.effects.slip_event import Mode, slip_s, swing
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
+from tactbench.rigs.twin.partial_slip import share_of_force, sliding_stiffness, stick_ratio
 
 ROUNDING = 1e-9
 """Closed forms against closed forms: what a few hundred operations round."""

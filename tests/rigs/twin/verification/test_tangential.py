@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from tactbench.rigs.twin.effects import partial_slip, slip_event
+from tactbench.rigs.twin import partial_slip
+from tactbench.rigs.twin.effects import slip_event
 from tactbench.rigs.twin.verification import tangential
 
 CHECKS = {check.name: check for check in tangential.checks()}

@@ -1,4 +1,20 @@
-"""Plugins with one flaw each, named after it; ``sound-…`` have none. `CAUGHT_BY`: the check that is meant for each."""
+"""Plugins with one flaw each, named after it; ``sound-…`` have none.
+
+`CAUGHT_BY`: the check that is meant for each. `rig_file`: those with one are checked with ``--invasive`` as well.
+"""
+
+
+def rig_file(kind, name):
+    """Return the text of the rig file with which a plugin is checked; None: it needs none."""
+    if kind == "rig" and "moving-rig" in name:
+        return f"version: 1\nrig: {name}\nsensors:\n  sound-pad: {{link: 'loop://'}}\n"
+    if name == "scale-is-not-at-that-address":
+        force = f"force: {{device: {name}, link: 'loop://'}}"
+        return f"version: 1\nrig: bench\nsensors:\n  sound-pad: {{link: 'loop://'}}\n{force}\n"
+    if name == "is-not-at-that-address":
+        return f"version: 1\nrig: bench\nsensors:\n  {name}: {{link: 'loop://'}}\n"
+    return None
+
 
 CAUGHT_BY = {
     "sensor": {
@@ -44,6 +60,9 @@ CAUGHT_BY = {
         "transducer-mirrors": "response-is-where-it-is-pressed",
         "transducer-turns-the-sign": "sign-is-as-stated",
         "transducer-falls-back": "more-load-more-response",
+        "transducer-reads-shear": None,
+        "transducer-folds-shear": "shear-turns-with-its-direction",
+        "transducer-forgets-shear": "shear-turns-with-its-direction",
         "transducer-is-in-grams": "gentle-press-is-within-range",
         "driver-opens-two-lines": "driver-opens",
         "driver-is-a-number": "driver-says-who-it-is",
@@ -55,6 +74,7 @@ CAUGHT_BY = {
         "driver-leaves-its-line-open": "driver-closes-its-line",
         "driver-hides-the-unplugging": "driver-reports-unplug",
         "driver-takes-any-option": "driver-refuses-unknown-options",
+        "is-not-at-that-address": "real-device-answers",
     },
     "rig": {
         "sound-rig": None,
@@ -76,6 +96,35 @@ CAUGHT_BY = {
         "rig-that-changes-the-scene": "scene-is-not-changed",
         "rig-without-reasons": "plan-says-why",
         "rig-that-gives-fractions": "press-is-recorded",
+        "sound-moving-rig": None,
+        "moving-rig-that-breaks-off": "real-rig-presses",
+        "moving-rig-that-pulls": "real-rig-follows-the-profile",
+        "moving-rig-that-overshoots": "real-rig-does-not-overshoot",
+        "moving-rig-that-stays-pressed": "real-rig-lets-go",
+        "moving-rig-that-does-not-stop": "real-rig-retreats-when-stopped",
+    },
+    "device": {
+        "sound-scale": None,
+        "sound-stage": None,
+        "scale-opens-two-lines": "driver-opens",
+        "scale-is-a-number": "driver-says-who-it-is",
+        "scale-goes-back-in-time": "driver-reads",
+        "scale-doubles-samples": "driver-keeps-its-rate",
+        "scale-waits-anyhow": "driver-does-not-wait-when-told-so",
+        "scale-leaves-its-line-open": "driver-closes-its-line",
+        "scale-hides-the-unplugging": "driver-reports-unplug",
+        "scale-takes-any-option": "driver-refuses-unknown-options",
+        "scale-shows-no-force": "force-is-in-newtons",
+        "scale-is-in-millinewtons": "force-is-in-newtons",
+        "scale-is-in-grams": "force-is-what-is-sensed",
+        "scale-turns-the-sign": "force-is-what-is-sensed",
+        "scale-swaps-axes": "force-is-what-is-sensed",
+        "scale-keeps-its-zero": "tare-takes-the-load-as-zero",
+        "scale-hides-its-end": "overload-is-marked",
+        "scale-is-not-at-that-address": "real-device-answers",
+        "stage-is-in-millimetres": "position-is-in-metres",
+        "stage-shows-no-position": "position-is-in-metres",
+        "stage-runs-off": "opening-and-reading-move-nothing",
     },
     "task": {
         "sound-task": None,

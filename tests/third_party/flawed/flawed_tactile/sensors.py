@@ -105,8 +105,9 @@ SPECS = {
 TRANSDUCERS = (
     "takes-no-grid", "writes-into-the-spec", "leaves-one-taxel-out", "is-nan-at-rest", "is-nan-over-range",
     "rests-elsewhere", "keeps-its-own-order", "remembers", "changes-the-state", "feels-nothing", "swaps-axes",
-    "mirrors", "turns-the-sign", "falls-back", "is-in-grams",
+    "mirrors", "turns-the-sign", "falls-back", "is-in-grams", "reads-shear", "folds-shear", "forgets-shear",
 )  # fmt: skip
+READS_SHEAR = ("reads-shear", "folds-shear", "forgets-shear")
 DRIVERS = (
     "opens-two-lines", "is-a-number", "has-a-stream-of-its-own", "goes-back-in-time", "swaps-taxels", "doubles-samples",
     "waits-anyhow", "leaves-its-line-open", "hides-the-unplugging", "takes-any-option",
@@ -124,6 +125,7 @@ def tactbench_sensors():
         SensorDescriptor(
             spec=PAD, transducer="flawed_tactile.transducers:sound", driver="flawed_tactile.line:sound", **wired
         ),
+        SensorDescriptor(spec=with_(PAD, name="is-not-at-that-address"), driver="flawed_tactile.line:sound", **wired),
         SensorDescriptor(
             spec=with_(PAD, name="names-code-that-is-not-there"), transducer="flawed_tactile.transducers:build"
         ),
@@ -132,7 +134,12 @@ def tactbench_sensors():
         *(SensorDescriptor(spec=with_(spec, name=name)) for name, spec in SPECS.items()),
         *(
             SensorDescriptor(
-                spec=with_(PAD, name=f"transducer-{name}", parameters=dict(PAD.parameters)),
+                spec=with_(
+                    PAD,
+                    name=f"transducer-{name}",
+                    parameters=dict(PAD.parameters),
+                    reads_shear=("taxel",) if name in READS_SHEAR else (),
+                ),
                 transducer=f"flawed_tactile.transducers:{code(name)}",
             )
             for name in TRANSDUCERS

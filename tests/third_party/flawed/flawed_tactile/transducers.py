@@ -83,6 +83,18 @@ def feels_nothing(sensor, grid, wanted):
     return made(sensor, grid, wanted, lambda readings, state: np.full_like(readings, 100.0))
 
 
+def reads_shear(sensor, grid, wanted):
+    return made(sensor, grid, wanted, lambda readings, state: readings + 40.0 * state.tangential_displacement_mm.sum())
+
+
+def folds_shear(sensor, grid, wanted):
+    return made(sensor, grid, wanted, lambda readings, state: readings + 40.0 * np.abs(state.shear_mpa.sum()))
+
+
+def forgets_shear(sensor, grid, wanted):
+    return made(sensor, grid, wanted)
+
+
 def swaps_axes(sensor, grid, wanted):
     return made(sensor, grid, wanted, place=lambda x, y: (y, x))
 

@@ -1,0 +1,49 @@
+"""Options that several verbs have, and those of the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+Command = Callable[..., Any]
+
+
+def options(*several: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    """Return a decorator that adds options to a verb, in this order in its help."""
+
+    def add(command: Command) -> Command:
+        for option in reversed(several):
+            command = option(command)
+        return command
+
+    return add
+
+
+ENGINE = (
+    click.option(
+        "--engine",
+        type=click.Choice(("in-process", "isolated", "dask")),
+        help="Where cells are carried out: each in a process of its own (the default), on a Dask cluster, or, a single "
+        "cell, in the process of the run.",
+    ),
+    click.option(
+        "--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Cells at once."
+    ),
+    click.option(
+        "--timeout",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="SECONDS",
+        help="What one cell, or one recording, may take. Default: no limit, since a slow estimator on much data may "
+        "rightly take hours.",
+    ),
+    click.option(
+        "--memory",
+        type=click.IntRange(min=1),
+        metavar="MB",
+        help="Memory that one cell, or one recording, may take beyond libraries and recordings that all share. "
+        "Default: no limit; if the system runs out of it, cells are ended first.",
+    ),
+    click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler for --engine dask. Default: a local cluster."),
+)

@@ -1,0 +1,77 @@
+"""What `tactbench check` found of a sensor, beside its rows: where they were made by the very package that was checked.
+
+`check NAME --out FOLDER` leaves ``conformance/NAME.json`` in a result folder.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.files import read_regular, replace_file
+from tactbench.core.provenance.source import PACKAGE
+
+Row = dict[str, Any]
+
+FOLDER = "conformance"
+KEY = "conformance_level"
+"""Of a row, in a folder with such a file: the level, or why there is none."""
+NOT_CHECKED, OTHER_VERSION = "not checked", "other version"
+_LEVELS = ("none", "bronze", "silver", "gold")
+_MOST_BYTES = 65_536
+
+
+def identity_of(package: str, provenance: Mapping[str, Any]) -> dict[str, str]:
+    """Return what tells one state of a plugin's package from another, of `gather`'s provenance; empty: not known."""
+    if package == PACKAGE:
+        return {name: str(provenance[name]) for name in ("tactbench", "commit") if name in provenance}
+    plugins = provenance.get("plugins")
+    for one in plugins if isinstance(plugins, list) else ():
+        if isinstance(one, dict) and one.get("package") == package:
+            return {name: str(one.get(name)) for name in ("distribution", "version", "source")}
+    return {}
+
+
+def write_level(folder: Path, sensor: str, facts: Mapping[str, Any]) -> Path:
+    """Write what a check found into a result folder and return the file; raises OSError if it cannot be written."""
+    path = folder / FOLDER / f"{sensor}.json"
+    path.parent.mkdir(exist_ok=True)
+    replace_file(path, (json.dumps({"sensor": sensor, **facts}, indent=1) + "\n").encode())
+    return path
+
+
+def read_levels(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return what was checked, by sensor; what cannot be read or makes no sense is left out."""
+    found = {}
+    for path in sorted((folder / FOLDER).glob("*.json")):
+        try:
+            facts = json.loads(read_regular(path, _MOST_BYTES))
+        except (OSError, ValueError, RecursionError):
+            continue
+        if isinstance(facts, dict) and facts.get("level") in _LEVELS and isinstance(facts.get("sensor"), str):
+            found[facts["sensor"]] = facts
+    return found
+
+
+def with_levels(rows: Sequence[Row], folder: Path, provenance: Callable[[str], Mapping[str, Any]]) -> list[Row]:
+    """Return rows with the level of their sensors under `KEY`, or as they are where nothing was checked.
+
+    Parameters
+    ----------
+    provenance
+        By a row's ``made_by``.
+    """
+    levels = read_levels(folder)
+    # A level is never declared.
+    rows = [{name: row[name] for name in row if name != KEY} if KEY in row else row for row in rows]
+    return [{**row, KEY: _level(row, levels, provenance)} for row in rows] if levels else rows
+
+
+def _level(row: Row, levels: Mapping[str, Mapping[str, Any]], provenance: Callable[[str], Mapping[str, Any]]) -> str:
+    facts = levels.get(str(row.get("sensor")))
+    if facts is None:
+        return NOT_CHECKED
+    made_with = identity_of(str(facts.get("package")), provenance(str(row.get("made_by"))))
+    return str(facts["level"]) if made_with and made_with == facts.get("identity") else OTHER_VERSION

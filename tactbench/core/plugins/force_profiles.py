@@ -1,0 +1,49 @@
+"""Force profiles by name, made the force paths that scenes hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pydantic import ValidationError
+
+from tactbench.core.errors import PluginContractError
+from tactbench.core.plugins.registry import load_object
+from tactbench.core.spec.profile import ForcePath
+from tactbench.core.spec.quantity import Quantity, Source
+from tactbench.core.spec.rig import ProfileDescriptor
+
+
+def force_path(descriptor: ProfileDescriptor, given: Mapping[str, Quantity], by: str) -> ForcePath:
+    """Return the path that a profile makes of its parameters: those `given`, and the others by default.
+
+    Parameters
+    ----------
+    by
+        Who asks for it, for the path's source, which also names the profile with every parameter.
+
+    Raises
+    ------
+    UsageError
+        If it has no such parameter, or one is out of range.
+    PluginContractError
+        If its plugin makes no force path of them.
+    """
+    values = descriptor.values(given)
+    what = f"The force profile {descriptor.name!r}"
+    try:
+        made = load_object(descriptor.where)(**values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise PluginContractError(
+            f"{what} makes no force path of {values}: {f'{place}: ' if place else ''}{first['msg']}.",
+            hint="Its times ascend from 0 s, and its forces are finite and 0 N or more.",
+        ) from error
+    if not isinstance(made, ForcePath):
+        raise PluginContractError(
+            f"{what} returned a {type(made).__name__}, and a ForcePath is expected.",
+            hint=f"Correct {descriptor.where}.",
+        )
+    listed = ", ".join(f"{name} {value:g} {descriptor.parameters[name].unit}" for name, value in values.items())
+    source = Source(tag="assumed", reference=f"{by}: force profile {descriptor.name} ({listed})")
+    return made.model_copy(update={"source": source})

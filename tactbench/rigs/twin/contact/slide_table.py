@@ -1,0 +1,136 @@
+"""What a tangential force adds to the readings of one contact, tabulated over both forces.
+
+The traction of a contact pressed by P that carries Q along a slide is, after Cattaneo and Mindlin in the general form
+of Ciavarella (1998) and Jaeger (1998), the difference of two contacts without friction:
+
+    q = A p(P) - B p(P*),    P* = (c/a)³ P the load inside the part that sticks,    A P - B P* = Q
+
+A = B = mu after a first push; a contact that slips as a whole has B = 0. What lies between (a push after a slip) is
+``q = Q/P p(P) + b mu [(P*/P) p(P) - p(P*)]`` with b from 0 to 1: a share of the pressure, and b times what a first
+push would have apart from that. So are the readings: exact for b = 0 and b = 1, and for every b where they are linear
+in traction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import Skin, SkinState
+from tactbench.rigs.twin.contact.interpolant import Interpolant
+from tactbench.rigs.twin.contact.load_table import LoadTable, through
+from tactbench.rigs.twin.contact.press import AnyPress
+from tactbench.rigs.twin.contact.tangential import Direction, TangentialResponse, tangential_of
+
+_SHARES = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+"""Of mu P, carried by a traction in proportion to the pressure; at 0 nothing is added."""
+_PUSHES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+"""Of mu P, by a first push; at its ends all sticks or all slips: a traction in proportion, too."""
+
+
+def traction_shares(
+    force_n: FloatArray, tangential_n: FloatArray, stick_ratio: FloatArray, friction: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return Q/(mu P), P*/P and b at (n,) moments.
+
+    b is bounded such that no traction exceeds mu times the pressure, one way or the other.
+    """
+    limit = friction * force_n
+    share = np.clip(np.divide(tangential_n, limit, out=np.zeros_like(limit), where=limit > 0), -1.0, 1.0)
+    inner = np.where(limit > 0, stick_ratio, 0.0) ** 3
+    b = np.divide(1.0 - share, inner, out=np.zeros_like(share), where=inner > 0)
+    back = np.divide(1.0 + share, 1.0 - inner, out=np.ones_like(share), where=inner < 1)
+    return share, inner, np.minimum(np.minimum(b, back), 1.0)
+
+
+def dragged_state(
+    state: SkinState,
+    inner: SkinState,
+    along: TangentialResponse,
+    direction: Direction,
+    outer_by: float,
+    inner_by: float,
+) -> SkinState:
+    """Return `state` with a traction ``outer_by p(state) - inner_by p(inner)`` in `direction`, and what it moves.
+
+    Where a pressure has fallen under more load (under a shell's dent, under a cover's edge), the inner one is cut to it
+    and the rest of it raised to the same force: no friction holds what does not press.
+    """
+    touched, inner_mpa = state.pressure_mpa > 0, np.minimum(inner.pressure_mpa, state.pressure_mpa)
+    if inner_mpa.any():
+        inner = replace(inner, pressure_mpa=inner_mpa * (inner.pressure_mpa.sum() / inner_mpa.sum()))
+    shear = np.multiply.outer(np.array(direction), outer_by * state.pressure_mpa - inner_by * inner.pressure_mpa)
+    moved = along.pressed(state) + outer_by * along.dragged(state, direction, touched)
+    if inner_by:
+        moved -= inner_by * along.dragged(inner, direction, touched)
+    return replace(state, tangential_displacement_mm=moved, shear_mpa=shear)
+
+
+@dataclass(frozen=True)
+class SlideTable:
+    """What a slide in one direction over one surface adds to the readings."""
+
+    friction: float
+    """mu, the static one."""
+    proportional: Interpolant
+    """(m,) loads -> (m, shares * channels): readings under a share of the pressure, less those without."""
+    partial: Interpolant
+    """(m,) loads -> (m, pushes * channels): readings after a first push, less those under the same share."""
+
+    def __call__(
+        self, force_n: FloatArray, load_n: FloatArray, tangential_n: FloatArray, stick_ratio: FloatArray
+    ) -> FloatArray:
+        """Return the (n, channels) that is added to the readings.
+
+        Parameters
+        ----------
+        force_n
+            (n,) force that the response follows: the normal one, or one that lags behind it.
+        load_n, tangential_n
+            (n,) true normal and tangential force.
+        stick_ratio
+            (n,) radius of the part that sticks over that of the contact; 0 where everything slips.
+        """
+        share, inner, b = traction_shares(load_n, tangential_n, stick_ratio, self.friction)
+        at = np.clip(force_n, 0.0, self.proportional.loads[-1])
+        added = _between(_SHARES, self.proportional(at), share)
+        return added + b[:, None] * _between(_PUSHES, self.partial(at), 1.0 - inner)
+
+
+def build_slide_table(
+    press: AnyPress,
+    read: Callable[[SkinState], FloatArray],
+    table: LoadTable,
+    skin: Skin,
+    direction: Direction,
+    friction: float,
+) -> SlideTable:
+    """Return what a slide adds, at the loads of `table`; `press` and `read` are those it was made with."""
+    along = tangential_of(skin, press.medium.grid)
+    proportional, partial = [], []
+    for load, plain in zip(table.loads_n.tolist(), table.readings, strict=True):
+        state = press(load)
+
+        def added(inner: SkinState, outer_by: float, inner_by: float, state: SkinState = state) -> FloatArray:
+            return read(dragged_state(state, inner, along, direction, friction * outer_by, friction * inner_by))
+
+        even = {push: added(state, push, 0.0) - plain for push in {*_SHARES.tolist(), *_PUSHES.tolist()}}
+        first = {push: added(press((1.0 - push) * load), 1.0, 1.0) - plain for push in _PUSHES.tolist()}
+        proportional.append(np.concatenate([even[push] for push in _SHARES.tolist()]))
+        partial.append(np.concatenate([first[push] - even[push] for push in _PUSHES.tolist()]))
+    loads = table.loads_n.tolist()
+    return SlideTable(
+        friction, through(loads, proportional, table.touch_down_n), through(loads, partial, table.touch_down_n)
+    )
+
+
+def _between(nodes: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
+    """Return (n, channels): the polynomial through (n, nodes * channels) `values` at (n,) `at` (Lagrange)."""
+    weights = np.ones((at.size, nodes.size))
+    for i, node in enumerate(nodes):
+        for other in np.delete(nodes, i):
+            weights[:, i] *= (at - other) / (node - other)
+    return np.asarray(np.einsum("ni,nic->nc", weights, values.reshape(at.size, nodes.size, -1)))

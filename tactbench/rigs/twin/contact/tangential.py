@@ -1,0 +1,135 @@
+"""How a skin's outer surface moves along itself: what a press squeezes out, and where a traction drags it.
+
+The answer is linear in pressure and traction. That a traction also lifts the surface, and so changes the pressure, is
+neglected, as in Cattaneo's and Mindlin's contacts: exact for short waves in an incompressible layer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from tactbench.plugin import FloatArray
+from tactbench.plugin.simulation import BondedLayer, FluidBackedShell, Skin, SkinGrid, SkinState
+from tactbench.rigs.twin.contact.spectrum import Spectrum
+from tactbench.rigs.twin.layer_kernel import shear_shapes
+from tactbench.rigs.twin.partial_slip import shear_modulus_mpa, sliding_stiffness
+
+Direction = tuple[float, float]
+"""Unit vector along x and s."""
+
+
+class TangentialResponse(Protocol):
+    """A skin's answer along its surface."""
+
+    def pressed(self, state: SkinState) -> FloatArray:
+        """Return the (2, nx, ns) displacement [mm] of a pressed skin without friction."""
+
+    def dragged(self, state: SkinState, direction: Direction, touched: npt.NDArray[np.bool_]) -> FloatArray:
+        """Return the (2, nx, ns) displacement [mm] under a traction of the size of the contact pressure.
+
+        `touched` (nx, ns) is the whole contact, of which `state` may hold but the inner part's pressure.
+        """
+
+
+def tangential_of(skin: Skin, grid: SkinGrid) -> TangentialResponse:
+    """Return what moves the surface of `skin` along itself."""
+    if isinstance(skin, BondedLayer):
+        return _Layer(skin, grid)
+    return _Shell(skin, grid) if isinstance(skin, FluidBackedShell) else _Patch(skin)
+
+
+def pressed_state(state: SkinState, along: TangentialResponse | None) -> SkinState:
+    """Return `state` with what a press without friction does along the surface, and no traction.
+
+    None: nobody looks, or the scene leaves it out; nothing moves.
+    """
+    moved = np.zeros((2, *state.pressure_mpa.shape)) if along is None else along.pressed(state)
+    return replace(state, tangential_displacement_mm=moved, shear_mpa=np.zeros_like(moved))
+
+
+class _Patch:
+    """A contact that moves as a whole, by the force over the half-space's stiffness; the skin around it stays.
+
+    So does `friction` move it. A foam of independent columns is pressed straight down.
+    """
+
+    def __init__(self, skin: Skin) -> None:
+        self._shear_mpa = shear_modulus_mpa(skin)
+
+    def pressed(self, state: SkinState) -> FloatArray:
+        return np.zeros((2, *state.pressure_mpa.shape))
+
+    def dragged(self, state: SkinState, direction: Direction, touched: npt.NDArray[np.bool_]) -> FloatArray:
+        if not state.force_n > 0:
+            return np.zeros((2, *touched.shape))
+        stiffness = sliding_stiffness(np.array(state.contact_radius_mm), self._shear_mpa)
+        return np.asarray(np.multiply.outer(np.array(direction), state.force_n / stiffness * touched))
+
+
+class _Spectral:
+    """Waves of a periodic sheet."""
+
+    def __init__(self, grid: SkinGrid) -> None:
+        spectrum = Spectrum(grid)
+        nx, ns = self._shape = spectrum.shape
+        self.k2 = spectrum.k2.copy()
+        self.k2[0, 0] = 1.0
+        kx, ks = spectrum.kx.copy(), np.broadcast_to(np.sqrt(spectrum.k2[:1]), spectrum.half).copy()
+        # A wave of two cells has no slope on the grid: odd operators leave it out.
+        if nx % 2 == 0:
+            kx[nx // 2] = 0.0
+        if ns % 2 == 0:
+            ks[:, -1] = 0.0
+        self.slope = 1j * np.stack([kx, ks])
+        """(2, nx, ns//2+1) derivatives along x and s."""
+
+    def filtered(self, field: FloatArray, multiplier: npt.NDArray[np.complex128]) -> FloatArray:
+        """Return the (2, nx, ns) fields whose waves are those of (nx, ns) `field` times (2, nx, ns//2+1)."""
+        return np.asarray(np.fft.irfft2(np.fft.rfft2(field) * multiplier, self._shape))
+
+
+class _Shell(_Patch):
+    """The shallow shell's own membrane displacements, and the turn of its normal at the outer face.
+
+    Donnell: ``k⁴ u = i kx (ks² - nu kx²) w / R``, ``k⁴ v = -i ks (ks² + (2 + nu) kx²) w / R`` for a deflection w
+    towards the core; the outer face moves by ``t/2 grad w`` more. No clamp holds the sheet along itself.
+    """
+
+    def __init__(self, skin: FluidBackedShell, grid: SkinGrid) -> None:
+        super().__init__(skin)
+        self._waves = _Spectral(grid)
+        (along, across), k4 = self._waves.slope, self._waves.k2**2
+        kx2, ks2, poisson = np.abs(along) ** 2, np.abs(across) ** 2, skin.poisson.to("1")
+        membrane = np.stack([along * (ks2 - poisson * kx2), -across * (ks2 + (2 + poisson) * kx2)])
+        half_mm = skin.thickness.to("mm") / 2
+        self._moved = membrane / (skin.mid_radius.to("mm") * k4) + half_mm * self._waves.slope
+
+    def pressed(self, state: SkinState) -> FloatArray:
+        return self._waves.filtered(state.deflection_mm, self._moved)
+
+
+class _Layer:
+    """A layer bonded to a rigid base: closed forms wave by wave (:func:`shear_shapes`)."""
+
+    def __init__(self, skin: BondedLayer, grid: SkinGrid) -> None:
+        young, poisson, thickness = skin.young.to("MPa"), skin.poisson.to("1"), skin.thickness.to("mm")
+        self._waves = _Spectral(grid)
+        k, shear = np.sqrt(self._waves.k2), young / (2 * (1 + poisson))
+        squeezed, along, across = (shape / (shear * k) for shape in shear_shapes(k * thickness, poisson))
+        self._squeezed = self._waves.slope * (squeezed / k)
+        # ``across`` for every direction, and what a wave along the traction adds: the tensor (along - across) k k / k².
+        self._more = (along - across) / self._waves.k2
+        across[0, 0], self._more[0, 0] = thickness / shear, 0.0
+        self._across = across
+
+    def pressed(self, state: SkinState) -> FloatArray:
+        return self._waves.filtered(state.pressure_mpa, self._squeezed)
+
+    def dragged(self, state: SkinState, direction: Direction, touched: npt.NDArray[np.bool_]) -> FloatArray:
+        slope, way = self._waves.slope, np.array(direction)[:, None, None]
+        answer = self._across * way - self._more * slope * (slope * way).sum(axis=0)
+        return self._waves.filtered(state.pressure_mpa, answer)

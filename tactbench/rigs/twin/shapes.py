@@ -1,0 +1,149 @@
+"""Shapes of indenters as heights over a plane. Millimetres.
+
+The heights named by this package's own descriptors stand here, beside what makes one of any plugin's ready to press.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tactbench.plugin import (
+    FloatArray,
+    Indenter,
+    IndenterDescriptor,
+    PluginContractError,
+    RigError,
+    UsageError,
+    load_object,
+)
+
+BEYOND_MM = 50.0
+"""How far above the body a flank is put where it is vertical, or where there is no body: large, finite, never touched.
+"""
+RIM = 0.999
+"""Share of its radius up to which a round body exists: at its rim the flank is vertical, and no height field can touch
+it."""
+_STEP_MM = 1e-4
+"""Half of the step over which a slope is taken: far below any cell, far above rounding."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A body that is neither flat nor a cap, as a scene wants it."""
+
+    name: str
+    sizes: tuple[tuple[str, float], ...]
+    """Its dimensions, each in its own unit."""
+    angle: float
+    """By how much it is turned about the press axis, from x towards s [rad]."""
+    height: Callable[..., FloatArray] = field(repr=False, compare=False)
+
+    def height_mm(self, x_mm: FloatArray, s_mm: FloatArray) -> FloatArray:
+        """Return its height above its lowest point at places (broadcast) from its axis along x and s.
+
+        Raises
+        ------
+        PluginContractError
+            If its plugin returns another shape, or what is no finite number.
+        """
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        x, y = np.broadcast_arrays(cos * x_mm + sin * s_mm, cos * s_mm - sin * x_mm)
+        found = np.asarray(self.height(x, y, **dict(self.sizes)), dtype=np.float64)
+        if found.shape != x.shape or not np.all(np.isfinite(found)):
+            raise PluginContractError(
+                f"The height of the indenter {self.name!r} came back with shape {found.shape} and "
+                f"{np.count_nonzero(~np.isfinite(found))} values that are not finite; {x.shape} finite values are "
+                "expected.",
+                hint="Return a large height, 50 mm or more, where there is no body.",
+            )
+        return found
+
+    def slope(self, x_mm: FloatArray, s_mm: FloatArray) -> FloatArray:
+        """Return how steep it is at places from its axis [1]."""
+        along = self.height_mm(x_mm + _STEP_MM, s_mm) - self.height_mm(x_mm - _STEP_MM, s_mm)
+        across = self.height_mm(x_mm, s_mm + _STEP_MM) - self.height_mm(x_mm, s_mm - _STEP_MM)
+        return np.asarray(np.hypot(along, across) / (2 * _STEP_MM), dtype=np.float64)
+
+
+def shape_of(indenter: Indenter, installed: Sequence[IndenterDescriptor]) -> Shape | None:
+    """Return the shape that a scene names; None for a cap and a flat surface, which its radius says.
+
+    Raises
+    ------
+    RigError
+        If no such shape is installed.
+    UsageError
+        If a dimension is none of its own, in another unit, or out of its range.
+    """
+    if indenter.shape is None:
+        return None
+    for descriptor in installed:
+        if descriptor.name == indenter.shape:
+            sizes = tuple(descriptor.sizes(indenter.dimensions).items())
+            return Shape(indenter.shape, sizes, indenter.angle.to("rad"), load_object(descriptor.where))
+    known = ", ".join(sorted({"cap", "flat", *(one.name for one in installed)}))
+    raise RigError(f"No indenter is called {indenter.shape!r}.", hint=f"Installed are: {known}.")
+
+
+def cap(x_mm: FloatArray, y_mm: FloatArray, *, radius: float) -> FloatArray:
+    """Return the height of a spherical cap."""
+    return sag_mm(x_mm**2 + y_mm**2, radius)
+
+
+def flat(x_mm: FloatArray, y_mm: FloatArray) -> FloatArray:
+    """Return the height of a flat surface without an edge."""
+    return np.zeros(np.broadcast_shapes(x_mm.shape, y_mm.shape))
+
+
+def cylinder(x_mm: FloatArray, y_mm: FloatArray, *, radius: float) -> FloatArray:
+    """Return the height of a cylinder that lies along x, without ends."""
+    return sag_mm(y_mm**2 + 0.0 * x_mm, radius)
+
+
+def edge(x_mm: FloatArray, y_mm: FloatArray, *, wedge_angle: float, tip_radius: float) -> FloatArray:
+    """Return the height of a wedge along x, without ends: two flanks with `wedge_angle` [deg] between them.
+
+    They are tangents of the rounded tip, which each leaves where it is as steep as they are, ``1/tan(angle/2)``.
+    """
+    slope = 1.0 / math.tan(math.radians(wedge_angle) / 2)
+    away = np.abs(y_mm + 0.0 * x_mm)
+    if tip_radius == 0:
+        return np.asarray(slope * away)
+    leaves = tip_radius * slope / math.hypot(1.0, slope)
+    return sag_mm(np.minimum(away, leaves) ** 2, tip_radius) + slope * np.maximum(away - leaves, 0.0)
+
+
+def pin(x_mm: FloatArray, y_mm: FloatArray, *, radius: float, fillet: float) -> FloatArray:
+    """Return the height of an upright pin with a flat end: its rim is rounded by `fillet`, its side is vertical.
+
+    Raises
+    ------
+    UsageError
+        If the fillet is larger than the pin's radius.
+    """
+    if fillet > radius:
+        raise UsageError(
+            f"The indenter 'pin': fillet is given as {fillet:g} mm, and at most its radius, {radius:g} mm, is "
+            "expected.",
+            hint="With both alike it is a cap.",
+        )
+    r = np.hypot(x_mm, y_mm)
+    if fillet == 0:
+        return np.where(r <= radius, 0.0, BEYOND_MM)
+    return sag_mm(np.maximum(r - (radius - fillet), 0.0) ** 2, fillet)
+
+
+def sag_mm(r2: FloatArray, radius: float) -> FloatArray:
+    """Return how far a circle has risen at the square of a distance from its lowest point; 0 for an infinite radius.
+
+    ``r² / (R + sqrt(R² - r²))``, in which nothing cancels.
+    """
+    if math.isinf(radius):
+        return np.zeros_like(r2)
+    exists = r2 < (RIM * radius) ** 2
+    inside = np.where(exists, r2, 0.0)
+    return np.where(exists, inside / (radius + np.sqrt(radius**2 - inside)), radius + BEYOND_MM)

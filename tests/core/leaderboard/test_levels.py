@@ -1,0 +1,86 @@
+"""The level that `check` has computed stands beside the sensor, where the rows were made with what was checked."""
+
+import json
+import re
+import shutil
+
+import pytest
+
+from tactbench.core.leaderboard.levels import KEY, NOT_CHECKED, OTHER_VERSION, identity_of, with_levels, write_level
+from tactbench.core.matrix.store import Store
+from tactbench.core.plugins.registry import installed
+from tactbench.core.report.results import open_results
+from tactbench.core.report.section import ReportData
+from tactbench.core.report.sensors import sensors_section
+from tests.conftest import ROOT
+
+PAD = {"distribution": "acme", "version": "1.2", "package": "acme_pad", "source": "abc", "commit": ""}
+MADE_WITH = {"tactbench": "0.1.0", "commit": "1234", "plugins": [PAD]}
+
+
+@pytest.fixture
+def kept(tmp_path):
+    """A copy of a result folder."""
+    return shutil.copytree(ROOT / "tests" / "kept_results" / "v1", tmp_path / "kept")
+
+
+def levels(rows, folder, provenance=MADE_WITH):
+    return [row.get(KEY) for row in with_levels(rows, folder, lambda made_by: provenance)]
+
+
+def test_a_level_is_of_the_package_that_made_the_rows(tmp_path):
+    rows = [{"sensor": "pad", "made_by": "x"}, {"sensor": "other", "made_by": "x"}]
+    facts = {"level": "silver", "package": "acme_pad", "identity": identity_of("acme_pad", MADE_WITH)}
+    write_level(tmp_path, "pad", facts)
+    assert levels(rows, tmp_path) == ["silver", NOT_CHECKED]
+    changed = {**MADE_WITH, "plugins": [{**PAD, "source": "abd"}]}
+    assert levels(rows, tmp_path, changed) == [OTHER_VERSION, NOT_CHECKED]
+    assert levels(rows, tmp_path, {}) == [OTHER_VERSION, NOT_CHECKED]
+
+
+def test_of_ours_the_commit_counts():
+    assert identity_of("tactbench", MADE_WITH) == {"tactbench": "0.1.0", "commit": "1234"}
+    assert identity_of("acme_pad", {"plugins": "none"}) == {}
+
+
+def test_a_row_declares_no_level_of_its_own(tmp_path):
+    assert levels([{"sensor": "pad", KEY: "gold"}], tmp_path) == [None]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[1]", '{"sensor": "pad", "level": "platinum"}', '{"sensor": 3, "level": "gold"}']
+)
+def test_a_file_that_makes_no_sense_is_no_level(tmp_path, text):
+    write_level(tmp_path, "pad", {})
+    (tmp_path / "conformance" / "pad.json").write_text(text)
+    assert levels([{"sensor": "pad"}], tmp_path) == [None]
+
+
+def test_check_keeps_the_level_and_every_table_shows_it(verbs, kept):
+    file = kept / "conformance" / "ideal.json"
+    assert str(file.relative_to(kept.parent)) in verbs("check", "ideal", "--out", "kept").stderr
+    facts = json.loads(file.read_text())
+    assert (facts["sensor"], facts["level"], facts["failed"], facts["modes"]) == ("ideal", "silver", 0, ["passive"])
+    facts["sensor"] = "pad"  # which the kept results are of, and nobody has installed
+    write_level(kept, "pad", facts)
+    assert OTHER_VERSION in verbs("leaderboard", "kept").stdout  # those rows are of an older commit
+    store = Store(kept)
+    (made_by,) = {row["made_by"] for row in store.rows()}
+    write_level(kept, "pad", {**facts, "identity": identity_of("tactbench", store.provenance(made_by))})
+    shown = json.loads(verbs("leaderboard", "kept", "--format", "json").stdout)
+    assert {row["shown"]["level"] for row in shown} == {"silver"}
+    assert re.search(r"\| pad +\| silver +\|", verbs("leaderboard", "kept", "--format", "md").stdout)
+    assert "shown_level" in verbs("leaderboard", "kept", "--format", "csv").stdout
+    assert ">silver<" in verbs("leaderboard", "kept", "--format", "html").stdout
+    assert "level" not in verbs("leaderboard", "kept", "--no-times").stdout  # no seed decides it
+    notes = sensors_section(ReportData(open_results(store, installed()))).notes
+    assert "Levels that `tactbench check` has computed: pad silver." in notes
+
+
+def test_where_nothing_was_checked_there_is_no_column(verbs, kept):
+    assert "level" not in verbs("leaderboard", "kept", "--wide").stdout
+
+
+def test_only_levels_of_sensors_are_kept(verbs, kept):
+    assert "none is computed" in verbs("check", "force", "--out", "kept", code=2).stderr
+    assert "no results in" in verbs("check", "ideal", "--out", ".", code=2).stderr

@@ -1,0 +1,97 @@
+"""Force profiles by name: what scenes hold is a path that needs no plugin."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tactbench.core.errors import PluginContractError, UsageError
+from tactbench.core.plugins.force_profiles import force_path
+from tactbench.core.plugins.registry import installed
+from tactbench.core.spec.parameter import Parameter
+from tactbench.core.spec.quantity import Source, assumed
+from tactbench.core.spec.rig import ProfileDescriptor
+from tactbench.core.spec.scene import Scene
+from tactbench.plugin import ForcePath, sine, staircase
+
+
+def path_of(name, **given):
+    profile = installed().profiles[name]
+    units = {one: parameter.unit for one, parameter in profile.parameters.items()}
+    stated = {one: assumed(value, units.get(one, "1"), "a test") for one, value in given.items()}
+    return force_path(profile, stated, "a test")
+
+
+def at(path, t_s):
+    return np.interp(t_s, *path.corners)
+
+
+def test_a_staircase_goes_up_and_down_in_equal_steps():
+    path = path_of("staircase", peak=3, steps=3, dwell=2, rise=0.5, hold=1, rate=10)
+    middles = 1 + 2.5 * np.arange(6) + 1.5  # of every dwell
+    np.testing.assert_allclose(at(path, middles), [1, 2, 3, 2, 1, 0])
+    assert (path.hold_s, path.times_s[-1], path.samples) == (1.0, 16.0, 160)
+
+
+def test_a_press_is_held_and_released():
+    path = path_of("press-hold-release", peak=4, rise=1, dwell=5, release=2, rest=3, hold=1)
+    assert path.corners == ((0.0, 1.0, 2.0, 7.0, 9.0, 12.0), (0.0, 0.0, 4.0, 4.0, 0.0, 0.0))
+
+
+def test_a_sine_is_as_fine_as_it_says():
+    path = path_of("sine", mean=2, amplitude=1.5, frequency=0.5, periods=4, rise=1, hold=1)
+    t_s = np.linspace(2.0, 10.0, 20_001)
+    error = np.abs(at(path, t_s) - (2 - 1.5 * np.cos(2 * math.pi * 0.5 * (t_s - 2.0)))).max()
+    # In the middle of the chord of 1/64 of a period at the top; 20 000 points find it to a thousandth.
+    half = math.pi / 64
+    assert error == pytest.approx(1.5 * math.cos(half) * (1 - math.cos(half)), rel=1e-3)
+
+
+def test_a_path_names_its_profile_and_is_read_without_it():
+    path = path_of("sine", mean=2, amplitude=1.0)
+    assert path.source.reference == (
+        "a test: force profile sine (mean 2 N, amplitude 1 N, frequency 1 Hz, periods 10 1, rise 1 s, hold 3 s, "
+        "rate 200 Hz)"
+    )
+    scene = Scene(name="a", profile=path)
+    assert Scene.model_validate_json(scene.model_dump_json()).profile == path
+    assert path.model_copy(update={"source": sine().source}) == sine()
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "says"),
+    [
+        ("sine", {"amplitude": 9}, "'sine': amplitude is given as 9 N, and at most its mean, 2 N, is expected"),
+        ("sine", {"height": 1}, "'sine': 'height' is given, and it has no such number"),
+        ("staircase", {"steps": 2.5}, "'staircase': steps is given as 2.5, and a whole number from 1 on is expected"),
+        ("press-hold-release", {"rise": 0}, "'press-hold-release': rise is given as 0 s, and 0.001 s or more is exp"),
+    ],
+)
+def test_a_parameter_that_cannot_be_is_named(name, given, says):
+    with pytest.raises(UsageError, match=says):
+        path_of(name, **given)
+
+
+def backwards(*, start):
+    return ForcePath(times_s=(0.0, start), forces_n=(0.0, -1.0), samples=1, source=Source(tag="assumed", reference="t"))
+
+
+def number(*, start):
+    return start
+
+
+@pytest.mark.parametrize(
+    ("where", "says"),
+    [("backwards", r"makes no force path of \{'start': 1.0\}: forces_n.1: .*0"), ("number", "returned a float")],
+)
+def test_what_is_no_force_path_is_the_plugins_fault(where, says):
+    start = Parameter(default=1.0, unit="s", text="a time")
+    odd = ProfileDescriptor(name="odd", title="odd", where=f"{__name__}:{where}", parameters={"start": start})
+    with pytest.raises(PluginContractError, match=says):
+        force_path(odd, {}, "a test")
+
+
+def test_a_staircase_of_one_step_is_a_press():
+    assert staircase(steps=1, peak=2).forces_n == (0.0, 0.0, 2.0, 2.0, 0.0, 0.0)

@@ -1,0 +1,221 @@
+"""What moves along the skin: laws that hold whatever the numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tactbench.plugin import assumed
+from tactbench.plugin.simulation import BondedLayer, SkinSheet
+from tactbench.rigs.twin.closed_forms.tangential import CattaneoMindlin
+from tactbench.rigs.twin.contact.press import Press, at_rest
+from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.slide_table import dragged_state, traction_shares
+from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
+from tactbench.rigs.twin.geometry import Contact, gap_mm, outer_radius_mm, skin_grid
+from tactbench.rigs.twin.partial_slip import sliding_stiffness
+
+YOUNG, SIDE_MM, FORCE_N, RADIUS_MM, MU = 1.0, 12.0, 0.3, 1.0, 0.6
+
+
+def _q(value, unit):
+    return assumed(value, unit, "test")
+
+
+def _layer(poisson, *, cells=64, thickness_mm=20.0):
+    sheet = SkinSheet(x_min=_q(-SIDE_MM / 2, "mm"), x_max=_q(SIDE_MM / 2, "mm"), arc=_q(SIDE_MM, "mm"),
+                      cells=(cells, cells))  # fmt: skip
+    return BondedLayer(sheet=sheet, young=_q(YOUNG, "MPa"), poisson=_q(poisson, "1"), thickness=_q(thickness_mm, "mm"),
+                       contact_stiffness=_q(1000, "MPa/mm"))  # fmt: skip
+
+
+def _r(grid):
+    return np.hypot(grid.x_mm[:, None], grid.s_mm[None, :])
+
+
+def _hertz(skin):
+    """Return a state with Hertz's pressure in the middle."""
+    rest = at_rest(medium_of(skin, skin_grid(skin.sheet)))
+    peak = 1.5 * FORCE_N / (math.pi * RADIUS_MM**2)
+    pressure = peak * np.sqrt(np.clip(1 - (_r(rest.grid) / RADIUS_MM) ** 2, 0, None))
+    return dataclasses.replace(rest, pressure_mpa=pressure, force_n=FORCE_N, contact_radius_mm=RADIUS_MM)
+
+
+def _outwards(state):
+    grid, moved = state.grid, state.tangential_displacement_mm
+    return (moved[0] * grid.x_mm[:, None] + moved[1] * grid.s_mm[None, :]) / _r(grid)
+
+
+def _off_boussinesq(poisson, cells):
+    """Return the largest difference from Johnson 1985, eq. 3.41b, within two radii, over the largest displacement."""
+    skin = _layer(poisson, cells=cells)
+    state = pressed_state(_hertz(skin), tangential_of(skin, skin_grid(skin.sheet)))
+    r, peak = _r(state.grid), 1.5 * FORCE_N / (math.pi * RADIUS_MM**2)
+    inside = np.where(r < RADIUS_MM, 1 - np.clip(1 - (r / RADIUS_MM) ** 2, 0, None) ** 1.5, 1.0)
+    closed = -(1 - 2 * poisson) * (1 + poisson) / (3 * YOUNG) * RADIUS_MM**2 / r * peak * inside
+    # A half-space's surface shrinks where it is pressed, by (1-2nu) p / 2G of its area; the mean of a periodic sheet's
+    # cannot, so that the rest of it stretches evenly.
+    stretched = (1 - 2 * poisson) * (1 + poisson) / (2 * YOUNG) * FORCE_N / SIDE_MM**2 * r
+    near = r < 2 * RADIUS_MM
+    return float(np.abs(_outwards(state) - closed - stretched)[near].max() / np.abs(closed).max())
+
+
+def test_a_thick_layer_moves_like_boussinesqs_half_space_the_closer_the_finer_the_grid():
+    coarse, fine = _off_boussinesq(0.3, 48), _off_boussinesq(0.3, 192)
+    # The pressure is taken at the cells' centres, and its edge in steps of cells: the error falls at least with the
+    # cell, of which the radius has 4 and 16; to the same share of the largest displacement.
+    assert coarse < 0.25 / 4
+    assert fine < 0.25 / 16
+    assert fine < coarse / 4
+
+
+def test_an_incompressible_half_space_does_not_move_along_itself():
+    for poisson, least, most in ((0.5, 0.0, 1e-6), (0.3, 1e-2, 1.0)):
+        # h = 20 mm: the longest waves (6 mm per radian) still feel the base by q² e^-2q.
+        skin = _layer(poisson)
+        state = pressed_state(_hertz(skin), tangential_of(skin, skin_grid(skin.sheet)))
+        assert least <= np.abs(state.tangential_displacement_mm).max() <= most
+
+
+@pytest.mark.parametrize(("poisson", "thickness_mm", "sign"), [(0.5, 2.0, 1), (0.3, 20.0, -1)])
+def test_a_centred_press_moves_the_skin_to_or_from_the_centre_and_nowhere_on_the_whole(poisson, thickness_mm, sign):
+    skin = _layer(poisson, thickness_mm=thickness_mm)
+    state = pressed_state(_hertz(skin), tangential_of(skin, skin_grid(skin.sheet)))
+    moved = state.tangential_displacement_mm
+    largest = np.abs(moved).max()
+    # What is squeezed out of an incompressible layer flows away; a compressible half-space is drawn in.
+    assert np.all(sign * _outwards(state)[_r(state.grid) < RADIUS_MM] > 0)
+    # Rounding of transforms.
+    np.testing.assert_allclose(moved[0][::-1], -moved[0], atol=1e-12 * largest)
+    np.testing.assert_allclose(moved[1][:, ::-1], -moved[1], atol=1e-12 * largest)
+    np.testing.assert_allclose(moved[0].T, moved[1], atol=1e-12 * largest)
+    assert not state.shear_mpa.any()
+
+
+@settings(max_examples=20)
+@given(st.floats(0, 0.5), st.floats(0.5, 20), st.integers(0, 2**32 - 1))
+def test_tractions_do_each_others_work(poisson, thickness_mm, seed):
+    """Betti: what one traction does along another's displacement is what the other does along its own."""
+    skin = _layer(poisson, cells=16, thickness_mm=thickness_mm)
+    along, rng = tangential_of(skin, skin_grid(skin.sheet)), np.random.default_rng(seed)
+    rest = at_rest(medium_of(skin, skin_grid(skin.sheet)))
+    ways = [(math.cos(angle), math.sin(angle)) for angle in rng.uniform(0, 2 * math.pi, 2)]
+    states = [dataclasses.replace(rest, pressure_mpa=rng.random((16, 16))) for _ in ways]
+    moved = [along.dragged(state, way, rest.pressure_mpa > 0) for state, way in zip(states, ways, strict=True)]
+    work = [
+        float((np.multiply.outer(ways[one], states[one].pressure_mpa) * moved[other]).sum())
+        for one, other in ((0, 1), (1, 0))
+    ]
+    own = float((np.multiply.outer(ways[0], states[0].pressure_mpa) * moved[0]).sum())
+    assert work[0] == pytest.approx(work[1], rel=1e-10, abs=1e-10 * own)
+    assert own > 0
+
+
+@pytest.fixture(scope="module")
+def presses(specs):
+    """One skin of each kind, pressed with a cap."""
+    made = {}
+    layer = _layer(0.5, cells=48, thickness_mm=3.0)
+    for name, skin in (("layer", layer), ("foam", specs["icub"].skin), ("shell", specs["biotac"].skin)):
+        grid, sheet = skin_grid(skin.sheet), skin.sheet
+        contact = Contact(10.0, float(grid.x_mm.mean()), 0.0)
+        gap = gap_mm(grid, contact, outer_radius_mm(sheet), sheet.dome, sheet.relief)
+        made[name] = (Press(medium_of(skin, grid), gap, contact), tangential_of(skin, grid))
+    return made
+
+
+@pytest.mark.parametrize("name", ["layer", "foam", "shell"])
+@settings(max_examples=12)
+@given(
+    since=st.floats(-0.5, 1), inner=st.sampled_from([0.0, 0.1, 0.5, 0.9, 1.0]), held=st.booleans(),
+    angle=st.floats(0, 2 * math.pi), load=st.sampled_from([1.0, 3.0]),
+)  # fmt: skip
+def test_a_traction_adds_up_to_its_force_and_never_exceeds_friction(presses, name, since, inner, held, angle, load):
+    press, along = presses[name]
+    state, way = press(load), (math.cos(angle), math.sin(angle))
+    # As Dragged has it: a share of what was left of the limit since the last slip, by Mindlin or held as the way goes.
+    asked = (since + (1 - since) * (1 - inner ** (2 / 3) if held else 1 - inner)) * MU * load
+    share, stuck, b = (
+        float(one[0]) for one in traction_shares(*(np.array([v]) for v in (load, asked, inner ** (1 / 3))), MU)
+    )
+    by = (MU * (share + b * stuck), MU * b)
+    dragged = dragged_state(state, press(inner * load), along, way, *by)
+    area = float(np.prod(state.grid.cell_mm))
+    # The solver balances forces to 1e-6 of the load, of both contacts.
+    np.testing.assert_allclose(dragged.shear_mpa.sum((1, 2)) * area, asked * np.array(way), atol=3e-6 * load)
+    assert np.all(np.hypot(*dragged.shear_mpa) <= MU * state.pressure_mpa * (1 + 1e-9))
+    back = dragged_state(state, press(inner * load), along, (-way[0], -way[1]), *by)
+    plain = pressed_state(state, along).tangential_displacement_mm
+    np.testing.assert_allclose(back.shear_mpa, -dragged.shear_mpa, atol=1e-15)
+    np.testing.assert_allclose(
+        back.tangential_displacement_mm - plain, plain - dragged.tangential_displacement_mm, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("push", [0.3, 0.6, 0.9])
+def test_a_first_push_is_cattaneos_and_its_middle_moves_as_one(push):
+    skin = _layer(0.5, cells=64)
+    grid = skin_grid(skin.sheet)
+    press = Press(medium_of(skin, grid), gap_mm(grid, Contact(5.0, 0.0, 0.0), math.inf), Contact(5.0, 0.0, 0.0))
+    along, state = tangential_of(skin, grid), press(FORCE_N)
+    a = state.contact_radius_mm
+    closed = CattaneoMindlin(MU, a, FORCE_N, 4 / 1.5 * YOUNG / 3)
+    inner = press(FORCE_N * (1 - push))
+    dragged = dragged_state(state, inner, along, (1.0, 0.0), MU, MU)
+    r, expected = _r(grid), closed.traction_mpa(push * MU * FORCE_N, _r(grid))
+    # A cell is a fifth of the contact's radius: at both edges a square root is cut into steps.
+    rms = float(np.sqrt(np.mean(np.square(dragged.shear_mpa[0] - expected)[r < a])))
+    assert rms < 0.05 * MU * state.pressure_mpa.max()
+    stuck = r < 0.8 * closed.stick_radius_mm(push * MU * FORCE_N)
+    moved = dragged.tangential_displacement_mm
+    # Nothing moves across; the middle sticks to a rigid cap, to the same steps of the edges.
+    assert np.ptp(moved[0][stuck]) < 0.02 * closed.shift_mm(push * MU * FORCE_N)
+    assert np.abs(moved[1][stuck]).max() < 0.02 * closed.shift_mm(push * MU * FORCE_N)
+
+
+@pytest.mark.parametrize("name", ["foam", "shell"])
+def test_where_no_model_moves_the_surface_the_contact_moves_as_friction_says(presses, name):
+    press, along = presses[name]
+    state = press(1.0)
+    moved = along.dragged(state, (0.0, 1.0), state.pressure_mpa > 0)
+    stiffness = float(sliding_stiffness(np.array(state.contact_radius_mm), along._shear_mpa))
+    assert not moved[0].any()
+    np.testing.assert_allclose(moved[1], np.where(state.pressure_mpa > 0, 1.0 / stiffness, 0.0), rtol=1e-12)
+
+
+def test_columns_are_pressed_straight_down(presses):
+    press, along = presses["foam"]
+    assert not pressed_state(press(1.0), along).tangential_displacement_mm.any()
+
+
+def test_a_shells_membrane_is_in_balance_along_itself(specs):
+    """Donnell's membrane forces have no divergence: nothing pulls the sheet along itself without friction."""
+    skin = specs["biotac"].skin
+    grid = skin_grid(skin.sheet)
+    bell = np.exp(-((grid.x_mm[:, None] - grid.x_mm.mean()) ** 2 + grid.s_mm[None, :] ** 2) / 2 / 2.0**2)
+    deflection = bell - bell.mean()
+    dx, ds = grid.cell_mm
+    kx = 2 * np.pi * np.fft.fftfreq(grid.x_mm.size, dx)[:, None]
+    ks = 2 * np.pi * np.fft.fftfreq(grid.s_mm.size, ds)[None, :]
+
+    def along_x(field):
+        return np.real(np.fft.ifft2(1j * kx * np.fft.fft2(field)))
+
+    def along_s(field):
+        return np.real(np.fft.ifft2(1j * ks * np.fft.fft2(field)))
+
+    rest = at_rest(medium_of(skin, grid))
+    moved = tangential_of(skin, grid).pressed(dataclasses.replace(rest, deflection_mm=deflection))
+    half, nu = skin.thickness.to("mm") / 2, skin.poisson.to("1")
+    u, v = moved[0] - half * along_x(deflection), moved[1] - half * along_s(deflection)
+    hoop = along_s(v) - deflection / skin.mid_radius.to("mm")
+    n_x, n_s, n_xs = along_x(u) + nu * hoop, hoop + nu * along_x(u), (1 - nu) / 2 * (along_s(u) + along_x(v))
+    scale = np.abs(along_s(n_s)).max()
+    # A bell of 2 mm has nothing left at the waves of two cells, which the grid cannot tell apart: e^-40.
+    assert np.abs(along_x(n_x) + along_s(n_xs)).max() < 1e-9 * scale
+    assert np.abs(along_x(n_xs) + along_s(n_s)).max() < 1e-9 * scale

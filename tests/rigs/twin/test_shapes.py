@@ -1,0 +1,240 @@
+"""Indenters that are neither flat nor caps: their heights, and what the solvers make of them against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tactbench.plugin import FloatArray, Indenter, RigContext, RigError, Scene, UsageError, assumed
+from tactbench.plugin.simulation import BondedLayer, FoamPad, SkinSheet
+from tactbench.rigs.twin import tactbench_effects, tactbench_indenters
+from tactbench.rigs.twin.boundary_elements.contact import press as press_elements
+from tactbench.rigs.twin.boundary_elements.kernels import HalfSpace
+from tactbench.rigs.twin.closed_forms.half_space import FlatPunch
+from tactbench.rigs.twin.contact.local import LocalPress
+from tactbench.rigs.twin.contact.press import Press
+from tactbench.rigs.twin.contact.skins import medium_of
+from tactbench.rigs.twin.contact.validity import remarks
+from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, skin_grid
+from tactbench.rigs.twin.rig import build
+from tactbench.rigs.twin.shapes import Shape, shape_of
+
+INDENTERS = tactbench_indenters()
+
+
+def _q(value: float, unit: str = "mm"):
+    return assumed(value, unit, "a test")
+
+
+def shape(name: str, angle: float = 0.0, **sizes: float) -> Shape:
+    units = {name: one.unit for name, one in next(one for one in INDENTERS if one.name == name).dimensions.items()}
+    stated = {size: _q(value, units[size]) for size, value in sizes.items()}
+    found = shape_of(Indenter(shape=name, dimensions=stated, angle=_q(angle, "deg")), INDENTERS)
+    assert found is not None
+    return found
+
+
+def pressed_by(body: Shape) -> Contact:
+    return Contact(math.inf, 0.0, 0.0, shape=body)
+
+
+def sheet(cells: int) -> SkinSheet:
+    return SkinSheet(x_min=_q(-8), x_max=_q(8), arc=_q(16), cells=(cells, cells))
+
+
+# Nothing but columns: no shear, no cover, and so little strain that the foam is linear.
+FOAM = {
+    "young": _q(0.2, "MPa"), "thickness": _q(2.0), "densification": _q(1e9, "1"), "shear": _q(0.0, "MPa"),
+    "cover_tension": _q(0.0, "N/mm"), "cover_bending": _q(0.0, "N*mm"), "contact_stiffness": _q(1e3, "MPa/mm"),
+}  # fmt: skip
+K = 0.1
+"""Of the columns: young / thickness [MPa/mm]."""
+
+
+def columns(body: Shape, force_n: float, cells: int = 64):
+    skin = FoamPad(sheet=sheet(cells), **FOAM)
+    grid = skin_grid(skin.sheet)
+    return Press(medium_of(skin, grid), gap_mm(grid, pressed_by(body)), pressed_by(body))(force_n)
+
+
+# Force of a depth d on columns k under a line of length L = 16: k L ∫ (d - h(y))+ dy.
+def line_on_columns(depth: float, height) -> float:
+    y = np.linspace(-8, 8, 200_001)
+    return float(K * 16 * np.trapezoid(np.maximum(depth - height(y), 0.0), y))
+
+
+@pytest.mark.parametrize(
+    ("body", "height"),
+    [
+        (shape("cylinder", radius=6.0), lambda y: 6.0 - np.sqrt(np.maximum(36.0 - y**2, 0.0))),
+        (shape("edge", wedge_angle=140.0, tip_radius=0.0), lambda y: np.abs(y) / math.tan(math.radians(70.0))),
+    ],
+    ids=["cylinder", "sharp edge"],
+)
+@pytest.mark.parametrize("angle", [0.0, 90.0])
+def test_a_line_on_columns_is_as_deep_as_the_closed_form(body, height, angle):
+    turned = Shape(body.name, body.sizes, math.radians(angle), body.height)
+    force = line_on_columns(1.0, height)
+    # Depths count from the lowest cell centre, half a cell beside the line. The penalty yields by 1e-4 of the depth;
+    # sums over cells of a quarter of a millimetre are off by the square of their share of the width, some thousandths.
+    lowest = float(turned.height_mm(np.array([0.125]), np.array([0.125]))[0])
+    assert columns(turned, force).depth_mm + lowest == pytest.approx(1.0, rel=0.003)
+
+
+def test_the_depth_of_an_edge_converges_with_the_grid():
+    body = shape("edge", wedge_angle=140.0, tip_radius=0.0)
+    force = line_on_columns(0.83, lambda y: np.abs(y) / math.tan(math.radians(70.0)))
+    errors = [abs(columns(body, force, cells).depth_mm - 0.83) for cells in (16, 32, 64)]
+    # The lowest cell centre is half a cell beside the tip: halved with the cells, and what else is wrong sooner.
+    assert errors[1] < 0.6 * errors[0]
+    assert errors[2] < 0.6 * errors[1]
+
+
+def test_a_pin_on_columns_presses_what_stands_under_it():
+    state = columns(shape("pin", radius=2.5), 1.0)
+    touched = state.pressure_mpa > 0
+    area = np.count_nonzero(touched) * 0.25**2
+    # A circle of whole cells, ten in radius: their number is that of its area to one in a hundred.
+    assert area == pytest.approx(math.pi * 2.5**2, rel=0.02)
+    np.testing.assert_allclose(state.pressure_mpa[touched], 1.0 / area, rtol=1e-3)
+    assert state.depth_mm == pytest.approx(1.0 / area / K, rel=2e-3)  # and a hundredth of it in the penalty's springs
+
+
+def test_a_pin_on_a_half_space_sinks_in_as_boussinesq_says():
+    cells, side = 48, 8.0
+    x = (np.arange(cells) + 0.5) * side / cells - side / 2
+    height = shape("pin", radius=2.0).height_mm(x[:, None], x[None, :])
+    gap = np.where(height < 50, height, np.inf)
+    found = press_elements(HalfSpace(1.0), gap, (side / cells, side / cells), 1.0)
+    # 2 a E* d; the rim's pressure is infinite there and a mean over cells here: 12 cells a radius leave some per cent.
+    assert found.depth_mm == pytest.approx(FlatPunch(2.0, 1.0).depth_mm(1.0), rel=0.02)
+
+
+def test_a_cylinder_on_a_half_space_is_hertz_in_every_cross_section():
+    # Far from the ends of a long contact each section is plane: with its own load per length P, a² = 4 P R / (pi E*)
+    # and p0 = 2 P / (pi a) (Johnson 1985, section 4.2.3).
+    radius, cell = 10.0, 0.1
+    x, y = (np.arange(64) + 0.5) * 0.5 - 16, (np.arange(48) + 0.5) * cell - 2.4
+    gap = shape("cylinder", radius=radius).height_mm(x[:, None], y[None, :])
+    found = press_elements(HalfSpace(1.0), gap, (0.5, cell), 3.0)
+    middle = found.pressure_mpa[32]
+    load = float(middle.sum()) * cell
+    half_width = math.sqrt(4 * load * radius / math.pi)
+    assert middle.max() == pytest.approx(2 * load / (math.pi * half_width), rel=0.02)  # 16 cells a half-width
+    assert np.count_nonzero(middle) * cell == pytest.approx(2 * half_width, abs=2 * cell)
+
+
+@pytest.fixture(scope="module")
+def layer():
+    skin = BondedLayer(
+        sheet=sheet(48),
+        young=_q(1.0, "MPa"),
+        poisson=_q(0.3, "1"),
+        thickness=_q(2.0),
+        contact_stiffness=_q(300, "MPa/mm"),
+    )
+    grid = skin_grid(skin.sheet)
+    return skin, grid, medium_of(skin, grid)
+
+
+def test_a_turned_cylinder_gives_the_transposed_pressure(layer):
+    _, grid, medium = layer
+    found = []
+    for angle in (0.0, 90.0):
+        contact = pressed_by(shape("cylinder", radius=5.0, angle=angle))
+        found.append(Press(medium, gap_mm(grid, contact), contact)(2.0).pressure_mpa)
+    # The solver's own tolerance, 1e-6, is all that tells them apart.
+    np.testing.assert_allclose(found[1], found[0].T, atol=1e-4 * found[0].max())
+    assert np.ptp(found[0], axis=0).max() < 1e-4 * found[0].max()  # the same all along the cylinder
+    assert np.ptp(found[0], axis=1).max() > 0.5 * found[0].max()
+
+
+def test_a_cylinder_sinks_in_less_than_a_cap_of_its_radius_and_an_edge_more(layer):
+    _, grid, medium = layer
+
+    def depth(contact: Contact) -> float:
+        return Press(medium, gap_mm(grid, contact), contact)(2.0).depth_mm
+
+    cylinder = depth(pressed_by(shape("cylinder", radius=5.0)))
+    assert cylinder < 0.7 * depth(Contact(5.0, 0.0, 0.0))
+    assert depth(pressed_by(shape("edge", wedge_angle=100.0, tip_radius=0.4))) > cylinder
+    # Flanks that begin beyond the contact are never touched: a rounded edge is then the cylinder of its tip.
+    assert depth(pressed_by(shape("edge", wedge_angle=90.0, tip_radius=5.0))) == pytest.approx(cylinder, rel=1e-9)
+
+
+def test_the_cheapest_rung_presses_shapes_too(layer):
+    skin, grid, medium = layer
+    contact = pressed_by(shape("cylinder", radius=5.0))
+    springs = float(medium.stiffness[0, 0])
+    force = line_on_columns(0.3, lambda y: 5.0 - np.sqrt(np.maximum(25.0 - y**2, 0.0))) * springs / K
+    # A cell is a third of a millimetre, the half-width five of them.
+    assert LocalPress(skin, medium, gap_mm(grid, contact), contact)(force).depth_mm == pytest.approx(0.3, rel=0.05)
+
+
+def height_at(body: Shape, x: float, y: float) -> float:
+    found: FloatArray = body.height_mm(np.array([x]), np.array([y]))
+    return float(found[0])
+
+
+def test_the_angle_turns_from_x_towards_s():
+    body = shape("cylinder", radius=5.0, angle=30.0)
+    along = np.array([math.cos(math.radians(30)), math.sin(math.radians(30))])
+    assert height_at(body, *(3 * along)) == pytest.approx(0.0, abs=1e-12)  # the cylinder's own axis
+    assert height_at(body, *(3 * along[::-1] * [-1, 1])) == pytest.approx(1.0)  # 5 - sqrt(25 - 9)
+
+
+def test_a_rounded_edge_leaves_its_tip_without_a_kink():
+    body = shape("edge", wedge_angle=120.0, tip_radius=2.0)
+    y = np.linspace(0.0, 4.0, 4001)
+    slope = np.diff(body.height_mm(np.zeros(1), y)) / np.diff(y)
+    assert slope[-1] == pytest.approx(1 / math.tan(math.radians(60)))
+    assert (
+        np.abs(np.diff(slope)).max() < 1e-3
+    )  # 1e-3 mm over a radius of 2 mm is half a thousandth, steepest at the end
+
+
+def test_a_pin_that_is_all_fillet_is_a_cap():
+    pin, x = shape("pin", radius=3.0, fillet=3.0), np.linspace(-2.9, 2.9, 59)
+    np.testing.assert_allclose(pin.height_mm(x, 0 * x), 3 - np.sqrt(9 - x**2), rtol=1e-12, atol=1e-15)
+    assert height_at(pin, 3.1, 0.0) > 50
+    with pytest.raises(UsageError, match=r"fillet is given as 4 mm, and at most its radius, 3 mm, is expected"):
+        height_at(shape("pin", radius=3.0, fillet=4.0), 0.0, 0.0)
+
+
+@pytest.mark.parametrize("body", [shape("pin", radius=0.2), shape("edge", wedge_angle=80.0, tip_radius=0.0)])
+def test_a_shape_that_the_grid_cannot_resolve_is_refused(body):
+    with pytest.raises(RigError, match=rf"indenter '{body.name}' .* rises by .* mm within 0.25 mm, a cell of the skin"):
+        check_contact(skin_grid(sheet(64)), pressed_by(body))
+
+
+def test_what_the_grid_does_resolve_is_not_refused():
+    for body in (shape("pin", radius=0.3), shape("edge", wedge_angle=90.0, tip_radius=0.0), shape("cylinder")):
+        check_contact(skin_grid(sheet(64)), pressed_by(body))
+
+
+def test_a_narrow_line_is_remarked_upon_however_long_it_is(layer):
+    _, grid, medium = layer
+    contact = pressed_by(shape("edge", wedge_angle=100.0, tip_radius=0.0))
+    said = remarks(Press(medium, gap_mm(grid, contact), contact), (0.1, 0.5), math.inf)
+    assert said["contact_radius_cells"] < 3
+    assert "it follows the mesh" in said["remark contact"]
+
+
+def test_a_flank_steeper_than_45_degrees_is_remarked_upon(layer):
+    _, grid, medium = layer
+    contact = pressed_by(shape("edge", wedge_angle=60.0, tip_radius=0.5))
+    said = remarks(Press(medium, gap_mm(grid, contact), contact), (20.0,), math.inf)
+    assert said["remark flank"] == "the edge touches where its flank has a slope of 1.7"
+
+
+def test_a_scene_with_an_unknown_shape_says_which_are_installed(sensors):
+    twin = build(RigContext(effects=tuple(tactbench_effects()), indenters=tuple(INDENTERS)))
+    with pytest.raises(RigError, match="No indenter is called 'knob'") as caught:
+        twin.plan(sensors["icub"], Scene(name="a", indenter=Indenter(shape="knob")))
+    assert caught.value.hint == "Installed are: cap, cylinder, edge, flat, pin."
+    with pytest.raises(UsageError, match=r"'edge': tip_radius is given as 2 N, and a number in mm is expected"):
+        twin.plan(
+            sensors["icub"], Scene(name="a", indenter=Indenter(shape="edge", dimensions={"tip_radius": _q(2, "N")}))
+        )
