@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -206,11 +206,7 @@ def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[
                 f"{task.kind}.",
                 hint=f"Estimators for it: {', '.join(fitting)}.",
             )
-        _known_parameters(estimator.name, estimator.params, descriptor.params)
+        for parameter in estimator.params:
+            if parameter not in descriptor.params:
+                raise UnknownNameError(f"parameter of estimator {estimator.name!r}", parameter, descriptor.params)
     return choices
-
-
-def _known_parameters(estimator: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> None:
-    for parameter in given:
-        if parameter not in known:
-            raise UnknownNameError(f"parameter of estimator {estimator!r}", parameter, known)
