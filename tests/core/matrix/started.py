@@ -10,6 +10,9 @@ from tempfile import TemporaryDirectory
 from tests.conftest import ROOT
 from tests.core.pool.patience import until
 
+LIGHT = "tests.core.pool.light_fork_server"
+"""What Dask workers load whose cells need no library."""
+
 
 class Started:
     """Processes that end with the test."""
@@ -29,14 +32,13 @@ class Started:
             self.close()
             raise
 
-    def worker(self, *path, nanny=False):
-        """Start a worker that sees the packages in the folders `path` first."""
+    def worker(self, *path, light=False):
+        """Start a worker that sees the packages in the folders `path` first; a `light` one is for work without libraries."""
         where = self.folder / f"worker-{len(list(self.folder.iterdir()))}"
         where.mkdir()
         options = ("--nthreads", "1", "--no-dashboard", "--memory-limit", "0", "--local-directory", str(where))
-        return self._start(
-            "dask_worker", self.address, "--nanny" if nanny else "--no-nanny", *options, path=path, cwd=where
-        )
+        preload = ("--preload", LIGHT) if light else ()
+        return self._start("dask_worker", self.address, "--no-nanny", *preload, *options, path=path, cwd=where)
 
     def _start(self, program, *arguments, path=(), cwd=None):
         log = self._stack.enter_context((self.folder / f"{program}.log").open("ab"))

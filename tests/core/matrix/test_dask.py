@@ -6,13 +6,14 @@ import sys
 import threading
 
 import pytest
+from dask import config
 
 from tactbench.core.errors import Crashed, DataError, EngineError, TimedOut, UsageError
 from tactbench.core.matrix import dask
 from tactbench.core.matrix.dask import Dask, client_of
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.pool.limits import Limits
-from tests.core.matrix.started import posing_as, started
+from tests.core.matrix.started import LIGHT, posing_as, started
 from tests.core.pool.patience import ending, gone, until
 from tests.core.pool.remote_work import kill_once, misbehave, parent_of, process, square, wait_for, where
 
@@ -21,7 +22,7 @@ LIMITS = Limits(timeout_s=60)
 
 @pytest.fixture(scope="module")
 def address():
-    with client_of(None, 2) as client:
+    with config.set({"distributed.worker.preload": [LIGHT]}), client_of(None, 2) as client:
         yield client.scheduler.address
 
 
@@ -120,7 +121,7 @@ def test_a_scheduler_without_workers_is_refused(cluster, monkeypatch):
 
 @pytest.fixture(scope="module")
 def worker(cluster):
-    return cluster.worker()
+    return cluster.worker(light=True)
 
 
 RUN = """
@@ -150,7 +151,7 @@ def test_workers_may_come_late_and_one_that_differs_gets_nothing(cluster, worker
         refused = cluster.worker(old)
         log = cluster.folder / "dask_worker.log"
         assert until(lambda: "version of scipy is 0.1 there" in log.read_text(), 60)
-        cluster.worker()
+        cluster.worker(light=True)
         assert until(second.exists, 60)  # both cells wait to be let go: on one worker that would never be
         for cell in (begun, second):
             assert until(cell.read_text)
@@ -177,7 +178,7 @@ def test_a_worker_of_another_environment_is_named_and_nothing_is_computed(tmp_pa
 def test_when_the_scheduler_goes_the_cells_left_say_so(tmp_path, monkeypatch):
     monkeypatch.setattr(dask, "CONNECT_S", 2.0)
     with started(tmp_path) as own:
-        own.worker()
+        own.worker(light=True)
         begun = tmp_path / "begun"
         items = [(tmp_path / "free", tmp_path), (begun, tmp_path / "never"), (tmp_path / "unsent", tmp_path)]
         outcomes = []

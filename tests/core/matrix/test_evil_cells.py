@@ -59,9 +59,9 @@ ENDS = {
 """Status, signal and a part of the reason of every evil cell."""
 
 
-def run(shell, *arguments, out="out", code=1):
+def run(command, *arguments, out="out", code=1, plugins=("evil",)):
     """Run and return the listed rows by estimator, and what the command printed."""
-    done = shell(*ASKED, *arguments, "--out", out, "--format", "json", plugins=("evil",), code=code)
+    done = command(*ASKED, *arguments, "--out", out, "--format", "json", plugins=plugins, code=code)
     listed = json.loads(done.stdout)
     assert Counter(row["cell"] for row in listed).most_common(1)[0][1] == 1, "one row a cell"
     return {row["estimator"]: row for row in listed}, done
@@ -92,10 +92,10 @@ def processes_in(folder):
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory):
     """The honest cells without any evil one beside them."""
-    shell = Shell(tmp_path_factory.mktemp("honest"))
-    presses(shell.folder / "shelf")
-    run(shell, "--estimator", "ols", code=0)
-    return lines_of(shell.folder / "out"), shell.folder / "shelf"
+    verbs = Verbs(tmp_path_factory.mktemp("honest"))
+    presses(verbs.folder / "shelf")
+    run(verbs, "--estimator", "ols", code=0, plugins=())
+    return lines_of(verbs.folder / "out"), verbs.folder / "shelf"
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -239,10 +239,11 @@ def test_options_that_do_not_go_together_are_refused(tmp_path):
 
 def test_number_of_jobs_and_order_change_no_score(alone, tmp_path):
     (tmp_path / "shelf").symlink_to(alone[1])
-    shell = Shell(tmp_path)
+    verbs = Verbs(tmp_path)
     texts = {}  # of Dask: tests.core.matrix.test_dask_runs
     for name, first, last in (("in-process", "forest-10", "ridge"), ("isolated-2", "ridge", "forest-10")):
-        run(shell, "--estimator", first, "--estimator", last, "--repeats", "2", *ENGINES[name], out=name, code=0)
+        asked = ("--estimator", first, "--estimator", last, "--repeats", "2", *ENGINES[name])
+        run(verbs, *asked, out=name, code=0, plugins=())
         texts[name] = json.loads((tmp_path / name / "scores.json").read_text())
     in_order, turned = ({row["cell"]: row for row in rows} for rows in texts.values())
     assert in_order == turned
