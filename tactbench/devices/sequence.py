@@ -89,16 +89,17 @@ class Unwrap:
         times = np.zeros_like(now) if t_ns is None else np.broadcast_to(np.asarray(t_ns, dtype=np.int64), now.shape)
         highest = int(now[0]) if self._highest is None else self._highest
         seen_ns = int(times[0]) if self._seen_ns is None else self._seen_ns
-        steps = _steps(highest, now) % self._modulus
-        broken = _steps(seen_ns, times) > self._longest_ns
-        broken[0] |= self._restarted
-        self._restarted = False
-        if np.all((steps < self._modulus // 2) | broken):
-            numbers = highest + np.cumsum(np.where(broken & (steps == 0), self._modulus, steps))
-            self.breaks += int(np.count_nonzero(broken))
-            self._highest, self._seen_ns = int(numbers[-1]), int(times[-1])
-            return numbers
-        return self._with_late(now, times, highest, seen_ns, restarted=bool(broken[0]))
+        restarted, self._restarted = self._restarted, False
+        if len(now) > 1:  # of a single row, which drivers give each millisecond, numpy takes longer than one by one
+            steps = _steps(highest, now) % self._modulus
+            broken = _steps(seen_ns, times) > self._longest_ns
+            broken[0] |= restarted
+            if np.all((steps < self._modulus // 2) | broken):
+                numbers = highest + np.cumsum(np.where(broken & (steps == 0), self._modulus, steps))
+                self.breaks += int(np.count_nonzero(broken))
+                self._highest, self._seen_ns = int(numbers[-1]), int(times[-1])
+                return numbers
+        return self._with_late(now, times, highest, seen_ns, restarted=restarted)
 
     def _with_late(self, counts: IntArray, times: IntArray, highest: int, seen_ns: int, *, restarted: bool) -> IntArray:
         """Return the numbers one by one: after a late count, differences are from the highest, not from it."""
@@ -159,6 +160,9 @@ class SequenceCheck:
         if numbers is None:
             return block
         before = int(numbers[0]) - 1 if self._highest is None else self._highest
+        if len(numbers) == 1 and numbers[0] == before + 1:
+            self._highest = before + 1
+            return block
         ahead = np.maximum.accumulate(np.concatenate(([before], numbers)))
         lost = numbers - ahead[:-1] - 1
         self._highest = int(ahead[-1])

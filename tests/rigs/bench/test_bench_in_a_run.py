@@ -17,8 +17,8 @@ def test_rows_of_emulated_devices_are_ranked_with_nobody_else(shell, verbs):
     text = EXAMPLE.read_text(encoding="utf-8")
     assert NET_FT in text
     (shell.folder / "rig.yaml").write_text(text.replace(NET_FT, NET_FT + SLOWER), encoding="utf-8")
-    shell("run", *asked)
-    out = shell("run", "--rig-file", "rig.yaml", *asked).stdout
+    verbs("run", *asked)
+    out = verbs("run", "--rig-file", "rig.yaml", *asked).stdout
     assert "EMULATED (rig bench)" in out
     table = verbs("leaderboard", "--format", "md").stdout
     assert table.count("· EMULATED (rig bench)\n") == 1
