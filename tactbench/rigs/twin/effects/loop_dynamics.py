@@ -59,16 +59,12 @@ class Dynamics:
 
         Its eigenvalues decide: the loop settles if and only if all lie inside the unit circle.
         """
-        size = 3 + self.delay_steps
-        columns = []
-        for unit in np.eye(size):
-            x, y, integral, *late = (float(value) for value in unit)
-            y = self.kept * y + (1 - self.kept) * stiffness_n_per_mm * x
-            integral -= self.integral * self.step_s * y
-            late = [integral - self.proportional * y, *late]
-            x = self.left * x + (1 - self.left) * late[self.delay_steps]
-            columns.append([x, y, integral, *late[: self.delay_steps]])
-        return np.array(columns).T
+        x, y, integral, *late = np.eye(3 + self.delay_steps)  # each a row: by the state before the step
+        y = self.kept * y + (1 - self.kept) * stiffness_n_per_mm * x
+        integral = integral - self.integral * self.step_s * y
+        late = [integral - self.proportional * y, *late]
+        x = self.left * x + (1 - self.left) * late[self.delay_steps]
+        return np.array([x, y, integral, *late[: self.delay_steps]])
 
     def growth(self, stiffness_n_per_mm: float) -> float:
         """Return the largest modulus of the eigenvalues: above 1 the loop oscillates."""
