@@ -54,7 +54,7 @@ def run(paths, estimator):
 
 def test_the_place_is_found_on_both_sensors(recorded):
     """From 20 places on a square of 10 mm, two millimetres apart: half of that is within reach, chance is 3.8 mm."""
-    result, mean = run(recorded, "forest-100"), run(recorded, "mean")
+    result, mean = run(recorded, "forest-10"), run(recorded, "mean")
     assert mean.score > 3.0
     assert result.scores["median error"] < 1.5
     assert result.score < mean.score / 2
