@@ -33,7 +33,7 @@ class Started:
             raise
 
     def worker(self, *path, light=False):
-        """Start a worker that sees the packages in the folders `path` first; a `light` one is for work without libraries."""
+        """Start a worker that sees the packages in the folders `path` first; `light`: for work without libraries."""
         where = self.folder / f"worker-{len(list(self.folder.iterdir()))}"
         where.mkdir()
         options = ("--nthreads", "1", "--no-dashboard", "--memory-limit", "0", "--local-directory", str(where))

@@ -13,6 +13,7 @@ from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.recording.mapping import import_tables
 from tactbench.core.recording.reader import open_recording
 from tactbench.core.samples import Quality
+from tactbench.rigs.twin.likeness.report import checks
 from tests.core.evaluation.test_real_recordings import REGISTRY, run
 
 MAPPINGS = Path(__file__).resolve().parents[4] / "examples" / "mappings"
@@ -157,6 +158,22 @@ def test_icub_grasp(imported):
     agree = near.mean(axis=0)
     assert (np.diag(agree) > 0.9).all()
     assert agree[~np.eye(5, dtype=bool)].max() < 0.55
+
+
+def test_real_fingertips_lie_in_the_ranges_of_the_icub_s_figures(imported):
+    # The ranges come from these files: the statistics must find them again.
+    every = checks(REGISTRY.sensors["icub"], imported("icub-grasp").recordings[0].path.parent)
+    found = {verdict.name: verdict for check in every for verdict in check.run()}
+    assert all(verdict.met for verdict in found.values()), {n: v.found for n, v in found.items() if not v.met}
+    assert len(found) == 12
+    # To the printed digits of the published evaluation: 4.8 % rise, participation 2.9, 26 counts, 98 at most, 243.
+    assert found["share-rising"].found == pytest.approx(0.048, abs=0.003)
+    assert found["participation"].found == pytest.approx(2.9, abs=0.15)
+    assert found["largest-drop"].found == pytest.approx(26, abs=1)
+    assert found["deepest-drop"].found == 98
+    assert found["rest-level"].found == pytest.approx(243, abs=1)
+    left = [check for check in every if check.title.startswith("left out")]
+    assert [check.name for check in left] == ["rest: offset-own"]
 
 
 def test_the_first_frame_names_the_object(imported):
