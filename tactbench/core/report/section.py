@@ -12,8 +12,7 @@ from typing import Any
 from tactbench.core.leaderboard.names import answer_name
 from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.report.calibrated import Calibrated
-from tactbench.core.report.results import Results
-from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.report.results import Results, SavedFigure
 from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
@@ -135,3 +134,8 @@ class Section:
 
 
 Maker = Callable[[ReportData], Section]
+
+
+def block_anchor(place: int) -> str:
+    """Return where the page shows the block at this place of the table."""
+    return f"leaderboard-{place + 1}"
