@@ -23,7 +23,7 @@ def leaderboards_section(subject: ReportData) -> Section:
     """Return the section of leaderboards, failed and skipped cells with their reasons."""
     table = subject.leaderboard
     tables = tuple(
-        replace(full_grid(block, subject.anchors), anchor=block_anchor(place))
+        replace(subject.linked(full_grid(block)), anchor=block_anchor(place))
         for place, block in enumerate(table.blocks)
     )
     paragraphs = ("Click a heading to sort by it; click it again to turn the order round.",)
