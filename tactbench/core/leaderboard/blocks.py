@@ -37,17 +37,7 @@ class Block:
 def blocks_of(
     rows: Sequence[Row], columns: Sequence[str], letters: Mapping[str, str], times: bool
 ) -> tuple[Block, ...]:
-    """Arrange rows into blocks, ranked.
-
-    Parameters
-    ----------
-    rows
-        In the order of their cells' names.
-    letters
-        The mark of each host.
-    times
-        Whether verdicts may name costs.
-    """
+    """Arrange rows, in the order of their cells' names, into ranked blocks; verdicts name costs only with `times`."""
     blocks = []
     for key, members in sorted(_grouped(rows).items(), key=lambda group: _order(group[0])):
         arranged, unranked = _arranged(members)
@@ -123,13 +113,7 @@ def _arranged(members: Sequence[Row]) -> tuple[list[tuple[Row, Placing | None]],
 
 
 def no_better(error: float, sign: float, baseline: float | None) -> bool:
-    """Return whether an answer is no better than the trivial one: it gets no place.
-
-    Parameters
-    ----------
-    error
-        ``sign`` times its score, the lower the better.
-    """
+    """Return whether an answer is no better than the trivial one and gets no place; its error is ``sign`` x score."""
     return baseline is not None and error >= sign * baseline
 
 

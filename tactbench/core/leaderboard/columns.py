@@ -169,15 +169,7 @@ class Line:
 
 
 def line_of(row: Row, placing: Placing | None, columns: Sequence[str], letters: Mapping[str, str]) -> Line:
-    """Return the line of a row.
-
-    Parameters
-    ----------
-    placing
-        Where the row stands in its block; None: a baseline, or a cell that did not end well.
-    letters
-        The mark of each host.
-    """
+    """Return the line of a row; one without a place is a baseline, or did not end well. Hosts have `letters`."""
     texts = {"sensor": sensor_name(row), "estimator": answer_name(row)}
     if row["status"] != "done":
         texts |= {"#": "", "score": row["status"].upper()}

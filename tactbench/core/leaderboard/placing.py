@@ -38,10 +38,7 @@ class Placing(NamedTuple):
 def places(results: Sequence[Row]) -> tuple[dict[str, Placing], str]:
     """Return where each of `results` stands, by the name of its cell, and why there are no rank intervals, if so.
 
-    Parameters
-    ----------
-    results
-        The finished answers of one block, no baselines, the best score first.
+    They are the finished answers of one block, no baselines, the best score first.
     """
     counts = [row.get("n_replicates") for row in results]
     if any(n is not None and n < FEWEST for n in counts):

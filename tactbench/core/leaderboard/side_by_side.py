@@ -19,15 +19,7 @@ _NOTE = (
 
 
 def compare(rows: Iterable[Row], by: str) -> list[TextTable]:
-    """Return a table for each task (and whatever else must not be mixed) that was asked in several ways.
-
-    Parameters
-    ----------
-    rows
-        Rows of a leaderboard.
-    by
-        One of `tactbench.core.leaderboard.axes.AXES`.
-    """
+    """Return a table for each task (and whatever else must not be mixed) that was asked in several ways of `AXES`."""
     groups: dict[tuple[Any, ...], list[Row]] = {}
     alike = [key for key in ("protocol", "split") if key != by]
     for row in rows:

@@ -32,23 +32,16 @@ def verdict_of(
 ) -> tuple[str, ...]:
     """Return sentences on the answers of one block: who is best, how well that is resolved, what it hangs on.
 
+    The first is one of three verdicts: a clear winner, a tie at the top, not enough to tell. Where intervals allow it,
+    then how many neighbouring rows are separable, whether the first place hangs on one replicate and between what
+    scores single ones lie; then answers that need no touch, and where published figures lie.
+
     Parameters
     ----------
-    ranked
-        Answers that have a place, in order.
-    below
-        How many answers are no better than the trivial one.
-    trivial
-        The trivial answers of the block.
+    ranked, below, trivial
+        Answers that have a place, in order; how many are no better than the trivial one; the trivial ones.
     times
         Whether costs may be named: no seed decides them.
-
-    Returns
-    -------
-    tuple of str
-        One of three verdicts (a clear winner; a tie at the top; not enough to tell), then, where intervals allow it,
-        how many neighbouring rows are separable, whether the first place hangs on one replicate and between what scores
-        single ones lie; then answers that need no touch, and where published figures lie.
     """
     if not ranked:
         return (_none_better(below, trivial),) if below else ()
