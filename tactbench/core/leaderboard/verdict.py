@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from operator import itemgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sign_of
-from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
 from tactbench.core.tables.numbers import interval, score, suffix
 from tactbench.core.tables.text import visible
+
+if TYPE_CHECKING:
+    from tactbench.core.statistics.ranking import Rank
 
 Row = Mapping[str, Any]
 
@@ -28,7 +30,7 @@ comparison_key = itemgetter("sensor", "task", "rig", "protocol", "split")
 
 
 def verdict_of(
-    ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Sequence[Row] = (), *, times: bool = True
+    ranked: Sequence[tuple[Row, Rank]], below: int, trivial: Sequence[Row] = (), *, times: bool = True
 ) -> tuple[str, ...]:
     """Return sentences on the answers of one block: who is best, how well that is resolved, what it hangs on.
 
@@ -211,7 +213,7 @@ def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:
     return ""
 
 
-def _resolution(ranked: Sequence[tuple[Row, Placing]], leaders: int, names: Sequence[str]) -> str:
+def _resolution(ranked: Sequence[tuple[Row, Rank]], leaders: int, names: Sequence[str]) -> str:
     """Return how many neighbours can be told apart, and whether the first place hangs on one replicate."""
     apart = sum(one.apart for _, one in ranked)
     behind = len(ranked) - leaders
