@@ -18,6 +18,7 @@ from tactbench.rigs.twin.contact.skins import medium_of
 from tactbench.rigs.twin.contact.slide_table import dragged_state, traction_shares
 from tactbench.rigs.twin.contact.tangential import pressed_state, tangential_of
 from tactbench.rigs.twin.geometry import Contact, gap_mm, outer_radius_mm, skin_grid
+from tactbench.rigs.twin.layer_kernel import shear_shapes
 from tactbench.rigs.twin.partial_slip import sliding_stiffness
 
 YOUNG, SIDE_MM, FORCE_N, RADIUS_MM, MU = 1.0, 12.0, 0.3, 1.0, 0.6
@@ -114,6 +115,44 @@ def test_tractions_do_each_others_work(poisson, thickness_mm, seed):
     own = float((np.multiply.outer(ways[0], states[0].pressure_mpa) * moved[0]).sum())
     assert work[0] == pytest.approx(work[1], rel=1e-10, abs=1e-10 * own)
     assert own > 0
+
+
+def test_an_even_traction_shears_a_layer():
+    skin = _layer(0.4, cells=16, thickness_mm=3.0)
+    along, rest = tangential_of(skin, skin_grid(skin.sheet)), at_rest(medium_of(skin, skin_grid(skin.sheet)))
+    even = dataclasses.replace(rest, pressure_mpa=np.full((16, 16), 0.1))
+    moved = along.dragged(even, (0.6, -0.8), even.pressure_mpa > 0)
+    by_h_over_g = 0.1 * 3.0 / (YOUNG / 2 / 1.4)
+    np.testing.assert_allclose(moved[0], 0.6 * by_h_over_g, rtol=1e-12)
+    np.testing.assert_allclose(moved[1], -0.8 * by_h_over_g, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("waves_x", "waves_s"), [(2, 0), (0, 3), (2, -1)])
+def test_a_wave_of_traction_moves_a_layer_along_itself_and_along_its_crests(waves_x, waves_s):
+    skin, grid = _layer(0.3, cells=16, thickness_mm=3.0), skin_grid(_layer(0.3, cells=16).sheet)
+    k = 2 * math.pi / SIDE_MM * np.array([waves_x, waves_s])
+    wave = np.cos(k[0] * grid.x_mm[:, None] + k[1] * grid.s_mm[None, :])
+    state = dataclasses.replace(at_rest(medium_of(skin, grid)), pressure_mpa=wave)
+    way, size, shear = np.array([0.6, -0.8]), float(np.hypot(*k)), YOUNG / 2 / 1.3
+    _, along, across = (float(shape) / (shear * size) for shape in shear_shapes(np.array(size * 3.0), 0.3))
+    ahead = k * (k @ way) / size**2
+    moved = tangential_of(skin, grid).dragged(state, tuple(way), wave > 0)
+    np.testing.assert_allclose(moved, np.multiply.outer(along * ahead + across * (way - ahead), wave), atol=1e-12)
+
+
+@given(st.floats(-1, 1), st.floats(0, 1), st.booleans())
+def test_no_share_exceeds_friction_wherever_the_inner_pressure_is_no_larger(since, inner, held):
+    # As in the recordings: after a slip that ended at a share `since` of the limit, by Mindlin or held as the way goes.
+    asked = since + (1 - since) * (1 - inner ** (2 / 3) if held else 1 - inner)
+    share, stuck, b = (
+        float(one[0]) for one in traction_shares(*(np.array([v]) for v in (2.0, asked * MU * 2.0, np.cbrt(inner))), MU)
+    )
+    assert share == pytest.approx(asked, abs=1e-12)
+    assert stuck == pytest.approx(inner, abs=1e-12)
+    outer = share + b * stuck
+    # q / mu p from where nothing sticks (p* = 0) to where the whole inner pressure is that of the contact.
+    assert outer <= 1 + 1e-12
+    assert outer - b >= -1 - 1e-12
 
 
 @pytest.fixture(scope="module")
