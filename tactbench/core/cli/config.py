@@ -1,4 +1,4 @@
-"""Where matrices and calibrations lie: the default ones, and matrices that come with tactbench by name."""
+"""Where what came with tactbench lies: the default matrix and calibration, matrices by name, results."""
 
 from __future__ import annotations
 
@@ -16,51 +16,47 @@ if TYPE_CHECKING:
     from tactbench.core.spec.calibration import CalibrationSpec
 
 
-def default_matrix() -> MatrixSpec:
-    """Return ``benchmarks.yaml`` of this folder, else the one that came with tactbench.
+def shipped(name: str, in_checkout: str, hint: str) -> Path:
+    """Return what came with tactbench: `name` in the installed package, or `in_checkout` in a checkout of it.
 
     Raises
     ------
     ConfigError
-        If the file is wrong, or the installation has lost it.
+        If the installation has lost it.
     """
-    return load_yaml(_default("benchmarks.yaml", "matrix"), MatrixSpec)
+    package = Path(tactbench.__file__).parent
+    for place in (package / name, package.parent / in_checkout):
+        if place.exists():
+            return place
+    raise ConfigError(name, None, "tactbench was installed without it.", hint=hint)
+
+
+def default_matrix() -> MatrixSpec:
+    """Return ``benchmarks.yaml`` of this folder, else the one that came with tactbench; raises ConfigError."""
+    own = Path("benchmarks.yaml")
+    hint = "Give a matrix with --config FILE."
+    return load_yaml(own if own.is_file() else shipped(own.name, own.name, hint), MatrixSpec)
 
 
 def default_calibration() -> CalibrationSpec:
     """Return ``calibration.yaml`` of this folder, else the one that came with tactbench; raises ConfigError."""
     from tactbench.core.spec.calibration import CalibrationSpec
 
-    return load_yaml(_default("calibration.yaml", "procedure"), CalibrationSpec)
-
-
-def _default(name: str, what: str) -> Path:
-    package = Path(tactbench.__file__).parent
-    for place in (Path(name), package / name, package.parent / name):
-        if place.is_file():
-            return place
-    raise ConfigError(name, None, "is not here, and tactbench was installed without it.",
-                      hint=f"Give a {what} with --config FILE.")  # fmt: skip
+    own = Path("calibration.yaml")
+    hint = "Give a procedure with --config FILE."
+    return load_yaml(own if own.is_file() else shipped(own.name, own.name, hint), CalibrationSpec)
 
 
 def packaged_matrices() -> dict[str, Path]:
     """Return the matrices that came with tactbench, by name."""
-    package = Path(tactbench.__file__).parent
-    for folder in (package / "matrices", package.parent / "examples" / "matrices"):
-        if folder.is_dir():
-            return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
-    return {}
+    folder = shipped("matrices", "examples/matrices", "Give a file with --config FILE.")
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
 
 
 def shipped_results() -> Path:
     """Return the file of results that came with tactbench; raises ConfigError if the installation has lost it."""
-    package = Path(tactbench.__file__).parent
-    places = (package / "results" / "default.json", package.parent / "examples" / "results" / "default.json")
-    for place in places:
-        if place.is_file():
-            return place
-    raise ConfigError(places[0].name, None, "tactbench was installed without its results.",
-                      hint="Make some with `tactbench run --protocol deployable`.")  # fmt: skip
+    hint = "Make some with `tactbench run --protocol deployable`."
+    return shipped("results/default.json", "examples/results/default.json", hint)
 
 
 def matrix_called(given: str) -> MatrixSpec:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-import tactbench
+from tactbench.core.cli.config import shipped
 
 
 @click.command(name="docs")
@@ -30,24 +30,12 @@ def command(page: str | None) -> None:
 
 
 def installed_pages() -> dict[str, Path]:
-    """Return the pages by name: those in the installed package, or in the checkout that it is used from.
-
-    Raises
-    ------
-    ConfigError
-        If the installation has lost them.
-    """
-    from tactbench.core.errors import ConfigError
-
-    package = Path(tactbench.__file__).parent
-    places = (package / "docs", package.parent / "docs")
-    for place in places:
-        if (place / "index.md").is_file():
-            return {
-                path.relative_to(place).with_suffix("").as_posix(): path
-                for path in sorted(place.rglob("*.md"), key=lambda path: (path.parent != place, path.name))
-            }
-    raise ConfigError(places[0].name, None, "tactbench was installed without its pages.", hint="Install it again.")
+    """Return the pages by name: those in the installed package, or in the checkout that it is used from."""
+    folder = shipped("docs/index.md", "docs/index.md", "Install it again.").parent
+    return {
+        path.relative_to(folder).with_suffix("").as_posix(): path
+        for path in sorted(folder.rglob("*.md"), key=lambda path: (path.parent != folder, path.name))
+    }
 
 
 def _title(page: Path) -> str:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.scenes import indenter_of, press_options, profile_of, scene_of
+from tactbench.core.cli.options import options
+from tactbench.core.cli.scenes import PRESS, indenter_of, profile_of, scene_of
 from tactbench.core.cli.screen import remark
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ STATUS_S = 5.0
 @click.argument("names", nargs=-1, metavar="[DEVICE]...")
 @click.option("--rig-file", type=click.Path(path_type=Path), metavar="FILE",
               help="Start every device of this rig file whose link is `emulated`.")  # fmt: skip
-@press_options
+@options(*PRESS)
 @click.option("--presses", type=click.IntRange(min=1), metavar="N", help="End after so many; default: with Ctrl-C.")
 @click.option("--fault", "faults", multiple=True, metavar="DEVICE:FAULT",
               help="Something wrong with a device: biotac:parity:every=100, net-ft:unplug:start_s=20.")  # fmt: skip

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tactbench.core.cli.options import options
-from tactbench.core.cli.scenes import indenter_of, press_options, profile_of, scene_of
+from tactbench.core.cli.scenes import PRESS, indenter_of, profile_of, scene_of
 from tactbench.core.cli.simulation import SIMULATION, simulation_of
 from tactbench.core.tables.text import command_line
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @click.option("--sensor", required=True, metavar="NAME", help="What is pressed on.")
 @click.option("--rig", metavar="NAME", help="What presses; default: the rig file's rig, or else twin.")
 @click.option("--rig-file", metavar="FILE", help="Devices and links of a rig of real or emulated devices.")
-@press_options
+@options(*PRESS)
 @click.option("--slide-mm-s", type=click.FloatRange(min=0, min_open=True), metavar="V",
               help="Slide towards the tip at this speed, from the middle on; vibration is recorded too.")  # fmt: skip
 @options(*SIMULATION)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -20,24 +19,22 @@ if TYPE_CHECKING:
 _BY = "the command line"
 
 
-def press_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add what is pressed, and how, to a verb; `indenter_of`, `profile_of` and `scene_of` take the values."""
-    above_0 = click.FloatRange(min=0, min_open=True)
-    for option in (
-        click.option("--profile", "profile", metavar="NAME[:P=X,...]",
-                     help="A force profile by name in place of the ramp: sine:mean=2,frequency=0.5; see "
-                          "`tactbench list profiles`."),
-        click.option("--seconds", type=above_0, metavar="T",
-                     help="Duration; the ramp keeps its shape. Default 60."),
-        click.option("--force-n", type=above_0, metavar="F", help="Force at the end; default 5."),
-        click.option("--cap-mm", type=above_0, metavar="R",
-                     help="Radius of a spherical cap; without it the indenter is flat."),
-        click.option("--indenter", "indenter", metavar="NAME[:D=X,...]",
-                     help="Another shape by name: cylinder:radius=4,angle=90, turned by 90 degrees about the press "
-                          "axis; see `tactbench list indenters`."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
+_ABOVE_0 = click.FloatRange(min=0, min_open=True)
+
+PRESS = (
+    click.option("--indenter", "indenter", metavar="NAME[:D=X,...]",
+                 help="Another shape by name: cylinder:radius=4,angle=90, turned by 90 degrees about the press "
+                      "axis; see `tactbench list indenters`."),
+    click.option("--cap-mm", type=_ABOVE_0, metavar="R",
+                 help="Radius of a spherical cap; without it the indenter is flat."),
+    click.option("--force-n", type=_ABOVE_0, metavar="F", help="Force at the end; default 5."),
+    click.option("--seconds", type=_ABOVE_0, metavar="T",
+                 help="Duration; the ramp keeps its shape. Default 60."),
+    click.option("--profile", "profile", metavar="NAME[:P=X,...]",
+                 help="A force profile by name in place of the ramp: sine:mean=2,frequency=0.5; see "
+                      "`tactbench list profiles`."),
+)  # fmt: skip
+"""Given to `indenter_of`, `profile_of` and `scene_of`."""
 
 
 def scene_of(

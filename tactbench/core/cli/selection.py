@@ -60,7 +60,15 @@ def requested_matrix(
     UsageError
         If a file, a name or a combination of options is wrong.
     """
-    matrix = _with_those_beside(_matrix(**selection, replaying=recordings is not None), registry)
+    matrix = _matrix(**selection, replaying=recordings is not None)
+    chosen = {choice.name for choice in matrix.tasks}
+    tasks = []
+    for choice in matrix.tasks:
+        known = choice.name in registry.tasks
+        beside = registry.tasks[choice.name].spec.beside if known else ()  # an unknown name is refused with all others
+        more = [choice.model_copy(update={"name": name}) for name in beside if name not in chosen]
+        tasks += [choice, *more]  # those that are to be read beside it are answered in the same way
+    matrix = matrix.model_copy(update={"tasks": tuple(tasks)})
     simulation = simulation_of(
         registry, matrix.rig, matrix.sensors, effects=effects, rung=rung, tolerance=tolerance, scenario=scenario,
         nuisances=nuisances, stated=matrix.simulation,
@@ -72,18 +80,6 @@ def requested_matrix(
     if simulation is not None:
         matrix = matrix.model_copy(update={"simulation": simulation})
     return matrix, recordings or (Path(matrix.recordings) if matrix.recordings else None)
-
-
-def _with_those_beside(matrix: MatrixSpec, registry: Registry) -> MatrixSpec:
-    """Return the matrix with each task followed by those that are to be read beside it, answered in the same way."""
-    chosen = {choice.name for choice in matrix.tasks}
-    tasks = []
-    for choice in matrix.tasks:
-        known = choice.name in registry.tasks
-        beside = registry.tasks[choice.name].spec.beside if known else ()  # an unknown name is refused with all others
-        more = [choice.model_copy(update={"name": name}) for name in beside if name not in chosen]
-        tasks += [choice, *more]
-    return matrix.model_copy(update={"tasks": tuple(tasks)})
 
 
 def _matrix(

@@ -229,10 +229,10 @@ class _Folds:
             return model
         if data.vote:
             require_answers(data, assignment.test, fold.test)
-        asked, combined = self._combined(fold.test, predicted)
-        self.scores[f"fold {fold.name}"] = metric.of(asked.y, combined, n_classes)
-        self.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(asked))
-        self._keep("test", asked, combined, number)
+        tested, combined = self._combined(fold.test, predicted)
+        self.scores[f"fold {fold.name}"] = metric.of(tested.y, combined, n_classes)
+        self.fold_sizes[f"fold {fold.name}"] = (len(fold.train), len(tested))
+        self._keep("test", tested, combined, number)
         if alone and not n_classes:
             on_training = answers_of(model, X_train, estimator.name, n_classes, fold.train.y.shape[1:])
             self._keep("train", *self._combined(fold.train, on_training), number)

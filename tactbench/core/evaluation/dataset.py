@@ -111,13 +111,13 @@ def load_dataset(task: TaskSpec, recordings: Sequence[Path]) -> Dataset:
     classes = _classes([raw for _, raw in read]) if task.kind == "classification" and not framed else ()
     if not any(raw.labelled.any() for _, raw in read):
         raise NotApplicable(
-            f"Task {task.name!r} asks for {_wanted(task)}, and no recording has it.",
+            f"Task {task.name!r} asks for {_target_name(task)}, and no recording has it.",
             hint="State it in the mapping, or choose another task.",
         )
     tables = tuple(_table(meta, raw, classes) for meta, raw in read)
     unlabelled = sum(int((~table.labelled).sum()) for table in tables)
     if unlabelled:
-        counts[f"of {sum(len(table.row) for table in tables)} rows have no {_wanted(task)} and were left out"] = (
+        counts[f"of {sum(len(table.row) for table in tables)} rows have no {_target_name(task)} and were left out"] = (
             unlabelled
         )
     whole = task.answer_per != "sample"
@@ -141,7 +141,7 @@ def _whole(table: Table, task: TaskSpec) -> Table:
     """Return a recording that no group cuts; where it is to have one answer, one whose answer changes is refused."""
     if task.answer_per == "recording" and len(np.unique(table.y[table.labelled])) > 1:
         raise NotApplicable(
-            f"Task {task.name!r} asks one answer of each recording, and {_wanted(task)} changes within "
+            f"Task {task.name!r} asks one answer of each recording, and {_target_name(task)} changes within "
             f"{table.meta.name!r}.",
             hint="Cut the recordings where it changes (`recording` in the mapping), or ask a task of single samples.",
         )
@@ -329,7 +329,7 @@ def _table(meta: RecordingMeta, raw: _Raw, classes: tuple[Any, ...]) -> Table:
     return Table(meta, raw.X, y, raw.labelled, raw.force, raw.time_s, raw.row, raw.groups, raw.readings, raw.reference)
 
 
-def _wanted(task: TaskSpec) -> str:
+def _target_name(task: TaskSpec) -> str:
     if isinstance(task.target, SlipTarget):
         return "slip of the reference"
     if isinstance(task.target, LabelTarget):

@@ -33,9 +33,9 @@ def voted(part: Part, predicted: npt.NDArray[Any], n_classes: int) -> tuple[Part
     return rows, votes.argmax(axis=1)
 
 
-def require_answers(data: Dataset, test: tuple[Mask, ...], asked: Part) -> None:
+def require_answers(data: Dataset, test: tuple[Mask, ...], tested: Part) -> None:
     """Refuse a test set of which a recording has no row left that could be answered; raises DataError."""
-    answered = set(asked.recording.tolist())
+    answered = set(tested.recording.tolist())
     for place, (table, mask) in enumerate(zip(data.tables, test, strict=True)):
         if place not in answered and (mask & table.labelled).any():
             raise DataError(

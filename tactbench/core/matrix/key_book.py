@@ -17,6 +17,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,12 +42,13 @@ class Entry(NamedTuple):
     """``digest`` and ``path`` of each recording, by a name that does not depend on its key."""
 
 
+@dataclass
 class KeyBook:
-    """The book of one result folder; `folder` is ``OUT/cache/keys``."""
+    """The book of one result folder."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._lines: dict[str, dict[str, Any]] | None = None
+    folder: Path
+    """``OUT/cache/keys``."""
+    _lines: dict[str, dict[str, Any]] | None = None
 
     def write(self, entries: Iterable[Entry]) -> None:
         """Add the entries that the book lacks; a folder that refuses them costs no result."""
@@ -55,10 +57,19 @@ class KeyBook:
         if not fresh:
             return
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
+            self.folder.mkdir(parents=True, exist_ok=True)
             kept: dict[int, str] = {}
-            lines = [self._line(entry, kept) for entry in fresh]
-            path = self._folder / "keys.jsonl"
+            """Digests of parts by identity: many entries share one object."""
+            lines: list[dict[str, Any]] = []
+            for entry in fresh:
+                parts = {name: part for name, part in (("fixed", entry.fixed.sections), ("data", entry.data)) if part}
+                for part in parts.values():
+                    if id(part) not in kept:
+                        kept[id(part)] = self._keep(part)
+                digests = {name: kept[id(part)] for name, part in parts.items()}
+                configuration = dict(entry.configuration)
+                lines.append({"name": entry.name, "key": entry.key, "configuration": configuration, **digests})
+            path = self.folder / "keys.jsonl"
             torn = path.exists() and not path.read_bytes().endswith(b"\n")
             with path.open("a", encoding="utf-8") as book:
                 text = "".join(json.dumps(line, sort_keys=True, default=repr) + "\n" for line in lines)
@@ -76,19 +87,10 @@ class KeyBook:
         sections = {**self._part(line.get("fixed")), "configuration": line["configuration"]}
         return {**sections, "data": self._part(line["data"])} if line.get("data") else sections
 
-    def _line(self, entry: Entry, kept: dict[int, str]) -> dict[str, Any]:
-        """Return an entry's line; `kept` are the digests of parts by identity: many entries share one object."""
-        parts = {"fixed": entry.fixed.sections, "data": entry.data}
-        for part in parts.values():
-            if part and id(part) not in kept:
-                kept[id(part)] = self._keep(part)
-        digests = {name: kept[id(part)] for name, part in parts.items() if part}
-        return {"name": entry.name, "key": entry.key, "configuration": dict(entry.configuration), **digests}
-
     def _keep(self, part: Mapping[str, Section]) -> str:
         content = json.dumps(part, sort_keys=True, separators=(",", ":"), default=repr).encode()
         digest = hashlib.sha256(content).hexdigest()[:32]
-        path = self._folder / f"{digest}.json"
+        path = self.folder / f"{digest}.json"
         if not path.exists():
             replace_file(path, content, sync=False)  # what a power cut takes costs an explanation
         return digest
@@ -96,7 +98,7 @@ class KeyBook:
     def _part(self, digest: object) -> dict[str, Any]:
         if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):
             return {}
-        path = self._folder / f"{digest}.json"
+        path = self.folder / f"{digest}.json"
         try:
             found = json.loads(read_regular(path, _LARGEST))
         except (OSError, ValueError, RecursionError):
@@ -107,7 +109,7 @@ class KeyBook:
         """Return the latest line of each name, and every line by its key."""
         if self._lines is None:
             self._lines = {}
-            path = self._folder / "keys.jsonl"
+            path = self.folder / "keys.jsonl"
             try:
                 lines = read_regular(path, _LARGEST).decode().splitlines()
             except (OSError, ValueError):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from tactbench.core.matrix.plan import Cell
@@ -33,22 +34,17 @@ class Fixed(NamedTuple):
 _canonical = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=True, default=repr).encode
 
 
+@dataclass
 class Keys:
-    """The keys of one run: what does not change from cell to cell is worked out once.
+    """The keys of one run: what does not change from cell to cell is worked out once."""
 
-    Parameters
-    ----------
-    registry
-        Where descriptors and their owners are looked up.
-    """
-
-    def __init__(self, registry: Registry) -> None:
-        self._registry = registry
-        self.sources = SourceDigests()
-        """Digests of the owners' packages."""
-        self._answers: dict[tuple[str, str], Fixed] = {}
-        self._makers: dict[tuple[str, str, str, str | None], Fixed] = {}
-        self._data: dict[tuple[str, ...], str] = {}
+    registry: Registry
+    """Where descriptors and their owners are looked up."""
+    sources: SourceDigests = field(default_factory=SourceDigests)
+    """Digests of the owners' packages."""
+    _answers: dict[tuple[str, str], Fixed] = field(default_factory=dict)
+    _makers: dict[tuple[str, str, str, str | None], Fixed] = field(default_factory=dict)
+    _data: dict[tuple[str, ...], str] = field(default_factory=dict)
 
     def of_cell(self, cell: Cell, data: Sequence[str]) -> str:
         """Return the key of a cell's result; `data` are the content digests of its recordings, in order."""
@@ -62,7 +58,7 @@ class Keys:
         """Return what all cells of one task and one estimator share."""
         pair = cell.task, cell.estimator
         if pair not in self._answers:
-            task, estimator = self._registry.tasks.owned(cell.task), self._registry.estimators.owned(cell.estimator)
+            task, estimator = self.registry.tasks.owned(cell.task), self.registry.estimators.owned(cell.estimator)
             code = [task.descriptor.spec.features_by, estimator.descriptor.where]
             modules = [task.module, estimator.module, *(where for where in code if where)]
             source = self.sources.behind(modules, "answer")
@@ -89,17 +85,18 @@ class Keys:
         if made not in self._makers:
             devices = RigFile.model_validate_json(rig_file) if rig_file else None
             if devices is not None and not devices.emulated:
-                return _apart(sensor={"name": sensor}, rig={"name": rig, "file": rig_file})
-            maker, carrier = self._registry.sensors.owned(sensor), self._registry.rigs.owned(rig)
-            effects = [self._registry.effects.owned(effect.name) for effect in self._registry.effects]
+                sections = {"sensor": {"name": sensor}, "rig": {"name": rig, "file": rig_file}}
+                return Fixed(_digest(_canonical(sections)), sections)
+            maker, carrier = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig)
+            effects = [self.registry.effects.owned(effect.name) for effect in self.registry.effects]
             modules = [maker.module, carrier.module, carrier.descriptor.where]
             modules += [where for where in (maker.descriptor.transducer, maker.descriptor.driver) if where]
             modules += [] if devices is None else self._behind(devices)
             for effect in effects:
                 modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
             named = {}
-            if shape is not None and shape in self._registry.indenters:  # of an unknown one the rig itself complains
-                body = self._registry.indenters.owned(shape)
+            if shape is not None and shape in self.registry.indenters:  # of an unknown one the rig itself complains
+                body = self.registry.indenters.owned(shape)
                 modules += [body.module, body.descriptor.where]
                 named["indenter"] = body.descriptor.model_dump(exclude={"title"})
             self._makers[made] = _fixed(
@@ -116,8 +113,8 @@ class Keys:
     def _behind(self, devices: RigFile) -> list[str]:
         """Return where the code of the devices of a rig file is, and of the simulation that moves the emulated ones."""
         names = [entry.device for entry in (devices.force, *devices.devices.values()) if entry is not None]
-        owners = [self._registry.devices.owned(name) for name in names]
-        physics = self._registry.rigs.owned(devices.emulation.physics)
+        owners = [self.registry.devices.owned(name) for name in names]
+        physics = self.registry.rigs.owned(devices.emulation.physics)
         return [*(owner.module for owner in owners), physics.module, physics.descriptor.where]
 
 
@@ -138,10 +135,6 @@ def _fixed(source: Source, distributions: tuple[str, ...], **descriptors: Sectio
     imported = {f"import {name}": found for name, found in source.versions.items()}
     sections["versions"] = {**versions(distributions), **imported}
     sections.update({f"source of {package}": files for package, files in source.packages.items()})
-    return _apart(**sections)
-
-
-def _apart(**sections: Section) -> Fixed:
     return Fixed(_digest(_canonical(sections)), sections)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -57,10 +57,15 @@ class Cell:
         path = (self.sensor, self.task, self.rig, f"{self.protocol}{split}", f"{self.estimator}{options}")
         return "/".join((*path, str(self.repeat)))
 
+    @property
+    def task_key(self) -> str:
+        """What `task_called` finds its task by: its name, or the JSON that declares it."""
+        return self.declared_task or self.task
+
 
 def task_of(cell: Cell, registry: Registry) -> TaskSpec:
     """Return the task of a cell, in a process that may not have seen its recordings."""
-    return task_called(cell.declared_task or cell.task, registry)
+    return task_called(cell.task_key, registry)
 
 
 def task_called(task: str, registry: Registry) -> TaskSpec:
@@ -201,11 +206,7 @@ def _estimators(task: TaskSpec, choice: TaskChoice, registry: Registry) -> list[
                 f"{task.kind}.",
                 hint=f"Estimators for it: {', '.join(fitting)}.",
             )
-        _known_parameters(estimator.name, estimator.params, descriptor.params)
+        for parameter in estimator.params:
+            if parameter not in descriptor.params:
+                raise UnknownNameError(f"parameter of estimator {estimator.name!r}", parameter, descriptor.params)
     return choices
-
-
-def _known_parameters(estimator: str, given: Mapping[str, Any], known: Mapping[str, Any]) -> None:
-    for parameter in given:
-        if parameter not in known:
-            raise UnknownNameError(f"parameter of estimator {estimator!r}", parameter, known)

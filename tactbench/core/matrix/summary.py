@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import Any
 
 from tactbench.core.matrix.store import Row
 from tactbench.core.matrix.store.sharing import canonical
 from tactbench.core.spec.row import LOWER_IS_BETTER
+
+_group = itemgetter("sensor", "task", "rig", "protocol", "split", "repeat")
 
 SEED_DECIDES = (
     "cell", "status", "metric", "score", "ci_low", "ci_high", "ci_method", "reference_floor",
@@ -38,11 +41,6 @@ def fill_baselines(rows: Sequence[Row]) -> None:
             bars[group, timed] = best(known, default=None)
     for row in rows:
         row["baseline"] = bars.get((_group(row), row.get("looks_at") == "time"))
-
-
-def _group(row: Row) -> tuple[Any, ...]:
-    get = row.get
-    return get("sensor"), get("task"), get("rig"), get("protocol"), get("split"), get("repeat")
 
 
 def scores_text(rows: Sequence[Row]) -> str:

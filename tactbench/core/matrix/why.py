@@ -32,9 +32,10 @@ class Explanation:
 
 def recording_entry(request: RecordingRequest, keys: Keys) -> Entry:
     """Return what went into a recording's key, for the book."""
+    name = f"recording {request.sensor} {request.rig} {request.scene.name} {request.role} {request.seed}"
     scene = {"role": request.role, "seed": request.seed, "scene": request.scene.model_dump()}
     maker = keys.maker(request.sensor, request.rig, request.rig_file, request.scene.indenter.shape)
-    return Entry(_name(request), request.path.stem[-12:], scene, maker)
+    return Entry(name, request.path.stem[-12:], scene, maker)
 
 
 def cell_entries(
@@ -112,10 +113,6 @@ def _unmade(
         reasons.update(dict.fromkeys(found or [f"recording {request.scene.name} was removed"]))
     unmade = [f"{len(never)} of {len(requests)} recordings were never made, {never[0]} first"] if never else []
     return [*unmade, *reasons]
-
-
-def _name(request: RecordingRequest) -> str:
-    return f"recording {request.sensor} {request.rig} {request.scene.name} {request.role} {request.seed}"
 
 
 def _configuration(cell: Cell) -> Section:

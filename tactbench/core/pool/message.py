@@ -8,6 +8,7 @@ import struct
 import sys
 import traceback
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -69,24 +70,19 @@ def _restored(value: Any, arrays: list[npt.NDArray[Any]]) -> Any:
     return value
 
 
+@dataclass
 class Inbox:
-    """Gathers the bytes that come through one pipe until a message is whole.
+    """Gathers the bytes that come through one pipe until a message is whole."""
 
-    Parameters
-    ----------
-    descriptor
-        The reading end; it must not block.
-    """
-
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
-        self._bytes = bytearray()
+    descriptor: int
+    """The reading end; it must not block."""
+    _bytes: bytearray = field(default_factory=bytearray)
 
     def read(self) -> bool:
         """Take what is there; return False once nothing will ever come again."""
         while True:
             try:
-                piece = os.read(self._descriptor, 2**20)
+                piece = os.read(self.descriptor, 2**20)
             except BlockingIOError:
                 return True
             except OSError:  # the other end was closed before it had read all

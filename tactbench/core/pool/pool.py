@@ -8,6 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import KW_ONLY, dataclass
 from multiprocessing.connection import wait
 from typing import TypeVar
 
@@ -17,6 +18,7 @@ from tactbench.core.pool.processes import (
     can_fork,
     children,
     interrupts_blocked,
+    kill_below,
     kill_orphans,
     set_subreaper,
 )
@@ -29,6 +31,7 @@ _SERVER_ENDS_S = 5.0
 """Seconds that a fork server which refuses a start may take to end: it was killed, and a busy machine is slow."""
 
 
+@dataclass(frozen=True)
 class Pool:
     """Up to `jobs` child processes.
 
@@ -54,20 +57,12 @@ class Pool:
     it crashes becomes a child of this process and is ended then.
     """
 
-    def __init__(
-        self,
-        jobs: int = 1,
-        limits: Limits = UNLIMITED,
-        *,
-        reuse: bool = False,
-        fork: bool | None = None,
-        is_needed: Callable[[], bool] = lambda: True,
-    ) -> None:
-        self._jobs = jobs
-        self._limits = limits
-        self._reuse = reuse
-        self._fork = fork
-        self._is_needed = is_needed
+    jobs: int = 1
+    limits: Limits = UNLIMITED
+    _: KW_ONLY
+    reuse: bool = False
+    fork: bool | None = None
+    is_needed: Callable[[], bool] = lambda: True
 
     def each(self, work: Callable[[T], R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
         """Yield every item with its result or what stopped it, in the order in which they end.
@@ -76,23 +71,23 @@ class Pool:
         -----
         An item whose process ends before it has begun gets another one, once.
         """
-        every = list(items) if self._reuse else []
-        coming = enumerate(every) if self._reuse else ((0, item) for item in items)
+        every = list(items) if self.reuse else []
+        coming = enumerate(every) if self.reuse else ((0, item) for item in items)
         again: deque[tuple[int, T]] = deque()
         """Items whose processes ended before they had begun."""
         busy: list[Worker] = []
         idle: list[Worker] = []
-        fork = can_fork() if self._fork is None else self._fork
+        fork = can_fork() if self.fork is None else self.fork
         with _children_of_items(busy, idle) as spared:
             while True:
-                while len(busy) < self._jobs:
+                while len(busy) < self.jobs:
                     second = bool(again)
                     index, item = again.popleft() if again else next(coming, (-1, None))
                     if index < 0:
                         break
                     try:
                         with interrupts_blocked():
-                            worker = idle.pop() if idle else Worker(work, every or [item], self._limits, fork)
+                            worker = idle.pop() if idle else Worker(work, every or [item], self.limits, fork)
                             busy.append(worker)
                             worker.begin(index, second)
                     except Exception as error:
@@ -101,7 +96,7 @@ class Pool:
                             again.append((index, item))  # type: ignore[arg-type]
                         else:  # it cannot be pickled, or the system starts no more processes
                             yield item, error  # type: ignore[misc]
-                if not busy or not self._is_needed():
+                if not busy or not self.is_needed():
                     return
                 wait([one for worker in busy for one in worker.waits_on], min(worker.wait_s() for worker in busy))
                 for worker in list(busy):
@@ -121,8 +116,8 @@ class Pool:
         """End whatever an item that is over has started, and its process unless another item may have it."""
         with interrupts_blocked():
             busy.remove(worker)
-            if self._reuse and worker.alive:
-                worker.end_below()
+            if self.reuse and worker.alive:
+                kill_below(worker.pid)
                 idle.append(worker)
             else:
                 worker.kill()

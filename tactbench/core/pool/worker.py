@@ -17,7 +17,7 @@ from tactbench.core.pool.child import WHERE_SIGNAL, run_child
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.log import cut_back, flush, open_log, tail
 from tactbench.core.pool.message import Inbox, load_error
-from tactbench.core.pool.processes import kill_below, kill_tree
+from tactbench.core.pool.processes import kill_tree
 
 STACK_S = 0.1
 """Seconds that a process which is about to be ended has to write where it is."""
@@ -75,6 +75,7 @@ class Worker:
             parent = os.getpid() if fork else None
             self._process = context.Process(target=run_child, args=(work, items, child_end, log, limits, parent))
             self._process.start()
+            self.pid: int = self._process.pid
         except BaseException:
             self.connection.close()
             log.close()
@@ -99,7 +100,7 @@ class Worker:
         self._closed_s: float | None = None
         """When the pipe of its result was found closed."""
         self._ends_s: float | None = self._began_s + START_S
-        self._shared_mb = max(self._shared_mb, memory.resident_mb(self._process.pid))
+        self._shared_mb = max(self._shared_mb, memory.resident_mb(self.pid))
         with suppress(OSError):  # it has ended: `outcome` says so
             self.connection.send_bytes(str(index).encode())
 
@@ -110,12 +111,6 @@ class Worker:
 
     def outcome(self) -> Any:
         """Return what came of its item: a result, an error, or `PENDING`."""
-        found = self._look()
-        if isinstance(found, CellStopped):
-            found.spent_s = time.monotonic() - self._began_s
-        return found
-
-    def _look(self) -> Any:
         over = self._process.exitcode is not None  # before the pipe is read: what it sent last is not missed
         open_ = self._inbox.read()
         try:
@@ -142,7 +137,12 @@ class Worker:
             return self._stop(self._stopped)
         if self._limits.timeout_s is not None and float(message["spent_s"]) > self._limits.timeout_s:
             return self._stop(endings.too_slow(self._limits))
-        return load_error(message["error"], self._printed()) if "error" in message else message["value"]
+        if "error" not in message:
+            return message["value"]
+        error = load_error(message["error"], self._printed())
+        if isinstance(error, CellStopped):
+            error.spent_s = time.monotonic() - self._began_s
+        return error
 
     def _stop(self, why: CellStopped) -> CellStopped:
         """End the process; return why."""
@@ -153,12 +153,12 @@ class Worker:
     def _ended(self) -> CellStopped:
         """Return why the process has ended without a result."""
         self._process.join()
-        if self._stopped is not None:
-            self._stopped.log = self._printed()
-            return self._stopped
-        return endings.crashed(
-            self._process.exitcode, self._printed(), memory_was_short=memory.oom_kills() > self._kills
-        )
+        if self._stopped is None:
+            short = memory.oom_kills() > self._kills
+            self._stopped = endings.crashed(self._process.exitcode, self._printed(), memory_was_short=short)
+        self._stopped.log = self._printed()
+        self._stopped.spent_s = time.monotonic() - self._began_s
+        return self._stopped
 
     def _limited(self) -> Any:
         """End the process if its item has taken more than it may."""
@@ -175,7 +175,7 @@ class Worker:
             self._ask_to_end()
         elif (
             self._limits.memory_mb is not None and self._stopped is None and self.begun
-            and memory.taken_mb(self._process.pid, self._shared_mb) > self._limits.memory_mb
+            and memory.taken_mb(self.pid, self._shared_mb) > self._limits.memory_mb
         ):  # fmt: skip
             return self._stop(endings.out_of_memory(self._limits))
         return PENDING
@@ -183,7 +183,7 @@ class Worker:
     def _ask_to_end(self) -> None:
         self._ends_s = time.monotonic() + self._limits.grace_s
         with suppress(ProcessLookupError):
-            os.kill(self._process.pid, signal.SIGTERM)
+            os.kill(self.pid, signal.SIGTERM)
 
     def _where(self) -> str:
         """Have the process write its stacks to the log, and return them; "" if it does not."""
@@ -191,7 +191,7 @@ class Worker:
             return ""
         before = len(self._printed())
         with suppress(ProcessLookupError):
-            os.kill(self._process.pid, WHERE_SIGNAL)
+            os.kill(self.pid, WHERE_SIGNAL)
         until = time.monotonic() + STACK_S
         length = -1
         while time.monotonic() < until and not (length == len(self._printed()) > before):
@@ -208,10 +208,6 @@ class Worker:
         """Whether it can be given another item."""
         return self._process.exitcode is None
 
-    def end_below(self) -> None:
-        """End what an item that is over has left running below this process."""
-        kill_below(self._process.pid)
-
     def give_grace(self) -> None:
         """Ask it to end, and leave it the time that it has for that."""
         if self._limits.grace_s and self.alive:
@@ -221,7 +217,7 @@ class Worker:
     def kill(self) -> None:
         """Kill it, and whatever it has started."""
         if self.alive:
-            kill_tree(self._process.pid)
+            kill_tree(self.pid)
 
     def close(self) -> None:
         """Wait for its end, once it was killed, and let go of it."""

@@ -17,7 +17,7 @@ from tactbench.core.matrix.store.disk import sync_path, writing
 from tactbench.core.matrix.store.image import digest_of, read_image
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
-from tactbench.core.matrix.store.rows import NAMING, NotPlainError, Row, named, plain, text_of
+from tactbench.core.matrix.store.rows import NAMING, NotPlainError, Row, named, text_of
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
 
 if TYPE_CHECKING:
@@ -120,7 +120,8 @@ class Store:
         if not limits.is_key(key) or row.get("status") != "done":
             raise ValueError(f"a finished cell has the status 'done' and a key of 32 hexadecimal digits, not {key!r}")
         ledger = self._read()
-        written, text = plain({**row, "key": key})
+        text = text_of({**row, "key": key})
+        written: Row = json.loads(text)
         image = shard.build(text, self._provenance[1], sets)
         entry = Entry(written, (digest_of(image), len(image)))
         path = self._shard(key)
@@ -305,23 +306,21 @@ class Store:
             self._ledger = read_ledger(self.folder)
             for entry in self._ledger.entries:
                 self._place(entry)
-            known = {f"{key}.h5" for key in self._done}
-            for name in sorted(self._names() - known):
-                self._adopt(name)
+            with suppress(OSError):
+                for path in sorted(self._cells.iterdir()):
+                    if path.suffix == ".h5" and path.stem not in self._done and limits.is_key(path.stem):
+                        self._adopt(path.stem, self._ledger)
         return self._ledger
 
-    def _adopt(self, name: str) -> None:
+    def _adopt(self, key: str, ledger: Ledger) -> None:
         """Take in a shard that the ledger has lost."""
         from tactbench.core.matrix.store import shard
 
-        key = name.removesuffix(".h5")
-        if not limits.is_key(key) or self._ledger is None:
-            return
         try:
             image = read_image(self._shard(key))
             entry = Entry(shard.row_in(self._shard(key), image), (digest_of(image), len(image)))
         except FormatError as error:
-            self._ledger.troubles.append(str(error))
+            ledger.troubles.append(str(error))
             return
         self._orphans.append(entry)
         self._done[key] = entry
@@ -333,12 +332,6 @@ class Store:
 
     def _shard(self, key: str) -> Path:
         return self._cells / f"{key}.h5"
-
-    def _names(self) -> set[str]:
-        try:
-            return {path.name for path in self._cells.iterdir() if path.suffix == ".h5"}
-        except OSError:
-            return set()
 
     @contextmanager
     def _written(self) -> Iterator[None]:

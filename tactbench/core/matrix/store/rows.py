@@ -27,21 +27,8 @@ class NotPlainError(ValueError):
     """The row of a finished cell holds what is no plain data: nothing of it was written."""
 
 
-def plain(row: Mapping[str, Any]) -> tuple[Row, str]:
-    """Return a row as it reads when it comes back from a file, and its text: lists for tuples, keys in order.
-
-    Raises
-    ------
-    NotPlainError
-        If it holds what JSON has no word for.
-    """
-    text = text_of(row)
-    back: Row = json.loads(text)
-    return back, text
-
-
 def text_of(row: Mapping[str, Any]) -> str:
-    """Return the text of a row; raises NotPlainError."""
+    """Return the text of a row, keys in order; raises NotPlainError if it holds what JSON has no word for."""
     try:
         return _finite(row)
     except (TypeError, ValueError, RecursionError) as error:

@@ -56,17 +56,12 @@ def build(row: str, provenance: str, sets: Mapping[Role, Answers]) -> bytes:
             "sha256": _digest(row, provenance, tables),
         }
         for name, fact in facts.items():
-            _write_text(file, name, fact)
+            text = np.bytes_(fact.encode())
+            if len(text) <= _ATTRIBUTE_BYTES:
+                file.attrs[name] = text
+            else:
+                file.create_dataset(name, data=text)
     return image.getvalue()
-
-
-def _write_text(file: Any, name: str, text: str) -> None:
-    """Write a text as an attribute, or as a dataset where it is longer than attributes of HDF5 may be."""
-    value = np.bytes_(text.encode())
-    if len(value) <= _ATTRIBUTE_BYTES:
-        file.attrs[name] = value
-    else:
-        file.create_dataset(name, data=value)
 
 
 def _table(answers: Answers) -> npt.NDArray[Any]:
@@ -138,7 +133,7 @@ def _opened(path: Path, image: bytes) -> tuple[str, dict[str, Answers]]:
 
 
 def _text(path: Path, file: Any, name: str) -> str:
-    """Return what `_write_text` wrote; empty if it is not there."""
+    """Return a text that is an attribute, or a dataset where it is a long one; empty if it is not there."""
     value = file.attrs.get(name)
     if value is None:
         dataset = trust.numbers(path, file, name, "S", 0, strict=True)
