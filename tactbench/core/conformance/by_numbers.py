@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.conformance.check import CheckFailed, check, code_of, fail, skip
-from tactbench.core.conformance.press import carried_out, simulated_rig, simulated_sensors, tiny_scene
 from tactbench.core.conformance.subject import Subject
+from tactbench.core.conformance.trial_press import carried_out, simulated_rig, simulated_sensors, tiny_scene
 from tactbench.core.errors import PluginContractError, RigError, UsageError
 from tactbench.core.plugins.force_profiles import force_path
 from tactbench.core.spec.parameter import Parameter
