@@ -14,7 +14,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, NotApplicable, Scalar
 from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
-from tactbench.rigs.twin.contact.pressing import press_of, reader_of
+from tactbench.rigs.twin.contact.pressing import press_of, reader_of, slide_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import check_contact, outer_radius_mm, pad_of, skin_grid
 from tactbench.rigs.twin.synthesis import Settled, Synthesis
@@ -135,7 +135,7 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     spec, asked = run.sensor.model_dump_json(), run.scene.simulation.tolerance
     text = (
         f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{asked}|{only_skin}"
-        f"|{run.tangential}|{_slide(run)}"
+        f"|{run.tangential}|{slide_of(run)}"
     )
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
@@ -170,7 +170,7 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
         most_nodes=fidelity.most_nodes,
         clock=run.clock,
     )
-    slide, skin = _slide(run), run.sensor.spec.skin
+    slide, skin = slide_of(run), run.sensor.spec.skin
     began = run.clock()
     sliding = None
     if names and skin is not None and slide is not None:
@@ -189,15 +189,6 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
     said = remarks(press, table.loads_n.tolist(), outer_mm, pad)
     tabulated = _Tabulated(table, sliding, press.touched_core, closing, film, said)
     return tabulated, prepared_s + table.read_s + slide_s if names else 0.0
-
-
-def _slide(run: Synthesis) -> tuple[tuple[float, float], float] | None:
-    """Return a slide's direction and static friction; None if nothing slides or nobody looks along the skin."""
-    slide = run.scene.slide
-    if slide is None or not run.tangential or not run.load.largest_n > 0:
-        return None
-    angle = slide.direction.to("rad")
-    return (math.cos(angle), math.sin(angle)), slide.surface.static_friction.to("1")
 
 
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])

@@ -258,6 +258,9 @@ class Dragged:
         own = kind == HELD
         left = np.interp(t_s[own], drive.t_s, self._release_mm) - about[own]
         share[own] = np.divide(x[own] - about[own], left, out=np.ones(left.size), where=left > NOTHING_MM)
+        # What sticks keeps the force of its partial slip: only where all has slipped is it that of the whole way.
+        stuck = left.clip(0.0) * share_of_force(share[own])
+        force[own] = stiffness[own] * np.where(left > NOTHING_MM, about[own] + stuck, x[own])
         slip[kind == SLIDE] = drive.speed_mm_s
         slipping = (kind == SLIP) | (kind == SLIDE)
         touched = load > _LEAST_LOAD_N
