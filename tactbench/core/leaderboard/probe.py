@@ -10,7 +10,7 @@ from typing import Any
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import answer_name, sensor_name, sign_of
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
-from tactbench.core.tables.numbers import ABSENT, interval, score, suffix
+from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit, suffix
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable, sort_value
 
@@ -104,7 +104,7 @@ def _about_trivial(row: Row, trivial: Row | None) -> Iterator[str]:
     """Yield that the best trivial answer scores as well, or that the interval does not exclude it."""
     if trivial is None:
         return
-    values = f"{score(trivial['score'], row['unit'])} of {score(row['score'], row['unit'])}{suffix(row['unit'])}"
+    values = f"{score(trivial['score'], row['unit'])} of {score_with_unit(row['score'], row['unit'])}"
     if _skill(trivial["score"], row["score"], row) >= 0:
         yield f"TRIVIAL: {answer_name(trivial)} scores {values}"
     elif against_trivial(row, trivial["score"]):
@@ -117,7 +117,7 @@ def _about_first(row: Row, first: Row | None) -> Iterator[str]:
     if first is None or first["status"] != "done" or trivial is None:
         return
     beyond = _beyond_guessing(first, trivial)
-    says = f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix(unit)}"
+    says = f"the first frame alone scores {score(first['score'], unit)} of {score_with_unit(row['score'], unit)}"
     if beyond is None:
         yield "too few recordings or replicates to say what the first frame tells"
     elif beyond and _skill(first["score"], trivial, row) >= LEAK_SHARE * _skill(row["score"], trivial, row):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sign_of
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
-from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import visible
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def verdict_of(
     leaders = [place for place, (_, one) in enumerate(ranked) if not one.behind]
     best = rows[0]
     if may_be_trivial(best):
-        bar = score(best["baseline"], best["unit"]) + suffix(best["unit"])
+        bar = score_with_unit(best["baseline"], best["unit"])
         sentence = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {bar}."
     elif len(rows) == 1:
         sentence = f"{names[0]}: {_measured(best)}, the only answer better than {_bar(best, trivial)}."
@@ -111,12 +111,9 @@ def _without_touch(rows: Sequence[Row], trivial: Sequence[Row]) -> list[str]:
     if not found or best.get("looks_at") == "time":
         return []
     one = min(found, key=lambda row: sign * row["score"])
-    known = f"{answer_name(one)} reads no sensor, only the time since the press began, and scores {_score(one)}"
+    scores = score_with_unit(one["score"], one["unit"])
+    known = f"{answer_name(one)} reads no sensor, only the time since the press began, and scores {scores}"
     return [f"{known}: every recording is pressed alike, so these scores need no touch."]
-
-
-def _score(row: Row) -> str:
-    return score(row["score"], row["unit"]) + suffix(row["unit"])
 
 
 def _too_few(rows: Sequence[Row], names: Sequence[str]) -> str:
@@ -148,7 +145,7 @@ def _measured(row: Row) -> str:
         over = counted(n, str(unit)) if n else "replicates"
         held = f" ({percent(n, unit)} over {over}: {interval(low, high, row['unit'])})"
     name = METRIC_NAMES.get(row["metric"], visible(str(row["metric"])))
-    return f"{name} {score(row[value], row['unit'])}{suffix(row['unit'])}{what}{held}"
+    return f"{name} {score_with_unit(row[value], row['unit'])}{what}{held}"
 
 
 def may_be_trivial(row: Row) -> bool:
@@ -198,7 +195,9 @@ def _bar(row: Row, trivial: Sequence[Row]) -> str:
 def _none_better(below: int, trivial: Sequence[Row]) -> str:
     """Return that no answer scores better than the trivial ones that look at as much."""
     rows = list(best_trivials(row for row in trivial if row.get("looks_at") != "time").values())
-    bars = [f"{name} {_score(row)}" for name, row in zip(_names(rows), rows, strict=True)]
+    bars = [
+        f"{name} {score_with_unit(row['score'], row['unit'])}" for name, row in zip(_names(rows), rows, strict=True)
+    ]
     return f"None of {below} answers scores better than the trivial one{': ' * bool(bars)}{', '.join(bars)}."
 
 

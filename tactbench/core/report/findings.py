@@ -11,7 +11,7 @@ from tactbench.core.plugins.registry import Registry
 from tactbench.core.report.calibrated import Share
 from tactbench.core.report.published import row_interval
 from tactbench.core.report.section import ReportData, Section
-from tactbench.core.tables.numbers import score, suffix
+from tactbench.core.tables.numbers import score, score_with_unit
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, text_table
 
 Row = Mapping[str, Any]
@@ -42,9 +42,9 @@ class Contrast:
         better = "non-linear" if (by < 0) == (self.linear["metric"] in LOWER_IS_BETTER) else "linear"
         low, high = sorted((self.linear, self.other), key=lambda row: float(row["score"]))
         if low["ci_high"] is None or high["ci_low"] is None:
-            return f"{better} is better by {score(abs(by), unit)}{suffix(unit)}; too few replicates for intervals"
+            return f"{better} is better by {score_with_unit(abs(by), unit)}; too few replicates for intervals"
         apart = "are apart" if low["ci_high"] < high["ci_low"] else "overlap"
-        return f"{better} is better by {score(abs(by), unit)}{suffix(unit)}; the intervals {apart}"
+        return f"{better} is better by {score_with_unit(abs(by), unit)}; the intervals {apart}"
 
     @staticmethod
     def score_text(row: Row) -> str:

@@ -14,7 +14,7 @@ from tactbench.core.report.calibrated import Calibrated, PredictiveRange
 from tactbench.core.report.section import ReportData, Section
 from tactbench.core.spec.task import Published, TaskSpec
 from tactbench.core.statistics.median import counted, percent
-from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 
@@ -69,7 +69,7 @@ def reproduce(registry: Registry, rows: Sequence[Row], calibrated: Calibrated | 
 def unasked(registry: Registry, rows: Sequence[Row]) -> list[str]:
     """Return a sentence for each published number that only recordings made elsewhere can stand beside."""
     return [
-        f"Not asked here: {_title(task, published, None)} ({score(published.score, task.unit)}{suffix(task.unit)}; "
+        f"Not asked here: {_title(task, published, None)} ({score_with_unit(published.score, task.unit)}; "
         f"{published.reference}): `{_command(task, published, registry)}`."
         for task in (descriptor.spec for descriptor in registry.tasks)
         for published in task.published
@@ -148,7 +148,7 @@ def _difference(row: Row, published: float) -> str:
     better = (ours < published) == (row["metric"] in LOWER_IS_BETTER)
     where = "below" if ours < published else "above"
     word = "better" if better else "worse"
-    return f"ours is {score(by, unit)}{suffix(unit)}{share} {where} the published, which is {word}"
+    return f"ours is {score_with_unit(by, unit)}{share} {where} the published, which is {word}"
 
 
 def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> str:
@@ -156,7 +156,7 @@ def _of_calibration(predicted: PredictiveRange, published: float, unit: str) -> 
     sentence = f"the published lies {'inside' if inside else 'outside'} the calibrated range ({predicted.use})"
     if not inside:
         edge = predicted.low if published < predicted.low else predicted.high
-        sentence += f" by {score(abs(published - edge), unit)}{suffix(unit)}"
+        sentence += f" by {score_with_unit(abs(published - edge), unit)}"
     if predicted.goes_with:
         named = " and ".join(f"{name} ({value:+.2f})" for name, value in predicted.goes_with.items())
         sentence += f"; of what is not known the number goes most with {named}"
