@@ -20,8 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tactbench.core.leaderboard.formats import TEXTS, plain_text
-from tactbench.core.leaderboard.parquet import parquet
+from tactbench.core.leaderboard.formats import SUFFIXES, rendered
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.matrix.evaluate_cell import opening
 from tactbench.core.matrix.plan import Cell
@@ -105,8 +104,8 @@ def main() -> None:
         print(f"imported while listing again: {done.stderr.strip().splitlines()[-1]}")
     table = build_table(rows)
     print(f"table from rows        {median(lambda: build_table(rows)) * 1e3:.0f} ms")
-    for shape, form in {**TEXTS, "parquet": parquet, "table": plain_text}.items():
-        print(f"{shape:<22} {median(lambda form=form: form(table)) * 1e3:.0f} ms")
+    for shape in SUFFIXES.values():
+        print(f"{shape:<22} {median(lambda shape=shape: rendered(table, shape)) * 1e3:.0f} ms")
 
 
 if __name__ == "__main__":

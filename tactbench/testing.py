@@ -30,12 +30,16 @@ __all__ = [
     "check_device",
     "check_effect",
     "check_estimator",
+    "check_indenter",
+    "check_profile",
     "check_rig",
     "check_sensor",
     "check_task",
     "device_checks",
     "effect_checks",
     "estimator_checks",
+    "indenter_checks",
+    "profile_checks",
     "rig_checks",
     "sensor_checks",
     "task_checks",
@@ -120,6 +124,16 @@ def effect_checks(name: str) -> list[PluginCheck]:
     return _checks("effect", name)
 
 
+def indenter_checks(name: str) -> list[PluginCheck]:
+    """Return the checks of a shape of indenter."""
+    return _checks("indenter", name)
+
+
+def profile_checks(name: str) -> list[PluginCheck]:
+    """Return the checks of a force profile."""
+    return _checks("profile", name)
+
+
 def check_sensor(name: str, *, recording: Path | None = None) -> CheckReport:
     """Run all checks of a sensor; raises UnknownNameError if there is none of that name, and nothing for a failure."""
     return _report("sensor", name, recording)
@@ -157,3 +171,13 @@ def __getattr__(name: str) -> Any:
     import importlib
 
     return importlib.import_module("tactbench.core.conformance.strategies")
+
+
+def check_indenter(name: str) -> CheckReport:
+    """Run all checks of a shape of indenter; see `check_sensor`."""
+    return _report("indenter", name)
+
+
+def check_profile(name: str) -> CheckReport:
+    """Run all checks of a force profile; see `check_sensor`."""
+    return _report("profile", name)

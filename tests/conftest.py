@@ -27,6 +27,16 @@ settings.load_profile("ci" if os.environ.get("CI") else "here")
 # before any of them is loaded; tests of several threads ask for them.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+# Thousands of tests are objects that live to the end: a collection that looks at all of them finds nothing.
+gc.set_threshold(100_000, 50, 100)
+
+
+def pytest_collection_finish():
+    """Leave what collection made out of all later collections of garbage."""
+    gc.collect()
+    gc.freeze()
+
+
 # Commands that tests start compile the package once, not each of them anew.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 

@@ -24,7 +24,7 @@ AT_ONCE = 1000
 """The most pieces of one `read`: a device may send faster than they are taken."""
 
 
-class Row(NamedTuple):
+class Sample(NamedTuple):
     """One sample of each channel."""
 
     values: Sequence[float]
@@ -94,7 +94,7 @@ class RowDriver(Driver, Generic[L]):
         """Nothing, unless a device is to be asked before its answer is read."""
 
     @abstractmethod
-    def rows(self, received: Any) -> Iterable[Row]:
+    def rows(self, received: Any) -> Iterable[Sample]:
         """Return the rows that are complete with what was received.
 
         Parameters
@@ -107,7 +107,7 @@ class RowDriver(Driver, Generic[L]):
         """Return what has come."""
         self.ask()
         times: list[int] = []
-        found: list[Row] = []
+        found: list[Sample] = []
         link: Any = self.link
         until_s = link.timer() + timeout_s
         for _ in range(AT_ONCE):

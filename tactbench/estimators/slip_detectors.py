@@ -20,13 +20,13 @@ BANDS = 16
 """Of the spectrum."""
 
 
-class Constant:
+class ConstantDetector:
     """The same score for every frame."""
 
     def __init__(self, score: float) -> None:
         self.score = score
 
-    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Constant:
+    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> ConstantDetector:
         """Learn nothing."""
         return self
 
@@ -35,14 +35,14 @@ class Constant:
         return np.full(len(X), self.score)
 
 
-def always(*, kind: str, seed: int, threads: int) -> Constant:
+def always(*, kind: str, seed: int, threads: int) -> ConstantDetector:
     """Return what says slip in every frame."""
-    return Constant(1.0)
+    return ConstantDetector(1.0)
 
 
-def never(*, kind: str, seed: int, threads: int) -> Constant:
+def never(*, kind: str, seed: int, threads: int) -> ConstantDetector:
     """Return what says slip in no frame."""
-    return Constant(0.0)
+    return ConstantDetector(0.0)
 
 
 class MeanFeature:
@@ -62,13 +62,13 @@ def mean_feature(*, kind: str, seed: int, threads: int) -> MeanFeature:
     return MeanFeature()
 
 
-class Learned:
+class ClassifierDetector:
     """A classifier's confidence that a frame slips, learned from every n-th frame."""
 
     def __init__(self, model: Any, rows: int) -> None:
         self.model, self.rows = model, rows
 
-    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> Learned:
+    def fit(self, X: FloatArray, y: npt.NDArray[Any]) -> ClassifierDetector:
         """Learn from X (n, p) and whether frames slip, (n,) of 0 and 1."""
         step = -(-len(X) // self.rows)
         self.model.fit(X[::step], y[::step])
@@ -81,28 +81,30 @@ class Learned:
         return np.asarray(self.model.predict_proba(X)[:, 1])
 
 
-def forest(*, kind: str, seed: int, threads: int, n_estimators: int, min_samples_leaf: int, rows: int) -> Learned:
+def forest(
+    *, kind: str, seed: int, threads: int, n_estimators: int, min_samples_leaf: int, rows: int
+) -> ClassifierDetector:
     """Return a random forest that weighs both classes alike."""
     from sklearn.ensemble import RandomForestClassifier
 
     model = RandomForestClassifier(
         n_estimators=n_estimators, min_samples_leaf=min_samples_leaf, class_weight="balanced", random_state=seed
     )
-    return Learned(model, rows)
+    return ClassifierDetector(model, rows)
 
 
-def support_vectors(*, kind: str, seed: int, threads: int, C: float, rows: int) -> Learned:
+def support_vectors(*, kind: str, seed: int, threads: int, C: float, rows: int) -> ClassifierDetector:
     """Return support vectors with a Gaussian kernel that weigh both classes alike."""
     from sklearn.svm import SVC
 
-    return Learned(SVC(C=C, class_weight="balanced"), rows)
+    return ClassifierDetector(SVC(C=C, class_weight="balanced"), rows)
 
 
-def logistic(*, kind: str, seed: int, threads: int, C: float, rows: int) -> Learned:
+def logistic(*, kind: str, seed: int, threads: int, C: float, rows: int) -> ClassifierDetector:
     """Return a logistic regression that weighs both classes alike."""
     from sklearn.linear_model import LogisticRegression
 
-    return Learned(LogisticRegression(C=C, class_weight="balanced", max_iter=1000), rows)
+    return ClassifierDetector(LogisticRegression(C=C, class_weight="balanced", max_iter=1000), rows)
 
 
 def wavelet_amplitudes(stream: StreamReadings, ends_s: FloatArray, window_s: float) -> FloatArray:

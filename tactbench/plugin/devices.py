@@ -12,7 +12,7 @@ from tactbench.core.plugins.interfaces import DeviceAcquisition, Operator
 from tactbench.core.spec.recording import Emulation, StreamClock, StreamCounts
 from tactbench.core.spec.rig import DeviceDescriptor
 from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
-from tactbench.plugin.on_demand import on_demand
+from tactbench.plugin.on_demand import Renamed, on_demand
 
 if TYPE_CHECKING:
     from tactbench.core.plugins.rig_devices import (
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tactbench.devices.fault import Fault, fault_concerns
     from tactbench.devices.log import DeviceLog
     from tactbench.devices.reading import Reading
-    from tactbench.devices.row_driver import Row, RowDriver
+    from tactbench.devices.row_driver import RowDriver, Sample
     from tactbench.devices.row_emulator import RowEmulator
     from tactbench.devices.sequence import SequenceCheck, Unwrap
     from tactbench.links.address import open_link
@@ -81,9 +81,9 @@ __all__ = [
     "Received",
     "RigCheck",
     "RigFile",
-    "Row",
     "RowDriver",
     "RowEmulator",
+    "Sample",
     "SceneSamples",
     "Senses",
     "Sent",
@@ -141,7 +141,7 @@ __getattr__ = on_demand(
         ),
         "tactbench.devices.log": ("DeviceLog",),
         "tactbench.devices.reading": ("Reading",),
-        "tactbench.devices.row_driver": ("Row", "RowDriver"),
+        "tactbench.devices.row_driver": ("RowDriver", "Sample"),
         "tactbench.devices.row_emulator": ("RowEmulator",),
         "tactbench.devices.sequence": ("SequenceCheck", "Unwrap"),
         "tactbench.links.address": ("open_link",),
@@ -169,4 +169,5 @@ __getattr__ = on_demand(
             "SpiStep",
         ),
     },
+    {"Row": Renamed("Sample", "0.2")},
 )

@@ -18,9 +18,9 @@ from tactbench.plugin.devices import (
     EmulatedDevices,
     EmulatorSettings,
     LinkUnplugged,
-    Row,
     RowDriver,
     RowEmulator,
+    Sample,
 )
 from tests.conftest import ROOT
 
@@ -43,7 +43,7 @@ class ByteDriver(RowDriver[ByteLink]):
     def rows(self, received):
         for start in range(0, len(received.data), 3):
             row = received.data[start : start + 3]
-            yield Row(list(row), [Quality.SATURATED if value == 255 else Quality.GOOD for value in row])
+            yield Sample(list(row), [Quality.SATURATED if value == 255 else Quality.GOOD for value in row])
 
 
 class ByteModel(RowEmulator):
@@ -61,7 +61,7 @@ class CanDriver(RowDriver[CanLink]):
     stream, link_kind = STREAM, CanLink
 
     def rows(self, received):
-        return [Row(list(received.data))]
+        return [Sample(list(received.data))]
 
 
 class CanModel(RowEmulator):

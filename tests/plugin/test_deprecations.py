@@ -7,6 +7,7 @@ from types import ModuleType
 import pytest
 
 from tactbench.core.errors import PluginDeprecationWarning
+from tactbench.plugin.devices import Sample
 from tactbench.plugin.on_demand import Renamed, on_demand
 from tests.core.plugins.test_discovery import installed_in
 
@@ -49,6 +50,12 @@ def test_the_old_name_is_the_new_thing_and_warns_each_time(door):
 def test_other_names_are_not_there(door):
     with pytest.raises(AttributeError, match="module 'some_door' has no attribute 'Older'"):
         _ = door.Older
+
+
+def test_a_sample_of_a_driver_was_called_row():
+    with pytest.warns(PluginDeprecationWarning, match="Row is called Sample now; Row is gone from tactbench 0.2 on"):
+        from tactbench.plugin.devices import Row
+    assert Row is Sample
 
 
 def test_a_plugin_with_an_old_name_is_loaded_and_told(verbs, tmp_path):

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tactbench.core.conformance.subject import Subject
     from tactbench.core.spec.rig_file import RigFile
 
-_KINDS = ("sensor", "rig", "device", "task", "estimator", "effect")
+_KINDS = ("sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile")
 
 
 @click.command(name="check")
@@ -51,7 +51,7 @@ def command(
     out: Path | None,
     shape: str,
 ) -> None:
-    """Check a sensor, rig, device, task, estimator or effect, or all that a plugin brings.
+    """Check a sensor, rig, device, task, estimator, effect, indenter or profile, or all that a plugin brings.
 
     By default nothing is opened and nothing moves; docs/conformance.md lists the checks. Exit code 1 if a check failed
     or fewer ran than every plugin of that kind can run, 2 if nothing is called NAME.

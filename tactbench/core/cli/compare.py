@@ -52,7 +52,7 @@ def kept_rows(folder: Path) -> list[dict[str, Any]]:
 def _print(found: Any, shape: str) -> None:
     from tactbench.core.cli.grid import print_records, print_tables
     from tactbench.core.cli.screen import remark
-    from tactbench.core.leaderboard.pairwise_table import notes_of, record_of, tables_of
+    from tactbench.core.leaderboard.pairwise import notes_of, record_of, tables_of
 
     if shape in ("json", "csv"):
         print_records([record_of(pair) for pair in found], shape)

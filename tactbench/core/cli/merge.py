@@ -44,7 +44,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
 def _tables(folder: Path, rows: Sequence[Row]) -> None:
     """Write what `tactbench leaderboard` shows."""
     from tactbench.core.cli.results import provenance_of
-    from tactbench.core.leaderboard.files import write_tables
+    from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.matrix.store import Store
     from tactbench.core.matrix.summary import fill_baselines
 

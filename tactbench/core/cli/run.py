@@ -64,7 +64,7 @@ def command(
     from tactbench.core.cli.plugins import tell_failed
     from tactbench.core.cli.progress import progress
     from tactbench.core.cli.results import provenance_of
-    from tactbench.core.leaderboard.files import write_tables
+    from tactbench.core.leaderboard.formats import write_tables
     from tactbench.core.leaderboard.levels import with_levels
     from tactbench.core.leaderboard.side_by_side import compare
     from tactbench.core.leaderboard.table import build_table

@@ -112,27 +112,12 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     UsageError
         If the file cannot be written.
     """
+    from tactbench.core.leaderboard.formats import rendered, show
+
     if shape == "table" and to is None and sys.stdout.isatty():
-        from tactbench.core.leaderboard.formats import show
-
         show(table, console(), view)
-    elif shape == "parquet":
-        from tactbench.core.leaderboard.parquet import parquet
-
-        _put(parquet(table), to)
-    elif shape == "xlsx":
-        from tactbench.core.leaderboard.xlsx import xlsx
-
-        _put(xlsx(table), to)
-    elif shape == "table":
-        from tactbench.core.leaderboard.formats import plain_text
-
-        _put(plain_text(table, width_without_terminal(), view).encode("utf-8", "backslashreplace"), to)
     else:
-        from tactbench.core.leaderboard.formats import TEXTS, VIEWED
-
-        text = VIEWED[shape](table, view) if shape in VIEWED else TEXTS[shape](table)
-        _put(text.encode("utf-8", "replace"), to)
+        _put(rendered(table, shape, view, width_without_terminal()), to)
 
 
 def _put(content: bytes, to: Path | None) -> None:

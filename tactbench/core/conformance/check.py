@@ -11,8 +11,8 @@ from typing import Any, Literal, NamedTuple, NoReturn
 
 from tactbench.core.errors import TactbenchError
 
-Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect"]
-KINDS: tuple[Kind, ...] = ("sensor", "rig", "device", "task", "estimator", "effect")
+Kind = Literal["sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile"]
+KINDS: tuple[Kind, ...] = ("sensor", "rig", "device", "task", "estimator", "effect", "indenter", "profile")
 Mode = Literal["passive", "invasive", "recording"]
 """`passive`: nothing is opened and nothing moves. `invasive`: a line is opened, something is pressed. `recording`: only
 a recording is read."""

@@ -11,8 +11,14 @@ from typing import Any, get_args
 
 from tactbench.core.conformance.check import check, code_of, fail, skip
 from tactbench.core.conformance.common import difference
-from tactbench.core.conformance.press import TrialPress, carried_out, first_that_goes, scenes_of, simulated_sensors
 from tactbench.core.conformance.subject import Subject
+from tactbench.core.conformance.trial_press import (
+    TrialPress,
+    carried_out,
+    first_that_goes,
+    scenes_of,
+    simulated_sensors,
+)
 from tactbench.core.errors import UsageError, nearest
 from tactbench.core.plugins.interfaces import Reason
 from tactbench.core.spec import units

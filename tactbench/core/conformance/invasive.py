@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 from tactbench.core.conformance.check import check, code_of, fail, skip
 from tactbench.core.conformance.driver import Lines, look_at
-from tactbench.core.conformance.press import FORCE_SHARE, effects_for, pressing_channel, tiny_scene
+from tactbench.core.conformance.press import FORCE_SHARE, pressing_channel
 from tactbench.core.conformance.subject import Subject
+from tactbench.core.conformance.trial_press import context_for, tiny_scene
 from tactbench.core.errors import TactbenchError
-from tactbench.core.plugins.interfaces import RigContext
 from tactbench.core.plugins.rig_files import load_rig_file
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
@@ -118,8 +118,7 @@ def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor]:
     if file.rig != subject.name:
         skip(f"the rig file is for the rig {file.rig}")
     sensor = subject.registry.sensors[next(iter(file.sensors))]
-    indenters = tuple(subject.registry.indenters)
-    context = RigContext(effects=effects_for(subject), indenters=indenters, rig_file=file, operator=subject.operator)
+    context = context_for(subject, rig_file=file, operator=subject.operator)
     with code_of("where", subject.package):
         return _Kept(subject.code("where")(context)), sensor
 

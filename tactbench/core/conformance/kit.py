@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tactbench.core.conformance import (
+    by_numbers,
     common,
     device,
     driver,
@@ -22,11 +23,20 @@ from tactbench.core.conformance.subject import Subject
 
 CHECKS: tuple[Check, ...] = (
     *common.CHECKS, *sensor_spec.CHECKS, *transducer.CHECKS, *press.CHECKS, *driver.CHECKS, *device.CHECKS,
-    *task.CHECKS, *estimator.CHECKS, *effect.CHECKS, *recorded.CHECKS, *invasive.CHECKS,
+    *task.CHECKS, *estimator.CHECKS, *effect.CHECKS, *by_numbers.CHECKS, *recorded.CHECKS, *invasive.CHECKS,
 )  # fmt: skip
 """In the order in which they run: a check stands behind those that it needs."""
 
-FLOORS: Mapping[Kind, int] = {"sensor": 11, "rig": 6, "device": 5, "task": 13, "estimator": 14, "effect": 12}
+FLOORS: Mapping[Kind, int] = {
+    "sensor": 11,
+    "rig": 6,
+    "device": 5,
+    "task": 13,
+    "estimator": 14,
+    "effect": 12,
+    "indenter": 13,
+    "profile": 10,
+}
 """Passive checks that every plugin of a kind can run, whatever it leaves out: fewer, and nothing was proved."""
 
 

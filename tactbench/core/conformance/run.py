@@ -41,6 +41,8 @@ _SILVER: Mapping[Kind, tuple[str, ...]] = {
     "task": (),
     "estimator": ("answers-have-the-shape",),
     "effect": ("it-is-applied",),
+    "indenter": ("indenter-is-pressed",),
+    "profile": (),
 }
 """Checks of which one must have run for silver: a plugin without any is not worse, it has shown less."""
 

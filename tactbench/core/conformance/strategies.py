@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from tactbench.core.conformance.geometry import pressed_locally, skin_grid
-from tactbench.core.conformance.press import tiny_scene
+from tactbench.core.conformance.trial_press import tiny_scene
 from tactbench.core.samples import SkinState
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.scene import Indenter, Scene

@@ -18,7 +18,7 @@ from tactbench.core.plugins.registry import Registry, ask_plugin, load_object
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A sensor, rig, device, task, estimator or effect under check, and what else is installed."""
+    """A sensor, rig, device, task, estimator, effect, indenter or profile under check, and what else is installed."""
 
     kind: Kind
     name: str

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from tactbench.core.conformance.check import check, code_of, fail, skip
-from tactbench.core.conformance.press import SECONDS, TrialPress, first_that_goes, tiny_scene
 from tactbench.core.conformance.sensor_spec import OF_KIND
 from tactbench.core.conformance.subject import Subject
+from tactbench.core.conformance.trial_press import SECONDS, TrialPress, first_that_goes, tiny_scene
 from tactbench.core.errors import UnknownNameError, UsageError, nearest
 from tactbench.core.spec import units
 from tactbench.core.spec.quantity import assumed

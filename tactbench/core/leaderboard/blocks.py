@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.lines import Line, line_of
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, hardware_name, metric_name
+from tactbench.core.leaderboard.columns import Line, line_of
+from tactbench.core.leaderboard.names import hardware_name, metric_name, sign_of
 from tactbench.core.leaderboard.placing import Placing, errors, places
 from tactbench.core.leaderboard.verdict import verdict_of
 from tactbench.core.tables.text import visible
@@ -48,20 +48,16 @@ def blocks_of(
     times
         Whether verdicts may name costs.
     """
-    groups = _grouped(rows)
-    return tuple(_block(key, groups[key], columns, letters, times) for key in sorted(groups, key=_order))
-
-
-def _block(
-    key: _Key, members: Sequence[Row], columns: Sequence[str], letters: Mapping[str, str], times: bool
-) -> Block:  # fmt: skip
-    arranged, unranked = _arranged(members)
-    lines = tuple(line_of(row, placing, columns, letters) for row, placing in arranged)
-    ranked = [(row, placing) for row, placing in arranged if placing is not None]
-    below = sum(line.kind == "result" and line.placing is None for line in lines)
-    trivial = [line.row for line in lines if line.kind == "baseline"]
-    verdict = tuple(map(visible, verdict_of(ranked, below, trivial, times=times)))
-    return Block(_title(key, members), lines, unranked, verdict)
+    blocks = []
+    for key, members in sorted(_grouped(rows).items(), key=lambda group: _order(group[0])):
+        arranged, unranked = _arranged(members)
+        lines = tuple(line_of(row, placing, columns, letters) for row, placing in arranged)
+        ranked = [(row, placing) for row, placing in arranged if placing is not None]
+        below = sum(line.kind == "result" and line.placing is None for line in lines)
+        trivial = [line.row for line in lines if line.kind == "baseline"]
+        verdict = tuple(map(visible, verdict_of(ranked, below, trivial, times=times)))
+        blocks.append(Block(_title(key, members), lines, unranked, verdict))
+    return tuple(blocks)
 
 
 def _order(key: _Key) -> tuple[Any, ...]:
@@ -101,7 +97,7 @@ def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, s
 
 def _arranged(members: Sequence[Row]) -> tuple[list[tuple[Row, Placing | None]], str]:
     """Return the rows of a block in order with their places, and why places have no intervals, if so."""
-    sign = 1.0 if members[0]["metric"] in LOWER_IS_BETTER else -1.0
+    sign = sign_of(members[0])
 
     def error(row: Row) -> float:
         return sign * row["score"] if math.isfinite(row["score"]) else math.inf
@@ -140,10 +136,7 @@ def no_better(error: float, sign: float, baseline: float | None) -> bool:
 def _title(key: _Key, members: Sequence[Row]) -> str:
     _, protocol, split, kind = key
     first = members[0]
-    direction = "lower" if first["metric"] in LOWER_IS_BETTER else "higher"
+    direction = "lower" if sign_of(first) > 0 else "higher"
     dagger = " †" if any(row["dagger"] for row in members) else ""
     parts = [first["task"], f"{metric_name(first)}, {direction} is better", protocol + dagger]
-    if split:
-        parts.append(f"split {split}")
-    parts.append(kind)
-    return visible(" · ".join(parts))
+    return visible(" · ".join([*parts, *([f"split {split}"] if split else []), kind]))

@@ -21,7 +21,7 @@ def checked(rows: Iterable[object]) -> tuple[list[Row], list[str]]:
     wrong: list[str] = []
     for given in rows:
         row = with_added(given) if isinstance(given, dict) else given
-        trouble = (_mistyped(row) or _senseless(row)) if isinstance(row, dict) else "it is no row"
+        trouble = _fault(row) if isinstance(row, dict) else "it is no row"
         if trouble:
             name = row.get("cell") if isinstance(row, dict) else None
             wrong.append(f"{name if isinstance(name, str) else 'a row without a name'}: {trouble}")
@@ -37,32 +37,28 @@ def with_added(row: Row) -> Row:
     return {**row, **lacking} if lacking else row
 
 
-def _mistyped(row: Row) -> str:
-    lacking = [key for key in _STORED if key not in row]
+def _fault(row: Row) -> str:
+    """Return why a row cannot be in a table, as a clause; empty if it can."""
+    lacking = [key for key in JSON_KEYS if key not in row and key != "key"]
     if lacking:
         return f"its row is of another version (it lacks {', '.join(lacking[:3])}); run it again"
-    return fault_in_row(row)
-
-
-def _senseless(row: Row) -> str:
+    fault = fault_in_row(row)
+    if fault:
+        return fault
     for key, value in row.items():
         if type(value) is int and abs(value) >= _LARGEST and key != "seed":
             return f"its {key} is larger than a table holds"
     if row["status"] == "done" and row["score"] is None:
         return "it is done and has no score"
-    if not _WHOLE.issuperset(map(type, row["counts"].values())):
+    if any(type(count) is not int for count in row["counts"].values()):
         return "its counts are not all whole numbers"
-    return "" if _is_square(row["confusion"]) else "its confusion is no square of whole numbers"
-
-
-def _is_square(confusion: list[Any] | None) -> bool:
-    return confusion is None or all(
-        isinstance(line, list) and len(line) == len(confusion) and all(type(count) is int for count in line)
-        for line in confusion
-    )
+    table = row["confusion"] or []
+    if any(not isinstance(line, list) or len(line) != len(table) for line in table) or any(
+        type(count) is not int for line in table for count in line
+    ):
+        return "its confusion is no square of whole numbers"
+    return ""
 
 
 _ADDED = ("declared_task", "events", "operating_points")
 """Keys that rows of the oldest folders lack (``tests/kept_results``); a key that is added to a row is added here."""
-_STORED = tuple(key for key in JSON_KEYS if key != "key")
-_WHOLE = frozenset({int})

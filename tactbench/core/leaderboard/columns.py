@@ -1,22 +1,31 @@
-"""The columns of a leaderboard: what each shows of a row, and what it is sorted by."""
+"""The columns of a leaderboard, and a row as the texts that stand in them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
 
+from tactbench.core.leaderboard.hosts import timing_mark
 from tactbench.core.leaderboard.levels import KEY as LEVEL
+from tactbench.core.leaderboard.names import answer_name, sensor_name
+from tactbench.core.leaderboard.placing import Placing
+from tactbench.core.spec.status import STOPPED
 from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, tail, whole
 from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 Value = Callable[[Row], float | None]
 Text = Callable[[Row], str]
+Kind = Literal["result", "baseline", "failed", "skipped"]
+"""Of a line: an answer, a trivial one, a cell that did not end well or was not begun."""
 
 
 class Column(NamedTuple):
     """A column of numbers that a row has by itself."""
 
+    shown: str
+    """What it is called where programs read its text: ``shown`` in JSON, ``shown_…`` in CSV and Parquet."""
     text: Text
     value: Value
     """What it is sorted by: times in seconds, intervals by their middle."""
@@ -26,24 +35,20 @@ class Column(NamedTuple):
     """A table has the column only where a row has this key; empty: always."""
 
 
-def _score(key: str, if_known: str = "") -> Column:
-    return Column(lambda row: score(row.get(key), row["unit"]), lambda row: row.get(key), False, if_known)
+def _score(shown: str, key: str, if_known: str = "") -> Column:
+    return Column(shown, lambda row: score(row.get(key), row["unit"]), lambda row: row.get(key), if_known=if_known)
 
 
-def _count(key: str) -> Column:
-    return Column(lambda row: whole(row[key]), lambda row: row[key])
+def _count(shown: str, key: str) -> Column:
+    return Column(shown, lambda row: whole(row[key]), lambda row: row[key])
+
+
+def _duration(shown: str, value: Value) -> Column:
+    return Column(shown, lambda row: duration(value(row)), value, timed=True)
 
 
 def _middle(low: str, high: str) -> Value:
-    def middle(row: Row) -> float | None:
-        ends = row.get(low), row.get(high)
-        return None if ends[0] is None or ends[1] is None else (ends[0] + ends[1]) / 2
-
-    return middle
-
-
-def _duration(value: Value) -> Column:
-    return Column(lambda row: duration(value(row)), value, timed=True)
+    return lambda row: None if row.get(low) is None or row.get(high) is None else (row[low] + row[high]) / 2
 
 
 def _seconds(key: str) -> Value:
@@ -52,8 +57,7 @@ def _seconds(key: str) -> Value:
 
 def _tail(row: Row) -> float | None:
     """Return the 95th percentile of latencies; of fewer calls than it needs, the largest."""
-    p95 = _seconds("latency_ms_p95")(row)
-    return _seconds("latency_ms_max")(row) if p95 is None else p95
+    return _seconds("latency_ms_max" if row.get("latency_ms_p95") is None else "latency_ms_p95")(row)
 
 
 def _per_row(row: Row) -> float | None:
@@ -71,14 +75,14 @@ def row_interval(row: Row) -> str:
     return "one replicate" if count == 1 else spread if spread == ABSENT else f"range {spread}"
 
 
+def _beyond(row: Row) -> str:
+    return interval(row.get("beyond_floor_ci_low"), row.get("beyond_floor_ci_high"), row["unit"])
+
+
 def _right(row: Row) -> str:
     """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
     right, total = row.get("recordings_right"), row.get("recordings_asked")
     return ABSENT if right is None or total is None else f"{right:.3g} of {total:.3g}"
-
-
-def _beyond(row: Row) -> str:
-    return interval(row.get("beyond_floor_ci_low"), row.get("beyond_floor_ci_high"), row["unit"])
 
 
 def _delay(row: Row) -> str:
@@ -89,40 +93,38 @@ def _p95(row: Row) -> str:
     return tail(row.get("latency_ms_p95"), row.get("latency_ms_max"), row.get("latency_n"))
 
 
-OF_ROWS = {
-    "level": Column(lambda row: visible(str(row.get(LEVEL) or ABSENT)), lambda row: None, if_known=LEVEL),
-    "score": _score("score"),
-    "95 % interval": Column(row_interval, _middle("ci_low", "ci_high")),
-    "beyond floor": _score("score_beyond_floor", "score_beyond_floor"),
-    "95 % beyond": Column(
-        _beyond, _middle("beyond_floor_ci_low", "beyond_floor_ci_high"), if_known="score_beyond_floor"
+_BEYOND = "score_beyond_floor"
+_ENDS = _middle("beyond_floor_ci_low", "beyond_floor_ci_high")
+_ALL: dict[str, Column | str] = {
+    "#": "rank",
+    "sensor": "sensor",
+    "level": Column("level", lambda row: visible(str(row.get(LEVEL) or ABSENT)), lambda row: None, if_known=LEVEL),
+    "estimator": "estimator",
+    "score": _score("score", "score"),
+    "95 % interval": Column("interval", row_interval, _middle("ci_low", "ci_high")),
+    "beyond floor": _score("beyond_floor", _BEYOND, _BEYOND),
+    "95 % beyond": Column("beyond_floor_interval", _beyond, _ENDS, if_known=_BEYOND),
+    "true error": _score("true_error", "true_score", "true_score"),
+    "rank 95 %": "rank_interval",
+    "recordings right": Column(
+        "recordings_right", _right, lambda row: row.get("recordings_right"), if_known="recordings_right"
     ),
-    "true error": _score("true_score", "true_score"),
-    "recordings right": Column(_right, lambda row: row.get("recordings_right"), if_known="recordings_right"),
-    "published": _score("published"),
-    "baseline": _score("baseline"),
-    "n test": _count("n_test"),
-    "sessions": _count("n_sessions"),
-    "sim": _duration(lambda row: row["sim_s"]),
-    "delay": Column(_delay, _seconds("answer_delay_ms"), timed=True),
-    "fit": _duration(lambda row: row["fit_s"]),
-    "latency p50": _duration(_seconds("latency_ms_p50")),
-    "p95": Column(_p95, _tail, timed=True),
-    "batch/row": _duration(_per_row),
+    "published": _score("published", "published"),
+    "baseline": _score("baseline", "baseline"),
+    "n test": _count("n_test", "n_test"),
+    "sessions": _count("sessions", "n_sessions"),
+    "sim": _duration("sim", lambda row: row["sim_s"]),
+    "delay": Column("answer_delay", _delay, _seconds("answer_delay_ms"), timed=True),
+    "fit": _duration("fit", lambda row: row["fit_s"]),
+    "latency p50": _duration("latency_p50", _seconds("latency_ms_p50")),
+    "p95": Column("latency_p95", _p95, _tail, timed=True),
+    "batch/row": _duration("batch_row", _per_row),
 }
-"""Columns by name; the others are told by the block that a row stands in, or are names."""
+"""All columns in order; of those that are names, or that the block of a row decides, only what programs call them."""
 
-SHOWN = {
-    "#": "rank", "sensor": "sensor", "level": "level", "estimator": "estimator", "score": "score",
-    "95 % interval": "interval", "beyond floor": "beyond_floor", "95 % beyond": "beyond_floor_interval",
-    "true error": "true_error", "rank 95 %": "rank_interval", "recordings right": "recordings_right",
-    "published": "published", "baseline": "baseline", "n test": "n_test", "sessions": "sessions", "sim": "sim",
-    "delay": "answer_delay", "fit": "fit", "latency p50": "latency_p50", "p95": "latency_p95",
-    "batch/row": "batch_row",
-}  # fmt: skip
-"""All columns in order, and what each is called where programs read its text: ``shown`` in JSON, ``shown_…`` in CSV and
-Parquet."""
-COLUMNS = tuple(SHOWN)
+OF_ROWS = {name: one for name, one in _ALL.items() if isinstance(one, Column)}
+SHOWN = {name: one.shown if isinstance(one, Column) else one for name, one in _ALL.items()}
+COLUMNS = tuple(_ALL)
 NUMERIC = frozenset(COLUMNS) - {"sensor", "level", "estimator"}
 INTERVALS = ("95 % interval", "95 % beyond")
 IF_KNOWN = {name: column.if_known for name, column in OF_ROWS.items() if column.if_known}
@@ -135,3 +137,73 @@ def columns(rows: Sequence[Row], *, times: bool) -> tuple[str, ...]:
     lacking = {name for name, key in IF_KNOWN.items() if all(row.get(key) is None for row in rows)}
     timed = {"level"} | {name for name, column in OF_ROWS.items() if column.timed}
     return tuple(name for name in COLUMNS if name not in lacking and (times or name not in timed))
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row as text."""
+
+    row: Row = field(repr=False, compare=False)
+    """Numbers in full."""
+    texts: Mapping[str, str]
+    """By column."""
+    kind: Kind
+    placing: Placing | None = None
+    """Where it stands in its block; results better than the trivial answer only."""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Its texts, one a column."""
+        return tuple(self.texts.values())
+
+    def value(self, column: str) -> float | None:
+        """Return what a line is sorted by in a column of numbers; None: last."""
+        if column not in NUMERIC or self.kind in ("failed", "skipped"):
+            return None  # a stopped cell may know a number that the table does not show
+        if column in OF_ROWS:
+            return OF_ROWS[column].value(self.row)
+        one = self.placing
+        if one is None or column == "#":
+            return one and one.place
+        return (one.low + one.high) / 2 if one.low and one.high else None
+
+
+def line_of(row: Row, placing: Placing | None, columns: Sequence[str], letters: Mapping[str, str]) -> Line:
+    """Return the line of a row.
+
+    Parameters
+    ----------
+    placing
+        Where the row stands in its block; None: a baseline, or a cell that did not end well.
+    letters
+        The mark of each host.
+    """
+    texts = {"sensor": sensor_name(row), "estimator": answer_name(row)}
+    if row["status"] != "done":
+        texts |= {"#": "", "score": row["status"].upper()}
+        kind: Kind = "failed" if row["status"] in STOPPED else "skipped"
+        return Line(row, {name: texts.get(name, ABSENT) for name in columns}, kind)
+    texts |= {"#": _place(placing, row), "rank 95 %": _range(placing)}
+    mark = timing_mark(row, letters)
+    for name in columns:
+        if name in OF_ROWS:
+            text = OF_ROWS[name].text(row)
+            texts[name] = text + mark if OF_ROWS[name].timed and text != ABSENT else text
+    texts["score"] += (" †" if row["dagger"] else "") + (" ‡" if row["stamps"] else "")
+    kind = "baseline" if row["is_baseline"] else "result"
+    return Line(row, {name: texts[name] for name in columns}, kind, placing)
+
+
+def _place(one: Placing | None, row: Row) -> str:
+    """Return the place; an answer that is no better than the trivial one has none, nor has an oracle."""
+    if one is None and row["is_baseline"]:
+        return "oracle" if row.get("looks_at") == "reference" else "base"
+    if one is None:
+        return ABSENT
+    return f"{one.place}=" if one.tied else str(one.place)
+
+
+def _range(one: Placing | None) -> str:
+    if one is None or one.low is None or one.high is None:
+        return ABSENT
+    return str(one.low) if one.low == one.high else f"{one.low}–{one.high}"

@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tactbench.core.errors import UsageError
+from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.latex import latex
 from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, keys, records
-from tactbench.core.leaderboard.table import Table
-from tactbench.core.leaderboard.view import DEFAULT_VIEW, View, document
+from tactbench.core.leaderboard.table import Table, build_table
+from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document
+from tactbench.core.tables import csv_text as csv_format
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
-from tactbench.core.tables.csv_text import csv_text as csv_lines
 from tactbench.core.tables.text import json_text, visible
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+Row = Mapping[str, Any]
+
+SUFFIXES = {
+    ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".html": "html", ".parquet": "parquet",
+    ".xlsx": "xlsx", ".txt": "table",
+}  # fmt: skip
+"""The format that a file is meant to have, by how its name ends."""
+IN_FOLDER = ("md", "csv", "json", "html")
+"""A run's result folder has these, ``leaderboard.md`` and so on; the others are made when asked for."""
 
 
 def show(table: Table, console: Console, view: View = DEFAULT_VIEW) -> None:
@@ -38,7 +51,7 @@ def csv_text(table: Table) -> str:
     """Return a leaderboard's records as CSV."""
     names = [*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)]
     lines = ([*(_stored(*one) for one in values.items()), *shown.values()] for values, shown in records(table))
-    return csv_lines(names, lines)
+    return csv_format.csv_text(names, lines)
 
 
 def _stored(key: str, value: Any) -> Any:
@@ -55,25 +68,55 @@ def json_array(table: Table) -> str:
 
 def page(table: Table) -> str:
     """Return the page of a table: one HTML file, every cell behind its numbers, times among them."""
-    from tactbench.core.leaderboard.board.page import page_of
+    from tactbench.core.leaderboard.board import page_of
 
     return page_of(table)
 
 
-TEXTS: dict[str, Callable[[Table], str]] = {
-    "json": json_array,
-    "csv": csv_text,
-    "md": markdown,
-    "latex": latex,
-    "html": page,
-}
-"""How a table is written, by the name of the format on the command line; all but Parquet and Excel: no text."""
+def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> bytes:
+    """Return a leaderboard in a format that `SUFFIXES` names.
 
-VIEWED: dict[str, Callable[[Table, View], str]] = {"md": markdown, "latex": latex}
-"""Those of them that print less than everything, as a view says."""
+    Parameters
+    ----------
+    view, width
+        What is printed of it for people, and how wide a terminal is; the formats for programs hold everything.
 
-SUFFIXES = {
-    ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".html": "html", ".parquet": "parquet",
-    ".xlsx": "xlsx", ".txt": "table",
-}  # fmt: skip
-"""The format that a file is meant to have, by how its name ends."""
+    Raises
+    ------
+    UsageError
+        If Parquet or Excel is asked for and its library is not installed.
+    """
+    from tactbench.core.leaderboard.binary import parquet, xlsx
+
+    if shape == "table":
+        return plain_text(table, width, view).encode("utf-8", "backslashreplace")
+    if shape in ("parquet", "xlsx"):
+        return parquet(table) if shape == "parquet" else xlsx(table)
+    if shape in ("md", "latex"):
+        text = markdown(table, view) if shape == "md" else latex(table, view)
+    else:
+        text = {"csv": csv_text, "json": json_array, "html": page}[shape](table)
+    return text.encode("utf-8", "replace")
+
+
+def write_tables(
+    rows: Sequence[Row], folder: Path, provenance: Sequence[Row] = (), table: Table | None = None
+) -> tuple[Path, ...]:
+    """Write the leaderboard of `rows`, or `table` where it has been made, into a result folder; return the files.
+
+    Raises
+    ------
+    UsageError
+        If the folder cannot be written; each of the files is then whole, an old one or a new one.
+    """
+    table = table or build_table(rows, provenance)
+    paths = {folder / f"leaderboard.{shape}": shape for shape in IN_FOLDER}
+    try:
+        for path, shape in paths.items():
+            replace_file(path, rendered(table, shape))
+    except OSError as error:
+        raise UsageError(
+            f"The tables cannot be written to {folder}: {error.strerror or error}.",
+            hint="Make room or give another folder; the results themselves are safe.",
+        ) from error
+    return tuple(paths)

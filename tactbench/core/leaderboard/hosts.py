@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from itertools import count, product
 from string import ascii_uppercase
 from typing import Any
 
@@ -14,7 +15,8 @@ Row = Mapping[str, Any]
 def host_letters(rows: Iterable[Row]) -> dict[str, str]:
     """Return a letter for each host that timed one of the rows, in order of their ids; none if there is but one."""
     hosts = sorted({host for host, _ in _clocks(rows)})
-    return {host: _letter(place) for place, host in enumerate(hosts)} if len(hosts) > 1 else {}
+    letters = ("".join(letters) for length in count(1) for letters in product(ascii_uppercase, repeat=length))
+    return dict(zip(hosts, letters, strict=False)) if len(hosts) > 1 else {}
 
 
 def timing_mark(row: Row, letters: Mapping[str, str]) -> str:
@@ -24,13 +26,7 @@ def timing_mark(row: Row, letters: Mapping[str, str]) -> str:
 
 
 def timing_notes(rows: Iterable[Row], letters: Mapping[str, str], provenance: Iterable[Row]) -> list[str]:
-    """Return what the marks of times mean.
-
-    Parameters
-    ----------
-    provenance
-        What is known of the runs: `host`, `cpu`, `cores`.
-    """
+    """Return what the marks of times mean; `provenance` tells of the runs, among it `host`, `cpu` and `cores`."""
     machines = {str(one.get("host", "")): one for one in provenance}
     notes = [f"[{letter}] timed on {_machine(host, machines.get(host))}." for host, letter in letters.items()]
     if letters:
@@ -74,9 +70,3 @@ def _machine(host: str, machine: Row | None) -> str:
     if not machine:
         return f"{name}, of which nothing else is known"
     return f"{name}: {visible(str(machine.get('cpu') or 'unknown CPU'))}, {visible(str(machine.get('cores')))} cores"
-
-
-def _letter(place: int) -> str:
-    """Return A … Z, then AA, AB and so on."""
-    before, last = divmod(place, 26)
-    return (_letter(before - 1) if before else "") + ascii_uppercase[last]

@@ -5,8 +5,9 @@ What is printed by default fits one column of a two-column paper; all columns ma
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import accumulate, zip_longest
 
 from tactbench.core.leaderboard import view as viewed
 from tactbench.core.leaderboard.blocks import Block
@@ -34,11 +35,13 @@ def latex(table: Table, view: View = DEFAULT_VIEW) -> str:
     for place, (block, grid) in enumerate(zip(table.blocks, viewed.grids(table, view), strict=True)):
         # A paper's table shows no ranks.
         shown = [note for note in viewed.notes(table, view) if whole_width or note != RANKS]
-        notes = (*shown, *viewed.footer(table, view)) if place == last else ()
-        grid = grid if whole_width else _narrow(grid)
-        parts += _table(replace(grid, title=_caption(block, grid)), notes, whole_width=whole_width, number=place)
+        notes = [*shown, *viewed.footer(table, view)] if place == last else []
+        if not whole_width:
+            grid = grid.only([name for name in grid.columns if name in _IN_A_COLUMN])
+        grid = replace(grid, title=_caption(block, grid))
+        parts += latex_table(grid, notes, number=place) if whole_width else _in_a_column(grid, notes, number=place)
     for number, section in enumerate(viewed.sections(table, view), len(table.blocks)):
-        parts += _table(section, section.notes, whole_width=True, number=number)
+        parts += latex_table(section, section.notes, number=number)
     parts += [f"% {tex(text)}" for text in viewed.commands(table, view)]
     return "\n".join(parts) + "\n"
 
@@ -55,19 +58,8 @@ def _caption(block: Block, grid: TextTable) -> str:
     return f"{'. '.join(sentences)}."
 
 
-def _narrow(grid: TextTable) -> TextTable:
-    """Return the columns of a paper's table."""
-    kept = [place for place, name in enumerate(grid.columns) if name in _IN_A_COLUMN]
-    lines = tuple(tuple(line[place] for place in kept) for line in grid.lines)
-    names = [grid.columns[place] for place in kept]
-    headers = tuple(grid.headers[place] for place in kept)
-    return replace(grid, columns=tuple(names), headings=headers, lines=lines)
-
-
-def _table(grid: TextTable, notes: Iterable[str], *, whole_width: bool, number: int) -> list[str]:
-    """Return a grid as a table: of one column, long texts broken into further lines; or over both, as it is."""
-    if whole_width:
-        return latex_table(grid, notes, number=number)
+def _in_a_column(grid: TextTable, notes: Sequence[str], *, number: int) -> list[str]:
+    """Return a table as LaTeX: of one column, long texts broken into further lines."""
     places = {name: place for place, name in enumerate(grid.columns)}
     gap = 2 * SEP_PT
     intervals = {places[name] for name in INTERVALS if name in places}
@@ -77,15 +69,16 @@ def _table(grid: TextTable, notes: Iterable[str], *, whole_width: bool, number: 
     )  # fmt: skip
     if hidden:
         notes = [*notes, f"There was no room for: {', '.join(grid.headers[place] for place in hidden)}."]
-    lines = [list(_broken(cells, widths)) for cells in grid.lines]
-    rules = [sum(map(len, lines[:place])) for place in _first_trivial(grid)]
-    heads = list(_broken(grid.headers, widths))
+    lines = [_broken(cells, widths) for cells in grid.lines]
+    begins = [0, *accumulate(map(len, lines))]
     kept = replace(
         grid,
         columns=tuple(grid.columns[place] for place in widths),
         headings=(),
-        lines=tuple(tuple(line) for one in lines for line in one),
+        lines=tuple(line for one in lines for line in one),
     )
+    rules = [begins[place] for place in _first_trivial(grid)]
+    heads = _broken(grid.headers, widths)
     return latex_table(kept, notes, headings=heads, number=number, over_both=False, rules=rules)
 
 
@@ -94,7 +87,6 @@ def _first_trivial(grid: TextTable) -> list[int]:
     return [grid.kinds.index("baseline")] if "baseline" in grid.kinds and grid.kinds[0] != "baseline" else []
 
 
-def _broken(cells: Sequence[str], widths: Mapping[int, float]) -> Iterator[list[str]]:
-    parts = [wrapped(cells[place], room, points) for place, room in widths.items()]
-    for number in range(max(map(len, parts))):
-        yield [part[number] if number < len(part) else "" for part in parts]
+def _broken(cells: Sequence[str], widths: Mapping[int, float]) -> list[tuple[str, ...]]:
+    parts: Iterable[list[str]] = (wrapped(cells[place], room, points) for place, room in widths.items())
+    return list(zip_longest(*parts, fillvalue=""))

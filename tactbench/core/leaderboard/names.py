@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.spec.row import LOWER_IS_BETTER as LOWER_IS_BETTER
 from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
+_Key = TypeVar("_Key")
+_Value = TypeVar("_Value")
 
 SIMULATED = "SIM (twin)"
 """What is said of simulated rows in place of a rig."""
@@ -41,9 +43,7 @@ def origin_mark(row: Row) -> str:
 
 def answer_name(row: Row) -> str:
     """Return the estimator's name, with the parameters that are not its defaults."""
-    if not row["params"]:
-        return visible(str(row["estimator"]))
-    options = ", ".join(f"{key}={value}" for key, value in sorted(row["params"].items()))
+    options = ", ".join(f"{key}={value}" for key, value in sorted((row["params"] or {}).items()))
     return visible(f"{row['estimator']} ({options})" if options else str(row["estimator"]))
 
 
@@ -51,6 +51,11 @@ def metric_name(row: Row) -> str:
     """Return the metric with its unit: ``RMSE [N]``."""
     unit = f" [{row['unit']}]" if row["unit"] != "1" else ""
     return visible(f"{METRIC_NAMES.get(row['metric'], row['metric'])}{unit}")
+
+
+def sign_of(row: Row) -> float:
+    """Return 1 where a lower score is better, else -1: a score times it is the lower the better."""
+    return 1.0 if row["metric"] in LOWER_IS_BETTER else -1.0
 
 
 def hardware_name(row: Row) -> str:
@@ -68,3 +73,11 @@ def question_name(row: Row) -> str:
 def answer_or_probe(row: Row) -> str:
     """Return the estimator or, for a probe, its protocol: what makes no sense to probe makes none with any other."""
     return visible(str(row["protocol"])) if is_probe(row["protocol"]) else answer_name(row)
+
+
+def distinct(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, list[_Value]]:
+    """Return the different values of each key, both in the order in which they come."""
+    found: dict[_Key, dict[_Value, None]] = {}
+    for key, value in pairs:
+        found.setdefault(key, {})[value] = None
+    return {key: list(values) for key, values in found.items()}

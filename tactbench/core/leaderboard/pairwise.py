@@ -1,4 +1,7 @@
-"""Two sensors, two estimators or two result folders, cell by cell: what may be compared, and what it shows."""
+"""Two sensors, two estimators or two result folders, cell by cell: what may be compared, and what it shows.
+
+Comparisons become one table a question, and records, with the same digits in every format.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +10,28 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.names import EMULATED, SIMULATED, answer_name, hardware_name
+from tactbench.core.leaderboard.names import (
+    EMULATED,
+    SIMULATED,
+    answer_name,
+    distinct,
+    hardware_name,
+    metric_name,
+)  # fmt: skip
 from tactbench.core.spec.matrix import ComparisonChoice
+from tactbench.core.statistics.aggregate import Aggregate, aggregate
 from tactbench.core.statistics.holm import holm
 from tactbench.core.statistics.over_folds import FoldDifference, over_folds
 from tactbench.core.statistics.paired import Difference, difference
+from tactbench.core.tables.numbers import ABSENT, interval, score, signed, suffix
+from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
 Kind = Literal["sensors", "estimators", "folders"]
 Key = tuple[Any, ...]
+COLUMNS = (
+    "of", "A", "B", "A − B", "95 % interval", "p", "p folds", "p Holm", "effect", "P(A better)", "n", "verdict",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -43,9 +59,7 @@ class PairwiseComparison:
     @property
     def row(self) -> Row:
         """Return one of the rows, for what both have."""
-        found = self.first_row if self.first_row is not None else self.second_row
-        assert found is not None, "a comparison has one row at least"
-        return found
+        return next(row for row in (self.first_row, self.second_row) if row is not None)
 
 
 def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None = None) -> list[PairwiseComparison]:
@@ -137,17 +151,15 @@ def _compared(
     found = []
     for key in dict.fromkeys([*keys[0], *keys[1]]):
         one, other = keys[0].get(key), keys[1].get(key)
+        result, folds = None, None
         if one is None or other is None:
-            missing, there = (first, other) if one is None else (second, one)
-            assert there is not None, "the key is of one of the two"
-            refused = _why_alone(kind, there, missing, keys[0] if one is None else keys[1])
+            missing, there, others = (first, keys[1][key], keys[0]) if one is None else (second, one, keys[1])
+            refused = _why_alone(kind, there, missing, others)
         else:
             refused = _why_not(one, other, first, second)
-        shown = one if one is not None else other
-        assert shown is not None, "the key is of one of the two"
-        result = difference(one, other) if one is not None and other is not None and not refused else None
-        folds = over_folds([(one, other)]) if one is not None and other is not None and result is not None else None
-        found.append(PairwiseComparison(kind, first, second, _common(kind, shown), one, other, result, folds, refused))
+            if not refused:
+                result, folds = difference(one, other), over_folds([(one, other)])
+        found.append(PairwiseComparison(kind, first, second, key[-1], one, other, result, folds, refused))
     return found
 
 
@@ -185,3 +197,143 @@ def _why_not(one: Row, other: Row, first: str, second: str) -> str:
     if (one["metric"], list(one["classes"])) != (other["metric"], list(other["classes"])):
         return "they were scored by other metrics or classes"
     return ""
+
+
+def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
+    """Return a table for each question: task, metric, protocol, split and hardware."""
+    groups: dict[str, list[PairwiseComparison]] = {}
+    for pair in comparisons:
+        groups.setdefault(_title(pair), []).append(pair)
+    return [
+        TextTable(title, COLUMNS, tuple(map(_line, members)), frozenset(COLUMNS[1:-1]))
+        for title, members in groups.items()
+    ]
+
+
+def _title(pair: PairwiseComparison) -> str:
+    row = pair.row
+    dagger = " †" if row["dagger"] else ""
+    parts = [f"A = {pair.first}, B = {pair.second}", row["task"], metric_name(row), f"{row['protocol']}{dagger}"]
+    split = [f"split {row['split']}"] if row["split"] else []
+    return " · ".join([*parts, *split, hardware_name(row)])
+
+
+def _line(pair: PairwiseComparison) -> tuple[str, ...]:
+    unit = pair.row["unit"]
+    scores = [score(row["score"] if row else None, unit) for row in (pair.first_row, pair.second_row)]
+    found = pair.difference
+    if found is None:
+        return (pair.of, *scores, *(ABSENT for _ in COLUMNS[4:]), f"not compared: {pair.refused}")
+    return (
+        pair.of,
+        *scores,
+        signed(found.value, unit),
+        ABSENT
+        if found.low is None or found.high is None
+        else f"{signed(found.low, unit)} … {signed(found.high, unit)}",
+        probability(found.p),
+        probability(pair.folds.p) if pair.folds else ABSENT,
+        probability(pair.p_corrected) if pair.declared else "exploratory",
+        ABSENT if found.effect is None else signed(found.effect, "1"),
+        ABSENT if found.improved is None else f"{found.improved:.2f}",
+        f"{found.replicates}" + ("" if found.paired else " unpaired"),
+        verdict(pair),
+    )
+
+
+def verdict(pair: PairwiseComparison) -> str:
+    """Return who is better, or that it cannot be told."""
+    found = pair.difference
+    if found is None:
+        return "not compared"
+    if found.verdict in ("equivalent", "undecided"):
+        return found.verdict
+    winner = pair.first if found.verdict == "better" else pair.second
+    region = pair.row.get("equivalence")
+    beyond = f" by more than {region:g}{suffix(pair.row['unit'])}" if region and found.beyond else ""
+    return f"{winner} better{beyond}"
+
+
+def probability(p: float | None) -> str:
+    """Return a p-value, two digits."""
+    if p is None:
+        return ABSENT
+    return "< 0.001" if p < 0.001 else f"{p:.2g}"
+
+
+def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
+    """Return what must be known to read the tables."""
+    found = [pair for pair in comparisons if pair.difference is not None]
+    notes = [
+        "A − B is in the metric's unit; p is of no difference at all, by exchanging A and B within replicates; effect "
+        "is the difference over the standard deviation of the replicates' differences; n counts replicates."
+    ] if found else []  # fmt: skip
+    for pair in found:
+        assert pair.difference is not None, "these were compared"
+        notes.append(f"{pair.row['task']}: {pair.difference.method}.")
+        region = pair.row.get("equivalence")
+        notes.append(
+            f"{pair.row['task']}: scores within {region:g}{suffix(pair.row['unit'])} are practically the same."
+            if region
+            else f"{pair.row['task']} declares no region of practical equivalence."
+        )
+        least = pair.difference.smallest_p
+        if least and least > 0.01:
+            notes.append(f"{pair.difference.replicates} replicates cannot give a p below {least:.2g}.")
+        if pair.folds:
+            notes.append(
+                f"p folds: {pair.folds.method}; training data of folds overlap, so p over replicates is too small "
+                "for a claim about estimators trained anew."
+            )
+    if found and all(pair.declared for pair in found):
+        notes.append("p Holm is corrected for all declared comparisons of these results.")
+    elif any(pair.declared for pair in found):
+        notes.append("p Holm is corrected for all declared comparisons; the others are exploratory.")
+    elif found:
+        notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
+    if any(pair.row["simulated"] for pair in found):
+        notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
+    return list(dict.fromkeys([*notes, *_averages(found)]))
+
+
+def _averages(found: Sequence[PairwiseComparison]) -> list[str]:
+    """Return the interquartile mean over tasks of either, where two tasks or more were compared under one protocol."""
+    groups = distinct(((hardware_name(pair.row), pair.row["protocol"]), place) for place, pair in enumerate(found))
+    notes = []
+    for (_, protocol), places in groups.items():
+        members = [found[place] for place in places]
+        one, other = (
+            aggregate([row for row in rows if row is not None])
+            for rows in zip(*((pair.first_row, pair.second_row) for pair in members), strict=True)
+        )
+        if len({pair.row["task"] for pair in members}) < 2 or one is None or other is None:
+            continue
+        averages = f"{members[0].first} {_average(one)}, {members[0].second} {_average(other)}"
+        notes.append(
+            f"Interquartile mean over {one.tasks} tasks under {protocol} ({one.entries} scores; 0 is the trivial "
+            f"baseline, 1 the reference): {averages}."
+            + "".join(f" Left out: {reason}." for reason in dict.fromkeys(one.left_out + other.left_out))
+        )
+    return notes
+
+
+def _average(side: Aggregate) -> str:
+    return f"{side.value:.3f} ({interval(side.low, side.high, '1')})"
+
+
+def record_of(pair: PairwiseComparison) -> dict[str, Any]:
+    """Return a pair as one flat record; all have the same keys."""
+    row, found, folds = pair.row, pair.difference, pair.folds
+    each: Mapping[str, Any] = {} if found is None else vars(found)
+    shared = ("task", "rig", "simulated", "protocol", "split", "repeat", "metric", "unit")
+    return {
+        "compared": pair.kind, "a": pair.first, "b": pair.second, "of": pair.of, **{key: row[key] for key in shared},
+        "score_a": pair.first_row and pair.first_row["score"], "score_b": pair.second_row and pair.second_row["score"],
+        "difference": each.get("value"), "low": each.get("low"), "high": each.get("high"), "p": each.get("p"),
+        "smallest_p": each.get("smallest_p"), "p_folds": folds and folds.p, "folds_low": folds and folds.low,
+        "folds_high": folds and folds.high, "declared": pair.declared, "p_holm": pair.p_corrected,
+        "effect": each.get("effect"), "improved": each.get("improved"), "equivalence": row.get("equivalence"),
+        "verdict": each.get("verdict"), "beyond": each.get("beyond"), "paired": each.get("paired"),
+        "replicates": each.get("replicates"), "replicate_unit": each.get("unit"), "method": each.get("method"),
+        "refused": pair.refused,
+    }  # fmt: skip

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER
+from tactbench.core.leaderboard.names import sign_of
 from tactbench.core.statistics.excess import beyond_floor, excess_of
 from tactbench.core.statistics.median import FEWEST
 
@@ -67,12 +67,7 @@ def errors(results: Sequence[Row]) -> list[float]:
     """
     if beyond_floor(results):
         return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]
-    return [
-        (row["score"] if row["metric"] in LOWER_IS_BETTER else -row["score"])
-        if math.isfinite(row["score"])
-        else math.inf
-        for row in results
-    ]
+    return [sign_of(row) * row["score"] if math.isfinite(row["score"]) else math.inf for row in results]
 
 
 def _unrankable(results: Sequence[Row]) -> str:
@@ -85,13 +80,10 @@ def _unrankable(results: Sequence[Row]) -> str:
 
 
 def _by_score(results: Sequence[Row]) -> dict[str, Placing]:
-    found: dict[str, Placing] = {}
     ordered = errors(results)
     many = Counter(ordered)
-    place, before = 0, None
-    for position, (row, error) in enumerate(zip(results, ordered, strict=True)):
-        if position == 0 or error != before:
-            place = position + 1
-        found[row["cell"]] = Placing(place, None, None, many[error] > 1)
-        before = error
-    return found
+    first = {error: place for place, error in reversed(list(enumerate(ordered, 1)))}
+    return {
+        row["cell"]: Placing(first[error], None, None, many[error] > 1)
+        for row, error in zip(results, ordered, strict=True)
+    }

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import importlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, answer_name, sensor_name
+from tactbench.core.leaderboard.names import answer_name, sensor_name, sign_of
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
-from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.tables.numbers import ABSENT, interval, score, suffix
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
 
@@ -28,70 +28,54 @@ COLUMNS = (
     "sensor", "task", "estimator", "split", "score", "95 % interval", "shuffled", "first frame alone",
     "trivial", "verdict",
 )  # fmt: skip
-NUMERIC = frozenset({"score", "95 % interval", "shuffled", "first frame alone", "trivial"})
+NUMERIC = frozenset(COLUMNS[4:9])
 
 
 def build_probe(rows: Sequence[Row]) -> TextTable | None:
     """Put each finished answer under `deployable` beside its probes; None if nothing was probed."""
-    probes = _Probes(rows)
-    if not probes:
-        return None
+    probes: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        if row["protocol"] == FIRST_FRAME.name or row["split"] in ("shuffled", None):
+            probes.setdefault(_key(row, row["protocol"]), []).append(row)
     best = best_trivials(rows)
     lines: list[tuple[str, ...]] = []
-    skipped: list[str] = []
+    skipped: dict[str, None] = {}
     for row in rows:
         if row["is_baseline"] or row["status"] != "done" or row["protocol"] != DEPLOYABLE.name:
             continue
         if row["split"] in ("shuffled", "in-session"):
             continue  # neither keeps recordings or groups apart: there is nothing to compare with
-        first = probes.of(row, FIRST_FRAME.name, row["split"])
-        shuffled = probes.of(row, DEPLOYABLE.name, "shuffled")
+        first = _probe_of(row, probes, FIRST_FRAME.name, row["split"])
+        shuffled = _probe_of(row, probes, DEPLOYABLE.name, "shuffled")
         if first is None and shuffled is None:
             continue
         lines.append(tuple(map(visible, _line(row, shuffled, first, best.get(comparison_key(row))))))
         if first is not None and first["status"] == "skipped":
-            skipped.append(visible(f"{row['sensor']}/{row['task']}: {first['reason']}"))
+            skipped[visible(f"{row['sensor']}/{row['task']}: {first['reason']}")] = None
     if not lines:
         return None
-    used = [place for place in range(len(COLUMNS)) if any(line[place] for line in lines)]
-    return TextTable(
-        title="Probe · does the score come from the contact?",
-        columns=tuple(COLUMNS[place] for place in used),
-        numeric=NUMERIC,
-        lines=tuple(tuple(line[place] for place in used) for line in lines),
-        notes=(
-            f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer). "
-            "Optimistic: shuffled rows score beyond the interval of the split. TRIVIAL: an answer that reads no sensor "
-            "scores as well. See docs/real-recordings.md.",
-            *dict.fromkeys(skipped),
-        ),
-        kinds=tuple("alarm" if line[-1].startswith(("LEAK", "TRIVIAL")) else "plain" for line in lines),
+    note = (
+        f"LEAK: the first frame alone has {LEAK_SHARE:.0%} or more of the skill (score beyond the trivial answer). "
+        "Optimistic: shuffled rows score beyond the interval of the split. TRIVIAL: an answer that reads no sensor "
+        "scores as well. See docs/real-recordings.md."
     )
+    kinds = tuple("alarm" if line[-1].startswith(("LEAK", "TRIVIAL")) else "plain" for line in lines)
+    title = "Probe · does the score come from the contact?"
+    return TextTable(title, COLUMNS, tuple(lines), NUMERIC, notes=(note, *skipped), kinds=kinds)
 
 
-class _Probes:
-    """The rows that are probes, found by the answer they probe."""
+def _key(row: Row, protocol: str) -> tuple[Any, ...]:
+    """Return what an answer and its probe under a protocol share."""
+    same = (row[key] for key in ("sensor", "task", "rig", "estimator"))
+    return (protocol, *same, json.dumps(row["params"], sort_keys=True))
 
-    def __init__(self, rows: Sequence[Row]) -> None:
-        self._rows: dict[tuple[Any, ...], list[Row]] = {}
-        for row in rows:
-            if row["protocol"] == FIRST_FRAME.name or row["split"] in ("shuffled", None):
-                self._rows.setdefault(self._key(row, row["protocol"]), []).append(row)
 
-    def __bool__(self) -> bool:
-        return bool(self._rows)
-
-    def of(self, row: Row, protocol: str, split: str) -> Row | None:
-        """Return the same answer under a protocol and split. A cell that was never begun may not know its split."""
-        for other in self._rows.get(self._key(row, protocol), ()):
-            if other["split"] == split or (other["split"] is None and other["status"] != "done"):
-                return other
-        return None
-
-    @staticmethod
-    def _key(row: Row, protocol: str) -> tuple[Any, ...]:
-        same = (row[key] for key in ("sensor", "task", "rig", "estimator"))
-        return (protocol, *same, json.dumps(row["params"], sort_keys=True))
+def _probe_of(row: Row, probes: Mapping[tuple[Any, ...], list[Row]], protocol: str, split: str) -> Row | None:
+    """Return the same answer under a protocol and split. A cell that was never begun may not know its split."""
+    for other in probes.get(_key(row, protocol), ()):
+        if other["split"] == split or (other["split"] is None and other["status"] != "done"):
+            return other
+    return None
 
 
 def _line(row: Row, shuffled: Row | None, first: Row | None, trivial: Row | None) -> tuple[str, ...]:
@@ -111,39 +95,36 @@ def _line(row: Row, shuffled: Row | None, first: Row | None, trivial: Row | None
     )
 
 
-def _about_trivial(row: Row, trivial: Row | None) -> list[str]:
-    """Return that the best trivial answer scores as well, or that the interval does not exclude it."""
+def _shown(row: Row | None) -> str:
+    if row is None or row["status"] == "done":
+        return ABSENT if row is None else score(row["score"], row["unit"])
+    return str(row["status"])
+
+
+def _about_trivial(row: Row, trivial: Row | None) -> Iterator[str]:
+    """Yield that the best trivial answer scores as well, or that the interval does not exclude it."""
     if trivial is None:
-        return []
+        return
     values = f"{score(trivial['score'], row['unit'])} of {score(row['score'], row['unit'])}{suffix(row['unit'])}"
     if _skill(trivial["score"], row["score"], row) >= 0:
-        return [f"TRIVIAL: {answer_name(trivial)} scores {values}"]
-    shown = against_trivial(row, trivial["score"])
-    return [f"not shown to be better than {answer_name(trivial)}: {values}"] if shown else []
+        yield f"TRIVIAL: {answer_name(trivial)} scores {values}"
+    elif against_trivial(row, trivial["score"]):
+        yield f"not shown to be better than {answer_name(trivial)}: {values}"
 
 
-def _shown(row: Row | None) -> str:
-    if row is None:
-        return "–"
-    return score(row["score"], row["unit"]) if row["status"] == "done" else str(row["status"])
-
-
-def _about_first(row: Row, first: Row | None) -> list[str]:
-    """Return what the first frame says of the score, or nothing."""
-    trivial = row["baseline"]
+def _about_first(row: Row, first: Row | None) -> Iterator[str]:
+    """Yield what the first frame says of the score, if anything."""
+    trivial, unit = row["baseline"], row["unit"]
     if first is None or first["status"] != "done" or trivial is None:
-        return []
+        return
     beyond = _beyond_guessing(first, trivial)
+    says = f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix(unit)}"
     if beyond is None:
-        return ["too few recordings or replicates to say what the first frame tells"]
-    if not beyond:
-        return []
-    unit = row["unit"]
-    sentence = (
-        f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix(unit)}"
-    )
-    leak = _skill(first["score"], trivial, row) >= LEAK_SHARE * _skill(row["score"], trivial, row)
-    return [f"LEAK: {sentence}" if leak else f"{sentence}: a part of the answer is known before"]
+        yield "too few recordings or replicates to say what the first frame tells"
+    elif beyond and _skill(first["score"], trivial, row) >= LEAK_SHARE * _skill(row["score"], trivial, row):
+        yield f"LEAK: {says}"
+    elif beyond:
+        yield f"{says}: a part of the answer is known before"
 
 
 def _beyond_guessing(first: Row, trivial: float) -> bool | None:
@@ -159,31 +140,25 @@ def _beyond_guessing(first: Row, trivial: float) -> bool | None:
         if guess == 1.0 or right == 0:
             return False
         return float(importlib.import_module("scipy.special").bdtrc(right - 1, n, guess)) <= TAIL
-    worst = first["ci_high"] if _lower_is_better(first) else first["ci_low"]
+    worst = first["ci_high" if sign_of(first) > 0 else "ci_low"]
     if first["n_test"] < FEWEST or worst is None:
         return None
     return _skill(worst, trivial, first) > 0
 
 
-def _about_shuffled(row: Row, shuffled: Row | None) -> list[str]:
-    """Return by how much shuffled rows flatter the score, if by more than its interval."""
+def _about_shuffled(row: Row, shuffled: Row | None) -> Iterator[str]:
+    """Yield by how much shuffled rows flatter the score, if by more than its interval."""
     if shuffled is None or shuffled["status"] != "done":
-        return []
-    best = row["ci_low"] if _lower_is_better(row) else row["ci_high"]
+        return
+    best = row["ci_low" if sign_of(row) > 0 else "ci_high"]
     if best is None:
-        return ["no interval to hold the shuffled score against"]
-    if _skill(shuffled["score"], best, row) <= 0:
-        return []
-    by = score(abs(shuffled["score"] - row["score"]), row["unit"])
-    sentence = f"optimistic by {by}{suffix(row['unit'])} when shuffled"
-    same = shuffled["n_test"] == row["n_test"] and set(shuffled["recordings"]) == set(row["recordings"])
-    return [sentence if same else f"{sentence} (tested on other rows)"]
+        yield "no interval to hold the shuffled score against"
+    elif _skill(shuffled["score"], best, row) > 0:
+        by = score(abs(shuffled["score"] - row["score"]), row["unit"])
+        same = shuffled["n_test"] == row["n_test"] and set(shuffled["recordings"]) == set(row["recordings"])
+        yield f"optimistic by {by}{suffix(row['unit'])} when shuffled" + ("" if same else " (tested on other rows)")
 
 
 def _skill(value: float, trivial: float, row: Row) -> float:
     """Return how much better than `trivial` a score is."""
-    return trivial - value if _lower_is_better(row) else value - trivial
-
-
-def _lower_is_better(row: Row) -> bool:
-    return row["metric"] in LOWER_IS_BETTER
+    return sign_of(row) * (trivial - value)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.leaderboard.names import answer_name, hardware_name, metric_name, sensor_name
-from tactbench.core.tables.numbers import interval, score
+from tactbench.core.tables.numbers import ABSENT, interval, score, signed
 from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
@@ -29,24 +29,20 @@ def compare(rows: Iterable[Row], by: str) -> list[TextTable]:
         One of `tactbench.core.leaderboard.axes.AXES`.
     """
     groups: dict[tuple[Any, ...], list[Row]] = {}
+    alike = [key for key in ("protocol", "split") if key != by]
     for row in rows:
-        if by == "fold":
-            groups.setdefault((*_key(row), row["protocol"], row["split"]), []).append(row)
-        else:
-            groups.setdefault((*_key(row), row["split" if by == "protocol" else "protocol"]), []).append(row)
+        key = (row["task"], hardware_name(row), row["repeat"], *(row[key] for key in alike))
+        groups.setdefault(key, []).append(row)
     found = []
     for members in groups.values():
         shown = _worth_showing(members)
-        ways = (
-            _folds(shown) if by == "fold" else list(dict.fromkeys(str(row[by]) for row in shown if row[by] is not None))
-        )
+        if by == "fold":
+            ways = sorted(dict.fromkeys(name for row in shown for name in _folds(row)), key=_numbers_first)
+        else:
+            ways = list(dict.fromkeys(str(row[by]) for row in shown if row[by] is not None))
         if len(ways) > 1:
             found.append(_comparison(shown, by, ways))
     return found
-
-
-def _key(row: Row) -> tuple[Any, ...]:
-    return row["task"], hardware_name(row), row["repeat"]
 
 
 def _worth_showing(members: Sequence[Row]) -> list[Row]:
@@ -59,14 +55,14 @@ def _worth_showing(members: Sequence[Row]) -> list[Row]:
     return sorted(kept, key=lambda row: row["is_baseline"])
 
 
-def _folds(members: Sequence[Row]) -> list[str]:
-    """Return the names of the folds, those that begin with a number in its order."""
-    names = dict.fromkeys(_fold(key, row) for row in members for key in row["scores"] if key.startswith("fold "))
-    return sorted(names, key=_numbers_first)
-
-
-def _fold(key: str, row: Row) -> str:
-    return key.removeprefix("fold ").removeprefix(f"{row['split']} ")
+def _folds(row: Row) -> dict[str, float]:
+    """Return the scores of a row's folds by their names."""
+    split = f"{row['split']} "
+    return {
+        key.removeprefix("fold ").removeprefix(split): value
+        for key, value in row["scores"].items()
+        if key.startswith("fold ")
+    }
 
 
 def _numbers_first(name: str) -> tuple[bool, float]:
@@ -83,12 +79,10 @@ def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> TextTab
     lines: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
     by_way: dict[tuple[str, str, str], Row] = {}
     for row in members:
-        by_way[sensor_name(row), answer_name(row), str(row.get(by))] = row
-        cells = lines.setdefault((sensor_name(row), answer_name(row)), {})
-        if by == "fold":
-            cells |= {way: _record(row, by, way, value) for way, value in _scores_of_folds(row)}
-        else:
-            cells[str(row[by])] = _record(row, by, str(row[by]), row["score"])
+        names = sensor_name(row), answer_name(row)
+        by_way[*names, str(row.get(by))] = row
+        scores = _folds(row) if by == "fold" else {str(row[by]): row["score"]}
+        lines.setdefault(names, {}).update({way: _record(row, by, way, value) for way, value in scores.items()})
     for names, cells in lines.items():
         start = cells.get(ways[0], {}).get("score")
         for way, record in cells.items():
@@ -102,40 +96,25 @@ def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> TextTab
         title=_title(first, by),
         columns=("sensor", "estimator", *ways),
         numeric=frozenset(ways),
-        lines=tuple(
-            (*names, *(_text(cells.get(way), first["unit"]) for way in ways)) for names, cells in lines.items()
-        ),
+        lines=tuple((*names, *(_text(cells.get(way)) for way in ways)) for names, cells in lines.items()),
         notes=() if by == "fold" else (_NOTE,),
         records=tuple(cells[way] for cells in lines.values() for way in ways if way in cells),
     )
 
 
-def _scores_of_folds(row: Row) -> Iterable[tuple[str, float]]:
-    return ((_fold(key, row), value) for key, value in row["scores"].items() if key.startswith("fold "))
-
-
 def _record(row: Row, by: str, way: str, value: float | None) -> dict[str, Any]:
     whole = by != "fold"
     return {
-        "task": row["task"],
-        "sensor": row["sensor"],
+        **{key: row[key] for key in ("task", "sensor")},
         "estimator": answer_name(row),
-        "simulated": row["simulated"],
-        "is_baseline": row["is_baseline"],
-        "protocol": row["protocol"],
-        "split": row["split"],
-        "repeat": row["repeat"],
+        **{key: row[key] for key in ("simulated", "is_baseline", "protocol", "split", "repeat")},
         "compared": by,
         "way": way,
-        "status": row["status"],
-        "metric": row["metric"],
-        "unit": row["unit"],
+        **{key: row[key] for key in ("status", "metric", "unit")},
         "score": value,
         "ci_low": row["ci_low"] if whole else None,
         "ci_high": row["ci_high"] if whole else None,
-        "difference": None,
-        "difference_low": None,
-        "difference_high": None,
+        **dict.fromkeys(("difference", "difference_low", "difference_high")),
     }
 
 
@@ -145,21 +124,20 @@ def _title(row: Row, by: str) -> str:
         parts.append(row["protocol"])
     if by != "split" and row["split"]:
         parts.append(f"split {row['split']}")
-    parts.append(hardware_name(row))
-    return " · ".join([*parts, f"by {by}"])
+    return " · ".join([*parts, hardware_name(row), f"by {by}"])
 
 
-def _text(record: Mapping[str, Any] | None, unit: str) -> str:
+def _text(record: Mapping[str, Any] | None) -> str:
     if record is None:
-        return "–"
+        return ABSENT
     if record["score"] is None:
         return str(record["status"]).upper()
-    value = score(record["score"], unit)
+    unit = record["unit"]
+    text = score(record["score"], unit)
     if record["difference"] is not None:
-        sign = "+" if record["difference"] >= 0 else "−"
-        value += f" ({sign}{score(abs(record['difference']), unit)})"
+        text += f" ({signed(record['difference'], unit)})"
     if record["ci_low"] is not None:
-        value += f"\n{interval(record['ci_low'], record['ci_high'], unit)}"
+        text += f"\n{interval(record['ci_low'], record['ci_high'], unit)}"
     if record["difference_low"] is not None:
-        value += f"\nΔ {interval(record['difference_low'], record['difference_high'], unit)}"
-    return value
+        text += f"\nΔ {interval(record['difference_low'], record['difference_high'], unit)}"
+    return text

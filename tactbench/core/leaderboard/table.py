@@ -12,18 +12,19 @@ from operator import itemgetter
 from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
-from tactbench.core.leaderboard.columns import columns
-from tactbench.core.leaderboard.events import events_section, operating_points_section
-from tactbench.core.leaderboard.footer import footer_of
+from tactbench.core.leaderboard.columns import Line, columns
 from tactbench.core.leaderboard.hosts import host_letters, timing_notes
-from tactbench.core.leaderboard.lines import Line
 from tactbench.core.leaderboard.notes import notes_of
-from tactbench.core.leaderboard.over_tasks import over_tasks
 from tactbench.core.leaderboard.probe import build_probe
-from tactbench.core.leaderboard.published import published_section
+from tactbench.core.leaderboard.sections import sections_of
+from tactbench.core.tables.text import cut, visible
 from tactbench.core.tables.text_table import TextTable
 
 Row = Mapping[str, Any]
+
+MOST_SEEDS = 12
+LONGEST = 1000
+"""Characters of a sentence in the footer; the whole provenance lies in the result folder."""
 
 
 @dataclass(frozen=True)
@@ -71,17 +72,44 @@ def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: b
     names = columns(rows, times=times)
     blocks = blocks_of(rows, names, letters, times)
     ordered = [line.row for block in blocks for line in block.lines]
-    notes = notes_of(ordered, blocks)
-    if times:
-        notes += timing_notes(rows, letters, known)
-    events = (events_section(ordered), operating_points_section(ordered)) if times else ()
-    sections = (*events, over_tasks(rows), published_section(rows), build_probe(ordered))
-    return Table(
-        blocks,
-        names,
-        tuple(notes),
-        tuple(section for section in sections if section is not None),
-        footer_of(rows, known, times),
-        known,
-        times,
+    notes = [*notes_of(ordered, blocks), *(timing_notes(rows, letters, known) if times else ())]
+    sections = sections_of(ordered, times=times)
+    probe = build_probe(ordered)
+    if probe is not None:
+        sections.append(probe)
+    return Table(blocks, names, tuple(notes), tuple(sections), _footer(rows, known, times), known, times)
+
+
+def _footer(rows: Sequence[Row], provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
+    """Return how many runs a table is of, and who computed them, with what, where."""
+    seeds = _seeds([seed for row in rows for seed in row.get("seeds") or [row["seed"]]])
+    if not times:
+        return (f"Times, memory and hosts are left out: a seed decides all that stands here. {seeds}",)
+    runs = len({row.get("made_by") for row in rows} - {None, ""})
+    of_runs = f" of {runs} kind{'s' if runs != 1 else ''} of runs (versions, machine, settings)" if runs else ""
+    if any((row.get("n_replicates") or 0) > 1 and row.get("replicate_unit") == "replicate" for row in rows):
+        seeds += (
+            " One a replicate, which is everything recorded anew; scores are medians, intervals those of the median."
+        )
+    return (
+        f"{len(rows)} cells{of_runs}. {seeds}",
+        *(cut(visible(sentence), LONGEST) for sentence in _made_by(provenance)),
     )
+
+
+def _made_by(provenance: Sequence[Row]) -> tuple[str, ...]:
+    from tactbench.core.provenance.gather import foot
+
+    try:
+        return foot(provenance) if provenance else ()
+    except (AttributeError, ArithmeticError, LookupError, TypeError, ValueError):
+        return ("The provenance of these rows cannot be read.",)  # a stranger's folder may say anything
+
+
+def _seeds(values: Sequence[Any]) -> str:
+    seeds = sorted({seed for seed in values if isinstance(seed, int)})
+    if not seeds:
+        return "Seeds are not known."
+    listed = ", ".join(map(str, seeds[:MOST_SEEDS]))
+    more = f" and {len(seeds) - MOST_SEEDS} more" if len(seeds) > MOST_SEEDS else ""
+    return f"{'Seeds' if len(seeds) > 1 else 'Seed'}: {listed}{more}."

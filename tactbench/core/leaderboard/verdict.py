@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, METRIC_NAMES, answer_name
+from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sign_of
 from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
@@ -19,9 +20,11 @@ PUBLISHED = "Published figures"
 """How the sentence on them begins."""
 _CHEAPER = 1.2
 """A cost that is so many times lower is said: less is within what timings of one machine differ by."""
-_SPARED = ("answer_delay_ms", "fit_s")
-"""Costs by which equal scores are told apart, the first that all rows have."""
 _SPARES = {"answer_delay_ms": "answers {:.3g} times sooner", "fit_s": "fits {:.3g} times quicker"}
+"""Costs by which equal scores are told apart, the first that all rows have."""
+
+comparison_key = itemgetter("sensor", "task", "rig", "protocol", "split")
+"""What answers must share to be held against a trivial one."""
 
 
 def verdict_of(
@@ -106,13 +109,11 @@ def _published(rows: Sequence[Row], names: Sequence[str]) -> list[str]:
 def _without_touch(rows: Sequence[Row], trivial: Sequence[Row]) -> list[str]:
     """Return a sentence where an answer that reads no sensor scores within the interval of the best one that does."""
     best = rows[0]
-    if best.get("looks_at") == "time":
-        return []
-    sign = 1.0 if best["metric"] in LOWER_IS_BETTER else -1.0
+    sign = sign_of(best)
     end = best["ci_high" if sign > 0 else "ci_low"]
     bar = best["score"] if end is None else end
     found = [row for row in trivial if row.get("looks_at") == "time" and sign * (row["score"] - bar) <= 0]
-    if not found:
+    if not found or best.get("looks_at") == "time":
         return []
     one = min(found, key=lambda row: sign * row["score"])
     known = f"{answer_name(one)} reads no sensor, only the time since the press began, and scores {_score(one)}"
@@ -146,17 +147,13 @@ def _measured(row: Row) -> str:
     else:
         value, ends, what = "score", ("ci_low", "ci_high"), ""
     low, high = (row.get(end) for end in ends)
-    held = "" if low is None else f" ({_level(row)} over {_replicates(row)}: {interval(low, high, row['unit'])})"
+    held = ""
+    if low is not None:
+        n, unit = row.get("n_replicates"), row.get("replicate_unit")
+        over = counted(n, str(unit)) if n else "replicates"
+        held = f" ({percent(n, unit)} over {over}: {interval(low, high, row['unit'])})"
     name = METRIC_NAMES.get(row["metric"], visible(str(row["metric"])))
     return f"{name} {score(row[value], row['unit'])}{suffix(row['unit'])}{what}{held}"
-
-
-def _level(row: Row) -> str:
-    return percent(row.get("n_replicates"), row.get("replicate_unit"))
-
-
-def _replicates(row: Row) -> str:
-    return counted(row["n_replicates"], str(row["replicate_unit"])) if row.get("n_replicates") else "replicates"
 
 
 def may_be_trivial(row: Row) -> bool:
@@ -165,20 +162,14 @@ def may_be_trivial(row: Row) -> bool:
 
 
 def best_trivials(rows: Iterable[Row]) -> dict[tuple[Any, ...], Row]:
-    """Return the best of all finished trivial answers by what :func:`asked_in` says of them; an oracle is none."""
+    """Return the best of all finished trivial answers by their `comparison_key`; an oracle is none."""
     best: dict[tuple[Any, ...], Row] = {}
     for row in rows:
         if row["is_baseline"] and row["status"] == "done" and row.get("looks_at") != "reference":
-            sign = 1.0 if row["metric"] in LOWER_IS_BETTER else -1.0
             known = best.setdefault(comparison_key(row), row)
-            if sign * row["score"] < sign * known["score"]:
+            if sign_of(row) * row["score"] < sign_of(row) * known["score"]:
                 best[comparison_key(row)] = row
     return best
-
-
-def comparison_key(row: Row) -> tuple[Any, ...]:
-    """Return what answers must share to be held against a trivial one."""
-    return tuple(row[key] for key in ("sensor", "task", "rig", "protocol", "split"))
 
 
 def against_trivial(row: Row, trivial: float) -> str:
@@ -192,28 +183,21 @@ def against_trivial(row: Row, trivial: float) -> str:
     """
     if _reaches(row, "ci_low", "ci_high", trivial):
         return "no better"
-    return (
-        "not shown" if _reaches(row, "ci_high", "ci_low", trivial) or _reaches(row, "score", "score", trivial) else ""
-    )
+    reached = _reaches(row, "ci_high", "ci_low", trivial) or _reaches(row, "score", "score", trivial)
+    return "not shown" if reached else ""
 
 
 def _reaches(row: Row, of_errors: str, of_shares: str, trivial: float | None) -> bool:
     """Return whether a figure of the row is as bad as `trivial`, or worse."""
-    lower = row["metric"] in LOWER_IS_BETTER
-    figure = row[of_errors if lower else of_shares]
-    if figure is None or trivial is None:
-        return False
-    return bool(figure >= trivial if lower else figure <= trivial)
+    sign = sign_of(row)
+    figure = row[of_errors if sign > 0 else of_shares]
+    return figure is not None and trivial is not None and sign * figure >= sign * trivial
 
 
 def _bar(row: Row, trivial: Sequence[Row]) -> str:
     """Return what the trivial answer is called that the baseline of a row is of."""
-    named = [
-        answer_name(one)
-        for one in trivial
-        if comparison_key(one) == comparison_key(row) and one["score"] == row["baseline"]
-    ]
-    return f"the trivial {named[0]}" if named else "the trivial one"
+    alike = (one for one in trivial if comparison_key(one) == comparison_key(row) and one["score"] == row["baseline"])
+    return f"the trivial {next(map(answer_name, alike), 'one')}"
 
 
 def _none_better(below: int, trivial: Sequence[Row]) -> str:
@@ -225,15 +209,12 @@ def _none_better(below: int, trivial: Sequence[Row]) -> str:
 
 def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:
     """Return which of equal answers costs least, and how much less than the best score's."""
-    for key in _SPARED:
-        costs = [row.get(key) for row in rows]
-        if any(cost is None or not math.isfinite(cost) or cost <= 0 for cost in costs):
-            continue
-        least = min(range(len(rows)), key=lambda place: costs[place])  # type: ignore[arg-type, return-value]
-        dearest = max(range(len(rows)), key=lambda place: costs[place])  # type: ignore[arg-type, return-value]
-        ratio = costs[dearest] / costs[least]  # type: ignore[operator]
-        if ratio >= _CHEAPER:
-            return f" Of these {names[least]} {_SPARES[key].format(ratio)} than {names[dearest]}."
+    for key, words in _SPARES.items():
+        costs = [(row.get(key) or math.nan, name) for row, name in zip(rows, names, strict=True)]
+        if all(0 < cost < math.inf for cost, _ in costs):
+            (least, quickest), (most, slowest) = min(costs, key=itemgetter(0)), max(costs, key=itemgetter(0))
+            if most / least >= _CHEAPER:
+                return f" Of these {quickest} {words.format(most / least)} than {slowest}."
     return ""
 
 

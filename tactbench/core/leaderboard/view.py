@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -57,7 +58,7 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
     UnknownNameError
         If there is no such column.
     """
-    known = {**{name: name for name in (*COLUMNS, CELL)}, **{shown: name for name, shown in SHOWN.items()}}
+    known = {name: name for name in (*COLUMNS, CELL)} | {shown: name for name, shown in SHOWN.items()}
     for name in names:
         if name not in known:
             raise UnknownNameError("column", name, (*COLUMNS, CELL))
@@ -68,21 +69,17 @@ def document(table: Table, view: View) -> list[TextTable | tuple[str, ...]]:
     """Return the tables and notes that are printed, from above."""
     sentences = (*notes(table, view), *commands(table, view))
     parts: tuple[TextTable | tuple[str, ...], ...] = (
-        *grids(table, view),
-        sentences,
-        *sections(table, view),
-        footer(table, view),
-    )
+        *grids(table, view), sentences, *sections(table, view), footer(table, view),
+    )  # fmt: skip
     return [part for part in parts if part]
 
 
 def grids(table: Table, view: View) -> list[TextTable]:
     """Return what is printed of a table's blocks."""
-    return [grid_of(block, view) for block in table.blocks]
+    return [_grid(block, view) for block in table.blocks]
 
 
-def grid_of(block: Block, view: View) -> TextTable:
-    """Return what is printed of a block."""
+def _grid(block: Block, view: View) -> TextTable:
     texts = [{**line.texts, CELL: visible(_cell(line.row))} for line in block.lines]
     if all("†" in text["score"] for text, line in zip(texts, block.lines, strict=True) if line.row["status"] == "done"):
         # The title has it: not repeated behind every score.
@@ -120,10 +117,9 @@ def full_grid(block: Block, anchors: Mapping[str, str] | None = None) -> TextTab
     lines = []
     for line in block.lines:
         anchor = (anchors or {}).get(line.row["cell"], "")
-        numbers = [name in NUMERIC and text not in ("", ABSENT) for name, text in line.texts.items()]
         texts = [
-            Entry(text, finite(line.value(name)), anchor) if number else text
-            for (name, text), number in zip(line.texts.items(), numbers, strict=True)
+            Entry(text, finite(line.value(name)), anchor) if name in NUMERIC and text not in ("", ABSENT) else text
+            for name, text in line.texts.items()
         ]
         why = "" if line.row["status"] == "done" else visible(f"{line.row['status']}: {line.row['reason']}")
         lines.append((*texts, why))
@@ -141,27 +137,22 @@ def _cell(row: Row) -> str:
 def header(name: str, rows: Sequence[Row]) -> str:
     """Return what stands above a column of a block: a score by its metric and unit, an interval by what it is over."""
     first = rows[0]
-    unit = f" [{visible(str(first['unit']))}]" if first["unit"] != "1" else ""
     if name == "score":
         return metric_name(first)
     if name in ("beyond floor", "true error"):
-        return f"{name}{unit}"
+        return name if first["unit"] == "1" else f"{name} [{visible(str(first['unit']))}]"
     if name == "95 % interval" and all(row.get("n_replicates") and row["ci_low"] is None for row in rows):
         return "range"
-    if name in INTERVALS:
-        over = _over(rows, "ci_low" if name == "95 % interval" else "beyond_floor_ci_low")
-        if not over:
-            return name
-        level = percent(first.get("n_replicates"), first.get("replicate_unit"))
-        return f"{level} {over}" if name == "95 % interval" else f"{name.replace('95 %', level)}, {over}"
-    return name
-
-
-def _over(rows: Sequence[Row], key: str) -> str:
-    """Return what all intervals of a block are over: ``over 8 replicates``; empty if it differs or is not known."""
-    found = {(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row.get(key) is not None}
-    count, unit = next(iter(found)) if len(found) == 1 else (None, None)
-    return f"over {counted(count, visible(str(unit or 'replicate')))}" if count else ""
+    if name not in INTERVALS:
+        return name
+    end = "ci_low" if name == "95 % interval" else "beyond_floor_ci_low"
+    found = {(row.get("n_replicates"), row.get("replicate_unit")) for row in rows if row.get(end) is not None}
+    number, unit = found.pop() if len(found) == 1 else (None, None)
+    if not number:
+        return name  # they differ in what they are over, or do not know it
+    level = percent(first.get("n_replicates"), first.get("replicate_unit"))
+    over = f"over {counted(number, visible(str(unit or 'replicate')))}"
+    return f"{level} {over}" if name == "95 % interval" else f"{name.replace('95 %', level)}, {over}"
 
 
 def sections(table: Table, view: View) -> tuple[TextTable, ...]:
@@ -186,24 +177,21 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
         more.append(f"{hidden} more note{'s' if hidden != 1 else ''}" if hidden else "the whole provenance")
         options.append("--notes")
     if not view.wide and not view.columns:
-        more += [
-            "all columns",
-            *(section.title.split(" · ")[0].lower() for section in table.sections if section.detail),
-        ]
+        details = [section.title.split(" · ")[0].lower() for section in table.sections if section.detail]
+        more += ["all columns", *details]
         options.append("--wide")
-    where = (view.folder,) if view.folder else ()
-    listed = _listed(more)
-    all_of_it = [f"{listed[:1].upper()}{listed[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."]
-    first = next((line for line in table.lines if line.kind == "result"), None)
-    if first is None:
-        return tuple(all_of_it if more else [])
-    out = ("--out", view.folder) if view.folder else ()
-    why = command_line("tactbench", "why", _cell(first.row), *out)
-    return (*(all_of_it if more else []), f"What a row rests on, its delay part by part: `{why}`.")
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
+    where, out = ((view.folder,), ("--out", view.folder)) if view.folder else ((), ())
+    found = []
+    if more:
+        listed = " and ".join([", ".join(more[:-1]), more[-1]] if len(more) > 1 else more)
+        found.append(
+            f"{listed[0].upper()}{listed[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."
+        )
+    first = next((line.row for line in table.lines if line.kind == "result"), None)
+    if first is not None:
+        why = command_line("tactbench", "why", _cell(first), *out)
+        found.append(f"What a row rests on, its delay part by part: `{why}`.")
+    return tuple(found)
 
 
 def footer(table: Table, view: View) -> tuple[str, ...]:
@@ -215,12 +203,11 @@ def best(table: Table, count: int) -> Table:
     """Return the table with the first `count` answers of each sensor in each block; places stay those among all."""
     blocks = []
     for block in table.blocks:
-        seen: dict[str, int] = {}
+        found: Counter[str] = Counter()
         kept = []
         for line in block.lines:
-            sensor = str(line.row["sensor"])
-            if line.kind == "result" and seen.setdefault(sensor, 0) < count:
-                seen[sensor] += 1
+            found[str(line.row["sensor"])] += line.kind == "result"
+            if line.kind == "result" and found[str(line.row["sensor"])] <= count:
                 kept.append(line)
         if kept:
             blocks.append(replace(block, lines=tuple(kept)))

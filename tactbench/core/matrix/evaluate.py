@@ -131,7 +131,7 @@ def _ordered(jobs: Sequence[Job], engine: Pool | InProcess | Dask, limits: Limit
     """
     groups: dict[tuple[str, tuple[Path, ...]], list[Job]] = {}
     for job in jobs:
-        groups.setdefault((job.cell.declared_task or job.cell.task, job.recordings), []).append(job)
+        groups.setdefault((job.cell.task_key, job.recordings), []).append(job)
     forks = isinstance(engine, Pool) and can_fork()
     for (task, recordings), members in groups.items():
         if forks or isinstance(engine, InProcess):

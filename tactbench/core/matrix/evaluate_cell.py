@@ -106,7 +106,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     # The global generators get the cell's seed: who draws from them shall not depend on the cells before.
     random.seed(cell.seed)
     np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that others draw from)
-    data = dataset(cell.declared_task or cell.task, recordings)
+    data = dataset(cell.task_key, recordings)
     context = CellContext(
         task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
         progress=working, latency=cell.latency,

@@ -57,10 +57,15 @@ class Cell:
         path = (self.sensor, self.task, self.rig, f"{self.protocol}{split}", f"{self.estimator}{options}")
         return "/".join((*path, str(self.repeat)))
 
+    @property
+    def task_key(self) -> str:
+        """What `task_called` finds its task by: its name, or the JSON that declares it."""
+        return self.declared_task or self.task
+
 
 def task_of(cell: Cell, registry: Registry) -> TaskSpec:
     """Return the task of a cell, in a process that may not have seen its recordings."""
-    return task_called(cell.declared_task or cell.task, registry)
+    return task_called(cell.task_key, registry)
 
 
 def task_called(task: str, registry: Registry) -> TaskSpec:

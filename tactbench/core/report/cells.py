@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.row_groups import APART, GROUPS, TITLES
+from tactbench.core.leaderboard.records import APART, GROUPS, TITLES
 from tactbench.core.report.section import Details, ReportData, Section
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
 

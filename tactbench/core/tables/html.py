@@ -27,9 +27,9 @@ def render(
     package
         Whose folder ``template`` has the template, styles and scripts.
     styles, scripts
-        Names of files; those that all pages share, ``page.css`` and ``sort.js``, come before them.
+        Names of files; those that all pages share, ``page.css`` and ``sort.js``, come before them, ``print.css`` after.
     values
-        What else the template shows; it can import the macros of ``table.html``.
+        What else the template shows; it extends ``base.html`` and can import the macros of ``table.html``.
     """
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
@@ -40,7 +40,7 @@ def render(
     environment.filters["prose"] = prose
     environment.filters["sort_value"] = sort_value
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode()
-    style = _texts(_HERE, ["page.css"]) + _texts(package, styles)
+    style = _texts(_HERE, ["page.css"]) + _texts(package, styles) + _texts(_HERE, ["print.css"])
     script = '\n"use strict";\n(() => {\n' + _texts(_HERE, ["sort.js"]) + _texts(package, scripts) + "})();\n"
     return environment.get_template(template).render(
         title=title,

@@ -19,6 +19,11 @@ def interval(low: float | None, high: float | None, unit: str) -> str:
     return ABSENT if low is None or high is None else f"{score(low, unit)} … {score(high, unit)}"
 
 
+def signed(value: float, unit: str) -> str:
+    """Return a difference in the digits of its scores, with its sign."""
+    return ("+" if value >= 0 else "−") + score(abs(value), unit)
+
+
 def suffix(unit: str) -> str:
     """Return what follows a number: its unit, and nothing where it has none."""
     return "" if unit == "1" else f" {unit}"

@@ -83,7 +83,12 @@ class TextTable:
         """Return the table without the columns in which no line says anything."""
         if not self.lines:
             return self
-        kept = [place for place in range(len(self.columns)) if any(line[place].strip(ABSENT) for line in self.lines)]
+        texts = zip(self.columns, zip(*self.lines, strict=True), strict=True)
+        return self.only([name for name, column in texts if any(text.strip(ABSENT) for text in column)])
+
+    def only(self, names: Collection[str]) -> TextTable:
+        """Return the table with these of its columns."""
+        kept = [place for place, name in enumerate(self.columns) if name in names]
         return replace(
             self,
             columns=tuple(self.columns[place] for place in kept),

@@ -3,7 +3,7 @@
 import pytest
 
 from tactbench.core.errors import UsageError
-from tactbench.core.leaderboard.files import write_tables
+from tactbench.core.leaderboard.formats import write_tables
 
 from .rows import row
 

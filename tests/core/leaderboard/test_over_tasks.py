@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.leaderboard.formats import plain_text
-from tactbench.core.leaderboard.over_tasks import over_tasks
+from tactbench.core.leaderboard.sections import over_tasks
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.statistics.aggregate import aggregate
 from tests.core.leaderboard.rendering import to_latex, to_markdown

@@ -3,8 +3,14 @@
 import pytest
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.pairwise import comparisons, folder_comparisons, with_declared
-from tactbench.core.leaderboard.pairwise_table import notes_of, record_of, tables_of
+from tactbench.core.leaderboard.pairwise import (
+    comparisons,
+    folder_comparisons,
+    notes_of,
+    record_of,
+    tables_of,
+    with_declared,
+)
 from tactbench.core.spec.matrix import ComparisonChoice
 
 from .rows import row

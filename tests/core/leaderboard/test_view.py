@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from tactbench.core.errors import UnknownNameError, UsageError
+from tactbench.core.leaderboard.binary import xlsx
 from tactbench.core.leaderboard.columns import COLUMNS
 from tactbench.core.leaderboard.formats import plain_text
 from tactbench.core.leaderboard.table import build_table
@@ -20,7 +21,6 @@ from tactbench.core.leaderboard.view import (
     known_columns,
     notes,
 )
-from tactbench.core.leaderboard.xlsx import xlsx
 from tactbench.core.tables.fitting import fit, pieces, wrapped
 from tests.core.leaderboard.rendering import to_markdown
 

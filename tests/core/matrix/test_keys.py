@@ -119,3 +119,10 @@ def test_the_code_of_a_tasks_own_features_is_in_the_key(tmp_path, monkeypatch):
         code.write_text(f"def crest(streams):\n    return {{'crest': {body}}}\n")
         keys.append(key(Keys(registry)))
     assert keys[0] != keys[1] == key(Keys(registry))
+
+
+def test_who_brings_the_indenter_counts_where_a_scene_names_it(keys):
+    plain, line = keys.maker("ideal", "twin"), keys.maker("ideal", "twin", shape="cylinder")
+    assert "indenter" not in plain.sections
+    assert line.sections["indenter"]["where"] == "tactbench.rigs.twin.shapes:cylinder"
+    assert keys.maker("ideal", "twin", shape="nobody-has-it").digest == plain.digest

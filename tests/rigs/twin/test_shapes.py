@@ -7,12 +7,22 @@ import math
 import numpy as np
 import pytest
 
-from tactbench.plugin import FloatArray, Indenter, RigContext, RigError, Scene, UsageError, assumed
-from tactbench.plugin.simulation import BondedLayer, FoamPad, SkinSheet
+from tactbench.plugin import (
+    FloatArray,
+    ForceRamp,
+    Indenter,
+    RigContext,
+    RigError,
+    Scene,
+    UsageError,
+    assumed,
+)
+from tactbench.plugin.simulation import BondedLayer, FoamPad, SkinSheet, Slide
 from tactbench.rigs.twin import tactbench_effects, tactbench_indenters
 from tactbench.rigs.twin.boundary_elements.contact import press as press_elements
 from tactbench.rigs.twin.boundary_elements.kernels import HalfSpace
 from tactbench.rigs.twin.closed_forms.half_space import FlatPunch
+from tactbench.rigs.twin.contact.elements import ElementsPress
 from tactbench.rigs.twin.contact.local import LocalPress
 from tactbench.rigs.twin.contact.press import Press
 from tactbench.rigs.twin.contact.skins import medium_of
@@ -20,6 +30,7 @@ from tactbench.rigs.twin.contact.validity import remarks
 from tactbench.rigs.twin.geometry import Contact, check_contact, gap_mm, skin_grid
 from tactbench.rigs.twin.rig import build
 from tactbench.rigs.twin.shapes import Shape, shape_of
+from tactbench.sensors.ideal import tactbench_sensors
 
 INDENTERS = tactbench_indenters()
 
@@ -171,6 +182,32 @@ def test_the_cheapest_rung_presses_shapes_too(layer):
     force = line_on_columns(0.3, lambda y: 5.0 - np.sqrt(np.maximum(25.0 - y**2, 0.0))) * springs / K
     # A cell is a third of a millimetre, the half-width five of them.
     assert LocalPress(skin, medium, gap_mm(grid, contact), contact)(force).depth_mm == pytest.approx(0.3, rel=0.05)
+
+
+def test_the_reference_rung_agrees_about_a_pin(layer):
+    skin, grid, medium = layer
+    contact = pressed_by(shape("pin", radius=2.5))
+    gap = gap_mm(grid, contact)
+    elements, default = ElementsPress(skin, medium, gap, contact)(1.0), Press(medium, gap, contact)(1.0)
+    assert np.array_equal(elements.pressure_mpa > 0, default.pressure_mpa > 0)
+    # They differ by the penalty's 300 MPa/mm, 2e-4 mm here, and by what is beside the sheet: its own image, or no load.
+    assert elements.depth_mm == pytest.approx(default.depth_mm, rel=0.03)
+
+
+def test_contacts_of_other_dimensions_and_angles_are_solved_anew():
+    twin = build(RigContext(effects=tuple(tactbench_effects()), indenters=tuple(INDENTERS)))
+    (ideal,) = tactbench_sensors()
+    found = []
+    for size, angle in ((4.0, 0.0), (4.0, 90.0), (8.0, 0.0)):
+        edge = Indenter(shape="cylinder", dimensions={"radius": _q(size)}, angle=_q(angle, "deg"))
+        slide = Slide(speed=_q(1, "mm/s"), start=_q(30, "s"))
+        scene = Scene(name="a", indenter=edge, slide=slide, profile=ForceRamp(samples=20))
+        with twin.open(ideal, scene, seed=1) as recording:
+            found.append(np.concatenate([one.data for one in recording if one.stream == "taxels"]))
+            assert recording.assumptions["indenter radius"] == size
+            assert "take the contact of the cylinder for a circle" in recording.drawn["remark round"]
+    assert not np.array_equal(found[0], found[1])
+    assert not np.array_equal(found[0], found[2])
 
 
 def height_at(body: Shape, x: float, y: float) -> float:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from tactbench.plugin import FloatArray
-from tactbench.plugin.devices import ByteLink, Received, Row, RowDriver, RowEmulator
+from tactbench.plugin.devices import ByteLink, Received, RowDriver, RowEmulator, Sample
 
 from tactbench_anyskin import STREAM
 
@@ -39,11 +39,11 @@ class AnySkinDriver(RowDriver[ByteLink]):
         """Forget what came before."""
         self._left = b""
 
-    def rows(self, received: Received) -> Iterator[Row]:
+    def rows(self, received: Received) -> Iterator[Sample]:
         """Return the frames that are complete."""
         frames, self._left, skipped = decode(self._left + received.data)
         self.counted.update({"bytes of no frame": skipped} if skipped else {})
-        return map(Row, frames)
+        return map(Sample, frames)
 
 
 class Emulator(RowEmulator):

@@ -7,7 +7,7 @@ carry the command that was asked; fields before the static one may come in any o
 import struct
 from collections.abc import Iterator, Sequence
 
-from tactbench.plugin.devices import ByteLink, CanFrame, Received, Row, RowDriver, RowEmulator
+from tactbench.plugin.devices import ByteLink, CanFrame, Received, RowDriver, RowEmulator, Sample
 
 from tactbench_robotiq_tsf85 import STREAM
 
@@ -46,7 +46,7 @@ class TSF85Driver(RowDriver[ByteLink]):
             self.link.write(packet(READ))
             self._asked_ns = self.clock()
 
-    def rows(self, received: Received) -> Iterator[Row]:
+    def rows(self, received: Received) -> Iterator[Sample]:
         """Return the reply, once it is whole."""
         data = self._left + received.data
         self._left = data = data[data.find(MARK) :] if MARK in data else b""
@@ -54,7 +54,7 @@ class TSF85Driver(RowDriver[ByteLink]):
             self._left, self._asked_ns = b"", None
             taxels = static_taxels(data[HEAD:][: data[3]], self.options["finger"])
             if taxels is not None:
-                yield Row(taxels)
+                yield Sample(taxels)
 
 
 class Emulator(RowEmulator):

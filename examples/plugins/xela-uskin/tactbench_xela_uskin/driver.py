@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from tactbench.plugin import Quality
-from tactbench.plugin.devices import CanFrame, CanLink, Row, RowDriver, RowEmulator
+from tactbench.plugin.devices import CanFrame, CanLink, RowDriver, RowEmulator, Sample
 
 from tactbench_xela_uskin import STREAM, TAXELS
 
@@ -35,7 +35,7 @@ class USkinDriver(RowDriver[CanLink]):
         self._heard: dict[int, tuple[int, ...]] = {}
         self.link.send(CanFrame(START + self.options["board"], b"\x07\x00"))
 
-    def rows(self, received: CanFrame) -> Iterator[Row]:
+    def rows(self, received: CanFrame) -> Iterator[Sample]:
         """Return a row with the last taxel's frame."""
         found = decode(received)
         if found is None:
@@ -46,7 +46,7 @@ class USkinDriver(RowDriver[CanLink]):
             values = [self._heard.get(taxel, (0, 0, 0)) for taxel in range(TAXELS)]
             missing = [Quality.GOOD if taxel in self._heard else Quality.MISSING for taxel in range(TAXELS)]
             self._heard = {}
-            yield Row(np.ravel(values).tolist(), np.repeat(missing, AXES).tolist())
+            yield Sample(np.ravel(values).tolist(), np.repeat(missing, AXES).tolist())
 
 
 class Emulator(RowEmulator):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.leaderboard.board.columns import (
+from tactbench.core.leaderboard.board import (
     DEEPEST,
     MANY,
     MOST_OTHERS,

@@ -5,9 +5,8 @@ import re
 
 import pytest
 
-from tactbench.core.leaderboard.board import columns
-from tactbench.core.leaderboard.board import page as page_module
-from tactbench.core.leaderboard.board.page import LARGEST
+from tactbench.core.leaderboard import board
+from tactbench.core.leaderboard.board import LARGEST
 from tactbench.core.leaderboard.table import build_table
 from tests.core.leaderboard.rendering import to_page
 from tests.core.leaderboard.rows import row
@@ -105,7 +104,7 @@ def test_a_reader_without_scripts_has_the_tables_of_a_small_board_and_a_sentence
     assert static.count("<tr") == 1 + 9
     assert "it broke" in static
     assert "&lt;b&gt;" in static
-    monkeypatch.setattr(page_module, "MOST_STATIC", 3)
+    monkeypatch.setattr(board, "MOST_STATIC", 3)
     large = to_page(some())
     assert "needs a browser that allows it" in large
     assert large.count("<tr") == 0
@@ -142,7 +141,7 @@ def test_where_room_is_short_the_most_telling_stays_and_the_rest_is_named(monkey
     rows = [row(f"s{n}", log=text, recordings=[text], traceback="" if n else "Traceback", key=text[:64])
             for n, text in enumerate(noise)]  # fmt: skip
     whole = to_page(rows)
-    monkeypatch.setattr(page_module, "LARGEST", len(whole) - 1_500)
+    monkeypatch.setattr(board, "LARGEST", len(whole) - 1_500)
     page = to_page(rows)
     assert len(page) <= len(whole) - 1_500
     head, _, _ = read_page(page)
@@ -151,7 +150,7 @@ def test_where_room_is_short_the_most_telling_stays_and_the_rest_is_named(monkey
 
 
 def test_of_many_cells_every_one_has_configuration_score_cost_reason_and_traceback(monkeypatch):
-    monkeypatch.setattr(columns, "MANY", 5)
+    monkeypatch.setattr(board, "MANY", 5)
     rows = sorted([*some(), row("k", key="ab" * 32, wall_s=1.234567, host="h" * 12)], key=lambda one: one["cell"])
     _, _, fields = read_page(to_page(rows))
     for key in ("cell", "sensor", "task", "estimator", "protocol", "status", "reason", "seed"):

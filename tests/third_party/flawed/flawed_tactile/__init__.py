@@ -183,4 +183,19 @@ CAUGHT_BY = {
         "effect-that-draws-elsewhere": "it-repeats-under-a-seed",
         "effect-that-changes-the-sensor": "it-leaves-the-sensor-alone",
     },
+    "indenter": {
+        "sound-shape": None,
+        "shape-of-few-words": "numbers-are-described",
+        "shape-of-one-row": "height-has-the-shape",
+        "shape-with-a-hole": "height-is-finite",
+        "shape-that-stands-off": "lowest-at-the-origin",
+        "shape-that-trembles": "same-numbers-same-answer",
+        "shape-that-cannot-be-small": "whole-range-is-answered",
+        "shape-deaf-to-its-size": "every-number-counts",
+        "shape-too-sharp": "indenter-is-pressed",
+    },
+    "profile": {
+        "sound-profile": None,
+        "profile-that-pulls": "path-is-made",
+    },
 }

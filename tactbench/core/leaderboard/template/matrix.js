@@ -2,24 +2,17 @@
 const MATRIX_PAGE = 100;
 
 const matrixLines = () => {
-  const { head, order, starts, shown } = board;
   const sensor = board.role("sensor"), estimator = board.role("estimator");
-  const lines = new Map();
-  const columns = [];
-  head.blocks.forEach((block, place) => {
-    let any = false;
-    for (let at = starts[place]; at < starts[place + 1]; at += 1) {
-      const row = order[at];
-      if (!shown[row]) continue;
-      any = true;
-      const names = [sensor.column.text(row), estimator.column.text(row)];
-      const name = JSON.stringify(names);
-      let line = lines.get(name);
-      if (!line) lines.set(name, (line = { names, cells: new Map() }));
-      line.cells.set(place, row);
+  const lines = new Map(), columns = [];
+  for (const place of board.head.blocks.keys()) {
+    const rows = board.rowsOf(place);
+    if (rows.length) columns.push(place);
+    for (const row of rows) {
+      const names = [sensor.column.text(row), estimator.column.text(row)], name = JSON.stringify(names);
+      if (!lines.has(name)) lines.set(name, { names, cells: new Map() });
+      lines.get(name).cells.set(place, row);
     }
-    if (any) columns.push(place);
-  });
+  }
   return { lines: [...lines.values()], columns };
 };
 

@@ -11,27 +11,19 @@ const readBoard = async () => {
   const [head, ...read] = await Promise.all(packed().map(inflated));
   const columns = head.columns.map((one, place) => ({ ...one, place, column: readColumn(read[place]) }));
   const fields = new Map(head.fields.map((name, place) => [name, readColumn(read[columns.length + place])]));
-  const { order } = head;
-  const starts = [0];
-  for (const { size } of head.blocks) starts.push(starts.at(-1) + size);
-  const blockOf = new Int32Array(head.rows).fill(-1);
-  head.blocks.forEach((_, place) => {
-    for (let at = starts[place]; at < starts[place + 1]; at += 1) blockOf[order[at]] = place;
-  });
   const byName = new Map(columns.map((one) => [one.name, one]));
-  const isSilent = ({ column }) => column.dictionary.every((one) => !asText(one) || asText(one) === ABSENT);
+  const isSilent = ({ column }) => column.dictionary.every((one) => ["", ABSENT].includes(asText(one)));
+  const shown = new Uint8Array(head.rows).fill(1), blockOf = new Int32Array(head.rows).fill(-1);
+  let start = 0;
+  const blocks = head.blocks.map(({ size }) => head.order.slice(start, start += size));
+  blocks.forEach((rows, place) => rows.forEach((row) => { blockOf[row] = place; }));
   return {
-    head, columns, fields, order, starts, blockOf, isSilent, rows: head.rows,
-    visibleColumns: columns.filter((one) => !isSilent(one)),
+    head, columns, fields, blockOf, isSilent, shown, visibleColumns: columns.filter((one) => !isSilent(one)),
     kinds: readColumn(head.kinds),
-    shown: new Uint8Array(head.rows).fill(1),
     role: (name) => byName.get(head.roles[name]),
     field: (name, row) => fields.get(name)?.text(row) ?? "",
     raw: (name, row) => fields.get(name)?.raw(row),
-    anyShown: (place) => {
-      for (let at = starts[place]; at < starts[place + 1]; at += 1) if (board.shown[order[at]]) return true;
-      return false;
-    },
+    rowsOf: (place) => blocks[place].filter((row) => shown[row]),
   };
 };
 
@@ -39,24 +31,27 @@ const ANY = "";
 const HARDWARE = ["hardware", "SIM"];
 const pickers = { sensor: "sensor", task: "task", estimator: "estimator", status: "status" };
 
+const fillPicker = (select, entries, wanted) => {
+  select.replaceChildren(...entries.map(([value, text]) => make("option", { value }, text)));
+  if (entries.some(([value]) => value === wanted)) select.value = wanted;
+};
+
 const fillFilters = () => {
+  const fill = (name, entries, all = `all (${whole(entries.length)})`) => fillPicker(byId(`pick-${name}`), [[ANY, all], ...entries], ANY);
   for (const [name, field] of Object.entries(pickers)) {
-    const column = board.fields.get(field);
-    const counts = new Map();
+    const column = board.fields.get(field), counts = new Map();
     for (const place of column?.index ?? []) counts.set(place, (counts.get(place) ?? 0) + 1);
     const entries = [...counts].map(([place, count]) => [String(place), asText(column.dictionary[place]), count])
       .sort((one, other) => words.compare(one[1], other[1]));
-    fillPicker(byId(`pick-${name}`), [[ANY, `all (${whole(entries.length)})`],
-      ...entries.map(([place, text, count]) => [place, name === "status" ? `${text} (${whole(count)})` : text])], ANY);
+    fill(name, entries.map(([place, text, count]) => [place, name === "status" ? `${text} (${whole(count)})` : text]));
   }
-  fillPicker(byId("pick-block"), [[ANY, `all (${whole(board.head.blocks.length)})`],
-    ...board.head.blocks.map((block, place) => [String(place), block.title])], ANY);
-  fillPicker(byId("pick-hardware"), [[ANY, "all"], ...HARDWARE.map((one) => [one, one])], ANY);
+  fill("block", board.head.blocks.map((block, place) => [String(place), block.title]));
+  fill("hardware", HARDWARE.map((one) => [one, one]), "all");
 };
 
 const SEARCHED = ["sensor", "task", "status", "reason", "protocol", "split", "rig"];
 const searched = (term) => {
-  const hit = new Uint8Array(board.rows);
+  const hit = new Uint8Array(board.head.rows);
   const columns = [...SEARCHED.map((name) => board.fields.get(name)), board.role("estimator").column, board.role("sensor").column];
   for (const column of columns) {
     if (!column) continue;
@@ -82,14 +77,14 @@ const filter = () => {
     const hit = searched(term);
     keep((row) => hit[row]);
   }
-  const count = shown.reduce((sum, one) => sum + one, 0);
-  byId("found").textContent = count === board.order.length ? `${whole(count)} cells` : `${whole(count)} of ${whole(board.order.length)} cells`;
+  const count = shown.reduce((sum, one) => sum + one, 0), all = head.order.length;
+  byId("found").textContent = `${count === all ? "" : `${whole(count)} of `}${whole(all)} cells`;
   state.page = state.matrixPage = 0;
   if (block !== ANY) byId("time-block").value = block;
   redraw();
 };
 
-const VIEWS = { tables: () => drawTables(), matrix: () => drawMatrix(), time: () => drawTime() };
+const VIEWS = { tables: drawTables, matrix: drawMatrix, time: drawTime };
 const redraw = () => VIEWS[state.view]();
 
 const show = (view) => {

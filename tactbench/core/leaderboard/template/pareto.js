@@ -7,18 +7,10 @@ const timeText = (seconds) => {
 
 const UNKNOWN = "a host that is not known";
 const pointsOf = (place, axis) => {
-  const { order, starts, shown } = board;
-  const score = board.role("score"), rank = board.role("rank"), times = axis.column.sort, scores = score.column.sort;
-  const points = [];
-  let untimed = 0;
-  for (let at = starts[place]; at < starts[place + 1]; at += 1) {
-    const row = order[at];
-    if (!shown[row] || Number.isNaN(scores[row])) continue;
-    if (!(times[row] > 0)) untimed += 1;
-    else points.push({ row, time: times[row], score: scores[row], kind: board.kinds.text(row), placed: !rank || rank.column.text(row) !== ABSENT,
-      host: board.field("host", row) || UNKNOWN });
-  }
-  return { points, untimed };
+  const score = board.role("score").column, rank = board.role("rank");
+  return board.rowsOf(place).filter((row) => !Number.isNaN(score.sort[row])).map((row) => ({
+    row, time: axis.column.sort[row], score: score.sort[row], kind: board.kinds.text(row),
+    placed: !rank || rank.column.text(row) !== ABSENT, host: board.field("host", row) || UNKNOWN }));
 };
 
 // In the order of time, each of the front scores better than all before it; without a place (no better than the trivial
@@ -36,21 +28,15 @@ const steps = (low, high, most) => {
   const rough = (high - low) / most;
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((one) => one * power).find((one) => one >= rough * 0.999);
-  const first = Math.ceil(low / step - 1e-9);
-  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const first = Math.ceil(low / step - 1e-9), digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, at) => (first + at) * step)
     .map((value) => [value, value.toFixed(digits)]);
 };
 
 const decades = (low, high) => {
-  const found = [];
-  for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power += 1) {
-    for (const part of Math.log10(high / low) < 2.5 ? [1, 2, 5] : [1]) {
-      const value = part * 10 ** power;
-      if (value >= low * 0.999 && value <= high * 1.001) found.push(value);
-    }
-  }
-  return found;
+  const first = Math.floor(Math.log10(low)), parts = Math.log10(high / low) < 2.5 ? [1, 2, 5] : [1];
+  return Array.from({ length: Math.ceil(Math.log10(high)) - first + 1 }, (_, at) => 10 ** (first + at))
+    .flatMap((power) => parts.map((part) => part * power)).filter((value) => value >= low * 0.999 && value <= high * 1.001);
 };
 
 const nameOf = (row) => `${board.role("sensor").column.text(row)} · ${board.role("estimator").column.text(row)}`;
@@ -64,70 +50,52 @@ const tellPoint = (point, axis) => {
   return [...parts, `${axis.name} ${axis.column.text(point.row)}`];
 };
 
-const fillPicker = (select, entries, wanted) => {
-  select.replaceChildren(...entries.map(([value, text]) => make("option", { value }, text)));
-  if (entries.some(([value]) => value === wanted)) select.value = wanted;
-};
-
 const drawTime = () => {
-  const { head } = board;
-  const figure = byId("pareto");
-  const axes = head.roles.times.map((name) => board.columns.find((one) => one.name === name))
-    .filter((one) => !board.isSilent(one));
-  const blocks = head.blocks.map((block, place) => [String(place), block.title])
-    .filter(([place]) => board.anyShown(Number(place)));
+  const { head } = board, figure = byId("pareto");
+  const nothing = (text) => figure.replaceChildren(make("p", { class: "missing" }, text));
+  const axes = head.roles.times.map((name) => board.columns.find((one) => one.name === name)).filter((one) => !board.isSilent(one));
+  const blocks = head.blocks.map((block, place) => [String(place), block.title]).filter(([place]) => board.rowsOf(place).length);
   fillPicker(byId("time-block"), blocks, byId("time-block").value);
   fillPicker(byId("time-axis"), axes.map((one) => [one.name, one.name]), byId("time-axis").value);
-  if (!blocks.length || !axes.length) {
-    byId("time-host-label").hidden = true;
-    figure.replaceChildren(make("p", { class: "missing" }, blocks.length ? "No cell has a time." : "No cell is left by the filter."));
-    return;
-  }
-  const place = Number(byId("time-block").value);
-  const block = head.blocks[place];
+  byId("time-host-label").hidden = true;
+  if (!blocks.length || !axes.length) return nothing(blocks.length ? "No cell has a time." : "No cell is left by the filter.");
+  const place = Number(byId("time-block").value), block = head.blocks[place];
   const axis = axes.find((one) => one.name === byId("time-axis").value);
-  const { points: all, untimed } = pointsOf(place, axis);
+  const scored = pointsOf(place, axis), all = scored.filter((one) => one.time > 0);
   const counts = new Map();
   for (const one of all) counts.set(one.host, (counts.get(one.host) ?? 0) + 1);
   const hosts = [...counts].sort((one, other) => other[1] - one[1] || words.compare(one[0], other[0]));
   fillPicker(byId("time-host"), hosts.map(([host, count]) => [host, `${host} (${whole(count)} cells)`]), byId("time-host").value);
   byId("time-host-label").hidden = hosts.length < 2;
-  if (!all.length) {
-    figure.replaceChildren(make("p", { class: "missing" }, "No cell of this block has both a score and this time."));
-    return;
-  }
+  if (!all.length) return nothing("No cell of this block has both a score and this time.");
   const host = byId("time-host").value;
   const points = all.filter((one) => one.host === host).sort((one, other) => one.time - other.time);
   const front = frontOf(points, block.lower);
-  const elsewhere = all.length - points.length;
+  const elsewhere = all.length - points.length, untimed = scored.length - all.length;
   const atOnce = [...new Set(points.map((one) => board.field("concurrency", one.row)).filter((text) => text))].sort(words.compare);
-  const told = [
+  const cells = atOnce.length > 1 ? `${atOnce[0]} to ${atOnce.at(-1)} cells` : atOnce[0] === "1" ? "one cell" : `${atOnce[0]} cells`;
+  const caption = [
     `${block.lower ? "Lower" : "Higher"} and further left is better. Filled: answers; joined: the front, which no other answer beats in both; its intervals are the upright bands. Hollow: trivial answers, which are not part of it, nor is what is no better than the best of them.`,
-    `All times of this figure were taken on ${host === UNKNOWN ? UNKNOWN : `host ${host}`}${atOnce.length ? `, with ${
-      atOnce.length > 1 ? `${atOnce[0]} to ${atOnce.at(-1)} cells` : atOnce[0] === "1" ? "one cell" : `${atOnce[0]} cells`} at once` : ""}.`,
+    `All times of this figure were taken on ${host === UNKNOWN ? UNKNOWN : `host ${host}`}${atOnce.length ? `, with ${cells} at once` : ""}.`,
   ];
-  if (elsewhere) told.push(`${whole(elsewhere)} cells timed on other hosts are not drawn: times of two hosts are not comparable.`);
-  if (untimed) told.push(`${whole(untimed)} cells have no such time.`);
-  figure.replaceChildren(
-    ...drawFigure(figure.clientWidth || 800, points, front, block, axis),
-    make("figcaption", {}, told.join(" ")),
-    frontTable(front, axis));
+  if (elsewhere) caption.push(`${whole(elsewhere)} cells timed on other hosts are not drawn: times of two hosts are not comparable.`);
+  if (untimed) caption.push(`${whole(untimed)} cells have no such time.`);
+  return figure.replaceChildren(...drawFigure(figure.clientWidth || 800, points, front, block, axis),
+    make("figcaption", {}, caption.join(" ")), frontTable(front, axis));
 };
 
 const frontTable = (front, axis) => {
-  const names = ["rank", "sensor", "estimator", "score", "interval"].map(board.role).filter((one) => one);
-  const columns = [axis, ...names];
+  const columns = [axis, ...["rank", "sensor", "estimator", "score", "interval"].map(board.role).filter((one) => one)];
+  const type = (one) => ({ class: one.numeric ? "number" : "" });
+  const cell = (row, { name, numeric, column }) => (numeric ? link(row, column.text(row), name === board.head.roles.score) : column.text(row));
   return make("div", { class: "box" }, make("table", {}, make("caption", {}, "The front, the quickest first"),
-    make("thead", {}, make("tr", {}, ...columns.map((one) => make("th", { scope: "col", class: one.numeric ? "number" : "" }, one.name)))),
-    make("tbody", {}, ...front.map(({ row }) => make("tr", {}, ...columns.map((one) =>
-      make("td", { class: one.numeric ? "number" : "" },
-        one.numeric ? link(row, one.column.text(row), one.name === board.head.roles.score) : one.column.text(row))))))));
+    make("thead", {}, make("tr", {}, ...columns.map((one) => make("th", { scope: "col", ...type(one) }, one.name)))),
+    make("tbody", {}, ...front.map(({ row }) => make("tr", {}, ...columns.map((one) => make("td", type(one), cell(row, one))))))));
 };
 
 const MANY_POINTS = 250;
 const drawFigure = (width, points, front, block, axis) => {
-  const height = Math.max(300, Math.min(520, width * 0.6));
-  const left = 64, right = 16, top = 12, bottom = 44;
+  const height = Math.max(300, Math.min(520, width * 0.6)), left = 64, right = 16, top = 12, bottom = 44;
   const interval = board.role("interval");
   const ends = new Map(front.map((one) => [one, interval ? intervalEnds(interval.column.text(one.row)) : []]));
   const all = points.map((one) => one.score).concat(...ends.values());
@@ -195,27 +163,31 @@ const drawFigure = (width, points, front, block, axis) => {
     const below = y(mark.point.score) + 12;
     tip.style.top = `${below + tip.offsetHeight > height ? Math.max(0, below - tip.offsetHeight - 24) : below}px`;
   };
-  const first = drawn.find((one) => onFront.has(one.point)) ?? drawn[0];
-  first.setAttribute("tabindex", 0);
-  const markOf = (event) => (event.target.point ? event.target : null);
+  const walk = (from, to) => {
+    from?.setAttribute("tabindex", -1);
+    to.setAttribute("tabindex", 0);
+  };
+  walk(null, drawn.find((one) => onFront.has(one.point)) ?? drawn[0]);
+  const listen = (type, act) => picture.addEventListener(type, (event) => { if (event.target.point) act(event.target, event); });
+  const rest = () => { tip.hidden = true; };
   // A pointer that rests beside the points does not silence the one that the keyboard is at.
-  const pointed = (mark) => { const told = mark ?? markOf({ target: document.activeElement }); if (told) tell(told); else tip.hidden = true; };
-  picture.addEventListener("pointerover", (event) => pointed(markOf(event)));
-  picture.addEventListener("pointerleave", () => pointed());
-  picture.addEventListener("focusin", (event) => { const mark = markOf(event); if (mark) tell(mark); });
-  picture.addEventListener("focusout", () => { tip.hidden = true; });
-  picture.addEventListener("click", (event) => { const mark = markOf(event); if (mark) open(mark); });
-  picture.addEventListener("keydown", (event) => {
-    const mark = markOf(event);
-    if (!mark) return;
+  const pointed = (event) => {
+    const mark = [event.target, document.activeElement].find((one) => one?.point);
+    if (mark) tell(mark); else rest();
+  };
+  picture.addEventListener("pointerover", pointed);
+  picture.addEventListener("pointerleave", pointed);
+  listen("focusin", tell);
+  listen("focusout", rest);
+  listen("click", open);
+  listen("keydown", (mark, event) => {
     const at = drawn.indexOf(mark);
     const next = { ArrowRight: at + 1, ArrowUp: at + 1, ArrowLeft: at - 1, ArrowDown: at - 1, Home: 0, End: drawn.length - 1 }[event.key];
     if (event.key === "Enter" || event.key === " ") open(mark);
-    else if (event.key === "Escape") tip.hidden = true;
+    else if (event.key === "Escape") rest();
     else if (next === undefined) return;
     else if (drawn[next]) {
-      mark.setAttribute("tabindex", -1);
-      drawn[next].setAttribute("tabindex", 0);
+      walk(mark, drawn[next]);
       drawn[next].focus({ preventScroll: true });
     }
     event.preventDefault();

@@ -5,13 +5,12 @@ const PRINTED = 2000;
 const state = { sort: null, page: 0, matrixSort: null, matrixPage: 0, size: PAGE, view: "tables" };
 
 // What rows are compared by in a column: numbers by value, texts by their place among all texts.
-const keysOf = (entry) => {
-  if (entry.column.sort) return entry.column.sort;
-  if (entry.keys) return entry.keys;
-  const { dictionary, index } = entry.column;
-  const place = textKeys(dictionary.map(asText));
-  entry.keys = Float64Array.from(index, (one) => place[one]);
-  return entry.keys;
+const keysOf = ({ column }) => {
+  if (!column.sort) {
+    const place = textKeys(column.dictionary.map(asText));
+    column.sort = Float64Array.from(column.index, (one) => place[one]);
+  }
+  return column.sort;
 };
 
 const turn = (sort, place, first = false) =>
@@ -23,38 +22,29 @@ const heading = (name, numeric, place, sort, again) =>
     make("button", { type: "button", onclick: () => again(place) }, name));
 
 const linesOfBlocks = () => {
-  const { head, order, shown, starts } = board;
   const keys = state.sort ? keysOf(board.columns[state.sort.place]) : null;
-  const found = [];
-  head.blocks.forEach((block, place) => {
-    const rows = [];
-    for (let at = starts[place]; at < starts[place + 1]; at += 1) if (shown[order[at]]) rows.push(order[at]);
-    if (rows.length) found.push({ block, place, rows: keys ? sorted(rows, keys, state.sort.descending) : rows });
-  });
-  return found;
+  return board.head.blocks.map((block, place) => ({ block, rows: board.rowsOf(place) })).filter(({ rows }) => rows.length)
+    .map(({ block, rows }) => ({ block, rows: keys ? sorted(rows, keys, state.sort.descending) : rows }));
 };
 
 const isStopped = (kind) => kind !== "result" && kind !== "baseline";
 
 const drawLine = (row) => {
-  const kind = board.kinds.text(row);
-  const line = make("tr", { class: kind });
+  const kind = board.kinds.text(row), line = make("tr", { class: kind }), columns = board.visibleColumns;
   let onTheWay = true;
-  for (let place = 0; place < board.visibleColumns.length; place += 1) {
-    const { name, numeric, column } = board.visibleColumns[place];
-    const text = column.text(row);
-    if (isStopped(kind) && numeric && (text === ABSENT || text === "") && place > 0) {
+  for (const [place, { name, numeric, column }] of columns.entries()) {
+    const text = column.text(row), isNumber = numeric && text !== "" && text !== ABSENT;
+    if (isStopped(kind) && numeric && !isNumber && place > 0) {
       const why = board.field("reason", row) || board.field("status", row);
-      line.append(make("td", { class: "reason", colspan: board.visibleColumns.length - place }, link(row, why, onTheWay)));
+      line.append(make("td", { class: "reason", colspan: columns.length - place }, link(row, why, onTheWay)));
       break;
     }
-    const told = numeric && text !== "" && text !== ABSENT;
-    line.append(make("td", { class: numeric ? "number" : "" }, told ? link(row, text, onTheWay && isScore(name)) : text));
-    if (told && isScore(name)) onTheWay = false;
+    const isScore = name === board.head.roles.score;
+    line.append(make("td", { class: numeric ? "number" : "" }, isNumber ? link(row, text, onTheWay && isScore) : text));
+    if (isNumber && isScore) onTheWay = false;
   }
   return line;
 };
-const isScore = (name) => name === board.head.roles.score;
 
 const drawTables = () => {
   const table = byId("lines");
