@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.conformance.check import CheckFailed, check, code_of, fail, skip
+from tactbench.core.conformance.press import FORCE_SHARE, pressing_channel
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.conformance.trial_press import carried_out, simulated_rig, simulated_sensors, tiny_scene
 from tactbench.core.errors import PluginContractError, RigError, UsageError
@@ -22,6 +23,8 @@ REACH_MM = 15.0
 """Half of the side of the plane over which heights are looked at: no skin here is wider."""
 LOWEST_MM = 1e-9
 """By which the lowest point may miss 0: rounding of millimetres, and nothing that a skin feels."""
+MOST_N = 100.0
+"""Beyond the rated range of every tactile sensor of a finger."""
 _WHY = "a check of plugins"
 
 
@@ -148,6 +151,51 @@ def path_is_made(subject: Subject) -> None:
     _path(subject)
 
 
+@check("profile", needs=("path-is-made",))
+def path_begins_without_load(subject: Subject) -> None:
+    """A recording is tared on its own unloaded hold: one that begins under load takes that for zero.
+
+    Begin with a hold at 0 N, by default of some seconds.
+    """
+    path = _path(subject)
+    if path.forces_n[0] != 0:
+        fail("where", f"its first force is {path.forces_n[0]:g} N")
+    if not path.hold_s > 0:
+        fail("where", "it begins to press at once, and no hold is left to tare on")
+
+
+@check("profile", needs=("path-is-made",))
+def path_can_be_borne(subject: Subject) -> None:
+    """A real rig presses what the path says, and a gram-force is a hundredth of a newton.
+
+    State forces in newtons, by default within what a fingertip bears.
+    """
+    largest = _path(subject).largest_n
+    if largest > MOST_N:
+        fail("where", f"its largest force is {largest:g} N by default, and no fingertip bears {MOST_N:g} N")
+
+
+@check("profile", needs=("path-begins-without-load", "path-can-be-borne"), level="silver")
+def path_is_recorded(subject: Subject) -> None:
+    """A recording has as many samples of the force as the path says: with too few, they miss what it does.
+
+    Give the path samples enough, some in each of its straight pieces.
+    """
+    if not simulated_sensors(subject):
+        skip("no sensor that can be simulated is installed")
+    rig, of_rig = simulated_rig(subject)
+    path = _path(subject)
+    with code_of("where", subject.package):
+        made = carried_out(rig, of_rig, simulated_sensors(subject)[0], tiny_scene(profile=path), 1)
+    found = pressing_channel(made.reference)
+    if found is None:
+        skip("the simulated rig records no pressing force")
+    stream, column = found
+    recorded = float(made.values(stream.name)[:, column].max())
+    if abs(recorded - path.largest_n) > FORCE_SHARE * path.largest_n:
+        fail("where", f"its {path.samples} samples reach {recorded:.3g} N, and the path {path.largest_n:g} N")
+
+
 _MADE = ("height-is-finite", "path-is-made")
 
 
@@ -213,5 +261,6 @@ def _unless_refused(subject: Subject, name: str, value: float) -> Any:
 
 CHECKS = (
     numbers_are_described, height_has_the_shape, height_is_finite, lowest_at_the_origin, path_is_made,
+    path_begins_without_load, path_can_be_borne, path_is_recorded,
     same_numbers_same_answer, whole_range_is_answered, every_number_counts, indenter_is_pressed,
 )  # fmt: skip

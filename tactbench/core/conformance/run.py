@@ -42,7 +42,7 @@ _SILVER: Mapping[Kind, tuple[str, ...]] = {
     "estimator": ("answers-have-the-shape",),
     "effect": ("it-is-applied",),
     "indenter": ("indenter-is-pressed",),
-    "profile": (),
+    "profile": ("path-is-recorded",),
 }
 """Checks of which one must have run for silver: a plugin without any is not worse, it has shown less."""
 

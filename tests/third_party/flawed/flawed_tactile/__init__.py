@@ -197,5 +197,8 @@ CAUGHT_BY = {
     "profile": {
         "sound-profile": None,
         "profile-that-pulls": "path-is-made",
+        "profile-under-load": "path-begins-without-load",
+        "profile-in-grams": "path-can-be-borne",
+        "profile-of-few-samples": "path-is-recorded",
     },
 }

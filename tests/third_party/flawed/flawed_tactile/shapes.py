@@ -55,6 +55,18 @@ def pull(*, peak):
     return push(peak=peak).model_copy(update={"forces_n": (0.0, 0.0, -peak)})
 
 
+def under_load(*, peak):
+    return push(peak=peak).model_copy(update={"forces_n": (0.1, 0.1, peak)})
+
+
+def in_grams(*, peak):
+    return push(peak=101.97 * peak)
+
+
+def of_few_samples(*, peak):
+    return push(peak=peak).model_copy(update={"samples": 2})
+
+
 @hookimpl
 def tactbench_indenters():
     def shape(name, code, size=SIZE):
@@ -72,5 +84,8 @@ def tactbench_indenters():
 def tactbench_profiles():
     return [
         ProfileDescriptor(name=name, title="A push", where=f"flawed_tactile.shapes:{code}", parameters={"peak": PEAK})
-        for name, code in (("sound-profile", "push"), ("profile-that-pulls", "pull"))
-    ]
+        for name, code in (
+            ("sound-profile", "push"), ("profile-that-pulls", "pull"), ("profile-under-load", "under_load"),
+            ("profile-in-grams", "in_grams"), ("profile-of-few-samples", "of_few_samples"),
+        )
+    ]  # fmt: skip
