@@ -60,7 +60,7 @@ def requests_for(
             continue
         requests[needed] = []
         for planned in in_drawn_order(task_of(cell, registry).scenes_for(needed[2]), cell.seed):
-            scene = planned.scene.asked(simulation)
+            scene = planned.scene.simulated_as(simulation)
             key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
             path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
             requests[needed].append(
