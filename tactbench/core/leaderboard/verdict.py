@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from operator import itemgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sign_of
-from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
 from tactbench.core.tables.numbers import interval, score, suffix
 from tactbench.core.tables.text import visible
+
+if TYPE_CHECKING:
+    from tactbench.core.statistics.ranking import Rank
 
 Row = Mapping[str, Any]
 
@@ -28,27 +30,20 @@ comparison_key = itemgetter("sensor", "task", "rig", "protocol", "split")
 
 
 def verdict_of(
-    ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Sequence[Row] = (), *, times: bool = True
+    ranked: Sequence[tuple[Row, Rank]], below: int, trivial: Sequence[Row] = (), *, times: bool = True
 ) -> tuple[str, ...]:
     """Return sentences on the answers of one block: who is best, how well that is resolved, what it hangs on.
 
+    The first is one of three verdicts: a clear winner, a tie at the top, not enough to tell. Where intervals allow it,
+    then how many neighbouring rows are separable, whether the first place hangs on one replicate and between what
+    scores single ones lie; then answers that need no touch, and where published figures lie.
+
     Parameters
     ----------
-    ranked
-        Answers that have a place, in order.
-    below
-        How many answers are no better than the trivial one.
-    trivial
-        The trivial answers of the block.
+    ranked, below, trivial
+        Answers that have a place, in order; how many are no better than the trivial one; the trivial ones.
     times
         Whether costs may be named: no seed decides them.
-
-    Returns
-    -------
-    tuple of str
-        One of three verdicts (a clear winner; a tie at the top; not enough to tell), then, where intervals allow it,
-        how many neighbouring rows are separable, whether the first place hangs on one replicate and between what scores
-        single ones lie; then answers that need no touch, and where published figures lie.
     """
     if not ranked:
         return (_none_better(below, trivial),) if below else ()
@@ -218,7 +213,7 @@ def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:
     return ""
 
 
-def _resolution(ranked: Sequence[tuple[Row, Placing]], leaders: int, names: Sequence[str]) -> str:
+def _resolution(ranked: Sequence[tuple[Row, Rank]], leaders: int, names: Sequence[str]) -> str:
     """Return how many neighbours can be told apart, and whether the first place hangs on one replicate."""
     apart = sum(one.apart for _, one in ranked)
     behind = len(ranked) - leaders
