@@ -203,7 +203,7 @@ def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
     """
     if not names:
         return _NO_CHANNELS_TOLERANCE
-    wanted = []
+    bounds = []
     channels = {channel.name: channel for track in run.tracks for channel in track.channels}
     for name in names:
         channel = channels[name]
@@ -211,8 +211,8 @@ def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
         hidden = 0.0 if nuisances is None else nuisances.hidden()
         # Without any stated noise: a ten-thousandth of the range, or of one.
         span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 1.0
-        wanted.append(hidden if hidden > 0 else 1e-4 * span)
-    aim = run.fidelity.table_tolerance_factor * np.array(wanted)
+        bounds.append(hidden if hidden > 0 else 1e-4 * span)
+    aim = run.fidelity.table_tolerance_factor * np.array(bounds)
     asked = run.scene.simulation.tolerance
     return aim if asked is None else np.minimum(aim, TABLE_SHARE * asked)
 
