@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
@@ -18,10 +18,8 @@ from tactbench.core.leaderboard.names import hardware_name, metric_name, sign_of
 from tactbench.core.leaderboard.verdict import verdict_of
 from tactbench.core.statistics.excess import beyond_floor, excess_of
 from tactbench.core.statistics.median import FEWEST
+from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.text import visible
-
-if TYPE_CHECKING:
-    from tactbench.core.statistics.ranking import Rank
 
 Row = Mapping[str, Any]
 _Key = tuple[str, str, str, str]
@@ -129,8 +127,6 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
 
     They are the finished answers of one block, no baselines, the best score first.
     """
-    from tactbench.core.statistics.ranking import Rank, ranks
-
     counts = [row.get("n_replicates") for row in results]
     if any(n is not None and n < FEWEST for n in counts):
         shared = Rank(1, None, None, len(results) > 1)
@@ -138,6 +134,8 @@ def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
     reason = _unrankable(results)
     if not results or reason:
         return _by_score(results), reason
+    from tactbench.core.statistics.ranking import ranks  # numerics
+
     try:
         return ranks(results), ""
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
@@ -166,8 +164,6 @@ def _unrankable(results: Sequence[Row]) -> str:
 
 
 def _by_score(results: Sequence[Row]) -> dict[str, Rank]:
-    from tactbench.core.statistics.ranking import Rank
-
     ordered = errors(results)
     many = Counter(ordered)
     first = {error: place for place, error in reversed(list(enumerate(ordered, 1)))}

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from tactbench.core.leaderboard.hosts import timing_mark
 from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.names import answer_name, sensor_name
 from tactbench.core.spec.status import STOPPED
+from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, tail, whole
 from tactbench.core.tables.text import visible
-
-if TYPE_CHECKING:
-    from tactbench.core.statistics.ranking import Rank
 
 Row = Mapping[str, Any]
 Value = Callable[[Row], float | None]

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sign_of
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
+from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import visible
-
-if TYPE_CHECKING:
-    from tactbench.core.statistics.ranking import Rank
 
 Row = Mapping[str, Any]
 

@@ -5,7 +5,8 @@ import pytest
 
 from tactbench.core.leaderboard.blocks import places
 from tactbench.core.leaderboard.table import build_table
-from tactbench.core.statistics.ranking import Rank, ranks
+from tactbench.core.statistics.rank import Rank
+from tactbench.core.statistics.ranking import ranks
 
 from .rows import resampled, row
 
