@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from tests.conftest import Shell
+from tests.conftest import Verbs
 from tests.core.matrix.started import started
 from tests.core.pool.patience import ending, until
 
@@ -19,19 +19,19 @@ RUN = ("run", "--repeats", "1", *ASKED)
 
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory):
-    """A shell with the result of a serial run in its folder."""
-    shell = Shell(tmp_path_factory.mktemp("runs"))
-    shell(*RUN, "--engine", "isolated", "--out", "serial")
-    return shell
+    """A command line with the result of a serial run in its folder."""
+    verbs = Verbs(tmp_path_factory.mktemp("runs"))
+    verbs(*RUN, "--engine", "isolated", "--out", "serial")
+    return verbs
 
 
 @contextmanager
-def begun(shell, out, *options):
+def begun(serial, out, *options):
     """Start a run that finds the recordings made, in a session of its own."""
-    shutil.copytree(shell.folder / "serial" / "recordings", shell.folder / out / "recordings")
+    shutil.copytree(serial.folder / "serial" / "recordings", serial.folder / out / "recordings")
     with ending(
         [sys.executable, "-m", "tactbench", *RUN, "--out", out, "--engine", "dask", *options],
-        cwd=shell.folder, env={**os.environ, "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}, text=True,
+        cwd=serial.folder, env={**os.environ, "PYTHONWARNINGS": "error", "OMP_NUM_THREADS": "1"}, text=True,
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
     ) as running:  # fmt: skip
         yield running
@@ -85,10 +85,10 @@ def test_ctrl_c_leaves_no_process_and_keeps_what_was_finished(serial):
     assert list((serial.folder / "interrupted" / "cells").glob("*.h5"))
 
 
-def test_without_a_scheduler_nothing_is_recorded(shell):
-    done = shell(*RUN, "--engine", "dask", "--scheduler", "tcp://127.0.0.1:1", code=2)
+def test_without_a_scheduler_nothing_is_recorded(verbs):
+    done = verbs(*RUN, "--engine", "dask", "--scheduler", "tcp://127.0.0.1:1", code=2)
     assert "tcp://127.0.0.1:1" in done.stderr
-    assert not list(shell.folder.rglob("*.h5"))
+    assert not list(verbs.folder.rglob("*.h5"))
 
 
 def session(leader):
