@@ -26,12 +26,10 @@ VERBS = {
     "compare": ("ols", "mean"),
     "why": (CELL,),
     "rerun": (CELL,),
-    "cost": ("--sensor", "ideal", "--task", "force", "--estimator", "ols"),
+    "cost": ("--sensor", "ideal", "--task", "force", "--estimator", "ols", "--rounds", "1"),
     "calibrate": ("--show",),
     "twin explain": ("--sensor", "icub", "--task", "force", "--rounds", "0"),
-    "twin verify": tuple(
-        word for group in ("contact", "memory", "friction", "vibration") for word in ("--only", group)
-    ),
+    "twin verify": ("--only", "friction"),
 }
 """What is asked of each verb that knows the format."""
 
