@@ -177,6 +177,7 @@ def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path,
 
 def test_a_row_over_several_places_states_all_of_them(verbs):
     asked = ("--sensor", "icub", "--task", "force", "--split", "placement", "--protocol", "deployable")
+    asked += ("--rung", "closed-form")  # the cheapest
     rows = json.loads(
         verbs("run", "--repeats", "1", *asked, "--estimator", "ols", "--no-latency", "--format", "json").stdout
     )
