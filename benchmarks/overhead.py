@@ -1,11 +1,11 @@
 """What the matrix adds to a cell: cold and found finished, for 100, 1,000 and 10,000 cells that do nothing.
 
 Every round and size is a process of its own, and its cells are carried out as ``--engine in-process`` does: one after
-the other in one forked process, where the system can fork. It carries out the matrix cold, lists it again finished, and
-then calls `evaluate` for the same cells in a plain loop: what the matrix took beyond that is what it adds. Latency of
-single rows is not measured (``latency: false``). The slope is what one more cell costs, between two sizes; what is left
-at no cells is the fixed cost of a run (provenance, digests of source). Bounds, stated before measuring: 1.5 ms a cold
-cell, 0.2 ms one found finished, and slopes that differ by less than 1.3.
+the other, several of them each in a forked process of its own. It carries out the matrix cold, lists it again finished,
+and then calls `evaluate` for the same cells in a plain loop: what the matrix took beyond that is what it adds. Latency
+of single rows is not measured (``latency: false``). The slope is what one more cell costs, between two sizes; what is
+left at no cells is the fixed cost of a run (provenance, digests of source). Bounds, stated before measuring: 5 ms a
+cold cell, 0.2 ms one found finished, and slopes that differ by less than 1.3.
 
 Usage: python benchmarks/overhead.py [--rounds 5] [--sizes 100,1000,10000] [--on DIR]
 """
@@ -101,7 +101,7 @@ def main() -> None:
     added = {size: statistics.median(one["cold"] - one["plain"] for one in rounds[size]) for size in sizes}
     cached = {size: statistics.median(one["cached"] for one in rounds[size]) for size in sizes}
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
-    where = "a forked process" if rounds[sizes[0]][0]["forked"] else "the run's process"
+    where = "forked processes" if rounds[sizes[0]][0]["forked"] else "the run's process"
     print(f"medians of {asked.rounds} rounds, cells in {where}, load {load:.1f} on {os.cpu_count()} cores; ms a cell")
     print(f"{'cells':>7}{'whole, cold':>13}{'plain loop':>12}{'added':>8}{'cached':>8}")
     for size in sizes:

@@ -72,7 +72,7 @@ def scenes_of(
     found = []
     simulation = simulation_of(spec, sensor, values)
     for planned in in_drawn_order(task.scenes, seed):
-        found.append(planned.model_copy(update={"scene": planned.scene.asked(simulation)}))
+        found.append(planned.model_copy(update={"scene": planned.scene.simulated_as(simulation)}))
     return found
 
 

@@ -13,7 +13,7 @@ from tactbench.core.leaderboard.names import LOWER_IS_BETTER
 from tactbench.core.spec.sensor import SensorSpec
 from tactbench.core.spec.task import TaskSpec
 from tactbench.core.spec.units import conversion
-from tactbench.core.tables.numbers import duration, score, suffix
+from tactbench.core.tables.numbers import duration, score_with_unit
 
 Row = Mapping[str, Any]
 State = Literal["met", "missed", "unknown"]
@@ -169,7 +169,7 @@ def _score(figure: ScoreInterval, wish: Wish, task: TaskSpec, pressed: float | N
         return None
 
     def formatted(number: float) -> str:
-        return score(number, task.unit) + suffix(task.unit)
+        return score_with_unit(number, task.unit)
 
     word = "above the wished error" if lower else "below the wished score"
     found = _compared("score", figure.value, wished, "", formatted, word, least=not lower)

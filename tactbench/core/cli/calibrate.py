@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.calibration_tables import CALIBRATION_FORMATS, print_calibration
+from tactbench.core.cli.grid import GRID_FORMATS
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
     from tactbench.core.calibration.result import CalibrationResult
     from tactbench.core.calibration.summary import Summary
     from tactbench.core.spec.calibration import CalibrationSpec
+
+_FORMATS = (*GRID_FORMATS, "md")
 
 
 @click.command(name="calibrate")
@@ -24,7 +27,7 @@ if TYPE_CHECKING:
 @click.option("--show", is_flag=True, help="Draw nothing: show the calibration in DIR, else the one that came along.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("tactbench-results"), show_default=True,
               metavar="DIR", help="Where DIR/calibration lies; draws that are there already are kept.")  # fmt: skip
-@click.option("--format", "shape", type=click.Choice(CALIBRATION_FORMATS), default="table", show_default=True)
+@click.option("--format", "shape", type=click.Choice(_FORMATS), default="table", show_default=True)
 def command(
     draws: int | None, seed: int | None, jobs: int, config: Path | None, show: bool, out: Path, shape: str
 ) -> None:
@@ -48,11 +51,11 @@ def command(
         if found is None:
             raise UsageError(f"There is no calibration in {out}, and none came along.", hint="Leave out --show.")
         remark(f"Shown: {found.shown}.")
-        print_calibration(found, summary(found), shape)
+        _print(found, summary(found), shape)
         return
     result = _drawn(_procedure(config), draws, seed, jobs, out)
     stats = summary(result)
-    print_calibration(result, stats, shape)
+    _print(result, stats, shape)
     _write(result, stats, out / "calibration")
 
 
@@ -128,3 +131,30 @@ def _write(result: CalibrationResult, stats: Summary, folder: Path) -> None:
     beside = " variations.csv," if result.varied else ""
     remark(f"Files: {folder}/draws.jsonl, draws.csv,{beside} run.json, ranges.json, findings.json, sensitivity.json, "
            "draws.png, .pdf, sensitivity.png, .pdf")  # fmt: skip
+
+
+def _print(result: CalibrationResult, stats: Summary, shape: str) -> None:
+    """Print what a calibration says in one of `_FORMATS`."""
+    from tactbench.core.calibration.summary import records
+    from tactbench.core.calibration.tables import markdown, text_tables
+    from tactbench.core.cli.grid import print_records, print_tables
+    from tactbench.core.cli.screen import remark
+
+    if shape == "md":
+        click.echo(markdown(result, stats), nl=False)
+    elif shape != "table":
+        print_records(_records(records(stats)), shape)
+    else:
+        click.echo(f"{result.spec.title} (SIM)\n")
+        print_tables(text_tables(result, stats))
+    if stats.failed:
+        reasons = sorted({draw.reason for draw in result.draws if draw.status == "failed"})
+        remark(f"{stats.failed} draws failed: {reasons[0]}" + (" …" if len(reasons) > 1 else ""))
+
+
+def _records(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[dict[str, Any]]:
+    """Return all tables as records of one shape, each with the name of its table."""
+    keys = list(dict.fromkeys(key for lines in tables.values() for line in lines for key in line))
+    return [
+        {"table": table, **{key: line.get(key) for key in keys}} for table, lines in tables.items() for line in lines
+    ]

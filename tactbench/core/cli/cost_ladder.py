@@ -112,7 +112,7 @@ def _print(ladder: Ladder) -> None:
     from tactbench.core.cli.grid import print_grid
     from tactbench.core.cli.screen import remark
     from tactbench.core.cost.ladder_file import DEFINITIONS
-    from tactbench.core.report.ladder_table import COLUMNS, RIGHT, line, title
+    from tactbench.core.report.costs import COLUMNS, RIGHT, line, title
 
     about = ladder.about
     lines = [line(row, about["unit"]) for row in ladder.rows]

@@ -150,7 +150,7 @@ def _scenes(registry: Registry, task: str, scene_name: str | None, simulation: S
     if scene_name is not None and scene_name not in planned:
         raise UnknownNameError(f"scene of task {task!r}", scene_name, planned)
     scenes = [planned[scene_name]] if scene_name is not None else list(planned.values())
-    return [scene.asked(simulation) if simulation else scene for scene in scenes]
+    return [scene.simulated_as(simulation) if simulation else scene for scene in scenes]
 
 
 def _alike(rig: Explaining, sensor: SensorDescriptor, scenes: list[Scene]) -> list[list[Scene]]:

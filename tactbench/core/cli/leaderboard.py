@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tactbench.core.cli.comparisons import print_comparisons
+from tactbench.core.cli.comparisons import COMPARISON_FORMATS, print_comparisons
 from tactbench.core.cli.options import options
 from tactbench.core.cli.results import opened, provenance_of, shown_rows
 from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, VIEW, format_of, print_table, view_of
@@ -60,6 +60,7 @@ def _show(
     filters: Mapping[str, Sequence[str]],
 ) -> None:  # fmt: skip
     from tactbench.core.errors import UsageError
+    from tactbench.core.leaderboard.side_by_side import compare
     from tactbench.core.leaderboard.table import build_table
     from tactbench.core.leaderboard.view import best
 
@@ -69,8 +70,18 @@ def _show(
         print_table(best(table, count) if count else table, shape, view, to=to)
     elif to is not None or not times or count:
         raise UsageError("A comparison is printed whole, and has no times.", hint="Leave out --to, --best, --no-times.")
+    elif shape not in COMPARISON_FORMATS:
+        raise UsageError(
+            f"A comparison cannot be printed as {shape}.", hint=f"Formats: {', '.join(COMPARISON_FORMATS)}."
+        )
     else:
-        print_comparisons(rows, by, shape)
+        tables = compare(rows, by)
+        if not tables:
+            raise UsageError(
+                f"These rows hold no question that was asked with more than one {by}.",
+                hint="Ask so first, for example `tactbench run --config protocols` or `tactbench run --config beyond`.",
+            )
+        print_comparisons(tables, shape)
 
 
 def _only(rows: list[dict[str, Any]], filters: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:

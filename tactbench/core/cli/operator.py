@@ -25,7 +25,7 @@ class TerminalOperator:
         self._yes = yes
         self._paused = paused
 
-    def asked(self, text: str) -> None:
+    def prompt(self, text: str) -> None:
         """Show `text` and wait for Enter; one pressed before it was shown does not count.
 
         Raises

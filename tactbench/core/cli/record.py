@@ -84,7 +84,7 @@ def command(
         registry, rig, [sensor], effects=effects, rung=rung, tolerance=tolerance, scenario=scenario, nuisances=nuisances
     )
     if simulation is not None:
-        scene = scene.asked(simulation)
+        scene = scene.simulated_as(simulation)
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
     provenance = gather()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,9 @@ from tactbench.core.cli.threads import keep_threads
 if TYPE_CHECKING:
     from tactbench.core.matrix.engine import EngineName
     from tactbench.core.matrix.run import Outcome
+
+_REASON_CHARACTERS = 200
+"""Of a reason that are shown; the whole of it is in the row."""
 
 
 @click.command(name="run")
@@ -90,8 +94,7 @@ def command(
     table = build_table(rows, provenance)
     print_table(table, shape, view_of(store.folder, wide=wide, notes=notes))
     for by in ("protocol", "split") if shape == "table" else ():
-        if compare(rows, by):  # once more, side by side
-            print_comparisons(rows, by, "table")
+        print_comparisons(compare(rows, by))  # once more, side by side
     write_tables(rows, store.folder, provenance, table)
     _farewell(outcome, rows, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)
@@ -111,7 +114,6 @@ def _so_far(rows: Sequence[Mapping[str, Any]]) -> str:
 def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path, shape: str) -> None:
     """Say what there is now, where it lies and what to try next."""
     from tactbench.core.cli.screen import remark
-    from tactbench.core.cli.stopped import tell_stopped
 
     answers = len(outcome.rows)
     of = f"{len(rows)} cells" if answers == len(rows) else f"{len(rows)} cells over their replicates"
@@ -121,6 +123,29 @@ def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path,
     tell_stopped(outcome.failures, folder)
     if shape == "table":
         _suggest(rows)
+
+
+def tell_stopped(rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
+    """Name every cell of `rows` with its reason in one line, and the commands that look into it."""
+    if not rows:
+        return
+    from tactbench.core.cli.screen import remark
+    from tactbench.core.tables.text import command_line
+
+    counts = Counter(row["status"] for row in rows)
+    remark(f"\nStopped: {', '.join(f'{number} {status}' for status, number in sorted(counts.items()))}.")
+    for row in rows:
+        remark(f"  {row['status']:<13}  {row['cell']}: {one_line(row['reason'])}")
+    which = str(rows[0]["cell"]), "--out", str(folder)
+    remark(f"Look into one:  {command_line('tactbench', 'why', *which)}")
+    remark(f"Try it again:   {command_line('tactbench', 'rerun', *which)}")
+
+
+def one_line(reason: str) -> str:
+    """Return `reason` in one line of readable length; what could move a terminal's cursor is shown, not done."""
+    from tactbench.core.tables.text import cut, visible
+
+    return cut(visible(" ".join(str(reason).split())), _REASON_CHARACTERS)
 
 
 def _suggest(rows: Sequence[Mapping[str, Any]]) -> None:

@@ -106,12 +106,12 @@ def _rests_on(row: Row) -> list[str]:
     """Return what the score of a finished cell is made of and what it is to be held against."""
     from tactbench.core.leaderboard.names import metric_name
     from tactbench.core.leaderboard.notes import count_texts, picked
-    from tactbench.core.tables.numbers import score, suffix
+    from tactbench.core.tables.numbers import score, score_with_unit
 
     unit = str(row["unit"])
     texts = [f"{metric_name(row)} {score(row['score'], unit)}"]
     if row.get("score_beyond_floor") is not None:
-        floor = f"floor of the reference {score(row['reference_floor'], unit)}{suffix(unit)}"
+        floor = f"floor of the reference {score_with_unit(row['reference_floor'], unit)}"
         texts += [floor, f"beyond it {score(row['score_beyond_floor'], unit)}"]
     if row.get("published") is not None:
         texts.append(f"published {score(row['published'], unit)} ({row['published_reference']})")

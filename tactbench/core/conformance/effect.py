@@ -57,17 +57,17 @@ def tokens_are_known(subject: Subject) -> None:
     effects = [*(one for one in subject.registry.effects if one.name != descriptor.name), descriptor]
     produced = {token for one in effects for token in one.produces}
     consumed = {token for one in effects for token in one.consumes}
-    wanted = {*consumed, *get_args(ChannelKind), *ALWAYS_WANTED}
+    consumable = {*consumed, *get_args(ChannelKind), *ALWAYS_WANTED}
     for token in descriptor.consumes:
         if token not in produced:
             fail(f"consumes[{token}]", f"no installed effect produces it{_meant(token, produced)}")
     if not descriptor.produces:
         fail("produces", "it is empty: nothing that is observed could ever need the effect")
-    if not wanted.intersection(descriptor.produces):
+    if not consumable.intersection(descriptor.produces):
         token = descriptor.produces[0]
         fail(
             f"produces[{token}]",
-            f"no installed effect consumes it, and it is no kind of channel{_meant(token, wanted)}",
+            f"no installed effect consumes it, and it is no kind of channel{_meant(token, consumable)}",
         )
 
 

@@ -297,11 +297,11 @@ def nuisances_are_in_its_units(subject: Subject) -> None:
     """
     spec = subject.descriptor.spec
     for kind, unit, field, amount in _amounts(spec):
-        wanted = {"tau": "s", "share": "1"}.get(_dimension(field), unit)
-        same = units.parse(amount.unit)[1] == units.parse(wanted)[1]
+        expected = {"tau": "s", "share": "1"}.get(_dimension(field), unit)
+        same = units.parse(amount.unit)[1] == units.parse(expected)[1]
         # Only time constants are converted; the others are taken as they are.
-        if not (same if wanted == "s" else amount.unit == wanted):
-            fail(f"spec.nuisances[{kind}].{field}", f"its unit is {amount.unit!r}, and {wanted!r} is needed")
+        if not (same if expected == "s" else amount.unit == expected):
+            fail(f"spec.nuisances[{kind}].{field}", f"its unit is {amount.unit!r}, and {expected!r} is needed")
 
 
 @check("sensor", needs=("nuisances-are-of-its-kinds",))

@@ -68,12 +68,12 @@ def metric_has_its_unit(subject: Subject) -> None:
     if isinstance(spec.target, LabelTarget) and "unit" not in spec.target.model_fields_set:
         target_unit = spec.unit  # a label of which nobody says more
     of_the_target = spec.metric in ("rmse", "mae") or METRICS[spec.metric].vector
-    wanted = target_unit if of_the_target else "1"
+    expected = target_unit if of_the_target else "1"
     kind = getattr(spec.target, "kind", None)
     if kind in OF_KIND and units.parse(target_unit)[1] != units.parse(OF_KIND[kind])[1]:
         fail("spec.target.unit", f"a {kind} is measured in {OF_KIND[kind]}, not in {target_unit}")
-    if units.parse(spec.unit) != units.parse(wanted):
-        fail("spec.unit", f"{spec.metric} of a target in {target_unit} is in {wanted}, not in {spec.unit}")
+    if units.parse(spec.unit) != units.parse(expected):
+        fail("spec.unit", f"{spec.metric} of a target in {target_unit} is in {expected}, not in {spec.unit}")
 
 
 @check("task")

@@ -38,14 +38,14 @@ AS_STRONG = 0.5
 and currents or foam carry a press to their neighbours. Swapped or mirrored axes leave a thousandth."""
 
 
-def wanted_channels(subject: Subject) -> tuple[ChannelSpec, ...]:
+def observed_channels(subject: Subject) -> tuple[ChannelSpec, ...]:
     """Return the channels that the transducer answers for."""
     found: tuple[ChannelSpec, ...] = subject.descriptor.spec.channels(*READ_FROM_THE_SKIN)
     return found
 
 
 @lru_cache(maxsize=2)
-def _prepared(subject: Subject, wanted: tuple[str, ...]) -> Any:
+def _prepared(subject: Subject, channel_names: tuple[str, ...]) -> Any:
     descriptor = subject.descriptor
     factory = subject.code("transducer")
     asked = inspect.signature(factory).parameters
@@ -56,17 +56,17 @@ def _prepared(subject: Subject, wanted: tuple[str, ...]) -> Any:
         if name in asked and asked[name].default is inspect.Parameter.empty
     }
     with code_of("transducer", subject.package):
-        return factory(descriptor.spec, skin_grid(descriptor.spec.skin.sheet), list(wanted), **given)
+        return factory(descriptor.spec, skin_grid(descriptor.spec.skin.sheet), list(channel_names), **given)
 
 
 def _names(channels: Sequence[ChannelSpec]) -> tuple[str, ...]:
     return tuple(channel.name for channel in channels)
 
 
-def _read(subject: Subject, state: SkinState, wanted: tuple[str, ...] | None = None) -> Any:
+def _read(subject: Subject, state: SkinState, channel_names: tuple[str, ...] | None = None) -> Any:
     """Return what the transducer gives for a state, whatever that is."""
-    wanted = _names(wanted_channels(subject)) if wanted is None else wanted
-    transducer = _prepared(subject, wanted)
+    channel_names = _names(observed_channels(subject)) if channel_names is None else channel_names
+    transducer = _prepared(subject, channel_names)
     with code_of("transducer", subject.package):
         return transducer(state)
 
@@ -106,13 +106,13 @@ def _at_rest(subject: Subject) -> FloatArray:
 def transducer_builds(subject: Subject) -> None:
     """The twin calls it with the spec, a grid of the skin and the names of the channels that somebody looks at.
 
-    Give it the arguments (spec, grid, wanted), let it return a function of a SkinState, and name every channel.
+    Give it the arguments (spec, grid, channel_names), let it return a function of a SkinState, and name every channel.
     """
     if subject.descriptor.transducer is None:
         skip("it names no transducer: it can be recorded and replayed, not simulated")
-    if not wanted_channels(subject):
+    if not observed_channels(subject):
         skip("it has no channel that is read from the skin (taxel, dc_pressure)")
-    made = _prepared(subject, _names(wanted_channels(subject)))
+    made = _prepared(subject, _names(observed_channels(subject)))
     if not callable(made):
         fail("transducer", f"it returned a {type(made).__name__}, and a function of a SkinState is needed")
 
@@ -126,7 +126,7 @@ def transducer_leaves_the_spec_alone(subject: Subject) -> None:
     spec = subject.descriptor.spec
     with code_of("transducer", subject.package):
         transducer = subject.code("transducer")(
-            spec, skin_grid(spec.skin.sheet), list(_names(wanted_channels(subject)))
+            spec, skin_grid(spec.skin.sheet), list(_names(observed_channels(subject)))
         )
         transducer(_state(subject, GENTLE_N))
     place = difference(subject.as_it_was["spec"], spec.model_dump())
@@ -138,15 +138,18 @@ def transducer_leaves_the_spec_alone(subject: Subject) -> None:
 def readings_have_the_shape(subject: Subject) -> None:
     """Columns of a recording are the channels in the order that was asked for; one too few shifts all that follow.
 
-    Return one number for each name in `wanted`, as an array of shape (n,).
+    Return one number for each name in `channel_names`, as an array of shape (n,).
     """
     import numpy as np
 
-    names = _names(wanted_channels(subject))
-    for wanted in (names, names[:1]):
-        given = np.asarray(_read(subject, _state(subject, GENTLE_N), wanted))
-        if given.shape != (len(wanted),):
-            fail("transducer", f"shape {given.shape} for {len(wanted)} wanted channels; ({len(wanted)},) is needed")
+    names = _names(observed_channels(subject))
+    for channel_names in (names, names[:1]):
+        given = np.asarray(_read(subject, _state(subject, GENTLE_N), channel_names))
+        if given.shape != (len(channel_names),):
+            fail(
+                "transducer",
+                f"shape {given.shape} for {len(channel_names)} requested channels; ({len(channel_names)},) is needed",
+            )
         if given.dtype.kind not in "fiu":
             fail("transducer", f"values of type {given.dtype}, and numbers are needed")
 
@@ -180,7 +183,7 @@ def finite_over_range(subject: Subject) -> None:
 def _finite(subject: Subject, given: FloatArray, when: str) -> None:
     import numpy as np
 
-    names = _names(wanted_channels(subject))
+    names = _names(observed_channels(subject))
     bad = [name for name, value in zip(names, given, strict=True) if not np.isfinite(value)]
     if bad:
         fail("transducer", f"{len(bad)} readings are not finite {when}: {', '.join(bad[:4])}")
@@ -192,7 +195,7 @@ def rest_is_as_stated(subject: Subject) -> None:
 
     State the `rest` that the transducer gives at zero load, or add it there.
     """
-    channels = wanted_channels(subject)
+    channels = observed_channels(subject)
     stated = [channel for channel in channels if channel.rest is not None]
     if not stated:
         skip("it states no rest level")
@@ -207,14 +210,14 @@ def rest_is_as_stated(subject: Subject) -> None:
 
 
 @check("sensor", needs=("finite-at-zero-load",), level="silver")
-def order_follows_wanted(subject: Subject) -> None:
+def order_follows_the_request(subject: Subject) -> None:
     """A run asks for the channels that it observes, in its own order; a transducer that ignores it mixes taxels up.
 
-    Look channels up by the names in `wanted`; never rely on their number or order.
+    Look channels up by the names in `channel_names`; never rely on their number or order.
     """
     import numpy as np
 
-    names = _names(wanted_channels(subject))
+    names = _names(observed_channels(subject))
     if len(names) < 2:
         skip("it has one channel")
     at_mm = _places(subject)[0][1] if _places(subject) else None
@@ -222,7 +225,7 @@ def order_follows_wanted(subject: Subject) -> None:
     fewer = tuple(reversed(names[: max(2, len(names) // 2)]))
     given = np.asarray(_read(subject, _state(subject, GENTLE_N, at_mm), fewer))
     if given.shape != (len(fewer),):
-        fail("transducer", f"shape {given.shape} for {len(fewer)} wanted channels")
+        fail("transducer", f"shape {given.shape} for {len(fewer)} requested channels")
     for name, value in zip(fewer, given.tolist(), strict=True):
         # A solver may stop elsewhere for fewer channels.
         if not math.isclose(value, whole[name], rel_tol=1e-3, abs_tol=1e-6):
@@ -243,7 +246,7 @@ def same_state_same_reading(subject: Subject) -> None:
     first = np.array(_read(subject, _state(subject, GENTLE_N)))
     _read(subject, _state(subject, 2 * GENTLE_N))
     again = np.array(_read(subject, _state(subject, GENTLE_N)))
-    changed = [name for name, a, b in zip(_names(wanted_channels(subject)), first, again, strict=True) if a != b]
+    changed = [name for name, a, b in zip(_names(observed_channels(subject)), first, again, strict=True) if a != b]
     if changed:
         fail("transducer", f"{changed[0]} reads another value for the same state, the second time")
 
@@ -275,7 +278,7 @@ def it_answers_to_a_press(subject: Subject) -> None:
 
     places = _places(subject)
     pressed = [_response(subject, GENTLE_N, at_mm) for _, at_mm in places] or [_response(subject, GENTLE_N)]
-    names = _names(wanted_channels(subject))
+    names = _names(observed_channels(subject))
     if not places and not np.any(pressed):
         fail("transducer", f"no channel changes under {GENTLE_N:g} N")
     for (own, _), change in zip(places, pressed, strict=False):
@@ -291,7 +294,7 @@ def response_is_where_it_is_pressed(subject: Subject) -> None:
     """
     import numpy as np
 
-    spec, names = subject.descriptor.spec, _names(wanted_channels(subject))
+    spec, names = subject.descriptor.spec, _names(observed_channels(subject))
     sites = _sites(subject)
     if len(sites) < 2:
         skip("it states no places of several taxels")
@@ -317,7 +320,7 @@ def sign_is_as_stated(subject: Subject) -> None:
 
     State sign = 1 where the reading rises under load, -1 where it falls, 0 where it does either.
     """
-    channels = wanted_channels(subject)
+    channels = observed_channels(subject)
     names = _names(channels)
     signed = {name for name, channel in zip(names, channels, strict=True) if channel.sign}
     places = [(own, at_mm) for own, at_mm in _places(subject) if signed.intersection(own)]
@@ -342,7 +345,7 @@ def more_load_more_response(subject: Subject) -> None:
     places = _places(subject)
     if not places:
         skip("it states no place of any channel")
-    names = _names(wanted_channels(subject))
+    names = _names(observed_channels(subject))
     own, at_mm = places[0]
     gentle, firm = (np.abs(_response(subject, force_n, at_mm)) for force_n in (0.5, 1.5))
     place = max((names.index(name) for name in own), key=lambda one: float(gentle[one]))
@@ -362,7 +365,7 @@ def shear_turns_with_its_direction(subject: Subject) -> None:
 
     if not subject.descriptor.spec.reads_shear:
         skip("its spec names no kind of channel that reads shear")
-    names = _names(wanted_channels(subject))
+    names = _names(observed_channels(subject))
     at_mm = _places(subject)[0][1] if _places(subject) else None
 
     def added(x: float, s: float) -> FloatArray:
@@ -395,7 +398,7 @@ def _sites(subject: Subject) -> dict[tuple[float, float], list[str]]:
     """Return the names of the taxels at each place on the sheet [mm]."""
     sheet = subject.descriptor.spec.skin.sheet
     sites: dict[tuple[float, float], list[str]] = {}
-    for channel in wanted_channels(subject):
+    for channel in observed_channels(subject):
         if channel.kind == "taxel" and channel.position_m is not None:
             sites.setdefault(on_sheet_mm(sheet, channel.position_m), []).append(channel.name)
     return sites
@@ -403,7 +406,7 @@ def _sites(subject: Subject) -> dict[tuple[float, float], list[str]]:
 
 CHECKS = (
     transducer_builds, transducer_leaves_the_spec_alone, readings_have_the_shape, finite_at_zero_load,
-    finite_over_range, rest_is_as_stated, order_follows_wanted, same_state_same_reading, state_is_not_changed,
+    finite_over_range, rest_is_as_stated, order_follows_the_request, same_state_same_reading, state_is_not_changed,
     it_answers_to_a_press, response_is_where_it_is_pressed, sign_is_as_stated, more_load_more_response,
     shear_turns_with_its_direction,
 )  # fmt: skip

@@ -7,6 +7,7 @@ The order of blocks and lines depends on the rows alone, never on the order they
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,12 +15,16 @@ from typing import Any
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
 from tactbench.core.leaderboard.names import hardware_name, metric_name, sign_of
-from tactbench.core.leaderboard.placing import Placing, errors, places
 from tactbench.core.leaderboard.verdict import verdict_of
+from tactbench.core.statistics.excess import beyond_floor, excess_of
+from tactbench.core.statistics.median import FEWEST
+from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
 _Key = tuple[str, str, str, str]
+MOST_RANKED = 20_000
+"""Answers of one block beyond which comparing all pairs takes too long."""
 
 
 @dataclass(frozen=True)
@@ -37,17 +42,7 @@ class Block:
 def blocks_of(
     rows: Sequence[Row], columns: Sequence[str], letters: Mapping[str, str], times: bool
 ) -> tuple[Block, ...]:
-    """Arrange rows into blocks, ranked.
-
-    Parameters
-    ----------
-    rows
-        In the order of their cells' names.
-    letters
-        The mark of each host.
-    times
-        Whether verdicts may name costs.
-    """
+    """Arrange rows, in the order of their cells' names, into ranked blocks; verdicts name costs only with `times`."""
     blocks = []
     for key, members in sorted(_grouped(rows).items(), key=lambda group: _order(group[0])):
         arranged, unranked = _arranged(members)
@@ -95,7 +90,7 @@ def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, s
     return row["task"], row["protocol"], kind
 
 
-def _arranged(members: Sequence[Row]) -> tuple[list[tuple[Row, Placing | None]], str]:
+def _arranged(members: Sequence[Row]) -> tuple[list[tuple[Row, Rank | None]], str]:
     """Return the rows of a block in order with their places, and why places have no intervals, if so."""
     sign = sign_of(members[0])
 
@@ -123,14 +118,59 @@ def _arranged(members: Sequence[Row]) -> tuple[list[tuple[Row, Placing | None]],
 
 
 def no_better(error: float, sign: float, baseline: float | None) -> bool:
-    """Return whether an answer is no better than the trivial one: it gets no place.
-
-    Parameters
-    ----------
-    error
-        ``sign`` times its score, the lower the better.
-    """
+    """Return whether an answer is no better than the trivial one and gets no place; its error is ``sign`` x score."""
     return baseline is not None and error >= sign * baseline
+
+
+def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
+    """Return where each of `results` stands, by the name of its cell, and why there are no rank intervals, if so.
+
+    They are the finished answers of one block, no baselines, the best score first.
+    """
+    counts = [row.get("n_replicates") for row in results]
+    if any(n is not None and n < FEWEST for n in counts):
+        shared = Rank(1, None, None, len(results) > 1)
+        return dict.fromkeys((row["cell"] for row in results), shared), f"fewer than {FEWEST} replicates carry them"
+    reason = _unrankable(results)
+    if not results or reason:
+        return _by_score(results), reason
+    from tactbench.core.statistics.ranking import ranks  # numerics
+
+    try:
+        return ranks(results), ""
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        # Rows of a stranger's folder: their replicates may be anything.
+        return _by_score(results), f"their replicates cannot be used ({type(error).__name__})"
+
+
+def errors(results: Sequence[Row]) -> list[float]:
+    """Return what answers of one metric are ordered by, the lower the better.
+
+    The score; of errors of force the mean square beyond the floor of the reference, if all of them have one. It may be
+    below zero, where the error beyond the floor is 0: two answers of one sensor differ by more than its floor tells.
+    """
+    if beyond_floor(results):
+        return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]
+    return [sign_of(row) * row["score"] if math.isfinite(row["score"]) else math.inf for row in results]
+
+
+def _unrankable(results: Sequence[Row]) -> str:
+    """Return why places have no intervals, if they have none; a row without replicates enters with its own interval."""
+    if not any(row.get("replicates") for row in results):
+        return "rows keep no replicates" if results else ""
+    if len(results) > MOST_RANKED:
+        return f"there are more than {MOST_RANKED} answers"
+    return "" if all(math.isfinite(row["score"]) for row in results) else "a score is no finite number"
+
+
+def _by_score(results: Sequence[Row]) -> dict[str, Rank]:
+    ordered = errors(results)
+    many = Counter(ordered)
+    first = {error: place for place, error in reversed(list(enumerate(ordered, 1)))}
+    return {
+        row["cell"]: Rank(first[error], None, None, many[error] > 1)
+        for row, error in zip(results, ordered, strict=True)
+    }
 
 
 def _title(key: _Key, members: Sequence[Row]) -> str:

@@ -117,8 +117,7 @@ def _head(table: Table, lines: Sequence[Line]) -> dict[str, Any]:
             for block, first in zip(table.blocks, firsts, strict=True)
         ],
         "columns": [{"name": name, "numeric": name in NUMERIC} for name in table.columns],
-        "roles": {"rank": "#", "sensor": "sensor", "estimator": "estimator", "score": "score",
-                  "interval": "95 % interval", "times": [name for name in DURATIONS if name in table.columns]},
+        "times": [name for name in DURATIONS if name in table.columns],
         "groups": GROUPS,
         "titles": TITLES,
         "notes": notes,
@@ -162,30 +161,19 @@ def deflated(document: Any) -> str:
 
 
 def column(values: Sequence[Any], sort: Sequence[float | None] | None = None) -> dict[str, Any]:
-    """Return a column, one value a row.
+    """Return a column, one value a row as `plain` makes them, with what rows are sorted by, if not by their texts.
 
-    Parameters
-    ----------
-    values
-        As JSON holds them; see `plain`.
-    sort
-        What the rows are sorted by, if not by their texts.
-
-    Returns
-    -------
-    dict
-        ``values``; or, of other than numbers that rows share, ``dictionary`` and ``index``, the place in it of each
-        row's value.
+    It has ``values``; or, of other than numbers that rows share, ``dictionary`` and ``index``, the place in it of each
+    row's value.
     """
     if sort is not None:
         return {"values": list(values), "sort": rounded(sort)}
     if float in set(map(type, values)):
         return {"values": list(values)}
     keys = [id(value) if isinstance(value, list | dict) else (type(value), value) for value in values]
+    each = dict(zip(keys, values, strict=True))
     texts: dict[str, int] = {}
-    places = {
-        key: texts.setdefault(_text(value), len(texts)) for key, value in dict(zip(keys, values, strict=True)).items()
-    }
+    places = {key: texts.setdefault(_text(value), len(texts)) for key, value in each.items()}
     if len(texts) == len(values):
         return {"values": list(values)}
     return {"dictionary": list(map(json.loads, texts)), "index": [places[key] for key in keys]}
@@ -207,10 +195,7 @@ def keys_of(rows: Sequence[Row]) -> set[str]:
 def details(rows: Sequence[Row], room: int) -> tuple[dict[str, str], list[str]]:
     """Return what is known of each cell besides its line in the table, by key, and the keys left out.
 
-    Parameters
-    ----------
-    room
-        Characters for all of it. What does not fit is cut shorter, then left out, the least telling first.
+    All of it takes at most `room` characters: what does not fit is cut shorter, then left out.
     """
     many = len(rows) > MANY
     known = keys_of(rows)

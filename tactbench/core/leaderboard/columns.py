@@ -9,8 +9,8 @@ from typing import Any, Literal, NamedTuple
 from tactbench.core.leaderboard.hosts import timing_mark
 from tactbench.core.leaderboard.levels import KEY as LEVEL
 from tactbench.core.leaderboard.names import answer_name, sensor_name
-from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.spec.status import STOPPED
+from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, tail, whole
 from tactbench.core.tables.text import visible
 
@@ -148,7 +148,7 @@ class Line:
     texts: Mapping[str, str]
     """By column."""
     kind: Kind
-    placing: Placing | None = None
+    placing: Rank | None = None
     """Where it stands in its block; results better than the trivial answer only."""
 
     @property
@@ -164,20 +164,12 @@ class Line:
             return OF_ROWS[column].value(self.row)
         one = self.placing
         if one is None or column == "#":
-            return one and one.place
+            return None if one is None else one.place
         return (one.low + one.high) / 2 if one.low and one.high else None
 
 
-def line_of(row: Row, placing: Placing | None, columns: Sequence[str], letters: Mapping[str, str]) -> Line:
-    """Return the line of a row.
-
-    Parameters
-    ----------
-    placing
-        Where the row stands in its block; None: a baseline, or a cell that did not end well.
-    letters
-        The mark of each host.
-    """
+def line_of(row: Row, placing: Rank | None, columns: Sequence[str], letters: Mapping[str, str]) -> Line:
+    """Return the line of a row; one without a place is a baseline, or did not end well. Hosts have `letters`."""
     texts = {"sensor": sensor_name(row), "estimator": answer_name(row)}
     if row["status"] != "done":
         texts |= {"#": "", "score": row["status"].upper()}
@@ -194,7 +186,7 @@ def line_of(row: Row, placing: Placing | None, columns: Sequence[str], letters: 
     return Line(row, {name: texts[name] for name in columns}, kind, placing)
 
 
-def _place(one: Placing | None, row: Row) -> str:
+def _place(one: Rank | None, row: Row) -> str:
     """Return the place; an answer that is no better than the trivial one has none, nor has an oracle."""
     if one is None and row["is_baseline"]:
         return "oracle" if row.get("looks_at") == "reference" else "base"
@@ -203,7 +195,7 @@ def _place(one: Placing | None, row: Row) -> str:
     return f"{one.place}=" if one.tied else str(one.place)
 
 
-def _range(one: Placing | None) -> str:
+def _range(one: Rank | None) -> str:
     if one is None or one.low is None or one.high is None:
         return ABSENT
     return str(one.low) if one.low == one.high else f"{one.low}–{one.high}"

@@ -14,7 +14,7 @@ from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, answer_o
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
 from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
 from tactbench.core.spec.status import STATUSES, STOPPED
-from tactbench.core.tables.numbers import score, suffix
+from tactbench.core.tables.numbers import score, score_with_unit
 from tactbench.core.tables.text import command_line, cut, visible
 
 Row = Mapping[str, Any]
@@ -97,7 +97,7 @@ def _percentiles(rows: Sequence[Row]) -> list[str]:
     named = _namer(rows)
     found = [
         f"{named(row)}/{answer_name(row)} {score(row['scores'][MEDIAN_ERROR], row['unit'])}, "
-        + _with_unit(row["scores"][HIGH_ERROR], row)
+        + score_with_unit(row["scores"][HIGH_ERROR], row["unit"])
         for row in rows
         if MEDIAN_ERROR in (row["scores"] or {}) and not row["is_baseline"]
     ]
@@ -122,7 +122,7 @@ def _floors(rows: Sequence[Row]) -> list[str]:
 
 def _floor(found: Sequence[float], unit: str) -> str:
     """Return a floor; of several campaigns the root of their mean square."""
-    text = f"{score(math.sqrt(sum(one * one for one in found) / len(found)), unit)}{suffix(unit)}"
+    text = score_with_unit(math.sqrt(sum(one * one for one in found) / len(found)), unit)
     ends = f"{score(min(found), unit)} … {score(max(found), unit)}"
     return text if len(found) == 1 else f"{text} (of {len(found)}: {ends})"
 
@@ -203,7 +203,7 @@ def _no_better(rows: Sequence[Row]) -> list[str]:
             where = question_name(row)
             look = "" if where in probed else f": `{_probing(row)}`"
             name = f"{answer_name(row)} ({row['protocol']}, split {row['split']})"
-            pairs.append(((where, shown, _trivial_name(trivial), _with_unit(bar, row), look), name))
+            pairs.append(((where, shown, _trivial_name(trivial), score_with_unit(bar, row["unit"]), look), name))
     words = {"no better": "no better", "not shown": "not shown to be better"}
     return [
         visible(
@@ -212,10 +212,6 @@ def _no_better(rows: Sequence[Row]) -> list[str]:
         )
         for (where, shown, trivial, value, look), names in distinct(pairs).items()
     ]
-
-
-def _with_unit(value: float | None, row: Row) -> str:
-    return score(value, row["unit"]) + suffix(row["unit"])
 
 
 def _trivial_name(trivial: Row | None) -> str:

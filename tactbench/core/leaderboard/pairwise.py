@@ -105,12 +105,7 @@ def with_declared(
 ) -> list[PairwiseComparison]:
     """Return comparisons with p-values corrected for all comparisons that were declared, whichever of them are shown.
 
-    Parameters
-    ----------
-    found
-        What is shown.
-    rows
-        The whole leaderboard: the family of tests is every declared pair of cells in it.
+    The family of tests is every declared pair of cells in `rows`, the whole leaderboard.
     """
     family: dict[frozenset[str], float | None] = {}
     for choice in declared:
@@ -201,13 +196,10 @@ def _why_not(one: Row, other: Row, first: str, second: str) -> str:
 
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
     """Return a table for each question: task, metric, protocol, split and hardware."""
-    groups: dict[str, list[PairwiseComparison]] = {}
+    groups: dict[str, list[tuple[str, ...]]] = {}
     for pair in comparisons:
-        groups.setdefault(_title(pair), []).append(pair)
-    return [
-        TextTable(title, COLUMNS, tuple(map(_line, members)), frozenset(COLUMNS[1:-1]))
-        for title, members in groups.items()
-    ]
+        groups.setdefault(_title(pair), []).append(_line(pair))
+    return [TextTable(title, COLUMNS, tuple(lines), frozenset(COLUMNS[1:-1])) for title, lines in groups.items()]
 
 
 def _title(pair: PairwiseComparison) -> str:
@@ -228,9 +220,7 @@ def _line(pair: PairwiseComparison) -> tuple[str, ...]:
         pair.of,
         *scores,
         signed(found.value, unit),
-        ABSENT
-        if found.low is None or found.high is None
-        else f"{signed(found.low, unit)} … {signed(found.high, unit)}",
+        " … ".join(signed(end, unit) for end in (found.low, found.high) if end is not None) or ABSENT,
         probability(found.p),
         probability(pair.folds.p) if pair.folds else ABSENT,
         probability(pair.p_corrected) if pair.declared else "exploratory",

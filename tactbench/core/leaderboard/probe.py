@@ -10,9 +10,9 @@ from typing import Any
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
 from tactbench.core.leaderboard.names import answer_name, sensor_name, sign_of
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
-from tactbench.core.tables.numbers import ABSENT, interval, score, suffix
+from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit, suffix
 from tactbench.core.tables.text import visible
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.text_table import Entry, TextTable, sort_value
 
 Row = Mapping[str, Any]
 
@@ -49,7 +49,7 @@ def build_probe(rows: Sequence[Row]) -> TextTable | None:
         shuffled = _probe_of(row, probes, DEPLOYABLE.name, "shuffled")
         if first is None and shuffled is None:
             continue
-        lines.append(tuple(map(visible, _line(row, shuffled, first, best.get(comparison_key(row))))))
+        lines.append(_line(row, shuffled, first, best.get(comparison_key(row))))
         if first is not None and first["status"] == "skipped":
             skipped[visible(f"{row['sensor']}/{row['task']}: {first['reason']}")] = None
     if not lines:
@@ -81,18 +81,17 @@ def _probe_of(row: Row, probes: Mapping[tuple[Any, ...], list[Row]], protocol: s
 def _line(row: Row, shuffled: Row | None, first: Row | None, trivial: Row | None) -> tuple[str, ...]:
     unit = row["unit"]
     found = [*_about_trivial(row, trivial), *_about_first(row, first), *_about_shuffled(row, shuffled)]
-    return (
-        sensor_name(row),
-        row["task"],
-        answer_name(row),
-        row["split"],
-        score(row["score"], unit),
-        interval(row["ci_low"], row["ci_high"], unit),
-        _shown(shuffled),
-        _shown(first),
-        score(row["baseline"], unit) if trivial is None else f"{score(trivial['score'], unit)} {answer_name(trivial)}",
-        "; ".join(found) or "no leak shown",
-    )
+    bar = score(row["baseline"], unit) if trivial is None else f"{score(trivial['score'], unit)} {answer_name(trivial)}"
+    shown = {"shuffled": shuffled, "first frame alone": first}
+    between = interval(row["ci_low"], row["ci_high"], unit)
+    texts = (score(row["score"], unit), between, _shown(shuffled), _shown(first), bar)
+    words = (sensor_name(row), row["task"], answer_name(row), row["split"], "; ".join(found) or "no leak shown")
+    numbers = [
+        Entry(visible(text), sort_value(text), cell=(shown.get(name) or row)["cell"])
+        for name, text in zip(COLUMNS[4:9], texts, strict=True)
+    ]
+    *about, says = map(visible, words)
+    return (*about, *numbers, says)
 
 
 def _shown(row: Row | None) -> str:
@@ -105,7 +104,7 @@ def _about_trivial(row: Row, trivial: Row | None) -> Iterator[str]:
     """Yield that the best trivial answer scores as well, or that the interval does not exclude it."""
     if trivial is None:
         return
-    values = f"{score(trivial['score'], row['unit'])} of {score(row['score'], row['unit'])}{suffix(row['unit'])}"
+    values = f"{score(trivial['score'], row['unit'])} of {score_with_unit(row['score'], row['unit'])}"
     if _skill(trivial["score"], row["score"], row) >= 0:
         yield f"TRIVIAL: {answer_name(trivial)} scores {values}"
     elif against_trivial(row, trivial["score"]):
@@ -118,7 +117,7 @@ def _about_first(row: Row, first: Row | None) -> Iterator[str]:
     if first is None or first["status"] != "done" or trivial is None:
         return
     beyond = _beyond_guessing(first, trivial)
-    says = f"the first frame alone scores {score(first['score'], unit)} of {score(row['score'], unit)}{suffix(unit)}"
+    says = f"the first frame alone scores {score(first['score'], unit)} of {score_with_unit(row['score'], unit)}"
     if beyond is None:
         yield "too few recordings or replicates to say what the first frame tells"
     elif beyond and _skill(first["score"], trivial, row) >= LEAK_SHARE * _skill(row["score"], trivial, row):

@@ -7,48 +7,20 @@ from typing import Any
 
 from tactbench.core.leaderboard.columns import SHOWN, Line
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.spec.row import FORMAT
+from tactbench.core.spec.row import FORMAT, ReplicatedRow, RowModel
 
-JSON_KEYS = (
-    "cell", "sensor", "task", "rig", "protocol", "split", "estimator", "params", "is_baseline", "looks_at",
-    "answer_per", "answer_from", "declared_task",
-    "repeat", "repeats", "seed", "status", "reason", "signal", "metric", "unit", "equivalence", "reference_score",
-    "score", "ci_low", "ci_high", "ci_method", "reference_floor", "score_beyond_floor", "beyond_floor_ci_low",
-    "beyond_floor_ci_high",
-    "true_score", "true_ci_low", "true_ci_high", "tare_s", "baseline", "published",
-    "published_reference", "published_remark", "n_recordings",
-    "n_sessions", "n_train", "n_test", "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50",
-    "latency_ms_p95", "latency_ms_max", "latency_n", "answer_delay_ms", "delay_parts_ms", "threads", "peak_rss_mb",
-    "wall_s", "concurrency", "host", "made_by", "simulated", "emulated",
-    "dagger", "stamps", "remarks", "assumptions", "counts", "chosen", "search", "scores", "fold_sizes", "confusion",
-    "classes", "events", "operating_points", "recordings", "key", "replicates",
-)  # fmt: skip
+_ELSEWHERE = ("simulation", "traceback", "log", "plan", "digests")
+"""What is large or of no use to a program: `why`, the page and the cell's own file have it."""
+_OF_CELL = [key for key in RowModel.model_fields if key not in _ELSEWHERE]
+JSON_KEYS = (*_OF_CELL[:-1], "key", _OF_CELL[-1])
 """Keys of a JSON row, in order."""
-
-OF_REPLICATES = (
-    "n_replicates",
-    "replicate_unit",
-    "replicate_scores",
-    "seeds",
-    "score_min",
-    "score_max",
-    "recordings_right",
-    "recordings_asked",
-)
+OF_REPLICATES = tuple(key for key in ReplicatedRow.model_fields if key not in ("key", *RowModel.model_fields))
 """Keys of a row that stands for all replicates of its cell; they follow."""
-
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
 
 NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key].isdisjoint({list, dict}))
 """Keys whose values are lists or tables: JSON inside a cell of CSV and Parquet."""
-
-OF_THE_MACHINE = frozenset({
-    "sim_s", "search_s", "fit_s", "predict_s", "batch_rows", "latency_ms_p50", "latency_ms_p95",
-    "latency_ms_max", "latency_n", "answer_delay_ms", "delay_parts_ms", "threads", "peak_rss_mb", "wall_s",
-    "concurrency", "host", "made_by", "search", "recordings", "key", "events", "operating_points",
-})  # fmt: skip
-"""Keys that machine, place or hour decide, not the seed alone."""
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "Configuration": (
@@ -70,6 +42,11 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 """Single values; a key that is in no group comes last, so that none is ever left out."""
+
+OF_THE_MACHINE = frozenset(GROUPS["Times and memory"]) | {
+    "delay_parts_ms", "threads", "search", "recordings", "key", "events", "operating_points",
+}  # fmt: skip
+"""Keys that machine, place or hour decide, not the seed alone."""
 
 TITLES = {
     "params": "Parameters other than the defaults",

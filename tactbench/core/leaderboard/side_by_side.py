@@ -8,7 +8,7 @@ from typing import Any
 
 from tactbench.core.leaderboard.names import answer_name, hardware_name, metric_name, sensor_name
 from tactbench.core.tables.numbers import ABSENT, interval, score, signed
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.tables.text_table import Entry, TextTable, finite
 
 Row = Mapping[str, Any]
 
@@ -19,15 +19,7 @@ _NOTE = (
 
 
 def compare(rows: Iterable[Row], by: str) -> list[TextTable]:
-    """Return a table for each task (and whatever else must not be mixed) that was asked in several ways.
-
-    Parameters
-    ----------
-    rows
-        Rows of a leaderboard.
-    by
-        One of `tactbench.core.leaderboard.axes.AXES`.
-    """
+    """Return a table for each task (and whatever else must not be mixed) that was asked in several ways of `AXES`."""
     groups: dict[tuple[Any, ...], list[Row]] = {}
     alike = [key for key in ("protocol", "split") if key != by]
     for row in rows:
@@ -78,11 +70,13 @@ def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> TextTab
 
     lines: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
     by_way: dict[tuple[str, str, str], Row] = {}
+    cells_of: dict[tuple[str, str, str], str] = {}
     for row in members:
         names = sensor_name(row), answer_name(row)
         by_way[*names, str(row.get(by))] = row
         scores = _folds(row) if by == "fold" else {str(row[by]): row["score"]}
         lines.setdefault(names, {}).update({way: _record(row, by, way, value) for way, value in scores.items()})
+        cells_of.update(dict.fromkeys(((*names, way) for way in scores), str(row["cell"])))
     for names, cells in lines.items():
         start = cells.get(ways[0], {}).get("score")
         for way, record in cells.items():
@@ -96,7 +90,10 @@ def _comparison(members: Sequence[Row], by: str, ways: Sequence[str]) -> TextTab
         title=_title(first, by),
         columns=("sensor", "estimator", *ways),
         numeric=frozenset(ways),
-        lines=tuple((*names, *(_text(cells.get(way)) for way in ways)) for names, cells in lines.items()),
+        lines=tuple(
+            (*names, *(_entry(cells.get(way), cells_of.get((*names, way), "")) for way in ways))
+            for names, cells in lines.items()
+        ),
         notes=() if by == "fold" else (_NOTE,),
         records=tuple(cells[way] for cells in lines.values() for way in ways if way in cells),
     )
@@ -127,9 +124,11 @@ def _title(row: Row, by: str) -> str:
     return " · ".join([*parts, hardware_name(row), f"by {by}"])
 
 
-def _text(record: Mapping[str, Any] | None) -> str:
-    if record is None:
-        return ABSENT
+def _entry(record: Mapping[str, Any] | None, cell: str) -> Entry:
+    return Entry(_text(record), finite(record["score"]), cell=cell) if record else Entry(ABSENT)
+
+
+def _text(record: Mapping[str, Any]) -> str:
     if record["score"] is None:
         return str(record["status"]).upper()
     unit = record["unit"]

@@ -8,10 +8,10 @@ from operator import itemgetter
 from typing import Any
 
 from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sign_of
-from tactbench.core.leaderboard.placing import Placing
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
-from tactbench.core.tables.numbers import interval, score, suffix
+from tactbench.core.statistics.rank import Rank
+from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import visible
 
 Row = Mapping[str, Any]
@@ -28,27 +28,20 @@ comparison_key = itemgetter("sensor", "task", "rig", "protocol", "split")
 
 
 def verdict_of(
-    ranked: Sequence[tuple[Row, Placing]], below: int, trivial: Sequence[Row] = (), *, times: bool = True
+    ranked: Sequence[tuple[Row, Rank]], below: int, trivial: Sequence[Row] = (), *, times: bool = True
 ) -> tuple[str, ...]:
     """Return sentences on the answers of one block: who is best, how well that is resolved, what it hangs on.
 
+    The first is one of three verdicts: a clear winner, a tie at the top, not enough to tell. Where intervals allow it,
+    then how many neighbouring rows are separable, whether the first place hangs on one replicate and between what
+    scores single ones lie; then answers that need no touch, and where published figures lie.
+
     Parameters
     ----------
-    ranked
-        Answers that have a place, in order.
-    below
-        How many answers are no better than the trivial one.
-    trivial
-        The trivial answers of the block.
+    ranked, below, trivial
+        Answers that have a place, in order; how many are no better than the trivial one; the trivial ones.
     times
         Whether costs may be named: no seed decides them.
-
-    Returns
-    -------
-    tuple of str
-        One of three verdicts (a clear winner; a tie at the top; not enough to tell), then, where intervals allow it,
-        how many neighbouring rows are separable, whether the first place hangs on one replicate and between what scores
-        single ones lie; then answers that need no touch, and where published figures lie.
     """
     if not ranked:
         return (_none_better(below, trivial),) if below else ()
@@ -60,7 +53,7 @@ def verdict_of(
     leaders = [place for place, (_, one) in enumerate(ranked) if not one.behind]
     best = rows[0]
     if may_be_trivial(best):
-        bar = score(best["baseline"], best["unit"]) + suffix(best["unit"])
+        bar = score_with_unit(best["baseline"], best["unit"])
         sentence = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {bar}."
     elif len(rows) == 1:
         sentence = f"{names[0]}: {_measured(best)}, the only answer better than {_bar(best, trivial)}."
@@ -116,12 +109,9 @@ def _without_touch(rows: Sequence[Row], trivial: Sequence[Row]) -> list[str]:
     if not found or best.get("looks_at") == "time":
         return []
     one = min(found, key=lambda row: sign * row["score"])
-    known = f"{answer_name(one)} reads no sensor, only the time since the press began, and scores {_score(one)}"
+    scores = score_with_unit(one["score"], one["unit"])
+    known = f"{answer_name(one)} reads no sensor, only the time since the press began, and scores {scores}"
     return [f"{known}: every recording is pressed alike, so these scores need no touch."]
-
-
-def _score(row: Row) -> str:
-    return score(row["score"], row["unit"]) + suffix(row["unit"])
 
 
 def _too_few(rows: Sequence[Row], names: Sequence[str]) -> str:
@@ -153,7 +143,7 @@ def _measured(row: Row) -> str:
         over = counted(n, str(unit)) if n else "replicates"
         held = f" ({percent(n, unit)} over {over}: {interval(low, high, row['unit'])})"
     name = METRIC_NAMES.get(row["metric"], visible(str(row["metric"])))
-    return f"{name} {score(row[value], row['unit'])}{suffix(row['unit'])}{what}{held}"
+    return f"{name} {score_with_unit(row[value], row['unit'])}{what}{held}"
 
 
 def may_be_trivial(row: Row) -> bool:
@@ -203,7 +193,9 @@ def _bar(row: Row, trivial: Sequence[Row]) -> str:
 def _none_better(below: int, trivial: Sequence[Row]) -> str:
     """Return that no answer scores better than the trivial ones that look at as much."""
     rows = list(best_trivials(row for row in trivial if row.get("looks_at") != "time").values())
-    bars = [f"{name} {_score(row)}" for name, row in zip(_names(rows), rows, strict=True)]
+    bars = [
+        f"{name} {score_with_unit(row['score'], row['unit'])}" for name, row in zip(_names(rows), rows, strict=True)
+    ]
     return f"None of {below} answers scores better than the trivial one{': ' * bool(bars)}{', '.join(bars)}."
 
 
@@ -218,7 +210,7 @@ def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:
     return ""
 
 
-def _resolution(ranked: Sequence[tuple[Row, Placing]], leaders: int, names: Sequence[str]) -> str:
+def _resolution(ranked: Sequence[tuple[Row, Rank]], leaders: int, names: Sequence[str]) -> str:
     """Return how many neighbours can be told apart, and whether the first place hangs on one replicate."""
     apart = sum(one.apart for _, one in ranked)
     behind = len(ranked) - leaders

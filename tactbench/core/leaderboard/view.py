@@ -106,19 +106,13 @@ def _grid(block: Block, view: View) -> TextTable:
     )
 
 
-def full_grid(block: Block, anchors: Mapping[str, str] | None = None) -> TextTable:
-    """Return a block with every column, what numbers are sorted by, and why cells did not end well.
-
-    Parameters
-    ----------
-    anchors
-        Where a page tells more about a cell, by its name.
-    """
+def full_grid(block: Block) -> TextTable:
+    """Return a block with every column, what numbers are sorted by, and why cells did not end well."""
     lines = []
     for line in block.lines:
-        anchor = (anchors or {}).get(line.row["cell"], "")
+        cell = line.row["cell"]
         texts = [
-            Entry(text, finite(line.value(name)), anchor) if name in NUMERIC and text not in ("", ABSENT) else text
+            text if name not in NUMERIC or text in ("", ABSENT) else Entry(text, finite(line.value(name)), cell=cell)
             for name, text in line.texts.items()
         ]
         why = "" if line.row["status"] == "done" else visible(f"{line.row['status']}: {line.row['reason']}")

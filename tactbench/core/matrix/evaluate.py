@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import PluginContractError
-from tactbench.core.matrix.engine import EngineChoice
+from tactbench.core.matrix.context import RunContext
 from tactbench.core.matrix.evaluate_cell import (
     Job,
     dataset,
@@ -20,13 +20,10 @@ from tactbench.core.matrix.evaluate_cell import (
     this_host,
     unanswered,
 )
-from tactbench.core.matrix.key_book import KeyBook
-from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell, task_of
-from tactbench.core.matrix.plan_recordings import RecordingPlan, request_key
-from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.recorded import Recorded, read_all, read_digest
-from tactbench.core.matrix.store import NotPlainError, Row, Store
+from tactbench.core.matrix.plan_recordings import request_key
+from tactbench.core.matrix.recorded import read_all, read_digest
+from tactbench.core.matrix.store import NotPlainError, Row
 from tactbench.core.matrix.why import beside, cell_entries
 from tactbench.core.plugins.registry import installed
 from tactbench.core.pool.in_process import InProcess
@@ -41,38 +38,21 @@ if TYPE_CHECKING:
     from tactbench.core.matrix.dask import Dask
 
 
-def evaluate_all(
-    cells: Sequence[Cell],
-    recording_plan: RecordingPlan,
-    book: KeyBook,
-    keys: Keys,
-    choice: EngineChoice,
-    store: Store,
-    made_by: str,
-    progress: Progress,
-    stage: str = "evaluating",
-) -> tuple[dict[str, Row], int]:
-    """Give every cell its row: found in `store`, computed now, or saying why it could not be.
-
-    Parameters
-    ----------
-    made_by
-        Id of this run's provenance.
-    stage
-        What the progress calls this.
+def evaluate_all(run: RunContext, cells: Sequence[Cell], stage: str) -> tuple[list[Row], int]:
+    """Give every cell its row: found in the store, computed now, or saying why it could not be.
 
     Returns
     -------
     rows, computed
-        By name of the cell; how many were not found finished.
+        In the order of the cells; how many were not found finished.
     """
-    recorded, paths = recording_plan.recorded, recording_plan.paths
+    store, recorded, choice, progress = run.store, run.recorded, run.choice, run.progress
+    paths, troubles = run.recording_plan.paths, run.recording_plan.troubles
     rows: dict[str, Row] = {}
     key_of: dict[str, str] = {}
     jobs: list[Job] = []
     stopped: list[tuple[Cell, BaseException]] = []
     """Cells without their recordings."""
-    troubles = recording_plan.troubles
     needed = {path: None for need in map(request_key, cells) if need not in troubles for path in paths[need]}
     unreadable = read_all(read_digest, recorded.unread(needed, "digest"), recorded, choice.limits)
     for cell in cells:
@@ -81,7 +61,7 @@ def evaluate_all(
         if trouble is None:
             try:
                 digests = tuple(recorded.digest(path) for path in paths[need])
-                key_of[cell.name] = keys.of_cell(cell, digests)
+                key_of[cell.name] = run.keys.of_cell(cell, digests)
             except Exception as error:
                 trouble = error
         if trouble is not None:
@@ -98,10 +78,9 @@ def evaluate_all(
     if computed:
         progress.begin(stage, computed, alone=isinstance(engine, InProcess))
     keyed = ((job.cell, key_of[job.cell.name], job.recordings) for job in jobs)
-    book.write(cell_entries(keyed, keys, recorded, store.folder))
+    run.book.write(cell_entries(keyed, run.keys, recorded, store.folder))
     for cell, trouble in stopped:
-        known = {"key": "", "made_by": made_by, "host": this_host()}
-        rows[cell.name] = store.note({**unanswered(cell, trouble), **known})
+        rows[cell.name] = _kept(run, cell, trouble, "")
         progress.advance(cell.name, stopped=rows[cell.name]["status"] in STOPPED)
     for _ in range(2):  # a cell may have written over the shard of an earlier one, which is then computed again
         engine = choice.engine(len(jobs))
@@ -109,24 +88,24 @@ def evaluate_all(
         work = partial(solve, concurrency=max(1, min(choice.jobs, len(jobs))), working=working)
         with closing(engine.each(work, _ordered(jobs, engine, choice.limits))) as outcomes:
             for job, outcome in outcomes:
-                known = {"key": key_of[job.cell.name], "made_by": made_by, "host": this_host()}
-                rows[job.cell.name] = _kept(job.cell, outcome, known, recorded, store)
+                rows[job.cell.name] = _kept(run, job.cell, outcome, key_of[job.cell.name])
                 progress.advance(job.cell.name, stopped=rows[job.cell.name]["status"] in STOPPED)
         done = [job for job in jobs if rows[job.cell.name]["status"] == "done"]
         jobs = [job for job in done if store.finished(key_of[job.cell.name]) is None]
         if not jobs:
             break
-    return rows, computed
+    return [rows[cell.name] for cell in cells], computed
 
 
-def _kept(cell: Cell, outcome: Any, known: Row, recorded: Recorded, store: Store) -> Row:
+def _kept(run: RunContext, cell: Cell, outcome: Any, key: str) -> Row:
     """Write the row of a cell, and return it as the store will give it back.
 
-    What stopped the cell, or what is wrong with its result, makes the row. `known` is what rows say that the run knows,
-    and their cells do not.
+    What stopped the cell, or what is wrong with its result, makes the row.
     """
     from tactbench.core.matrix.checking import fault_in
 
+    store = run.store
+    known = {"key": key, "made_by": run.made_by, "host": this_host()}  # what the run knows, and its cells do not
     if isinstance(outcome, BaseException):
         return store.note({**unanswered(cell, outcome), **known})
     fault = fault_in(outcome, opening(cell, task_of(cell, installed())))
@@ -134,7 +113,7 @@ def _kept(cell: Cell, outcome: Any, known: Row, recorded: Recorded, store: Store
         row, columns = outcome
         paths = [Path(path) for path in row["recordings"]]
         row |= {**known, "host": row["host"] or known["host"]}
-        row["digests"] = [recorded.digest(path) for path in paths]
+        row["digests"] = [run.recorded.digest(path) for path in paths]
         row["recordings"] = [beside(path, store.folder) for path in paths]
         try:
             return store.keep(row["key"], row, {role: Answers(**columns[role]) for role in columns})

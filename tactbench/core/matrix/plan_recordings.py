@@ -60,7 +60,7 @@ def requests_for(
             continue
         requests[needed] = []
         for planned in in_drawn_order(task_of(cell, registry).scenes_for(needed[2]), cell.seed):
-            scene = planned.scene.asked(simulation)
+            scene = planned.scene.simulated_as(simulation)
             key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
             path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
             requests[needed].append(
@@ -114,8 +114,6 @@ ACQUIRED_SPLITS = ("roles", "session", "recording", "unit", "in-session", "shuff
 class RecordingPlan:
     """Where the recordings of cells come from."""
 
-    recorded: Recorded
-    """What is known of recordings, those made now among them."""
     requests: dict[RequestKey, list[RecordingRequest]] = field(default_factory=dict)
     """What a rig has to record."""
     paths: dict[RequestKey, list[Path]] = field(default_factory=dict)
@@ -142,7 +140,7 @@ def plan_run(
     UsageError
         If the matrix asks for something that is not there.
     """
-    recording_plan = RecordingPlan(recorded)
+    recording_plan = RecordingPlan()
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     if not registry.rigs[matrix.rig].simulated:  # a simulated one replays nothing: it is built when it has to record
         ((_, paths),) = Pool(1, limits, reuse=True).each(_replayed, [(matrix.rig, recordings, rig_file)])
@@ -154,7 +152,7 @@ def plan_run(
             recording_plan.troubles = {request_key(cell): paths for cell in cells}
             return cells, recording_plan
         if paths is not None:
-            return _from_replay(matrix, registry, [Path(path) for path in paths], recording_plan, limits)
+            return _from_replay(matrix, registry, [Path(path) for path in paths], recorded, limits)
     if not matrix.sensors:
         raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
     cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry, rig_file)
@@ -169,12 +167,11 @@ def plan_run(
 
 
 def _from_replay(
-    matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], recording_plan: RecordingPlan, limits: Limits
+    matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], recorded: Recorded, limits: Limits
 ) -> tuple[list[Cell], RecordingPlan]:
     """Return the cells of recordings that exist; a child process reads them, so that a damaged one breaks nothing."""
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
-    recorded = recording_plan.recorded
     broken = read_all(read_sensor_and_scene, recorded.unread(paths, "sensor"), recorded, limits)
     scenes: dict[str, dict[Path, str | None]] = {}
     unreadable: dict[str, dict[Path, BaseException]] = {}
@@ -189,6 +186,7 @@ def _from_replay(
         if name not in known:
             raise UnknownNameError("sensor in these recordings", name, known)
     cells = plan_cells(matrix, matrix.sensors or known, registry)
+    recording_plan = RecordingPlan()
     for key in dict.fromkeys(request_key(cell) for cell in cells):
         sensor, task, split, _ = key
         recording_plan.paths[key], trouble = _serving(

@@ -12,13 +12,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from tactbench.core.errors import UnwritableError
-from tactbench.core.matrix.engine import EngineChoice
+from tactbench.core.matrix.context import RunContext
 from tactbench.core.matrix.installed import rig_of
-from tactbench.core.matrix.key_book import KeyBook
-from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
-from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, request_key
-from tactbench.core.matrix.progress import Progress
+from tactbench.core.matrix.plan_recordings import RecordingRequest, request_key
 from tactbench.core.matrix.recorded import stat_of
 from tactbench.core.matrix.why import recording_entry
 from tactbench.core.plugins.interfaces import Operator, Rig
@@ -30,17 +27,8 @@ GRACE_S = 5.0
 """Seconds that a real rig has to stand still and let go of its devices when its time is up."""
 
 
-def acquire_missing(
-    recording_plan: RecordingPlan,
-    cells: Sequence[Cell],
-    book: KeyBook,
-    keys: Keys,
-    choice: EngineChoice,
-    progress: Progress,
-    operator: Operator | None = None,
-    stage: str = "recording",
-) -> None:
-    """Make the recordings that `cells` lack, and note in `recording_plan` which were made and what went wrong.
+def acquire_missing(run: RunContext, cells: Sequence[Cell], operator: Operator | None, stage: str) -> None:
+    """Make the recordings that `cells` lack, and note in the recording plan what went wrong.
 
     Simulations do not disturb each other and are not timed by the wall: they use all cores; so are emulated devices in
     virtual time. A real rig does one scene at a time, and is asked to end before it is ended. A scene that its process
@@ -60,14 +48,15 @@ def acquire_missing(
         If the disk refuses them.
     """
     needs = dict.fromkeys(map(request_key, cells))
-    recorded, refused = recording_plan.recorded, dict[Path, BaseException]()
+    recording_plan, recorded, progress = run.recording_plan, run.recorded, run.progress
+    refused: dict[Path, BaseException] = {}
     unique = {request.path: request for need in needs for request in recording_plan.requests.get(need, ())}
     missing = [request for path, request in unique.items() if not path.exists()]
     if not missing:
         return
-    book.write(recording_entry(request, keys) for request in missing)
+    run.book.write(recording_entry(request, run.keys) for request in missing)
     simulated = all(_computed(request) for request in missing)
-    workers = min(max(choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
+    workers = min(max(run.choice.jobs, os.cpu_count() or 1), len(missing)) if simulated else 1
     progress.begin(stage, len(missing), alone=False)
     outcomes: Generator[tuple[RecordingRequest, str | BaseException], None, None]
     try:
@@ -79,7 +68,7 @@ def acquire_missing(
             if own and simulated:
                 import_own_rigs({one.rig for one in missing})
             # What an import of somebody else's changes in its process, it changes for one recording.
-            limits = replace(choice.limits, grace_s=0.0 if simulated else GRACE_S)
+            limits = replace(run.choice.limits, grace_s=0.0 if simulated else GRACE_S)
             outcomes = Pool(workers, limits, reuse=own).each(record, missing)
         with closing(outcomes):
             for request, outcome in outcomes:

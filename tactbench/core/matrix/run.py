@@ -10,6 +10,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+from tactbench.core.matrix.context import RunContext
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluate import evaluate_all
 from tactbench.core.matrix.key_book import KeyBook
@@ -93,10 +94,12 @@ def run_matrix(
         registry = with_declared(installed(), declared_in(recordings))
         keys = Keys(registry)
         recorded = Recorded(store.folder / "cache" / "recordings.json")
-        book = KeyBook(store.folder / "cache" / "keys")
         cells, recording_plan = plan_run(matrix, registry, keys, store, recordings, recorded, choice.limits)
         provenance = gather(keys.sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
-        made_by = store.begin(provenance)
+        run = RunContext(
+            store, keys, KeyBook(store.folder / "cache" / "keys"), recording_plan, recorded, choice, progress,
+            made_by=store.begin(provenance),
+        )  # fmt: skip
         rows: list[Row] = []
         computed = 0
         # Between replicates nothing is under way, so that a table can be shown. A cluster takes seconds to start, and
@@ -107,11 +110,9 @@ def run_matrix(
             rounds = [list(some) for _, some in groupby(sorted(cells, key=number_of), key=number_of)]
         for number, some in enumerate(rounds, 1):
             prefix = f"replicate {number} of {len(rounds)}: " if len(rounds) > 1 else ""
-            acquire_missing(recording_plan, some, book, keys, choice, progress, operator, stage=f"{prefix}recording")
-            found, now = evaluate_all(
-                some, recording_plan, book, keys, choice, store, made_by, progress, stage=f"{prefix}evaluating"
-            )
-            rows += [found[cell.name] for cell in some]
+            acquire_missing(run, some, operator, stage=f"{prefix}recording")
+            found, now = evaluate_all(run, some, stage=f"{prefix}evaluating")
+            rows += found
             computed += now
             if shown is not None and now and number < len(rounds):
                 shown(tuple(rows))

@@ -143,8 +143,8 @@ class Transducer(Protocol):
 class TransducerFactory(Protocol):
     """What ``SensorDescriptor.transducer`` names."""
 
-    def __call__(self, sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> Transducer:
-        """Prepare for `grid` and the channels named in `wanted`; raises RigError for a channel it cannot give."""
+    def __call__(self, sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> Transducer:
+        """Prepare for `grid` and the channels of `channel_names`; raises RigError for a channel it cannot give."""
 
 
 class Reason(NamedTuple):
@@ -227,7 +227,7 @@ class Estimator(Protocol):
 class Operator(Protocol):
     """Whoever stands at a rig of real devices."""
 
-    def asked(self, text: str) -> None:
+    def prompt(self, text: str) -> None:
         """Show what is to be done, and return when it is; raises RigError if nobody is there to do it."""
 
 

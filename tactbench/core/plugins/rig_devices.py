@@ -134,7 +134,7 @@ def ask_operator(file: RigFile, operator: Operator | None, doing: str, text: str
             f"Somebody has to {doing}: {text}",
             hint="Start it at a terminal, or use a rig file with emulated devices.",
         )
-    operator.asked(text)
+    operator.prompt(text)
 
 
 def emulation_of(file: RigFile, identity: Mapping[str, Mapping[str, str]]) -> Emulation | None:

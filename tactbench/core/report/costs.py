@@ -1,4 +1,4 @@
-"""What accuracy costs in time: what `tactbench cost` has written."""
+"""What accuracy costs in time: what `tactbench cost` has written, and its ladder as the terminal shows it too."""
 
 from __future__ import annotations
 
@@ -9,10 +9,71 @@ from typing import Any
 
 from tactbench.core.cost.ladder_file import VERSION
 from tactbench.core.files import read_regular
-from tactbench.core.report.ladder_table import COLUMNS, SORTED_BY, line, title
+from tactbench.core.leaderboard.names import METRIC_NAMES
 from tactbench.core.report.section import Picture, ReportData, Section
+from tactbench.core.tables.numbers import delay, duration, interval, score, tail
 from tactbench.core.tables.text import command_line
 from tactbench.core.tables.text_table import ABSENT, Entry, TextTable, finite, text_table
+
+COLUMNS = (
+    "estimator", "score", "95 % interval", "fit", "quartiles", "delay", "latency p50", "p95", "batch/row", "data",
+    "front", "100 Hz loop", "1 kHz loop", "remark",
+)  # fmt: skip
+RIGHT = ("score", "fit", "delay", "latency p50", "p95", "batch/row", "data")
+
+SORTED_BY = {
+    "score": "score", "95 % interval": "ci_low", "fit": "fit_s", "quartiles": "fit_s_q1",
+    "delay": "answer_delay_ms", "latency p50": "latency_ms_p50", "p95": "latency_ms_p95",
+    "batch/row": "batch_s_per_row", "data": "data_s",
+}  # fmt: skip
+"""Column -> key of the number behind it."""
+
+
+def title(about: Mapping[str, Any]) -> str:
+    """Return what holds for all rows: question, metric, protocol, rounds, threads."""
+    better = "higher" if about["higher_is_better"] else "lower"
+    simulated = f" · SIM ({about['rig']})" if about["simulated"] else ""
+    dagger = " †" if about["dagger"] else ""
+    threads = "1 thread" if about["threads"] == 1 else f"{about['threads']} threads"
+    metric = METRIC_NAMES.get(about["metric"], about["metric"])
+    return (
+        f"{about['sensor']}, {about['task']}: {metric}, {better} is better · "
+        f"{about['protocol']}{dagger} · split {about['split']}{simulated} · {about['rounds']} rounds, {threads}"
+    )
+
+
+def line(row: Mapping[str, Any], unit: str) -> dict[str, str]:
+    """Return one estimator's texts by column; what was not measured is left out."""
+    what = "oracle" if row.get("looks_at") == "reference" else "trivial"
+    name = f"{row['estimator']} ({what})" if row["is_baseline"] else row["estimator"]
+    remark = "; ".join((*([f"{row['status']}: {row['reason']}"] if row["status"] != "done" else []), *row["notes"]))
+    texts = {"estimator": name, "remark": remark}
+    if row["score"] is not None:
+        texts |= {"score": score(row["score"], unit), "95 % interval": interval(row["ci_low"], row["ci_high"], unit)}
+    if row["fit_s"] is None:
+        return texts
+    fronts = [what for what, on in (("fit", row["front_fit"]), ("delay", row["front_delay"])) if on]
+    return texts | {
+        "fit": duration(row["fit_s"]),
+        "quartiles": f"{duration(row['fit_s_q1'])} … {duration(row['fit_s_q3'])}",
+        "delay": delay(row["answer_delay_ms"], row["delay_parts_ms"]),
+        "latency p50": duration(row["latency_ms_p50"] / 1e3),
+        "p95": tail(row["latency_ms_p95"], row["latency_ms_max"], row["latency_n"]),
+        "batch/row": duration(row["batch_s_per_row"]),
+        "data": duration(row["data_s"]),
+        "front": ", ".join(fronts),
+        "100 Hz loop": _verdict(row, "loop_100_hz"),
+        "1 kHz loop": _verdict(row, "loop_1000_hz"),
+    }
+
+
+def _verdict(row: Mapping[str, Any], loop: str) -> str:
+    """Return whether the answer keeps up with a loop; if not, which part of its delay is the longest."""
+    if row[loop] is None:
+        return ""
+    parts = row["delay_parts_ms"]
+    return "yes" if row[loop] else f"no ({max(parts, key=parts.__getitem__)})"
+
 
 FOLDER = "cost"
 _MOST_BYTES = 2**24

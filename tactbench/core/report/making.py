@@ -12,12 +12,10 @@ from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.records import JSON_KEYS
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.calibrated import Calibrated
-from tactbench.core.report.figures.sensitivity import draw_sensitivity
+from tactbench.core.report.figures.saving import draw_sensitivity
 from tactbench.core.report.page import make_page
-from tactbench.core.report.published import published_table
-from tactbench.core.report.reproduction import records, reproduce
-from tactbench.core.report.results import Results
-from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.report.published import published_table, records, reproduce
+from tactbench.core.report.results import Results, SavedFigure
 from tactbench.core.report.section import ReportData
 from tactbench.core.tables.text_table import TextTable
 

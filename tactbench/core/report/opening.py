@@ -10,9 +10,8 @@ from tactbench.core.files import read_regular
 from tactbench.core.provenance.source import RELEVANT
 from tactbench.core.report.figures.published_and_ours import COLUMN
 from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
-from tactbench.core.report.leaderboards import block_anchor
-from tactbench.core.report.reproduction import reproduce
-from tactbench.core.report.section import Highlight, Picture, ReportData, Section
+from tactbench.core.report.published import reproduce
+from tactbench.core.report.section import Highlight, Picture, ReportData, Section, block_anchor
 from tactbench.core.tables.numbers import score
 from tactbench.core.tables.text_table import Entry, TextTable, text_table
 

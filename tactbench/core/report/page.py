@@ -2,19 +2,51 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from tactbench.core.leaderboard.view import full_grid
 from tactbench.core.report.cells import cells_section
 from tactbench.core.report.compared import compared_section
 from tactbench.core.report.costs import costs_section
+from tactbench.core.report.figures.published_and_ours import COLUMN
+from tactbench.core.report.figures.published_and_ours import NAME as PUBLISHED
 from tactbench.core.report.findings import findings_section
-from tactbench.core.report.leaderboards import leaderboards_section
 from tactbench.core.report.opening import about_section, answers_section
-from tactbench.core.report.pictures import pictures_section
 from tactbench.core.report.published import published_section
-from tactbench.core.report.section import Maker, ReportData, Section
+from tactbench.core.report.results import SavedFigure
+from tactbench.core.report.section import Maker, Picture, ReportData, Section, block_anchor
 from tactbench.core.report.sensors import sensors_section
 from tactbench.core.tables.html import render
+
+
+def leaderboards_section(subject: ReportData) -> Section:
+    """Return the section of leaderboards, failed and skipped cells with their reasons."""
+    table = subject.leaderboard
+    tables = tuple(
+        replace(subject.linked(full_grid(block)), anchor=block_anchor(place))
+        for place, block in enumerate(table.blocks)
+    )
+    paragraphs = ("Click a heading to sort by it; click it again to turn the order round.",)
+    return Section("leaderboards", "Leaderboards", paragraphs=paragraphs, tables=tables, notes=table.notes)
+
+
+def picture(one: SavedFigure, subject: ReportData) -> Picture:
+    """Return a figure with the cells that it shows."""
+    by_key = {row["key"]: row["cell"] for row in subject.rows if row["key"]}
+    cells = tuple((by_key[key], subject.anchors[by_key[key]]) for key in one.keys if key in by_key)
+    return Picture(one.title, one.caption, one.png.read_bytes(), cells)
+
+
+def pictures_section(subject: ReportData) -> Section:
+    """Return the section of figures: those that were drawn for this page."""
+    drawn = [one for one in subject.drawn if one.name not in (PUBLISHED, COLUMN)]
+    if not drawn:
+        none = "None was drawn from these results: `tactbench run` makes what the paper's figures show."
+        return Section("figures", "Figures", missing=subject.undrawn or (none,))
+    pictures = tuple(picture(one, subject) for one in drawn)
+    paragraphs = ("The same figures lie beside this page as `figures/*.pdf` and `figures/*.png`.",)
+    return Section("figures", "Figures", paragraphs=paragraphs, pictures=pictures, missing=subject.undrawn)
+
 
 TITLE = "tactbench: tactile sensors, what they answer and what it costs"
 

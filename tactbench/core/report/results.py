@@ -1,4 +1,4 @@
-"""What a report is made of: finished cells, what they answered, and the recordings behind them."""
+"""What a report is made of: finished cells, what they answered, the recordings behind them, and figures of them."""
 
 from __future__ import annotations
 
@@ -76,3 +76,18 @@ def open_results(store: Store, registry: Registry) -> Results:
     over = with_levels(over_replicates(good), store.folder, store.provenance)
     shown = (*over, *(row for row in rows if id(row) not in known))
     return Results(store, with_declared_of(registry, shown), shown, {str(row.get("key", "")): row for row in good})
+
+
+@dataclass(frozen=True)
+class SavedFigure:
+    """One figure."""
+
+    name: str
+    """Short, fit for a file name and an anchor: ``force-against-time``."""
+    title: str
+    caption: str
+    """What is on the axes and how to read it, in sentences a paper could use."""
+    png: Path
+    pdf: Path
+    keys: tuple[str, ...]
+    """Keys of the cells it shows."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,8 @@ from typing import Any
 from tactbench.core.leaderboard.names import answer_name
 from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.report.calibrated import Calibrated
-from tactbench.core.report.results import Results
-from tactbench.core.report.saved_figure import SavedFigure
-from tactbench.core.tables.text_table import TextTable
+from tactbench.core.report.results import Results, SavedFigure
+from tactbench.core.tables.text_table import Entry, TextTable
 
 Row = Mapping[str, Any]
 _DESCRIBED = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "seed")
@@ -56,6 +55,17 @@ class ReportData:
                 anchor, count = f"{stem}-{count}", count + 1
             found[row["cell"]] = anchor
         return found
+
+    def linked(self, table: TextTable) -> TextTable:
+        """Return a table whose numbers lead to the cells that they are from."""
+        lines = tuple(
+            tuple(
+                Entry(one, one.value, self.anchors.get(one.cell, "")) if isinstance(one, Entry) and one.cell else one
+                for one in line
+            )
+            for line in table.lines
+        )
+        return replace(table, lines=lines)
 
     def anchor_of(self, facts: Mapping[str, Any]) -> str:
         """Return the anchor of the one cell that `facts` describe: by name, by key, or by what was asked of whom.
@@ -135,3 +145,8 @@ class Section:
 
 
 Maker = Callable[[ReportData], Section]
+
+
+def block_anchor(place: int) -> str:
+    """Return where the page shows the block at this place of the table."""
+    return f"leaderboard-{place + 1}"

@@ -39,7 +39,8 @@ class RowModel(BaseModel):
     """One cell. Times are seconds unless the name says otherwise; a row may have other keys, of which nothing is asked.
 
     Rows are handed about as plain mappings; this model says what they hold, what stands there before anything is known,
-    and checks what comes from a file. Each row has dictionaries and lists of its own: pydantic copies empty defaults.
+    and checks what comes from a file. Tables for programs have its keys in this order. Each row has dictionaries and
+    lists of its own: pydantic copies empty defaults.
     """
 
     model_config = ConfigDict(extra="allow", strict=True, defer_build=True)
@@ -48,7 +49,6 @@ class RowModel(BaseModel):
     cell: str
     sensor: str = ""
     task: str = ""
-    declared_task: str = ""
     rig: str = ""
     protocol: str = ""
     split: str | None = None
@@ -58,6 +58,7 @@ class RowModel(BaseModel):
     looks_at: str = ""
     answer_per: str = "sample"
     answer_from: str = ""
+    declared_task: str = ""
     repeat: int = 1
     repeats: int = 1
     seed: int = 0
@@ -122,7 +123,6 @@ class RowModel(BaseModel):
     counts: Numbers = {}
     chosen: Numbers = {}
     search: list[dict[str, Any]] = []
-    recordings: list[str] = []
     digests: list[str] = []
     scores: Numbers = {}
     fold_sizes: dict[str, Any] = {}
@@ -130,6 +130,7 @@ class RowModel(BaseModel):
     classes: list[str | bool | int | float] = []
     events: Numbers = {}
     operating_points: list[Numbers] = []
+    recordings: list[str] = []
     replicates: dict[str, Any] = {}
 
 
@@ -139,12 +140,12 @@ class ReplicatedRow(RowModel):
     key: str = ""
     n_replicates: int | None = None
     replicate_unit: str | None = None
+    replicate_scores: list[float] | None = None
+    seeds: list[float] | None = None
     score_min: float | None = None
     score_max: float | None = None
     recordings_right: float | None = None
     recordings_asked: float | None = None
-    replicate_scores: list[float] | None = None
-    seeds: list[float] | None = None
 
 
 def fault_in_scores(row: Mapping[str, Any]) -> str:

@@ -287,7 +287,7 @@ class Scene(Frozen):
             scene = _with(scene, way, given)
         return scene
 
-    def asked(self, simulation: Simulation) -> Scene:
+    def simulated_as(self, simulation: Simulation) -> Scene:
         """Return the scene as a simulated rig is asked to carry it out; raises as `with_nuisances`."""
         if simulation == Simulation():
             return self

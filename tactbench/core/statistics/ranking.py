@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,29 +12,12 @@ from tactbench.core.samples import FloatArray, IntArray
 from tactbench.core.statistics.excess import beyond_floor, excess_of
 from tactbench.core.statistics.influence import PairableRows, scores_of, together
 from tactbench.core.statistics.leaving_out import best_without
+from tactbench.core.statistics.rank import Rank
 from tactbench.core.statistics.student import NORMAL, quantile
 
 Row = Mapping[str, Any]
 _STRIP = 64
 """Cells compared with all others at once: what a processor keeps at hand."""
-
-
-@dataclass(frozen=True)
-class Rank:
-    """A place, and the places that the data do not exclude."""
-
-    place: int
-    low: int
-    high: int
-    tied: bool
-    """another cell has the same place"""
-    apart: bool
-    """clearly worse than the cell next before it"""
-    behind: bool
-    """clearly worse than the cell with the best score"""
-    first_without: int = field(compare=False)
-    """without how many replicates, each left out alone, it is the best, of equal cells the one first in order; 0 for
-    all cells where replicates differ"""
 
 
 def ranks(rows: Iterable[Row]) -> dict[str, Rank]:

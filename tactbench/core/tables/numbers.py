@@ -29,6 +29,11 @@ def suffix(unit: str) -> str:
     return "" if unit == "1" else f" {unit}"
 
 
+def score_with_unit(value: float | None, unit: str) -> str:
+    """Return a score with its unit."""
+    return score(value, unit) + suffix(unit)
+
+
 def duration(seconds: float | None) -> str:
     """Return a duration with three significant digits and a unit that fits."""
     if seconds is None:

@@ -19,16 +19,18 @@ _NUMBER = re.compile(rf"({_DIGITS})(?: … {_DIGITS})?(?: %)?(?: ?[†‡*])*")
 class Entry(str):
     """A text of a table with the number behind it and a link."""
 
-    __slots__ = ("anchor", "value")
+    __slots__ = ("anchor", "cell", "value")
     value: float | None
     """What a column of numbers is sorted by, in one unit for the whole column; None sorts last."""
     anchor: str
     """Where a page tells more; empty: nowhere."""
+    cell: str
+    """The cell that it is from, by name; a page that has a place for each cell makes a link of it."""
 
-    def __new__(cls, text: str, value: float | None = None, anchor: str = "") -> Entry:
+    def __new__(cls, text: str, value: float | None = None, anchor: str = "", cell: str = "") -> Entry:
         """Return the text with what is known besides."""
         entry = super().__new__(cls, text)
-        entry.value, entry.anchor = value, anchor
+        entry.value, entry.anchor, entry.cell = value, anchor, cell
         return entry
 
 

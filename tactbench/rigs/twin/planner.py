@@ -146,14 +146,14 @@ def _observed(scene: Scene, sensor: SensorSpec) -> tuple[ChannelKind, ...]:
 
 
 def _needed(
-    effects: Sequence[EffectDescriptor], wanted: set[str], asked: Mapping[str, bool], scene: Scene, sensor: SensorSpec
+    effects: Sequence[EffectDescriptor], tokens: set[str], asked: Mapping[str, bool], scene: Scene, sensor: SensorSpec
 ) -> dict[str, Reason]:
     """Return what the effects say of themselves that could be needed: name -> reason.
 
     Only what is included needs what it consumes: an effect that the scene does not call for drags nothing along, and
     what would be called for but is consumed by such effects alone is not.
     """
-    begin = wanted.union(*(effect.produces for effect in effects if asked.get(effect.name)))
+    begin = tokens.union(*(effect.produces for effect in effects if asked.get(effect.name)))
     possible = _closure(effects, begin)
     reasons = {
         effect.name: _reason(effect, scene, sensor) for effect in effects if possible.intersection(effect.produces)
@@ -167,8 +167,8 @@ def _needed(
     return reasons
 
 
-def _closure(effects: Sequence[EffectDescriptor], wanted: set[str]) -> set[str]:
-    needed = set(wanted)
+def _closure(effects: Sequence[EffectDescriptor], tokens: set[str]) -> set[str]:
+    needed = set(tokens)
     while True:
         more = {
             token for effect in effects if needed.intersection(effect.produces) for token in effect.consumes

@@ -169,12 +169,12 @@ def _measured(
 def _planned(sensor: SensorDescriptor, effects: Sequence[EffectDescriptor], radius_mm: float) -> tuple[Scene, Plan]:
     present = {channel.kind for channel in sensor.spec.channels()}
     fluid = isinstance(sensor.spec.skin, FluidBackedShell)
-    wanted: tuple[ChannelKind, ...] = ("taxel", "dc_pressure") if fluid and "dc_pressure" in present else ("taxel",)
+    observed: tuple[ChannelKind, ...] = ("taxel", "dc_pressure") if fluid and "dc_pressure" in present else ("taxel",)
     scene = Scene(
         name=f"cost-{radius_mm:g}",
         indenter=Indenter(radius=assumed(radius_mm, "mm", "Karl et al. 2016") if math.isfinite(radius_mm) else None),
         placement=Placement(scatter=assumed(0.0, "mm", "the same contact for every way")),
-        observe=wanted,
+        observe=observed,
     )
     return scene, plan_scene(effects, scene, sensor.spec)
 

@@ -56,11 +56,11 @@ class Preparation:
 class BioTacTransducer:
     """Readings in counts, before noise, rounding and clipping."""
 
-    def __init__(self, prepared: Preparation, sensor: SensorSpec, wanted: Sequence[str]) -> None:
+    def __init__(self, prepared: Preparation, sensor: SensorSpec, channel_names: Sequence[str]) -> None:
         self._prepared = prepared
-        self._electrodes = [(place, NAMES.index(name)) for place, name in enumerate(wanted) if name in NAMES]
-        self._pressures = [place for place, name in enumerate(wanted) if name == "PDC"]
-        self._n_wanted = len(wanted)
+        self._electrodes = [(place, NAMES.index(name)) for place, name in enumerate(channel_names) if name in NAMES]
+        self._pressures = [place for place, name in enumerate(channel_names) if name == "PDC"]
+        self._n_channels = len(channel_names)
         channels = {channel.name: channel for channel in sensor.channels()}
         self._full_scale = channels[NAMES[0]].upper or 0.0
         pdc = channels["PDC"]
@@ -76,7 +76,7 @@ class BioTacTransducer:
         RigError
             If `state` is not of the prepared grid and film, or the film cannot be solved.
         """
-        readings = np.empty(self._n_wanted)
+        readings = np.empty(self._n_channels)
         if self._electrodes:
             self._check(state)
             shares = self._prepared.shares(state)
@@ -98,7 +98,7 @@ class BioTacTransducer:
 def build(
     sensor: SensorSpec,
     grid: SkinGrid,
-    wanted: Sequence[str],
+    channel_names: Sequence[str],
     *,
     refinement: int = REFINEMENT,
 ) -> BioTacTransducer:
@@ -110,7 +110,7 @@ def build(
         The BioTac's spec, perhaps with other parameters.
     grid
         The grid on which skin states will come.
-    wanted
+    channel_names
         Names of channels: E1 to E19 and PDC.
     refinement
         Conduction cells per skin cell and axis.
@@ -120,13 +120,13 @@ def build(
     RigError
         For TDC, TAC, PAC and unknown names; for a skin that is no fluid-backed shell.
     """
-    for name in wanted:
+    for name in channel_names:
         if name not in NAMES and name != "PDC":
             raise RigError(
                 f"{name} of {sensor.name} is not read from the skin.",
                 hint=f"Ask for {NAMES[0]} to {NAMES[-1]} and PDC.",
             )
-    return BioTacTransducer(prepared(sensor, grid, refinement), sensor, tuple(wanted))
+    return BioTacTransducer(prepared(sensor, grid, refinement), sensor, tuple(channel_names))
 
 
 def prepared(sensor: SensorSpec, grid: SkinGrid, refinement: int = REFINEMENT) -> Preparation:

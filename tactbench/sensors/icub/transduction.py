@@ -80,7 +80,7 @@ class ICubTransducer:
         return np.asarray(self._rest - self._gain * (self.capacitance(state) - 1.0))
 
 
-def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> ICubTransducer:
+def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> ICubTransducer:
     """Prepare the iCub fingertip's transduction.
 
     Parameters
@@ -89,7 +89,7 @@ def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> ICubTran
         The fingertip's spec, perhaps with other parameters.
     grid
         The grid on which skin states will come.
-    wanted
+    channel_names
         Names of taxels.
 
     Raises
@@ -104,15 +104,15 @@ def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> ICubTran
             hint="Declare the skin as FoamPad with an outer radius, or name another transducer.",
         )
     taxels = {channel.name: channel for channel in sensor.channels("taxel")}
-    unknown = [name for name in wanted if name not in taxels]
+    unknown = [name for name in channel_names if name not in taxels]
     if unknown:
         raise RigError(f"{sensor.name} has no taxel {', '.join(unknown)}.", hint=f"Taxels: {', '.join(taxels)}.")
     radius = sensor.parameters["taxel_radius"].to("mm")
     outer = skin.sheet.outer_radius.to("mm")
-    weights = [_kept(_Grid(grid), _place_mm(taxels[name], outer), radius) for name in wanted]
+    weights = [_kept(_Grid(grid), _place_mm(taxels[name], outer), radius) for name in channel_names]
     return ICubTransducer(
         np.stack(weights) if weights else np.empty((0, len(grid.x_mm) * len(grid.s_mm))),
-        np.array([_rest(taxels[name]) for name in wanted]),
+        np.array([_rest(taxels[name]) for name in channel_names]),
         sensor.parameters["gain"].to("count"),
         skin.thickness.to("mm"),
         sensor.parameters["least_gap"].value,

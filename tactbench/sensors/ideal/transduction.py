@@ -39,7 +39,7 @@ class IdealTransducer:
         return np.asarray(self._sensitivity * felt)
 
 
-def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> IdealTransducer:
+def build(sensor: SensorSpec, grid: SkinGrid, channel_names: Sequence[str]) -> IdealTransducer:
     """Prepare the ideal grid's transduction.
 
     Parameters
@@ -48,7 +48,7 @@ def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> IdealTra
         The ideal grid's spec, perhaps with other taxels.
     grid
         The grid on which skin states will come.
-    wanted
+    channel_names
         Names of taxels.
 
     Raises
@@ -58,8 +58,8 @@ def build(sensor: SensorSpec, grid: SkinGrid, wanted: Sequence[str]) -> IdealTra
     """
     places = {channel.name: channel.position_m for channel in sensor.channels("taxel")}
     sigma = sensor.parameters["influence"].to("mm")
-    along_x, along_s = np.empty((len(wanted), len(grid.x_mm))), np.empty((len(wanted), len(grid.s_mm)))
-    for row, name in enumerate(wanted):
+    along_x, along_s = np.empty((len(channel_names), len(grid.x_mm))), np.empty((len(channel_names), len(grid.s_mm)))
+    for row, name in enumerate(channel_names):
         place = places.get(name)
         if place is None:
             raise RigError(f"{sensor.name} has no taxel {name} with a place.", hint=f"Taxels: {', '.join(places)}.")

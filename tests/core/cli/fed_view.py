@@ -83,7 +83,7 @@ def main():
                 while time.monotonic() < until_s:
                     fed.tenth(1.0)
             elif what == "ask":
-                TerminalOperator(paused=view.paused).asked("Place the cap.")
+                TerminalOperator(paused=view.paused).prompt("Place the cap.")
             print(what, flush=True)
 
 

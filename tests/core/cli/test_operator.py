@@ -14,10 +14,10 @@ ASKS_TWICE = """
 from tactbench.core.cli.operator import TerminalOperator
 from tactbench.core.errors import RigError
 operator = TerminalOperator()
-operator.asked("Place the cap.")
+operator.prompt("Place the cap.")
 print("placed", flush=True)
 try:
-    operator.asked("Press.")
+    operator.prompt("Press.")
 except RigError as error:
     print(error)
 """
@@ -39,9 +39,9 @@ def test_without_a_terminal_somebody_has_to_be_there(monkeypatch):
     with Path(os.devnull).open() as nothing:
         monkeypatch.setattr(sys, "stdin", nothing)
         with pytest.raises(RigError, match=r"Somebody has to be there: Place the cap\..*--yes"):
-            TerminalOperator().asked("Place the cap.")
+            TerminalOperator().prompt("Place the cap.")
 
 
 def test_yes_goes_on(capsys):
-    TerminalOperator(yes=True).asked("Place the cap.")
+    TerminalOperator(yes=True).prompt("Place the cap.")
     assert capsys.readouterr().err == "Place the cap.\n"

@@ -3,7 +3,7 @@
 import pytest
 
 from tactbench.core.cli.progress import Lines, duration
-from tactbench.core.cli.stopped import one_line, tell_stopped
+from tactbench.core.cli.run import one_line, tell_stopped
 
 
 class Clock:

@@ -7,7 +7,7 @@ import pytest
 from tactbench.core.cost.ladder_rows import by_score, mark_fronts, stopped, timed
 from tactbench.core.cost.rounds import Timing
 from tactbench.core.errors import NotApplicable
-from tactbench.core.report.ladder_table import line
+from tactbench.core.report.costs import line
 from tests.core.cost.test_rounds import Hours, timed_estimator
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from tactbench.core.leaderboard.placing import Placing, places
+from tactbench.core.leaderboard.blocks import places
 from tactbench.core.leaderboard.table import build_table
+from tactbench.core.statistics.rank import Rank
 from tactbench.core.statistics.ranking import ranks
 
 from .rows import resampled, row
@@ -20,9 +21,9 @@ def test_without_replicates_places_are_by_score_and_the_table_says_so():
     rows = [row("a"), row("b"), row("c", score=0.9)]
     found, why = places(rows)
     assert list(found.values()) == [
-        Placing(1, None, None, True),
-        Placing(1, None, None, True),
-        Placing(3, None, None, False),
+        Rank(1, None, None, True),
+        Rank(1, None, None, True),
+        Rank(3, None, None, False),
     ]
     assert why
     table = build_table(rows)

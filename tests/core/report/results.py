@@ -4,7 +4,7 @@ import yaml
 
 from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
-from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.report.results import SavedFigure
 from tactbench.core.spec.matrix import MatrixSpec
 from tests.here import IN_THIS_PROCESS
 

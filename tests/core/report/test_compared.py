@@ -4,6 +4,7 @@ from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.compared import compared_section
 from tactbench.core.report.results import Results
 from tactbench.core.report.section import ReportData
+from tactbench.core.tables.text_table import sort_value
 from tests.core.leaderboard.rows import row
 
 
@@ -22,7 +23,7 @@ def test_a_probe_s_numbers_lead_each_to_the_cell_they_are_from(tmp_path):
     assert leads["score"] == leads["95 % interval"] == leads["trivial"] == "cell-whole"
     assert leads["shuffled"] == "cell-shuffled"
     assert leads["first frame alone"] == "cell-first"
-    values = {name: entry.value for name, entry in zip(table.columns, line, strict=True)}
+    values = {name: sort_value(text) for name, text in zip(table.columns, line, strict=True)}
     assert (values["score"], values["shuffled"]) == (0.5, 0.3)
 
 

@@ -1,5 +1,5 @@
 from tactbench.core.plugins.registry import load_registry
-from tactbench.core.report.linearity import contrasts
+from tactbench.core.report.findings import contrasts
 from tests.core.leaderboard.rows import row
 
 

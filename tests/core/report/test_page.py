@@ -14,8 +14,7 @@ from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.calibrated import Calibrated, Finding, Share
 from tactbench.core.report.costs import read_table
 from tactbench.core.report.page import make_page
-from tactbench.core.report.results import Results, open_results
-from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.report.results import Results, SavedFigure, open_results
 from tactbench.core.report.section import ReportData
 
 from .html import Reader

@@ -2,7 +2,7 @@ import pytest
 
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.report.calibrated import Calibrated, PredictiveRange
-from tactbench.core.report.reproduction import records, reproduce, verdict
+from tactbench.core.report.published import records, reproduce, verdict
 from tests.core.leaderboard.rows import row
 
 METHOD = "block bootstrap in time within 1 recording (blocks of 17 rows): spread between sessions is not in it"

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tactbench.core.report.stored import stored
+from tactbench.core.report.embedding import stored
 
 FACTS = {"of": "a", "points": 3}
 NUMBERS = {"xy": [0.1, 1 / 3]}

@@ -113,11 +113,11 @@ def test_a_simulation_is_asked_with_nuisances_in_any_order():
 
 
 def test_a_scene_is_asked_as_a_simulation_says():
-    asked = SCENE.asked(Simulation(rung="fine", nuisances={"placement_scatter_mm": 0.3}))
+    asked = SCENE.simulated_as(Simulation(rung="fine", nuisances={"placement_scatter_mm": 0.3}))
     assert asked.placement.scatter == assumed(0.3, "mm", "set for this run")
     assert asked.simulation.rung == "fine"
     assert asked.model_copy(update={"placement": SCENE.placement, "simulation": SCENE.simulation}) == SCENE
-    assert SCENE.asked(Simulation()) is SCENE
+    assert SCENE.simulated_as(Simulation()) is SCENE
 
 
 def test_what_nuisances_leave_out_is_zero():

@@ -127,7 +127,7 @@ def test_the_place_of_contact_is_stated_with_the_commanded_offset(rig, sensors):
 def test_nuisances_that_are_set_change_the_recording_and_are_stated(rig, sensors):
     held = _scene(profile=ForceRamp(end=_q(0.0, "N"), samples=2000), environment=QUIET)
     values = {"noise_scale": 1.0, "taxel_white_count": 9.0, "taxel_step_count": 0.0, "placement_tilt_x_rad": 0.0}
-    acquisition, streams = _record(rig, sensors["biotac"], held.asked(Simulation(nuisances=values)))
+    acquisition, streams = _record(rig, sensors["biotac"], held.simulated_as(Simulation(nuisances=values)))
     assert values.items() <= acquisition.assumptions.items()
     assert "placement_tilt_x_rad" not in _record(rig, sensors["biotac"], held)[0].assumptions
     noise = streams["electrodes"][1].std(axis=0)
@@ -145,7 +145,7 @@ def test_what_a_recording_assumes_has_the_names_under_which_it_is_set(rig, senso
 
 
 def test_a_nuisance_that_the_sensor_does_not_declare_is_not_stated(rig, sensors):
-    asked = _scene(profile=ForceRamp(samples=20)).asked(Simulation(nuisances={"dc_pressure_white_count": 9.0}))
+    asked = _scene(profile=ForceRamp(samples=20)).simulated_as(Simulation(nuisances={"dc_pressure_white_count": 9.0}))
     acquisition, _ = _record(rig, sensors["icub"], asked)
     assert "dc_pressure_white_count" not in acquisition.assumptions
 

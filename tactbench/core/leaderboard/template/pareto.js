@@ -53,7 +53,7 @@ const tellPoint = (point, axis) => {
 const drawTime = () => {
   const { head } = board, figure = byId("pareto");
   const nothing = (text) => figure.replaceChildren(make("p", { class: "missing" }, text));
-  const axes = head.roles.times.map((name) => board.columns.find((one) => one.name === name)).filter((one) => !board.isSilent(one));
+  const axes = head.times.map((name) => board.columns.find((one) => one.name === name)).filter((one) => !board.isSilent(one));
   const blocks = head.blocks.map((block, place) => [String(place), block.title]).filter(([place]) => board.rowsOf(place).length);
   fillPicker(byId("time-block"), blocks, byId("time-block").value);
   fillPicker(byId("time-axis"), axes.map((one) => [one.name, one.name]), byId("time-axis").value);
@@ -87,7 +87,7 @@ const drawTime = () => {
 const frontTable = (front, axis) => {
   const columns = [axis, ...["rank", "sensor", "estimator", "score", "interval"].map(board.role).filter((one) => one)];
   const type = (one) => ({ class: one.numeric ? "number" : "" });
-  const cell = (row, { name, numeric, column }) => (numeric ? link(row, column.text(row), name === board.head.roles.score) : column.text(row));
+  const cell = (row, { name, numeric, column }) => (numeric ? link(row, column.text(row), name === ROLES.score) : column.text(row));
   return make("div", { class: "box" }, make("table", {}, make("caption", {}, "The front, the quickest first"),
     make("thead", {}, make("tr", {}, ...columns.map((one) => make("th", { scope: "col", ...type(one) }, one.name)))),
     make("tbody", {}, ...front.map(({ row }) => make("tr", {}, ...columns.map((one) => make("td", type(one), cell(row, one))))))));

@@ -1,5 +1,6 @@
 // Opening the page: the data is unpacked, the filters are filled, and the view asked for is drawn.
 let board = null;
+const ROLES = { rank: "#", sensor: "sensor", estimator: "estimator", score: "score", interval: "95 % interval" };
 
 const say = (text) => {
   const place = byId("trouble");
@@ -20,7 +21,7 @@ const readBoard = async () => {
   return {
     head, columns, fields, blockOf, isSilent, shown, visibleColumns: columns.filter((one) => !isSilent(one)),
     kinds: readColumn(head.kinds),
-    role: (name) => byName.get(head.roles[name]),
+    role: (name) => byName.get(ROLES[name]),
     field: (name, row) => fields.get(name)?.text(row) ?? "",
     raw: (name, row) => fields.get(name)?.raw(row),
     rowsOf: (place) => blocks[place].filter((row) => shown[row]),

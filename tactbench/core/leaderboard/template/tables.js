@@ -39,7 +39,7 @@ const drawLine = (row) => {
       line.append(make("td", { class: "reason", colspan: columns.length - place }, link(row, why, onTheWay)));
       break;
     }
-    const isScore = name === board.head.roles.score;
+    const isScore = name === ROLES.score;
     line.append(make("td", { class: numeric ? "number" : "" }, isNumber ? link(row, text, onTheWay && isScore) : text));
     if (isNumber && isScore) onTheWay = false;
   }

@@ -14,7 +14,7 @@ from tactbench.core.errors import FolderError
 from tactbench.core.files import read_regular, write_all
 from tactbench.core.matrix.store import limits
 from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
-from tactbench.core.matrix.store.sharing import canonical, definition, digest_of, joined, parted, shared_lines
+from tactbench.core.matrix.store.sharing import DEFINITION, canonical, definition, digest_of, joined, parted
 
 NAME = "index.jsonl"
 
@@ -174,7 +174,8 @@ def _lines(entry: Entry, known: set[str]) -> tuple[list[str], set[str]]:
     if entry.shard is not None:
         record["shard"] = list(entry.shard)
     text = canonical(record)
-    return [*shared_lines(fresh), f'{text[:-1]}{_DIGEST}{digest_of(text)}"}}'], set(fresh)
+    shared = (DEFINITION.format(digest, value) for digest, value in fresh.items())
+    return [*shared, f'{text[:-1]}{_DIGEST}{digest_of(text)}"}}'], set(fresh)
 
 
 _DIGEST = ', "sha256": "'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -57,18 +58,12 @@ def joined(slim: Row, references: Mapping[str, str], shared: Mapping[str, Any]) 
     return {**slim, **{key: shared[digest] for key, digest in references.items()}}
 
 
-_HEAD = '{"shared": "'
-_MIDDLE = '", "value": '
-
-
-def shared_lines(texts: dict[str, str]) -> list[str]:
-    """Return the lines that define shared values."""
-    return [f"{_HEAD}{digest}{_MIDDLE}{text}}}" for digest, text in texts.items()]
+DEFINITION = '{{"shared": "{}", "value": {}}}'
+"""A line that defines a shared value, of its digest and its text."""
+_DEFINITION = re.compile(r'\{"shared": "([0-9a-f]{32})", "value": (.*)\}')
 
 
 def definition(line: str) -> str | None:
     """Return the digest that a line defines if the line holds what the digest says, else None."""
-    start = len(_HEAD) + 32 + len(_MIDDLE)
-    digest = line[len(_HEAD) : len(_HEAD) + 32]
-    whole = line.startswith(_HEAD) and line[len(_HEAD) + 32 : start] == _MIDDLE and line.endswith("}")
-    return digest if whole and digest_of(line[start:-1]) == digest else None
+    found = _DEFINITION.fullmatch(line)
+    return found[1] if found is not None and digest_of(found[2]) == found[1] else None

@@ -25,8 +25,7 @@ from tactbench.core.report.figures.published_and_ours import draw_published
 from tactbench.core.report.figures.saving import save
 from tactbench.core.report.figures.sketch import Sketch
 from tactbench.core.report.figures.style import styled
-from tactbench.core.report.results import Results
-from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.report.results import Results, SavedFigure
 from tactbench.core.spec.task import TaskSpec, VectorTarget
 
 Draw = Callable[[Group, Remark], Sketch]

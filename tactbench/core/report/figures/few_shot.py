@@ -26,8 +26,7 @@ from tactbench.core.report.figures.style import (
     sensor_colours,
     styled,
 )
-from tactbench.core.report.results import Results
-from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.report.results import Results, SavedFigure
 
 Row = Mapping[str, Any]
 

@@ -13,7 +13,7 @@ from tactbench.core.report.figures.style import GREY, panels
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
 from tactbench.core.spec.task import VectorTarget
-from tactbench.core.tables.numbers import score, suffix
+from tactbench.core.tables.numbers import score, score_with_unit
 
 CELLS = 20
 """Of the map, along its longer side: the rows of a cell are one dot."""
@@ -39,7 +39,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
     for here, panel, (true, answered, error) in zip(axes.flat, group.panels, maps, strict=False):
         here.plot(*np.stack([true, answered]).transpose(2, 0, 1), "-", color=GREY, linewidth=0.6, zorder=1)
         dots = here.scatter(*true.T, c=error, s=12, vmin=0.0, vmax=most, cmap="viridis_r", linewidths=0)
-        median = f"{score(panel.row['scores'][MEDIAN_ERROR], target.unit)}{suffix(target.unit)}"
+        median = score_with_unit(panel.row["scores"][MEDIAN_ERROR], target.unit)
         here.set_title(f"{panel.sensor}, median {median}")
         here.set_aspect("equal")
         here.set_xlabel(with_unit(target.names[0], target.unit))

@@ -12,7 +12,7 @@ from tactbench.core.report.figures.style import GREY, corner, legend, panels
 from tactbench.core.samples import Answers, FloatArray
 from tactbench.core.spec.scene import Role
 from tactbench.core.spec.task import TaskSpec
-from tactbench.core.tables.numbers import score, suffix
+from tactbench.core.tables.numbers import score_with_unit
 
 SHOWN: tuple[Role, ...] = ("train", "test")
 WORDS = {"train": "training", "test": "test"}
@@ -47,7 +47,7 @@ def draw(group: Group, remark: Remark) -> Sketch:
                 label=f"prediction, {panel.sensor}",
             )  # fmt: skip
             here.set_title(f"{panel.sensor}, {WORDS[role]}")
-            corner(here, f"{metric} {score(_score(panel, role, group.task), unit)}{suffix(unit)}")
+            corner(here, f"{metric} {score_with_unit(_score(panel, role, group.task), unit)}")
             if place == len(shown) - 1:
                 here.set_xlabel("time [s]" if clocked else "row of the recording")
         axes[place, 0].set_ylabel(with_unit(quantity(group.task), group.task.unit))

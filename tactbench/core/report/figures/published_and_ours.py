@@ -19,9 +19,8 @@ from tactbench.core.report.figures.style import (
     sensor_colours,
     styled,
 )
-from tactbench.core.report.reproduction import Reproduction, reproduce
-from tactbench.core.report.results import Results
-from tactbench.core.report.saved_figure import SavedFigure
+from tactbench.core.report.published import Reproduction, reproduce
+from tactbench.core.report.results import Results, SavedFigure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from tactbench.core.report.figures.sketch import Sketch, coloured, heading, mark
 from tactbench.core.report.figures.style import BLACK, corner, legend, panels
 from tactbench.core.samples import FloatArray
 from tactbench.core.spec.task import VectorTarget
-from tactbench.core.tables.numbers import score, suffix
+from tactbench.core.tables.numbers import score_with_unit, suffix
 
 ACROSS = 2
 """Panels beside each other."""
@@ -74,9 +74,9 @@ def _shown(group: Group) -> Iterator[_Shown]:
     for panel in group.panels:
         true, answered = panel.answers["test"].y_true, panel.answers["test"].y_pred
         if not isinstance(target, VectorTarget):
-            text = f"{metric_name(group.task)} {score(panel.row['score'], unit)}{suffix(unit)}"
+            text = f"{metric_name(group.task)} {score_with_unit(panel.row['score'], unit)}"
             yield _Shown(panel.sensor, panel.sensor, true, answered, text)
             continue
         for place, name in enumerate(target.names):
-            text = f"RMSE {score(float(np.sqrt(np.mean((answered - true)[:, place] ** 2))), unit)}{suffix(unit)}"
+            text = f"RMSE {score_with_unit(float(np.sqrt(np.mean((answered - true)[:, place] ** 2))), unit)}"
             yield _Shown(panel.sensor, f"{panel.sensor}, {name}", true[:, place], answered[:, place], text)

@@ -154,9 +154,9 @@ class _Grid:
     def solve(self, start: FloatArray, tolerance: float) -> _Whole:
         """Return the solution, from a (nx, ns) pressure; widen the window until nothing outside penetrates."""
         everywhere = operator(self.kernel, self.cells, self.cell_mm, self.cells)
-        wanted, products = start > 0, 0
+        touched, products = start > 0, 0
         while True:
-            window = self._window(wanted)
+            window = self._window(touched)
             shape = (window[0].stop - window[0].start, window[1].stop - window[1].start)
             inside = operator(self.kernel, self.cells, self.cell_mm, shape)
             problem = Problem(inside, self.gap_mm[window], self.reachable[window], self.total_mpa)
@@ -171,7 +171,7 @@ class _Grid:
             sinks[window] = False
             if not sinks.any():
                 break
-            wanted, start = wanted | sinks, pressure
+            touched, start = touched | sinks, pressure
         return _Whole(pressure, displacement, state.depth_mm, products, shape)
 
     def _settle(self, problem: Problem, start: FloatArray, tolerance: float) -> State:
@@ -193,11 +193,11 @@ class _Grid:
             hint="Ask for a larger tolerance, or check that the gap is that of a solid indenter.",
         )
 
-    def _window(self, wanted: Mask) -> tuple[slice, slice]:
+    def _window(self, touched: Mask) -> tuple[slice, slice]:
         """Return the quickest window around some cells, with a margin."""
         spans = []
         for axis in (0, 1):
-            places = np.flatnonzero(wanted.any(axis=1 - axis))
+            places = np.flatnonzero(touched.any(axis=1 - axis))
             spans.append((int(places[0]) - _MARGIN, int(places[-1]) + 1 + _MARGIN))
         lengths = window_cells(self.kernel, self.cells, (spans[0][1] - spans[0][0], spans[1][1] - spans[1][0]))
         slices = []

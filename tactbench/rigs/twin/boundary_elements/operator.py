@@ -47,12 +47,12 @@ class Operator:
         return pressure
 
 
-def window_cells(kernel: Kernel, cells: tuple[int, int], wanted: tuple[int, int]) -> tuple[int, int]:
-    """Return the window to use for `wanted` cells: of a length that transforms quickly, within the domain."""
+def window_cells(kernel: Kernel, cells: tuple[int, int], least: tuple[int, int]) -> tuple[int, int]:
+    """Return the window to use for `least` cells: of a length that transforms quickly, within the domain."""
     from scipy import fft
 
     lengths = []
-    for n, w in zip(cells, wanted, strict=True):
+    for n, w in zip(cells, least, strict=True):
         quick = fft.next_fast_len(max(w, 4), real=True)
         # A window wider than half a period would see both ways around: the period itself is then shorter.
         limit = n // 2 if kernel.periodic else n

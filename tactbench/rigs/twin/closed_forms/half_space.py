@@ -44,6 +44,13 @@ class Hertz:
         pressure: FloatArray = self.largest_pressure_mpa(force_n) * np.sqrt(inside)
         return pressure
 
+    def radial_mm(self, force_n: float, r_mm: FloatArray, poisson: float) -> FloatArray:
+        """Return how far the surface moves from the axis (below 0: towards it) at distances above 0 (Johnson 3.41b)."""
+        inside = 1 - np.clip(1 - (r_mm / self.contact_radius_mm(force_n)) ** 2, 0.0, None) ** 1.5
+        scale = -(1 - 2 * poisson) / (2 * math.pi * (1 - poisson) * self.modulus_mpa) * force_n
+        moved: FloatArray = scale * inside / r_mm
+        return moved
+
 
 @dataclass(frozen=True)
 class FlatPunch:

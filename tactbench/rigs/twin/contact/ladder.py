@@ -9,7 +9,7 @@ import itertools
 import numpy as np
 
 from tactbench.plugin import FloatArray, RigError
-from tactbench.rigs.twin.contact.pressing import pressed
+from tactbench.rigs.twin.contact.pressing import pressed, slide_of
 from tactbench.rigs.twin.fidelity import FINE, RUNGS
 from tactbench.rigs.twin.synthesis import Synthesis
 
@@ -37,7 +37,7 @@ def choose_rung(run: Synthesis, names: list[str], largest_n: float) -> None:
         return
     # The place of a recording's contact scatters by a tenth of a millimetre: that changes no rung's error much.
     spec, body = run.sensor.model_dump_json(), (run.contact.radius_mm, run.contact.shape)
-    text = f"{spec}|{body}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}"
+    text = f"{spec}|{body}|{largest_n}|{names}|{sorted(run.lent)}|{tolerance}|{run.tangential}|{slide_of(run)}"
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key not in _CHOSEN:
         if len(_CHOSEN) >= _MOST_KEPT:
@@ -73,13 +73,24 @@ def _cheapest(run: Synthesis, names: list[str], largest_n: float, tolerance: flo
 
 
 def _probed(run: Synthesis, names: list[str], largest_n: float, name: str) -> FloatArray | None:
-    """Return the readings at the probing loads, less those at rest; None if the rung does not do this skin."""
+    """Return the readings at the probing loads, less those at rest, and where a slide is looked at in full slip, too.
+
+    None if the rung does not do this skin.
+    """
     try:
         press, read = pressed(run, names, RUNGS[name])
     except RigError:
         return None
+    states = [press(share * largest_n) for share in _PROBES]
+    slide, skin = slide_of(run), run.sensor.spec.skin
+    if names and skin is not None and slide is not None:
+        from tactbench.rigs.twin.contact.slide_table import dragged_state
+        from tactbench.rigs.twin.contact.tangential import tangential_of
+
+        along, (direction, friction) = tangential_of(skin, press.medium.grid), slide
+        states += [dragged_state(state, state, along, direction, friction, 0.0) for state in states]
     rest = read(press(0.0))
-    return np.stack([read(press(share * largest_n)) - rest for share in _PROBES])
+    return np.stack([read(state) - rest for state in states])
 
 
 def _apart(one: FloatArray, other: FloatArray) -> float:

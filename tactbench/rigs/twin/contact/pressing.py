@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -114,6 +115,15 @@ def _reader(
         return readings
 
     return read
+
+
+def slide_of(run: Synthesis) -> tuple[tuple[float, float], float] | None:
+    """Return a slide's direction and static friction; None if nothing slides or nobody looks along the skin."""
+    slide = run.scene.slide
+    if slide is None or not run.tangential or not run.load.largest_n > 0:
+        return None
+    angle = slide.direction.to("rad")
+    return (math.cos(angle), math.sin(angle)), slide.surface.static_friction.to("1")
 
 
 def no_channels(state: SkinState) -> FloatArray:

@@ -36,14 +36,13 @@ def traction_shares(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return Q/(mu P), P*/P and b at (n,) moments.
 
-    b is bounded such that no traction exceeds mu times the pressure, one way or the other.
+    b is bounded such that no traction exceeds mu times the pressure.
     """
     limit = friction * force_n
     share = np.clip(np.divide(tangential_n, limit, out=np.zeros_like(limit), where=limit > 0), -1.0, 1.0)
     inner = np.where(limit > 0, stick_ratio, 0.0) ** 3
     b = np.divide(1.0 - share, inner, out=np.zeros_like(share), where=inner > 0)
-    back = np.divide(1.0 + share, 1.0 - inner, out=np.ones_like(share), where=inner < 1)
-    return share, inner, np.minimum(np.minimum(b, back), 1.0)
+    return share, inner, np.minimum(b, 1.0)
 
 
 def dragged_state(

@@ -14,7 +14,7 @@ import numpy as np
 from tactbench.plugin import FloatArray, NotApplicable, Scalar
 from tactbench.rigs.twin.contact.ladder import TABLE_SHARE, choose_rung
 from tactbench.rigs.twin.contact.load_table import LoadTable, build_table
-from tactbench.rigs.twin.contact.pressing import press_of, reader_of
+from tactbench.rigs.twin.contact.pressing import press_of, reader_of, slide_of
 from tactbench.rigs.twin.contact.validity import check_reach, remarks
 from tactbench.rigs.twin.geometry import check_contact, outer_radius_mm, pad_of, skin_grid
 from tactbench.rigs.twin.synthesis import Settled, Synthesis
@@ -135,7 +135,7 @@ def _tabulated(run: Synthesis, names: list[str], largest: float, *, only_skin: b
     spec, asked = run.sensor.model_dump_json(), run.scene.simulation.tolerance
     text = (
         f"{spec}|{run.contact}|{largest!r}|{names}|{run.fluid_pressure}|{run.lent}|{run.fidelity}|{asked}|{only_skin}"
-        f"|{run.tangential}|{_slide(run)}"
+        f"|{run.tangential}|{slide_of(run)}"
     )
     key = hashlib.blake2b(text.encode(), digest_size=16).digest()
     if key in _TABLES:
@@ -170,7 +170,7 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
         most_nodes=fidelity.most_nodes,
         clock=run.clock,
     )
-    slide, skin = _slide(run), run.sensor.spec.skin
+    slide, skin = slide_of(run), run.sensor.spec.skin
     began = run.clock()
     sliding = None
     if names and skin is not None and slide is not None:
@@ -191,15 +191,6 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
     return tabulated, prepared_s + table.read_s + slide_s if names else 0.0
 
 
-def _slide(run: Synthesis) -> tuple[tuple[float, float], float] | None:
-    """Return a slide's direction and static friction; None if nothing slides or nobody looks along the skin."""
-    slide = run.scene.slide
-    if slide is None or not run.tangential or not run.load.largest_n > 0:
-        return None
-    angle = slide.direction.to("rad")
-    return (math.cos(angle), math.sin(angle)), slide.surface.static_friction.to("1")
-
-
 _NO_CHANNELS_TOLERANCE = np.array([0.01, 0.01, 1e-4])
 """Depth and contact radius [mm] and pressure [MPa] where no channel says how closely the skin must be known: a
 hundredth of what a ramp to a few newtons gives."""
@@ -212,7 +203,7 @@ def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
     """
     if not names:
         return _NO_CHANNELS_TOLERANCE
-    wanted = []
+    bounds = []
     channels = {channel.name: channel for track in run.tracks for channel in track.channels}
     for name in names:
         channel = channels[name]
@@ -220,8 +211,8 @@ def _tolerance(run: Synthesis, names: list[str]) -> FloatArray:
         hidden = 0.0 if nuisances is None else nuisances.hidden()
         # Without any stated noise: a ten-thousandth of the range, or of one.
         span = channel.upper - channel.lower if channel.upper is not None and channel.lower is not None else 1.0
-        wanted.append(hidden if hidden > 0 else 1e-4 * span)
-    aim = run.fidelity.table_tolerance_factor * np.array(wanted)
+        bounds.append(hidden if hidden > 0 else 1e-4 * span)
+    aim = run.fidelity.table_tolerance_factor * np.array(bounds)
     asked = run.scene.simulation.tolerance
     return aim if asked is None else np.minimum(aim, TABLE_SHARE * asked)
 

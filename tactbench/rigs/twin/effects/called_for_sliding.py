@@ -45,7 +45,7 @@ def shear(scene: Scene, sensor: SensorSpec) -> Reason:
     if not looking:
         return Reason(False, "no observed channel looks along the skin", 0.0)
     slides = "; the slide drags it" if _slides(scene, sensor).called_for else ""
-    return Reason(True, f"{' and '.join(looking)} look at how a press moves the skin along itself{slides}")
+    return Reason(True, f"{' and '.join(looking)} channels look at how a press moves the skin along itself{slides}")
 
 
 def skin_vibration(scene: Scene, sensor: SensorSpec) -> Reason:

@@ -36,19 +36,19 @@ def apply(run: Synthesis) -> None:
     step_s = duration / run.t_s.size if drive.rate is None else 1.0 / drive.rate.to("Hz")
     steps = run.t_s.size if per_sample else math.ceil(duration / step_s)
     t_s: FloatArray = np.arange(steps, dtype=np.float64) * step_s
-    wanted = run.load.at(t_s)
+    setpoint = run.load.at(t_s)
     errors = run.of_recording("force") if per_sample else run.of_recording("force", "loop")
     noise = run.scene.environment.force_noise.to("N") * errors.standard_normal(steps)
     table = bare_skin(run, BEYOND * run.load.largest_n)
     force_n, deepest = force_at_depth(table)
-    start = depth_of(table, float(wanted[0]))
+    start = depth_of(table, float(setpoint[0]))
     dynamics = Dynamics.of(drive, step_s)
-    depths = dynamics.carried(force_n, wanted, noise, (-RETRACT_MM, deepest), start)
+    depths = dynamics.carried(force_n, setpoint, noise, (-RETRACT_MM, deepest), start)
     forces = np.array([force_n(depth) for depth in depths.tolist()])
     run.follow(Load(t_s, forces))
     run.drawn.update(
         loop_delay_steps=dynamics.delay_steps,
-        loop_error_rms_n=float(np.sqrt(np.mean((forces - wanted) ** 2))),
+        loop_error_rms_n=float(np.sqrt(np.mean((forces - setpoint) ** 2))),
         loop_largest_n=float(forces.max()),
         loop_steps_at_end=int(np.count_nonzero(depths >= deepest)),
     )

@@ -3,7 +3,7 @@
 One step of length T, with depth x, measured force m, filter y, integral i, command c:
 
     m_n = round(F(x_n) + noise_n)          y_n = a y_{n-1} + (1 - a) m_n        a = exp(-2 pi f T)
-    e_n = wanted_n - y_n                   i_n = i_{n-1} + ki T e_n             c_n = kp e_n + i_n
+    e_n = setpoint_n - y_n                   i_n = i_{n-1} + ki T e_n             c_n = kp e_n + i_n
     x_{n+1} = b x_n + (1 - b) c_{n-d}      b = exp(-T / lag)
 
 Filter and motor are held-input solutions of their first-order laws: exact for any T, and neither can become unstable
@@ -95,7 +95,7 @@ class Dynamics:
     def carried(
         self,
         force_n: Callable[[float], float],
-        wanted_n: FloatArray,
+        setpoint_n: FloatArray,
         noise_n: FloatArray,
         reach_mm: tuple[float, float],
         start_mm: float = 0.0,
@@ -106,7 +106,7 @@ class Dynamics:
         ----------
         force_n
             Force of the skin at a depth; 0 above it.
-        wanted_n
+        setpoint_n
             (n,) commanded force.
         noise_n
             (n,) error of the force sensor.
@@ -120,14 +120,14 @@ class Dynamics:
         y = force_n(start_mm)
         late = [start_mm] * (self.delay_steps + 1)
         velocity, most_change = 0.0, self.acceleration * self.step_s
-        depths = np.empty(wanted_n.size)
-        for n, (wanted, noise) in enumerate(zip(wanted_n.tolist(), noise_n.tolist(), strict=True)):
+        depths = np.empty(setpoint_n.size)
+        for n, (setpoint, noise) in enumerate(zip(setpoint_n.tolist(), noise_n.tolist(), strict=True)):
             depths[n] = x
             measured = force_n(x) + noise
             if self.resolution_n > 0:
                 measured = round(measured / self.resolution_n) * self.resolution_n
             y = self.kept * y + (1 - self.kept) * measured
-            missing = wanted - y
+            missing = setpoint - y
             integral = min(max(integral + self.integral * self.step_s * missing, low), high)
             late = [min(max(self.proportional * missing + integral, low), high), *late[:-1]]
             velocity = self._velocity(late[-1] - x, velocity, most_change)

@@ -174,25 +174,25 @@ class Dragged:
     def _lets_go(self, t: float, x: float, end: float) -> tuple[float, float]:
         """Return when and where the skin that sticks at x since t lets go; at `end` if not before."""
         drive = self.drive
-        wanted = drive.speed_mm_s * t - x
+        lead_mm = drive.speed_mm_s * t - x
         if x >= np.interp(t, drive.t_s, self._static_mm):
             return t, x
         at, size = int(np.searchsorted(drive.t_s, t, side="right")), 8
         while at < drive.t_s.size:
             lead = self._way_mm[at : at + size] - self._static_mm[at : at + size]
-            over = lead >= wanted
+            over = lead >= lead_mm
             first = int(over.argmax())
             if over[first]:
-                return self._crossing(at + first, wanted, t, x, end)
+                return self._crossing(at + first, lead_mm, t, x, end)
             if drive.t_s[min(at + size, drive.t_s.size) - 1] >= end:
                 break
             at, size = at + size, 2 * size
         return end, x + drive.speed_mm_s * (end - t)
 
-    def _crossing(self, node: int, wanted: float, t: float, x: float, end: float) -> tuple[float, float]:
+    def _crossing(self, node: int, lead_mm: float, t: float, x: float, end: float) -> tuple[float, float]:
         drive = self.drive
         low, high = (self._way_mm[n] - self._static_mm[n] for n in (node - 1, node))
-        share = (wanted - low) / (high - low) if high > low else 1.0
+        share = (lead_mm - low) / (high - low) if high > low else 1.0
         cross = drive.t_s[node - 1] + share * (drive.t_s[node] - drive.t_s[node - 1])
         cross = min(max(float(cross), t), end)
         return cross, x + drive.speed_mm_s * (cross - t)
@@ -258,6 +258,9 @@ class Dragged:
         own = kind == HELD
         left = np.interp(t_s[own], drive.t_s, self._release_mm) - about[own]
         share[own] = np.divide(x[own] - about[own], left, out=np.ones(left.size), where=left > NOTHING_MM)
+        # What sticks keeps the force of its partial slip: only where all has slipped is it that of the whole way.
+        stuck = left.clip(0.0) * share_of_force(share[own])
+        force[own] = stiffness[own] * np.where(left > NOTHING_MM, about[own] + stuck, x[own])
         slip[kind == SLIDE] = drive.speed_mm_s
         slipping = (kind == SLIP) | (kind == SLIDE)
         touched = load > _LEAST_LOAD_N

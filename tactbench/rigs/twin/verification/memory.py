@@ -43,8 +43,8 @@ def _solid() -> list[Verdict]:
     load = np.full(t_s.size, stress)
     load[0] = 0.0
     found = load / first + lag(t_s, load, tau) / second
-    wanted = stress * (1 / first - np.expm1(-t_s / tau) / second)
-    worst = float(np.abs(found / wanted - 1)[1:].max())
+    expected = stress * (1 / first - np.expm1(-t_s / tau) / second)
+    worst = float(np.abs(found / expected - 1)[1:].max())
     long = lag(np.array([0.0, 0.0, 2.6]), np.array([0.0, 1.0, 1.0]), tau)[-1]
     short = lag(np.array([0.0, 0.0, 1.3, 2.6]), np.array([0.0, 1.0, 1.0, 1.0]), tau)[-1]
     far = lag(np.array([0.0, 0.0, 1e3 * tau]), np.array([0.0, 1.0, 1.0]), tau)[-1]
@@ -60,8 +60,8 @@ def _ramp() -> list[Verdict]:
     for steps_per_tau in (1000.0, 1.0, 0.01):
         tau, rate = 3.0, 0.4
         t_s: FloatArray = np.arange(200, dtype=np.float64) * (tau / steps_per_tau)
-        wanted = rate * (t_s + tau * np.expm1(-t_s / tau))
-        error = float(np.abs(lag(t_s, rate * t_s, tau) - wanted).max() / wanted.max())
+        expected = rate * (t_s + tau * np.expm1(-t_s / tau))
+        error = float(np.abs(lag(t_s, rate * t_s, tau) - expected).max() / expected.max())
         verdicts.append(Verdict(f"{steps_per_tau:g} steps per tau", error, 0.0, _ROUNDING, source=_EXACT))
     return verdicts
 
@@ -78,8 +78,8 @@ def _curve() -> list[Verdict]:
         t_s = np.linspace(0, 60, n + 1)
         found = lag(t_s, np.sin(omega * t_s), tau)
         x = omega * tau
-        wanted = (np.sin(omega * t_s) - x * np.cos(omega * t_s) + x * np.exp(-t_s / tau)) / (1 + x * x)
-        errors.append(float(np.abs(found - wanted).max()))
+        expected = (np.sin(omega * t_s) - x * np.cos(omega * t_s) + x * np.exp(-t_s / tau)) / (1 + x * x)
+        errors.append(float(np.abs(found - expected).max()))
     return [
         Verdict("observed order", _order(errors), 1.9, 2.1, source="interpolation by straight pieces is of order 2"),
     ]
@@ -138,7 +138,7 @@ def _heat() -> list[Verdict]:
     loss = 1 / _CORE.resistance_k_per_w + through
     goal = (_CORE.power_w + _CORE.room_c / _CORE.resistance_k_per_w + through * indenter_c) / loss
     tau = _CORE.capacity_j_per_k / loss
-    wanted = goal + (start_c - goal) * np.exp(-t_s / tau)
+    expected = goal + (start_c - goal) * np.exp(-t_s / tau)
     # The first law over ten minutes, the temperature's integral taken from its samples alone.
     fine = np.linspace(0.0, 600.0, 4001)
     cooled = _CORE.carried(fine, np.full(fine.size, through), indenter_c, start_c)
@@ -151,7 +151,7 @@ def _heat() -> list[Verdict]:
     throughput = _CORE.power_w * span
     still = _CORE.carried(np.zeros(5), np.full(5, through), indenter_c, start_c)
     return [
-        Verdict("temperature", float(np.abs(found - wanted).max()), 0.0, 1e-10, "K", _EXACT),
+        Verdict("temperature", float(np.abs(found - expected).max()), 0.0, 1e-10, "K", _EXACT),
         Verdict(
             "energy given less kept, over the heater's",
             abs(given - kept) / throughput,

@@ -14,6 +14,7 @@ from tactbench.rigs.twin.effects.skin_mode import shaken
 from tactbench.rigs.twin.effects.slip_event import Mode, slip_s, swing
 from tactbench.rigs.twin.effects.stick_slip import Dragged, Drive
 from tactbench.rigs.twin.partial_slip import share_of_force, sliding_stiffness, stick_ratio
+from tactbench.rigs.twin.verification import shear
 
 ROUNDING = 1e-9
 """Closed forms against closed forms: what a few hundred operations round."""
@@ -30,6 +31,10 @@ def checks() -> Sequence[Check]:
         Check("sliding-energy", "friction", "work of the drive against all that dissipates it, over a cycle", _energy),
         Check("friction-limit", "friction", "force under a rising load against mu_s N", _limit),
         Check("bristle", "friction", "LuGre: one long step, steady sliding, passivity", _bristle),
+        Check(
+            "boussinesq", "shear", "a pressed layer's surface along itself against the half-space's", shear.boussinesq
+        ),
+        Check("cattaneo-skin", "shear", "a pressed and pushed layer against Cattaneo and Mindlin", shear.cattaneo),
         Check("skin-mode", "vibration", "the skin's mode: one long step, decay of its energy, resonance", _mode),
     ]
 

@@ -5,7 +5,7 @@ import pytest
 
 from tactbench.core.report.figures import published_and_ours
 from tactbench.core.report.figures.style import BLACK, sensor_colours, styled
-from tactbench.core.report.reproduction import reproduce
+from tactbench.core.report.published import reproduce
 from tactbench.core.report.results import Results
 
 from .made import REGISTRY, opened

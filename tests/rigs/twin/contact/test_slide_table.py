@@ -7,9 +7,11 @@ import math
 
 import numpy as np
 
+from tactbench.core.spec.scene import Simulation
 from tactbench.plugin import (
     ChannelSpec,
     ForceRamp,
+    Indenter,
     Placement,
     Scene,
     SensorDescriptor,
@@ -76,8 +78,8 @@ BLIND = SENSOR.model_copy(update={"spec": SPEC.model_copy(update={"reads_shear":
 def _scene(speed=5.0, angle_deg=0.0, **more):
     ramp = ForceRamp(start=_q(0.5, "N"), end=_q(1.5, "N"), hold=_q(0, "s"), duration=_q(2, "s"), samples=400)
     slide = Slide(speed=_q(speed, "mm/s"), start=_q(0.5, "s"), duration=_q(1, "s"), direction=_q(angle_deg, "deg"))
-    return Scene(name="slide", profile=ramp, slide=slide, observe=("taxel",), placement=Placement(scatter=_q(0, "mm")),
-                 **more)  # fmt: skip
+    return Scene(name="slide", indenter=Indenter(radius=_q(8, "mm")), profile=ramp, slide=slide, observe=("taxel",),
+                 placement=Placement(scatter=_q(0, "mm")), **more)  # fmt: skip
 
 
 def _readings(sensor, scene):
@@ -125,10 +127,11 @@ def test_readings_follow_the_tangential_force_of_the_recording():
 
 
 def test_the_other_way_everything_tangential_turns():
-    # The contact is in the middle, the magnet is not: what the press alone does is taken off.
-    _, there = _readings(SENSOR, _scene())
-    _, back = _readings(SENSOR, _scene(angle_deg=180.0))
-    _, still = _readings(SENSOR, _scene().model_copy(update={"slide": None}))
+    # The magnet is beside the contact: what the press alone does is taken off. No profile lifts the skin.
+    smooth = Simulation(effects=("-skin-vibration",))
+    _, there = _readings(SENSOR, _scene(simulation=smooth))
+    _, back = _readings(SENSOR, _scene(angle_deg=180.0, simulation=smooth))
+    _, still = _readings(SENSOR, _scene(simulation=smooth).model_copy(update={"slide": None}))
     assert np.abs(there - still)[:, :4].max() > 0.05
     np.testing.assert_allclose((back - still)[:, :4], -(there - still)[:, :4], atol=1e-12)
 
@@ -161,6 +164,18 @@ def build_blind(sensor, grid, wanted):
         return np.zeros(len(wanted))
 
     return read
+
+
+def test_a_tolerance_is_kept_in_the_slide_too():
+    # With this ratio the surface hardly moves under the press, so that only the slide tells the rungs apart.
+    still = SPEC.model_copy(update={"skin": SKIN.model_copy(update={"poisson": _q(0.35, "1")})})
+    sensor = SENSOR.model_copy(update={"spec": still})
+    errors = {}
+    for tolerance in (0.02, 0.002):
+        run, _ = _readings(sensor, _scene(simulation=Simulation(tolerance=tolerance)))
+        errors[run.rung] = run.rung_error
+        assert 0 < run.rung_error <= tolerance
+    assert len(errors) == 2
 
 
 def test_left_out_by_name_nothing_moves_along_the_skin():

@@ -91,6 +91,19 @@ def test_after_the_motion_the_force_stays_until_the_load_lets_it_go():
     assert seen.force_n[-1] == 0
 
 
+def test_a_motion_that_ends_while_the_skin_sticks_keeps_its_elastic_force():
+    first = Dragged(_drive([1.0, 1.0], speed_mm_s=1.0)).let_go_s[0]
+    for part in (0.2, 0.9):
+        start = 0.5
+        end = start + part * (first - start)
+        dragged = Dragged(_drive([1.0, 1.0], start_s=start, end_s=end, speed_mm_s=1.0))
+        before, after = (dragged(np.array([t])) for t in (end - 1e-9, end + 1e-9))
+        viscous = 2.0 * dragged.drive.mode.damping / dragged.drive.mode.omega * 1.0 * dragged.drive.stiffness[0]
+        # The limit of what sticks rises by the viscous force that ends: the elastic force moves by less than that.
+        assert before.force_n[0] - after.force_n[0] == pytest.approx(viscous, abs=1.0 * viscous)
+        assert after.displacement_mm[0] == pytest.approx(before.displacement_mm[0], rel=1e-6)
+
+
 def test_the_skin_sticks_less_and_less_on_the_way_to_a_slip():
     dragged = Dragged(_drive([1.0, 1.0], speed_mm_s=1.0))
     first = dragged.let_go_s[0]

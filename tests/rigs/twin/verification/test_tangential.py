@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from tactbench.rigs.twin import partial_slip
+from tactbench.rigs.twin.contact import slide_table
 from tactbench.rigs.twin.effects import slip_event
-from tactbench.rigs.twin.verification import tangential
+from tactbench.rigs.twin.layer_kernel import shear_shapes
+from tactbench.rigs.twin.verification import shear, tangential
 
 CHECKS = {check.name: check for check in tangential.checks()}
 
@@ -45,6 +47,20 @@ def test_a_slip_caught_too_early_is_noticed(monkeypatch):
     assert "velocity when caught, less the surface's" in _missed("slip-event")
     monkeypatch.setattr("tactbench.rigs.twin.effects.stick_slip.slip_s", early)
     assert {"period at 5 mm/s", "force drop at 5 mm/s"} <= _missed("stick-slip")
+
+
+@pytest.mark.parametrize("shape", [0, 1, 2])
+def test_a_wrong_shape_of_a_layer_along_itself_is_noticed(shape, monkeypatch):
+    def wrong(q, poisson):
+        return tuple(-right if n == shape else right for n, right in enumerate(shear_shapes(q, poisson)))
+
+    monkeypatch.setattr("tactbench.rigs.twin.contact.tangential.shear_shapes", wrong)
+    assert _missed("cattaneo-skin" if shape else "boussinesq")
+
+
+def test_a_whole_contact_that_slips_is_noticed(monkeypatch):
+    monkeypatch.setattr(shear, "dragged_state", lambda *args: slide_table.dragged_state(*args[:-1], 0.0))
+    assert "traction at 30% of slip, rms, of the largest friction" in _missed("cattaneo-skin")
 
 
 def test_friction_that_forgets_its_load_is_noticed(monkeypatch):

@@ -52,7 +52,7 @@ CAUGHT_BY = {
         "transducer-is-nan-at-rest": "finite-at-zero-load",
         "transducer-is-nan-over-range": "finite-over-range",
         "transducer-rests-elsewhere": "rest-is-as-stated",
-        "transducer-keeps-its-own-order": "order-follows-wanted",
+        "transducer-keeps-its-own-order": "order-follows-the-request",
         "transducer-remembers": "same-state-same-reading",
         "transducer-changes-the-state": "state-is-not-changed",
         "transducer-feels-nothing": "it-answers-to-a-press",

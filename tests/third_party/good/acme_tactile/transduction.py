@@ -3,11 +3,11 @@
 import numpy as np
 
 
-def build(sensor, grid, wanted):
+def build(sensor, grid, channel_names):
     x, s = np.meshgrid(grid.x_mm, grid.s_mm, indexing="ij")
     places = {channel.name: channel.position_m for channel in sensor.channels("taxel")}
     weights = []
-    for name in wanted:
+    for name in channel_names:
         px, py, _ = places[name]
         weight = np.exp(-(((x - px * 1e3) ** 2 + (s - py * 1e3) ** 2) / 1.2**2))
         weights.append(weight / weight.sum())
