@@ -84,4 +84,5 @@ def partial_rank_correlations(X: FloatArray, Y: FloatArray) -> FloatArray:
     own = np.column_stack([np.tile(np.arange(p), (Y.shape[1], 1)), np.arange(p, ranks.shape[1])])
     P = np.linalg.inv(together[own[:, :, None], own[:, None, :]])
     diagonal = np.diagonal(P, axis1=1, axis2=2)
-    return -P[:, :p, p] / np.sqrt(diagonal[:, :p] * diagonal[:, p:])
+    found: FloatArray = -P[:, :p, p] / np.sqrt(diagonal[:, :p] * diagonal[:, p:])
+    return found
