@@ -80,10 +80,9 @@ def partial_rank_correlations(X: FloatArray, Y: FloatArray) -> FloatArray:
     ranks -= ranks.mean(axis=0)
     size = np.sqrt((ranks**2).sum(axis=0))
     ranks /= np.where(size > 0, size, 1.0)
-    together = ranks.T @ ranks
-    found = np.empty((Y.shape[1], p))
-    for place in range(Y.shape[1]):
-        own = [*range(p), p + place]
-        P = np.linalg.inv(together[np.ix_(own, own)] + 1e-9 * np.eye(p + 1))
-        found[place] = -P[:p, p] / np.sqrt(np.diag(P)[:p] * P[p, p])
+    together = ranks.T @ ranks + 1e-9 * np.eye(ranks.shape[1])
+    own = np.column_stack([np.tile(np.arange(p), (Y.shape[1], 1)), np.arange(p, ranks.shape[1])])
+    P = np.linalg.inv(together[own[:, :, None], own[:, None, :]])
+    diagonal = np.diagonal(P, axis1=1, axis2=2)
+    found: FloatArray = -P[:, :p, p] / np.sqrt(diagonal[:, :p] * diagonal[:, p:])
     return found

@@ -26,7 +26,7 @@ WISH = ("--task", "force", "--max-delay-ms", "2", "--range-n", "5", "--rate-hz",
 def ran(tmp_path_factory):
     verbs = Verbs(tmp_path_factory.mktemp("ran"))
     asked = ("--sensor", "icub", "--task", "force", "--estimator", "ols", "--protocol", "karl2016")
-    verbs("run", *asked, "--repeats", "5")
+    verbs("run", *asked, "--repeats", "1")
     return verbs
 
 

@@ -6,18 +6,23 @@ import json
 
 import pytest
 
-from tests.conftest import Shell, Verbs
+from tactbench.core.matrix.run import run_matrix
+from tactbench.core.matrix.store import Store
+from tactbench.core.spec.matrix import MatrixSpec
+from tests.conftest import Verbs
+from tests.here import IN_THIS_PROCESS
 
-ASKED = ("run", "--repeats", "5", "--sensor", "biotac", "--sensor", "icub", "--task", "force",
-         "--protocol", "deployable",
-         "--estimator", "ols", "--estimator", "lasso", "--no-latency")  # fmt: skip
+MATRIX = {
+    "repeats": 5, "sensors": ["biotac", "icub"], "latency": False,
+    "tasks": [{"name": "force", "protocol": "deployable", "estimators": ["ols", "lasso"]}],
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def verbs(tmp_path_factory):
-    shell = Shell(tmp_path_factory.mktemp("compared"))
-    shell(*ASKED, "--out", "here")
-    return Verbs(shell.folder)
+    verbs = Verbs(tmp_path_factory.mktemp("compared"))
+    run_matrix(MatrixSpec.model_validate(MATRIX), Store(verbs.folder / "here"), choice=IN_THIS_PROCESS)
+    return verbs
 
 
 def test_two_sensors_in_every_format(verbs):

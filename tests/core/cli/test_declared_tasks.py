@@ -1,10 +1,13 @@
 """A table and a question: a mapping declares a task, and no Python is written."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 import yaml
+
+from tests.conftest import Verbs
 
 PAD = """
 version: 1
@@ -52,15 +55,37 @@ def tables(folder):
             (folder / f"{day}_{number}.csv").write_text("\n".join(lines) + "\n")
 
 
+@pytest.fixture(scope="module")
+def before(tmp_path_factory):
+    """Tables and mapping."""
+    folder = tmp_path_factory.mktemp("before")
+    tables(folder)
+    (folder / "pad.yaml").write_text(PAD)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def after(before, tmp_path_factory):
+    """The same with what was imported, and what the import said."""
+    folder = tmp_path_factory.mktemp("after") / "pad"
+    shutil.copytree(before, folder)
+    return folder, Verbs(folder)("import", "pad.yaml", "--out", "rec")
+
+
 @pytest.fixture
-def pad(verbs):
-    tables(verbs.folder)
-    (verbs.folder / "pad.yaml").write_text(PAD)
+def pad(before, verbs):
+    shutil.copytree(before, verbs.folder, dirs_exist_ok=True)
     return verbs
 
 
-def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
-    done = pad("import", "pad.yaml", "--out", "rec")
+@pytest.fixture
+def imported(after, verbs):
+    shutil.copytree(after[0], verbs.folder, dirs_exist_ok=True)
+    return verbs
+
+
+def test_one_import_and_one_run_answer_a_question_of_a_table(after, imported):
+    pad, done = imported, after[1]
     assert "tasks of their own, in rec/tasks.yaml: where" in done.stdout
     assert done.stdout.count("has no sample in") == 12, "then they are added up"
     assert "x 144, y 144" in done.stdout
@@ -83,16 +108,16 @@ def test_one_import_and_one_run_answer_a_question_of_a_table(pad):
     assert "residuals-where-deployable-session-knn-replay.png" in drawn
 
 
-def test_what_an_answer_costs_is_measured_of_a_declared_task_too(pad):
-    pad("import", "pad.yaml", "--out", "rec")
+def test_what_an_answer_costs_is_measured_of_a_declared_task_too(imported):
+    pad = imported
     asked = ("--sensor", "pad", "--task", "where", "--recordings", "rec", "--estimator", "knn", "--rounds", "1")
     rows = {row["estimator"]: row for row in json.loads(pad("cost", *asked, "--format", "json").stdout)}
     assert rows["knn"]["score"] < rows["mean"]["score"]
     assert rows["knn"]["fit_s"] > 0
 
 
-def test_another_question_of_the_same_recordings_is_another_cell(pad):
-    pad("import", "pad.yaml", "--out", "rec")
+def test_another_question_of_the_same_recordings_is_another_cell(imported):
+    pad = imported
     run = ("run", "--recordings", "rec", "--task", "where", "--no-latency", "--format", "json")
     before = json.loads(pad(*run).stdout)
     declared = pad.folder / "rec" / "tasks.yaml"
@@ -118,8 +143,8 @@ def test_two_files_may_not_mean_different_tasks_by_one_name(pad):
     assert pad("run", "--recordings", "rec/b", "--task", "where", "--no-latency", "--format", "csv").stdout
 
 
-def test_importing_again_keeps_the_tasks_and_other_ones_are_refused(pad):
-    pad("import", "pad.yaml", "--out", "rec")
+def test_importing_again_keeps_the_tasks_and_other_ones_are_refused(imported):
+    pad = imported
     before = (pad.folder / "rec" / "tasks.yaml").read_bytes()
     pad("import", "pad.yaml", "--out", "rec")
     assert (pad.folder / "rec" / "tasks.yaml").read_bytes() == before
@@ -130,8 +155,8 @@ def test_importing_again_keeps_the_tasks_and_other_ones_are_refused(pad):
     assert yaml.safe_load((pad.folder / "rec" / "tasks.yaml").read_text())["tasks"][0]["splits"] == ["recording"]
 
 
-def test_a_file_of_a_stranger_names_no_code(pad):
-    pad("import", "pad.yaml", "--out", "rec")
+def test_a_file_of_a_stranger_names_no_code(imported):
+    pad = imported
     declared = pad.folder / "rec" / "tasks.yaml"
     declared.write_text(declared.read_text() + "  features_by: os:system\n")
     refused = pad("run", "--recordings", "rec", "--task", "where", code=2)

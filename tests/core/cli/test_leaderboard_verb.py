@@ -144,12 +144,10 @@ def test_parquet_is_not_written_to_a_terminal(ran):
     assert "--to leaderboard.parquet" in done.stderr
 
 
-def test_without_times_two_runs_give_the_same_bytes(ran, shell):
-    shell(*RUN, "--jobs", "2")
+def test_without_times_two_runs_give_the_same_bytes(ran, verbs):
+    verbs(*RUN, "--jobs", "2")
     for shape in ("table", "md", "csv", "json", "latex"):
-        here, there = (
-            one("leaderboard", "out", "--no-times", "--format", shape).stdout for one in (ran, Verbs(shell.folder))
-        )
+        here, there = (one("leaderboard", "out", "--no-times", "--format", shape).stdout for one in (ran, verbs))
         assert here == there
     with_times = list(csv.DictReader(io.StringIO(ran("leaderboard", "out", "--format", "csv").stdout)))
     without = list(csv.DictReader(io.StringIO(ran("leaderboard", "out", "--no-times", "--format", "csv").stdout)))

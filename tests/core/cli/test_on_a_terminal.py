@@ -17,11 +17,11 @@ from tests.core.pool.patience import ending
 ROOT = Path(__file__).parents[3]
 
 COMMAND = [
-    *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "icub", "--task", "curvature"),
+    *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "ideal", "--task", "curvature"),
     *("--estimator", "logistic", "--estimator", "forest"),
 ]
 FORCE = [
-    *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "icub", "--task", "force"),
+    *(sys.executable, "-m", "tactbench", "run", "--repeats", "1", "--sensor", "ideal", "--task", "force"),
     *("--estimator", "ols", "--no-latency"),
 ]
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.conftest import Shell
+from tests.conftest import Verbs
 from tests.core.evaluation.made_slip import campaign
 
 ESTIMATORS = ("--estimator", "pac-band", "--estimator", "frame-difference")
@@ -13,12 +13,12 @@ RUN = ("run", "--recordings", "made", "--task", "slip", *ESTIMATORS)
 
 @pytest.fixture(scope="module")
 def answered(tmp_path_factory):
-    shell = Shell(tmp_path_factory.mktemp("events"))
-    folder = shell.folder / "made"
+    verbs = Verbs(tmp_path_factory.mktemp("events"))
+    folder = verbs.folder / "made"
     folder.mkdir()
     campaign(folder)
-    rows = json.loads(shell(*RUN, "--format", "json").stdout)
-    return shell, {(row["task"], row["estimator"]): row for row in rows}
+    rows = json.loads(verbs(*RUN, "--format", "json").stdout)
+    return verbs, {(row["task"], row["estimator"]): row for row in rows}
 
 
 def test_a_sensor_is_scored_by_all_its_streams_and_by_its_taxels(answered):
@@ -38,26 +38,26 @@ def test_a_sensor_is_scored_by_all_its_streams_and_by_its_taxels(answered):
 
 
 def test_tables_and_pages_tell_of_events(answered):
-    shell, _ = answered
-    table = shell("leaderboard", "--wide", "--notes").stdout
+    verbs, _ = answered
+    table = verbs("leaderboard", "--wide", "--notes").stdout
     assert "Events · at the threshold that validation recordings chose" in table
     assert "Events · where more false alarms are put up with" in table
     assert "force-ratio reads the reference sensor" in table
     assert "F1 with the thresholds of the labels halved … doubled: made/slip/pac-band 1.00 … 1.00" in table
     assert "  oracle  " in table
-    why = shell("why", "made/slip/replay/deployable/pac-band").stdout
+    why = verbs("why", "made/slip/replay/deployable/pac-band").stdout
     assert "false alarms per minute 0" in why
     assert "of the score that pac-band gives a frame" in why
-    shell("report")
-    drawn = {one.name for one in (shell.folder / "tactbench-results" / "report" / "figures").glob("*.png")}
+    verbs("report")
+    drawn = {one.name for one in (verbs.folder / "tactbench-results" / "report" / "figures").glob("*.png")}
     assert any(name.startswith("one-event-slip-") for name in drawn)
     assert any(name.startswith("latency-and-false-alarms-slip-") for name in drawn)
 
 
 def test_detectors_are_timed_with_the_features_of_a_frame(answered):
-    shell, _ = answered
+    verbs, _ = answered
     chosen = ("--sensor", "made", "--recordings", "made", "--task", "slip", *ESTIMATORS)
-    rows = json.loads(shell("cost", *chosen, "--rounds", "1", "--format", "json").stdout)
+    rows = json.loads(verbs("cost", *chosen, "--rounds", "1", "--format", "json").stdout)
     by_name = {row["estimator"]: row for row in rows}
     parts = by_name["pac-band"]["delay_parts_ms"]
     assert (parts["window"], parts["sampling"]) == (50.0, 10.0)

@@ -10,7 +10,8 @@ from tests.core.cli.test_screens import assert_one_clear_screen
 
 
 def test_a_plan_is_explained_with_reasons_costs_and_bounds(verbs):
-    done = verbs("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1", "--format", "json")
+    words = ("twin", "explain", "--sensor", "icub", "--task", "force", "--rounds", "1", "--no-score")
+    done = verbs(*words, "--format", "json")
     rows = {row["effect"]: row for row in json.loads(done.stdout)}
     assert rows["contact"]["included"]
     assert rows["contact"]["cost_s"] > 0
