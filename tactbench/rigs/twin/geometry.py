@@ -104,11 +104,7 @@ def gap_mm(
     nothing cancels: R = 1e9 mm and a flat surface agree to rounding. With a tilt the smallest gap is subtracted, so
     that the approach keeps its origin. With a relief the press axis stays that normal.
     """
-    if math.isinf(outer_radius_mm):
-        x, y = grid.x_mm[:, None] - contact.x_mm, grid.s_mm[None, :] - contact.s_mm
-        fall = np.zeros((1, 1))
-    else:
-        x, y, fall = _around(grid, contact, outer_radius_mm, dome, relief)
+    x, y, fall = around_mm(grid, contact, outer_radius_mm, dome, relief)
     own = sag_mm(x**2 + y**2, contact.radius_mm) if contact.shape is None else contact.shape.height_mm(x, y)
     gap: FloatArray = fall + own
     if contact.tilt_x or contact.tilt_s:
@@ -117,15 +113,23 @@ def gap_mm(
     return gap
 
 
-def _around(
-    grid: SkinGrid, contact: Contact, outer_radius_mm: float, dome: Dome | None, relief: SheetTable | None
+def around_mm(
+    grid: SkinGrid,
+    contact: Contact,
+    outer_radius_mm: float = math.inf,
+    dome: Dome | None = None,
+    relief: SheetTable | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return where the finger's surface lies as seen from the contact: along, across, and below its tangent plane.
+
+    Each broadcasts to (nx, ns).
 
     A point at meridian angle phi (0 on the cylinder) and angle theta from the contact lies at ``(X, Ro cos(phi)
     sin(theta), -Ro cos(phi) cos(theta))`` with ``sin(phi) = (X - start) / Ro`` on the dome; the differences
     to the contact's own point are turned by its meridian angle.
     """
+    if math.isinf(outer_radius_mm):
+        return grid.x_mm[:, None] - contact.x_mm, grid.s_mm[None, :] - contact.s_mm, np.zeros((1, 1))
     radius = outer_radius_mm
     theta = (grid.s_mm[None, :] - contact.s_mm) / radius
     phi, axial = _meridian(grid.x_mm[:, None], radius, dome)

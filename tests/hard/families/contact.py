@@ -112,7 +112,7 @@ def any_radius(case: Case) -> None:
     case.right = "refusal" if radius < cell else "either" if radius < 3.0 else "answer"
     press = press_of(skin, draw_contact(case, skin, radius))
     states = lawful(case, press, loads)
-    check_reach(press, loads[-1], outer_radius_mm(skin.sheet))
+    check_reach(press, loads[-1], outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
     told = remarks(press, loads, outer_radius_mm(skin.sheet), pad_of(skin.sheet, press.medium.grid))
     few = np.count_nonzero(states[-1].pressure_mpa) < math.pi * 3**2
     case.holds(
@@ -128,7 +128,7 @@ def past_the_rim(case: Case) -> None:
     touched = press.gap_mm[state.pressure_mpa > 0]
     # Every gap under a cap is below its radius and the finger's fall; beyond it there are 50 mm more.
     case.right = "refusal" if touched.max() > 30.0 else "answer"
-    check_reach(press, state.force_n, outer_radius_mm(skin.sheet))
+    check_reach(press, state.force_n, outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
 
 
 def a_cap_that_is_none(case: Case) -> None:
@@ -186,7 +186,7 @@ def any_load(case: Case) -> None:
     states = lawful(case, press, loads)
     case.holds(0 < states[0].depth_mm < 1e-9, f"a piconewton presses {states[0].depth_mm:g} mm deep")
     case.right = "either"
-    check_reach(press, loads[-1], outer_radius_mm(skin.sheet))
+    check_reach(press, loads[-1], outer_radius_mm(skin.sheet), skin.sheet.dome, skin.sheet.relief)
     case.holds("remark load" in remarks(press, loads, outer_radius_mm(skin.sheet)), "500 N and no remark")
 
 

@@ -183,10 +183,11 @@ def _tabulate(run: Synthesis, names: list[str], largest: float, *, within_reach:
     film = float(medium.rest_thickness_mm.min()) - medium.least_thickness_mm
     sheet = None if skin is None else skin.sheet
     outer_mm = math.inf if sheet is None else outer_radius_mm(sheet)
+    dome, relief = (None, None) if sheet is None else (sheet.dome, sheet.relief)
     if within_reach:
-        check_reach(press, largest, outer_mm)
+        check_reach(press, largest, outer_mm, dome, relief)
     pad = None if sheet is None else pad_of(sheet, medium.grid)
-    said = remarks(press, table.loads_n.tolist(), outer_mm, pad)
+    said = remarks(press, table.loads_n.tolist(), outer_mm, pad, dome, relief)
     tabulated = _Tabulated(table, sliding, press.touched_core, closing, film, said)
     return tabulated, prepared_s + table.read_s + slide_s if names else 0.0
 

@@ -12,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tactbench.plugin import FloatArray, RigError, Scalar
+from tactbench.plugin.simulation import Dome, SheetTable
 from tactbench.rigs.twin.contact.media import Medium
 from tactbench.rigs.twin.contact.press import AnyPress
-from tactbench.rigs.twin.geometry import STEEPEST
+from tactbench.rigs.twin.geometry import STEEPEST, around_mm
 from tactbench.rigs.twin.shapes import RIM
 
 RESOLVED_CELLS = 3.0
@@ -29,8 +30,14 @@ AT_THE_EDGE = 0.01
 """Share of the load outside the active skin that is still no remark. Assumed."""
 
 
-def check_reach(press: AnyPress, force_n: float, outer_radius_mm: float) -> None:
-    """Refuse a load under which the skin is touched where the cap no longer exists.
+def check_reach(
+    press: AnyPress,
+    force_n: float,
+    outer_radius_mm: float,
+    dome: Dome | None = None,
+    relief: SheetTable | None = None,
+) -> None:
+    """Refuse a load under which the skin is touched where the cap no longer exists; the skin's surface as in `gap_mm`.
 
     Raises
     ------
@@ -39,8 +46,8 @@ def check_reach(press: AnyPress, force_n: float, outer_radius_mm: float) -> None
     """
     if not force_n > 0 or math.isinf(press.contact.radius_mm):
         return
-    beyond = _from_apex_mm(press, outer_radius_mm) >= RIM * press.contact.radius_mm
-    if np.any(press(force_n).pressure_mpa[beyond] > 0):
+    along, across, _ = around_mm(press.medium.grid, press.contact, outer_radius_mm, dome, relief)
+    if np.any(press(force_n).pressure_mpa[np.hypot(along, across) >= RIM * press.contact.radius_mm] > 0):
         raise RigError(
             f"Under {force_n:g} N the cap of radius {press.contact.radius_mm:g} mm sinks in past its rim: what would "
             "touch there is not part of it.",
@@ -49,7 +56,12 @@ def check_reach(press: AnyPress, force_n: float, outer_radius_mm: float) -> None
 
 
 def remarks(
-    press: AnyPress, loads_n: Iterable[float], outer_radius_mm: float, pad: npt.NDArray[np.bool_] | None = None
+    press: AnyPress,
+    loads_n: Iterable[float],
+    outer_radius_mm: float,
+    pad: npt.NDArray[np.bool_] | None = None,
+    dome: Dome | None = None,
+    relief: SheetTable | None = None,
 ) -> dict[str, Scalar]:
     """Return what a reader of this contact must know, at the largest of `loads_n`.
 
@@ -61,6 +73,8 @@ def remarks(
         Radius of the finger's outer surface; infinite for a flat pad.
     pad
         (nx, ns) active skin; None: all of it but the outermost cells.
+    dome, relief
+        Of the finger's surface, as for `gap_mm`.
 
     Returns
     -------
@@ -89,9 +103,11 @@ def remarks(
     if force > HELD_AGAINST_N:
         found["remark load"] = f"{force:g} N is beyond the {HELD_AGAINST_N:g} N the model has been held against"
     found |= _too_deep(press.medium, press(force).deflection_mm)
-    radius, reach = press.contact.radius_mm, float(_from_apex_mm(press, outer_radius_mm)[pressure > 0].max())
+    along, across, _ = np.broadcast_arrays(*around_mm(press.medium.grid, press.contact, outer_radius_mm, dome, relief))
+    along, across = along[pressure > 0], across[pressure > 0]
+    radius, reach = press.contact.radius_mm, float(np.hypot(along, across).max())
     if shape is not None:
-        steepest = _steepest(press, outer_radius_mm, pressure > 0)
+        steepest = float(shape.slope(along, across).max())
         if steepest > STEEPEST * (1 + 1e-6):  # a flank of 45 degrees, by differences
             found["remark flank"] = f"the {shape.name} touches where its flank has a slope of {steepest:.2g}"
     elif reach >= radius * math.sin(math.atan(STEEPEST)):
@@ -114,29 +130,6 @@ def _narrow_cells(pressure: FloatArray) -> float:
     places = np.argwhere(pressure > 0)
     scatter = np.atleast_2d(np.cov(places.T, bias=True)) + np.eye(2) / 12  # a cell is a square
     return 2.0 * math.sqrt(float(np.linalg.eigvalsh(scatter)[0]))
-
-
-def _from_axis_mm(press: AnyPress, outer_radius_mm: float) -> tuple[FloatArray, FloatArray]:
-    """Return the (nx, 1) and (1, ns) distances from the indenter's axis, along and across."""
-    grid, contact = press.medium.grid, press.contact
-    across = grid.s_mm - contact.s_mm
-    if math.isfinite(outer_radius_mm):
-        across = outer_radius_mm * np.sin(across / outer_radius_mm)
-    return grid.x_mm[:, None] - contact.x_mm, across[None, :]
-
-
-def _from_apex_mm(press: AnyPress, outer_radius_mm: float) -> FloatArray:
-    """Return the (nx, ns) distance from the indenter's axis."""
-    return np.hypot(*_from_axis_mm(press, outer_radius_mm))
-
-
-def _steepest(press: AnyPress, outer_radius_mm: float, touched: npt.NDArray[np.bool_]) -> float:
-    """Return the largest slope of the indenter's shape where it is touched."""
-    shape = press.contact.shape
-    if shape is None:
-        return 0.0
-    along, across = np.broadcast_arrays(*_from_axis_mm(press, outer_radius_mm))
-    return float(shape.slope(along[touched], across[touched]).max())
 
 
 def _active(shape: tuple[int, ...], pad: npt.NDArray[np.bool_] | None) -> npt.NDArray[np.bool_]:
