@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.conformance.check import check, code_of, fail, skip
-from tactbench.core.conformance.driver import READ_S, WAIT_S, emulated, passing
+from tactbench.core.conformance.driver import BAD, WAIT_S, blocks_of, emulated, marks_of, rows_of
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.samples import Quality
 from tactbench.core.spec.sensor import ChannelSpec
@@ -30,7 +30,6 @@ OVERLOAD_N = 1e6
 """More than any sensor of a fingertip bears."""
 STILL_M = 1e-5
 """By which the position of a motor at rest may change (assumed: an increment of its drive, twice)."""
-_BAD = Quality.MISSING | Quality.SUSPECT
 
 
 def _of_kind(subject: Subject, kind: str) -> None:
@@ -79,14 +78,10 @@ def _medians(driver: Driver, clock: Any) -> dict[str, float]:
     """Read for `READ_S`; return the median of each channel over the second half, without samples that are marked."""
     import numpy as np
 
-    rows: dict[str, list[FloatArray]] = {stream.name: [] for stream in driver.streams}
-    for _ in passing(clock, READ_S):
-        for block in driver.read(WAIT_S):
-            marks = np.zeros(block.data.shape, np.uint8) if block.quality is None else block.quality
-            rows[block.stream].append(np.where((marks & _BAD) != 0, np.nan, block.data))
+    rows = rows_of(driver, clock)
     found: dict[str, float] = {}
     for stream in driver.streams:
-        table = np.concatenate(rows[stream.name])
+        table = rows[stream.name]
         found |= dict(
             zip((one.name for one in stream.channels), np.nanmedian(table[len(table) // 2 :], axis=0), strict=True)
         )
@@ -166,10 +161,9 @@ def overload_is_marked(subject: Subject) -> None:
         loads = {one.name: OVERLOAD_N for one in _forces(driver)}
     with _loaded(subject, loads) as (driver, clock, _):
         rows: dict[str, list[Any]] = {stream.name: [] for stream in driver.streams}
-        for _ in passing(clock, READ_S):
-            for block in driver.read(WAIT_S):
-                marks = np.zeros(block.data.shape, np.uint8) if block.quality is None else block.quality
-                rows[block.stream].append(((marks & (Quality.SATURATED | _BAD)) != 0) | ~np.isfinite(block.data))
+        for block in blocks_of(driver, clock):
+            marked = (marks_of(block) & (Quality.SATURATED | BAD)) != 0
+            rows[block.stream].append(marked | ~np.isfinite(block.data))
         for stream in driver.streams:
             marked = np.concatenate(rows[stream.name])
             for column, channel in enumerate(stream.channels):
@@ -218,9 +212,8 @@ def opening_and_reading_move_nothing(subject: Subject) -> None:
         rows: dict[str, list[FloatArray]] = {stream.name: [] for stream in driver.streams}
         driver.identify()
         driver.start()
-        for _ in passing(clock, READ_S):
-            for block in driver.read(WAIT_S):
-                rows[block.stream].append(np.asarray(block.data, dtype=np.float64))
+        for block in blocks_of(driver, clock):
+            rows[block.stream].append(np.asarray(block.data, dtype=np.float64))
         for name, (stream, column) in _positions(driver).items():
             found = np.concatenate(rows[stream])[:, column]
             found = found[np.isfinite(found)]

@@ -14,6 +14,10 @@ from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.sensor import ChannelSpec, SensorSpec
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from tactbench.core.samples import Block, FloatArray
     from tactbench.devices.driver import Driver
     from tactbench.devices.emulator import Senses
     from tactbench.links.link import Link
@@ -25,6 +29,8 @@ UNPLUGGED_S = 5.0
 """How long a driver may go on reading once its line is gone: no device is waited for longer."""
 GONE_AT_S = 2.0
 RATE_SHARE = 0.05
+BAD = Quality.MISSING | Quality.SUSPECT
+"""Marks of samples whose values say nothing."""
 MOST_STILL = 1000
 """Reads that may come back at one moment: of a device that sends a thousand samples at once."""
 
@@ -129,6 +135,30 @@ def passing(
         yield
 
 
+def blocks_of(driver: Driver, clock: Any) -> Iterator[Block]:
+    """Yield what a started driver reads within `READ_S`."""
+    for _ in passing(clock, READ_S):
+        yield from driver.read(WAIT_S)
+
+
+def marks_of(block: Block) -> npt.NDArray[np.uint8]:
+    """Return the (n, channels) marks of a block; one without any is good."""
+    import numpy as np
+
+    return np.zeros(block.data.shape, np.uint8) if block.quality is None else block.quality
+
+
+def rows_of(driver: Driver, clock: Any) -> dict[str, FloatArray]:
+    """Return by stream what a started driver reads within `READ_S`: (n, channels), NaN where it is marked as bad."""
+    import numpy as np
+
+    rows: dict[str, list[FloatArray]] = {stream.name: [] for stream in driver.streams}
+    for block in blocks_of(driver, clock):
+        values = np.asarray(block.data, dtype=np.float64)
+        rows[block.stream].append(np.where((marks_of(block) & BAD) != 0, np.nan, values))
+    return {name: np.concatenate(blocks) for name, blocks in rows.items()}
+
+
 @check("sensor", "device", needs=("code-names-resolve",), level="silver")
 def driver_opens(subject: Subject) -> None:
     """A driver is open once it is made: through the link that it is given, and no other.
@@ -205,9 +235,8 @@ def look_at(subject: Subject, driver: Driver, clock: Any) -> None:
             if np.shape(block.data) != (len(block.data), width[block.stream]):
                 fail("driver.read", f"a block of {block.stream} has shape {np.shape(block.data)}")
             rows[block.stream] += len(block.data)
-            marks = np.zeros(block.data.shape, np.uint8) if block.quality is None else block.quality
             values = np.asarray(block.data, dtype=np.float64)
-            if not np.isfinite(values[(marks & (Quality.MISSING | Quality.SUSPECT)) == 0]).all():
+            if not np.isfinite(values[(marks_of(block) & BAD) == 0]).all():
                 fail("driver.read", f"a block of {block.stream} holds values that are not finite and not marked")
             for field in ("t_ns", "sequence"):
                 counted = getattr(block, field)
@@ -239,15 +268,10 @@ def driver_reads_what_is_sensed(subject: Subject) -> None:
     channels = {one.name: one for one in spec.channels()}
     with emulated(subject, senses=constant(sensed)) as (driver, _, clock):
         driver.start()
-        rows: dict[str, list[Any]] = {stream.name: [] for stream in driver.streams}
-        for _ in passing(clock, READ_S):
-            for block in driver.read(WAIT_S):
-                marks = np.zeros(block.data.shape, np.uint8) if block.quality is None else block.quality
-                bad = (marks & (Quality.MISSING | Quality.SUSPECT)) != 0
-                rows[block.stream].append(np.where(bad, np.nan, np.asarray(block.data, dtype=np.float64)))
+        rows = rows_of(driver, clock)
         for stream in driver.streams:
             # The first samples may be from before.
-            read = np.nanmedian(np.concatenate(rows[stream.name]), axis=0)
+            read = np.nanmedian(rows[stream.name], axis=0)
             for name, found in zip([one.name for one in stream.channels], read.tolist(), strict=True):
                 if abs(found - sensed[name]) > _near(channels[name]):
                     others = [one for one, value in sensed.items() if abs(found - value) <= _near(channels[name])]
@@ -273,10 +297,9 @@ def driver_keeps_its_rate(subject: Subject) -> None:
     with emulated(subject) as (driver, _, clock):
         driver.start()
         times: dict[str, list[Any]] = {stream.name: [] for stream in driver.streams}
-        for _ in passing(clock, READ_S):
-            for block in driver.read(WAIT_S):
-                if block.t_ns is not None:
-                    times[block.stream].append(block.t_ns)
+        for block in blocks_of(driver, clock):
+            if block.t_ns is not None:
+                times[block.stream].append(block.t_ns)
         for stream in driver.streams:
             t_ns = np.concatenate(times[stream.name]) if times[stream.name] else np.zeros(0)
             if stream.rate_hz is None or len(t_ns) < 20:

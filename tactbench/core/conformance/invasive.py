@@ -237,7 +237,7 @@ class StoppedPress:
     """Mean force of its unloaded hold."""
     left_n: float | None
     """The last force after it was stopped; None: nothing came any more."""
-    said: str
+    message: str
     """What `stop` said is left to do."""
 
 
@@ -267,7 +267,7 @@ def _stopped(subject: Subject) -> StoppedPress:
             acquisition.stop("stopped by hand")
             raise
         pressed = len(rows)
-        said = acquisition.stop("a check of plugins")
+        message = acquisition.stop("a check of plugins")
         for block in blocks:
             take(block)
     hold = [force for t_s, force in rows if t_s - rows[0][0] < HOLD_S]
@@ -276,7 +276,7 @@ def _stopped(subject: Subject) -> StoppedPress:
         zero_n=_zero_n(acquisition),
         unloaded_n=float(np.mean(hold)) if hold else 0.0,
         left_n=float(np.mean(left[-5:])) if left else None,
-        said=said,
+        message=message,
     )
 
 
@@ -299,8 +299,8 @@ def real_rig_retreats_when_stopped(subject: Subject) -> None:
     Let `stop` of the acquisition retreat, wait for the end of that, and return "" or what is to be done by hand.
     """
     found = _stopped(subject)
-    if found.said:
-        fail("stop", f"it says: {found.said}")
+    if found.message:
+        fail("stop", f"it says: {found.message}")
     if found.left_n is not None and abs(found.left_n) > FORCE_SHARE * FORCE_N:
         fail("stop", f"{found.left_n:.3g} N are left after it has returned")
 

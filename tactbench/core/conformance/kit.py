@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tactbench.core.conformance import (
-    by_numbers,
     common,
     device,
     driver,
     effect,
     estimator,
+    indenter_and_profile,
     invasive,
     press,
     recorded,
@@ -23,7 +23,7 @@ from tactbench.core.conformance.subject import Subject
 
 CHECKS: tuple[Check, ...] = (
     *common.CHECKS, *sensor_spec.CHECKS, *transducer.CHECKS, *press.CHECKS, *driver.CHECKS, *device.CHECKS,
-    *task.CHECKS, *estimator.CHECKS, *effect.CHECKS, *by_numbers.CHECKS, *recorded.CHECKS, *invasive.CHECKS,
+    *task.CHECKS, *estimator.CHECKS, *effect.CHECKS, *indenter_and_profile.CHECKS, *recorded.CHECKS, *invasive.CHECKS,
 )  # fmt: skip
 """In the order in which they run: a check stands behind those that it needs."""
 

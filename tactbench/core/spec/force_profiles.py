@@ -44,12 +44,8 @@ def staircase(
     UsageError
         If `steps` is no whole number from 1 on.
     """
-    if steps < 1 or steps != int(steps):
-        raise UsageError(
-            f"The profile 'staircase': steps is given as {steps:g}, and a whole number from 1 on is expected.",
-            hint="For example 5.",
-        )
-    levels = [peak * level / steps for level in (*range(1, int(steps) + 1), *range(int(steps) - 1, -1, -1))]
+    count = _whole("staircase", "steps", steps, 5)
+    levels = [peak * level / count for level in (*range(1, count + 1), *range(count - 1, -1, -1))]
     return _path("staircase", [(hold, 0.0), *((span, level) for level in levels for span in (rise, dwell))], rate)
 
 
@@ -127,17 +123,20 @@ def sine(
             "expected.",
             hint="An indenter cannot pull.",
         )
-    if periods < 1 or periods != int(periods):
-        raise UsageError(
-            f"The profile 'sine': periods is given as {periods:g}, and a whole number from 1 on is expected.",
-            hint="For example 10.",
-        )
+    points = _whole("sine", "periods", periods, 10) * PER_PERIOD
     step = 1.0 / (frequency * PER_PERIOD)
-    swing = [
-        (step, mean - amplitude * math.cos(2 * math.pi * point / PER_PERIOD))
-        for point in range(1, int(periods) * PER_PERIOD + 1)
-    ]
+    swing = [(step, mean - amplitude * math.cos(2 * math.pi * point / PER_PERIOD)) for point in range(1, points + 1)]
     return _path("sine", [(hold, 0.0), (rise, mean - amplitude), *swing], rate)
+
+
+def _whole(profile: str, name: str, given: float, example: int) -> int:
+    """Return `given` as a count; raises UsageError if it is no whole number from 1 on."""
+    if given < 1 or given != int(given):
+        raise UsageError(
+            f"The profile {profile!r}: {name} is given as {given:g}, and a whole number from 1 on is expected.",
+            hint=f"For example {example}.",
+        )
+    return int(given)
 
 
 def _path(name: str, spans: Sequence[tuple[float, float]], rate_hz: float) -> ForcePath:
