@@ -59,7 +59,7 @@ class EngineChoice:
 
         Its `each` yields every item exactly once, as they end, with its result or the TactbenchError that stopped it;
         what comes of an item does not depend on the engine, and only a Ctrl-C by the user ends the iteration. In
-        process, one cell is carried out here; of several, each in a child process, one at a time.
+        process, one cell is carried out here; several in a child process, one at a time.
         """
         if self.name == "dask":
             from tactbench.core.matrix.dask import Dask
@@ -67,4 +67,4 @@ class EngineChoice:
             return Dask(self.jobs, self.limits, self.scheduler)
         if self.name == "in-process" and cells == 1:
             return InProcess(self.limits)
-        return Pool(self.jobs, self.limits)
+        return Pool(self.jobs, self.limits, reuse=self.name == "in-process")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from functools import partial
+from itertools import chain, groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -86,10 +87,15 @@ def evaluate_all(run: RunContext, cells: Sequence[Cell], stage: str) -> tuple[li
         engine = choice.engine(len(jobs))
         working = progress.working if isinstance(engine, InProcess) else None
         work = partial(solve, concurrency=max(1, min(choice.jobs, len(jobs))), working=working)
-        with closing(engine.each(work, _ordered(jobs, engine, choice.limits))) as outcomes:
-            for job, outcome in outcomes:
-                rows[job.cell.name] = _kept(run, job.cell, outcome, key_of[job.cell.name])
-                progress.advance(job.cell.name, stopped=rows[job.cell.name]["status"] in STOPPED)
+        ordered = _ordered(jobs, engine, choice.limits)
+        batches: Iterable[Iterable[Job]] = [ordered]
+        if choice.name == "in-process":  # cells of one estimator share a process: what its import changes is its own
+            batches = (batch for _, batch in groupby(ordered, _shared))
+        for batch in batches:
+            with closing(engine.each(work, batch)) as outcomes:
+                for job, outcome in outcomes:
+                    rows[job.cell.name] = _kept(run, job.cell, outcome, key_of[job.cell.name])
+                    progress.advance(job.cell.name, stopped=rows[job.cell.name]["status"] in STOPPED)
         done = [job for job in jobs if rows[job.cell.name]["status"] == "done"]
         jobs = [job for job in done if store.finished(key_of[job.cell.name]) is None]
         if not jobs:
@@ -124,7 +130,7 @@ def _kept(run: RunContext, cell: Cell, outcome: Any, key: str) -> Row:
 
 
 def _ordered(jobs: Sequence[Job], engine: Pool | InProcess | Dask, limits: Limits) -> Iterator[Job]:
-    """Yield `jobs` group by group of one task and the same recordings.
+    """Yield `jobs` group by group of one task and the same recordings, and in a group estimator by estimator.
 
     Before each group, what cells share that are forked off this process is imported and read here. A child process
     reads it first: what stops that is not read here, and stops each of the cells in its own process.
@@ -142,7 +148,14 @@ def _ordered(jobs: Sequence[Job], engine: Pool | InProcess | Dask, limits: Limit
             if readable is True:
                 dataset(task, recordings)
         find_libraries()
-        yield from members
+        by_estimator: dict[str, list[Job]] = {}
+        for job in members:
+            by_estimator.setdefault(job.cell.estimator, []).append(job)
+        yield from chain.from_iterable(by_estimator.values())
+
+
+def _shared(job: Job) -> tuple[str, tuple[Path, ...], str]:
+    return job.cell.task_key, job.recordings, job.cell.estimator
 
 
 def _is_readable(task_and_recordings: tuple[str, tuple[Path, ...]]) -> bool:

@@ -68,7 +68,7 @@ def _eat():
 
 
 def _print():
-    print("said by print")
+    print("said by print in process", os.getpid())
     sys.stderr.write("said to stderr\n")
     os.write(1, b'{"said": "to descriptor 1"}\n')
     os.system("echo said by a child")
