@@ -1,8 +1,9 @@
-"""Writing a file whole or not at all, reading one that anybody may have put there, and locks."""
+"""Writing a file whole or not at all, reading one that anybody may have put there, locks, and digests."""
 
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import stat
 from pathlib import Path
@@ -29,6 +30,13 @@ def read_regular(path: Path, most: int, *, follow: bool = True) -> bytes:
         if not stat.S_ISREG(os.fstat(opened).st_mode):
             raise OSError(errno.EINVAL, "it is no regular file", str(path))
         return file.read(most + 1)
+
+
+def sha256(content: str | bytes) -> str:
+    """Return the SHA-256 of bytes or of a text, 64 hexadecimal digits."""
+    if isinstance(content, str):
+        content = content.encode("utf-8", "surrogatepass")  # half characters, as a name of a file may hold, too
+    return hashlib.sha256(content).hexdigest()
 
 
 def try_lock(file: int) -> bool | None:

@@ -94,7 +94,8 @@ def command(
     table = build_table(rows, provenance)
     print_table(table, shape, view_of(store.folder, wide=wide, notes=notes))
     for by in ("protocol", "split") if shape == "table" else ():
-        print_comparisons(compare(rows, by))  # once more, side by side
+        if comparisons := compare(rows, by):  # once more, side by side
+            print_comparisons(comparisons)
     write_tables(rows, store.folder, provenance, table)
     _farewell(outcome, rows, store.folder, shape)
     ctx.exit(1 if outcome.failures else 0)

@@ -112,18 +112,14 @@ def print_table(table: Table, shape: str, view: View, *, to: Path | None = None)
     UsageError
         If the file cannot be written.
     """
+    from tactbench.core.errors import UsageError
+    from tactbench.core.files import replace_file
     from tactbench.core.leaderboard.formats import rendered, show
 
     if shape == "table" and to is None and sys.stdout.isatty():
         show(table, console(), view)
-    else:
-        _put(rendered(table, shape, view, width_without_terminal()), to)
-
-
-def _put(content: bytes, to: Path | None) -> None:
-    from tactbench.core.errors import UsageError
-    from tactbench.core.files import replace_file
-
+        return
+    content = rendered(table, shape, view, width_without_terminal())
     if to is None:
         click.echo(content, nl=False)
         return

@@ -16,13 +16,14 @@ from itertools import chain
 from typing import Any
 
 import tactbench
+from tactbench.core.files import sha256
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import NUMERIC, Line
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
 from tactbench.core.leaderboard.records import GROUPS, TITLES
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.view import full_grid
-from tactbench.core.matrix.store.sharing import canonical, provenance_id
+from tactbench.core.matrix.store.sharing import PROVENANCE_ID, canonical
 from tactbench.core.spec.row import FORMAT
 from tactbench.core.tables.html import render
 from tactbench.core.tables.text import visible
@@ -133,7 +134,7 @@ def _is_simulated(block: Block) -> bool:
 def _id(entry: Mapping[str, Any]) -> str:
     """Return what rows call their provenance by (`made_by`); "" if it is no plain data."""
     try:
-        return provenance_id(canonical(dict(entry)).encode())
+        return sha256(canonical(dict(entry)))[:PROVENANCE_ID]
     except (TypeError, ValueError, RecursionError):
         return ""
 

@@ -74,13 +74,10 @@ def _fault_in_answers(sets: Any, row: Row) -> str:
     given = len(sets["test"]["y_true"])
     if given != row["n_test"]:
         return f"it gave {given} test answers and says {row['n_test']}"
-    return _fault_in_score(sets["test"], row)
-
-
-def _fault_in_score(test: Mapping[str, Any], row: Row) -> str:
-    """Compute the score anew from the answers that are kept, in this process, where no plugin has run."""
+    # The score is computed anew from the answers that are kept, in this process, where no plugin has run.
     from tactbench.core.evaluation.metrics import metric_called
 
+    test = sets["test"]
     try:
         found = metric_called(row["metric"]).of(test["y_true"], test["y_pred"], len(row["classes"]))
     except (TypeError, ValueError, IndexError) as error:

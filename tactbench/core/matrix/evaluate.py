@@ -55,7 +55,7 @@ def evaluate_all(run: RunContext, cells: Sequence[Cell], stage: str) -> tuple[li
     stopped: list[tuple[Cell, BaseException]] = []
     """Cells without their recordings."""
     needed = {path: None for need in map(request_key, cells) if need not in troubles for path in paths[need]}
-    unreadable = read_all(read_digest, recorded.unread(needed, "digest"), recorded, choice.limits)
+    unreadable = read_all(read_digest, "digest", needed, recorded, choice.limits)
     for cell in cells:
         need = request_key(cell)
         trouble = troubles.get(need) or next((unreadable[path] for path in paths[need] if path in unreadable), None)
@@ -70,7 +70,7 @@ def evaluate_all(run: RunContext, cells: Sequence[Cell], stage: str) -> tuple[li
             continue
         found = store.finished(key_of[cell.name])
         if found is not None:
-            rows[cell.name] = reused(found, cell, task_of(cell, installed()))
+            rows[cell.name] = reused(found, cell, task_of(cell.task_key, installed()))
             store.reuse(rows[cell.name])
         else:
             jobs.append(Job(cell, tuple(paths[need]), digests if choice.name == "dask" else ()))
@@ -114,7 +114,7 @@ def _kept(run: RunContext, cell: Cell, outcome: Any, key: str) -> Row:
     known = {"key": key, "made_by": run.made_by, "host": this_host()}  # what the run knows, and its cells do not
     if isinstance(outcome, BaseException):
         return store.note({**unanswered(cell, outcome), **known})
-    fault = fault_in(outcome, opening(cell, task_of(cell, installed())))
+    fault = fault_in(outcome, opening(cell, task_of(cell.task_key, installed())))
     if not fault:
         row, columns = outcome
         paths = [Path(path) for path in row["recordings"]]
@@ -141,7 +141,7 @@ def _ordered(jobs: Sequence[Job], engine: Pool | InProcess | Dask, limits: Limit
     forks = isinstance(engine, Pool) and can_fork()
     for (task, recordings), members in groups.items():
         if forks or isinstance(engine, InProcess):
-            kinds = ((job.cell.estimator, task_of(job.cell, installed()).kind) for job in members)
+            kinds = ((job.cell.estimator, task_of(task, installed()).kind) for job in members)
             import_estimators(kinds)
         if forks and len(members) > 1:
             ((_, readable),) = Pool(1, limits, reuse=True).each(_is_readable, [(task, recordings)])

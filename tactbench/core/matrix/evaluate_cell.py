@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tactbench.core.errors import CellStopped, EngineError, NotApplicable, RecordingError
 from tactbench.core.evaluation.libraries import import_libraries
-from tactbench.core.matrix.plan import Cell, task_called, task_of
+from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.matrix.store import Row
 from tactbench.core.plugins.registry import installed, load_object
 from tactbench.core.pool.log import printed
@@ -71,7 +71,7 @@ def dataset(task: str, recordings: tuple[Path, ...]) -> Dataset:
     """Return `recordings` as a task (its name, or what declares it) needs them; forked children share what is read."""
     from tactbench.core.evaluation.dataset import load_dataset
 
-    return load_dataset(task_called(task, installed()), recordings)
+    return load_dataset(task_of(task, installed()), recordings)
 
 
 Solved = tuple[Row, dict[str, dict[str, Any]]]
@@ -90,7 +90,7 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     """
     cell, recordings, digests = job
     registry = installed()
-    task, estimator = task_of(cell, registry), registry.estimators[cell.estimator]
+    task, estimator = task_of(cell.task_key, registry), registry.estimators[cell.estimator]
     if digests:
         _check_content(recordings, digests)
     folder = Path.cwd()
@@ -208,7 +208,7 @@ def unanswered(cell: Cell, why: BaseException) -> Row:
     """Return the row of a cell that was skipped or stopped."""
     error = load_error(dump_error(why))
     registry = installed()
-    row = opening(cell, task_of(cell, registry), simulated=registry.rigs[cell.rig].simulated)
+    row = opening(cell, task_of(cell.task_key, registry), simulated=registry.rigs[cell.rig].simulated)
     if isinstance(error, NotApplicable):
         return {**row, "status": "skipped", "reason": str(error)}
     row |= {"status": "failed", "reason": str(error).rstrip(": "), "traceback": error.traceback_text}

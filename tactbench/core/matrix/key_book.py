@@ -11,7 +11,6 @@ It only explains: losing it costs no result.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
@@ -21,8 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tactbench.core.files import read_regular, replace_file
-from tactbench.core.matrix.keys import Fixed, Section
+from tactbench.core.files import read_regular, replace_file, sha256
+from tactbench.core.matrix.keys import KEY_DIGITS, Fixed, Section
 
 Sections = Mapping[str, Section]
 
@@ -64,8 +63,13 @@ class KeyBook:
             for entry in fresh:
                 parts = {name: part for name, part in (("fixed", entry.fixed.sections), ("data", entry.data)) if part}
                 for part in parts.values():
-                    if id(part) not in kept:
-                        kept[id(part)] = self._keep(part)
+                    if id(part) in kept:
+                        continue
+                    content = json.dumps(part, sort_keys=True, separators=(",", ":"), default=repr)
+                    kept[id(part)] = digest = sha256(content)[:KEY_DIGITS]
+                    path = self.folder / f"{digest}.json"
+                    if not path.exists():
+                        replace_file(path, content.encode(), sync=False)  # what a power cut takes costs an explanation
                 digests = {name: kept[id(part)] for name, part in parts.items()}
                 configuration = dict(entry.configuration)
                 lines.append({"name": entry.name, "key": entry.key, "configuration": configuration, **digests})
@@ -86,14 +90,6 @@ class KeyBook:
             return None
         sections = {**self._part(line.get("fixed")), "configuration": line["configuration"]}
         return {**sections, "data": self._part(line["data"])} if line.get("data") else sections
-
-    def _keep(self, part: Mapping[str, Section]) -> str:
-        content = json.dumps(part, sort_keys=True, separators=(",", ":"), default=repr).encode()
-        digest = hashlib.sha256(content).hexdigest()[:32]
-        path = self.folder / f"{digest}.json"
-        if not path.exists():
-            replace_file(path, content, sync=False)  # what a power cut takes costs an explanation
-        return digest
 
     def _part(self, digest: object) -> dict[str, Any]:
         if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):

@@ -6,12 +6,12 @@ data. A key is a digest of the sections' digests; the sections themselves are wh
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from tactbench.core.files import sha256
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.provenance.source import Source, SourceDigests, versions
@@ -22,6 +22,9 @@ _NOT_IN_THE_KEY = {"published", "equivalence", "reference_score", "title", "ques
 """Of a task: what changes no number, and what its recordings say themselves, by their content."""
 
 Section = Mapping[str, Any]
+
+KEY_DIGITS = 32
+"""Of a SHA-256, which a key is."""
 
 
 class Fixed(NamedTuple):
@@ -50,9 +53,9 @@ class Keys:
         """Return the key of a cell's result; `data` are the content digests of its recordings, in order."""
         several = tuple(data)
         if several not in self._data:
-            self._data[several] = _digest("\n".join(several))
+            self._data[several] = sha256("\n".join(several))[:KEY_DIGITS]
         digests = f"{self.shared_by_cells(cell).digest} {self._data[several]}"
-        return _digest(f"{digests} {_canonical(configuration_of(cell))}")
+        return sha256(f"{digests} {_canonical(configuration_of(cell))}")[:KEY_DIGITS]
 
     def shared_by_cells(self, cell: Cell) -> Fixed:
         """Return what all cells of one task and one estimator share."""
@@ -72,8 +75,8 @@ class Keys:
 
     def of_recording(self, sensor: str, rig: str, scene: Scene, role: Role, seed: int, rig_file: str = "") -> str:
         """Return the key of a recording that `rig` is to make of `scene`."""
-        own = [scene.model_dump(), role, seed]
-        return _digest(f"{self.maker(sensor, rig, rig_file, scene.indenter.shape).digest} {_canonical(own)}")
+        made_by = self.maker(sensor, rig, rig_file, scene.indenter.shape)
+        return sha256(f"{made_by.digest} {_canonical([scene.model_dump(), role, seed])}")[:KEY_DIGITS]
 
     def maker(self, sensor: str, rig: str, rig_file: str = "", shape: str | None = None) -> Fixed:
         """Return what all recordings by one rig of one sensor share, with one `shape` of indenter if a scene names one.
@@ -86,7 +89,7 @@ class Keys:
             devices = RigFile.model_validate_json(rig_file) if rig_file else None
             if devices is not None and not devices.emulated:
                 sections = {"sensor": {"name": sensor}, "rig": {"name": rig, "file": rig_file}}
-                return Fixed(_digest(_canonical(sections)), sections)
+                return Fixed(sha256(_canonical(sections))[:KEY_DIGITS], sections)
             maker, carrier = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig)
             effects = [self.registry.effects.owned(effect.name) for effect in self.registry.effects]
             modules = [maker.module, carrier.module, carrier.descriptor.where]
@@ -135,8 +138,4 @@ def _fixed(source: Source, distributions: tuple[str, ...], **descriptors: Sectio
     imported = {f"import {name}": found for name, found in source.versions.items()}
     sections["versions"] = {**versions(distributions), **imported}
     sections.update({f"source of {package}": files for package, files in source.packages.items()})
-    return Fixed(_digest(_canonical(sections)), sections)
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:32]
+    return Fixed(sha256(_canonical(sections))[:KEY_DIGITS], sections)

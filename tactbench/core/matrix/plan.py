@@ -59,17 +59,12 @@ class Cell:
 
     @property
     def task_key(self) -> str:
-        """What `task_called` finds its task by: its name, or the JSON that declares it."""
+        """What `task_of` finds its task by: its name, or the JSON that declares it."""
         return self.declared_task or self.task
 
 
-def task_of(cell: Cell, registry: Registry) -> TaskSpec:
-    """Return the task of a cell, in a process that may not have seen its recordings."""
-    return task_called(cell.task_key, registry)
-
-
-def task_called(task: str, registry: Registry) -> TaskSpec:
-    """Return a task by its name, or by the JSON that declares it."""
+def task_of(task: str, registry: Registry) -> TaskSpec:
+    """Return a task by its name, or by the JSON that declares it: a process may not have seen its recordings."""
     return DeclaredTask.model_validate_json(task).spec if task.startswith("{") else registry.tasks[task].spec
 
 
@@ -145,7 +140,7 @@ def with_probes(cells: Sequence[Cell], registry: Registry) -> list[Cell]:
     planned = frozenset(every)
     for cell in cells:
         rules = protocol_called(cell.protocol)
-        task = task_of(cell, registry)
+        task = task_of(cell.task_key, registry)
         if rules.probe or cell.split == "in-session" or (cell.baseline and cell.estimator not in task.baselines):
             continue
         if rules.roles_only and task.splits[:1] == ("roles",):

@@ -59,7 +59,7 @@ def requests_for(
         if needed in requests:
             continue
         requests[needed] = []
-        for planned in in_drawn_order(task_of(cell, registry).scenes_for(needed[2]), cell.seed):
+        for planned in in_drawn_order(task_of(cell.task_key, registry).scenes_for(needed[2]), cell.seed):
             scene = planned.scene.simulated_as(simulation)
             key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
             path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
@@ -172,7 +172,7 @@ def _from_replay(
     """Return the cells of recordings that exist; a child process reads them, so that a damaged one breaks nothing."""
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
-    broken = read_all(read_sensor_and_scene, recorded.unread(paths, "sensor"), recorded, limits)
+    broken = read_all(read_sensor_and_scene, "sensor", paths, recorded, limits)
     scenes: dict[str, dict[Path, str | None]] = {}
     unreadable: dict[str, dict[Path, BaseException]] = {}
     for path in paths:

@@ -8,17 +8,27 @@ from __future__ import annotations
 
 import importlib
 import json
-import os
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tactbench.core.files import read_regular, replace_file
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.pool import Pool
 
 Facts = Mapping[str, str | None]
+
+
+class Looks(NamedTuple):
+    """What a file looks like: which one it is, not by its path (a folder that is handed on names none), and when."""
+
+    inode: str
+    """Device and inode."""
+    size: int
+    modified_ns: int
+    changed_ns: int
+
 
 _FORMAT = "tactbench-memory 2"
 
@@ -48,7 +58,7 @@ class Recorded:
     def __init__(self, memory: Path, clock: Callable[[], int] = time.time_ns) -> None:
         self.digests: dict[Path, str] = {}
         """Of the content, known in this run."""
-        self.made: dict[Path, os.stat_result | None] = {}
+        self.made: dict[Path, Looks | None] = {}
         """What recordings that were made in this run looked like then."""
         self._path = memory
         self._clock = clock
@@ -61,37 +71,31 @@ class Recorded:
         except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
             pass
 
-    def facts(self, stat: os.stat_result | None) -> Facts:
-        """Return what is known about the file that looks like `stat`; nothing if it looks otherwise now, or is none."""
-        if stat is None:
+    def facts(self, looks: Looks | None) -> Facts:
+        """Return what is known about the file that looks so; nothing if it looks otherwise now, or is none."""
+        if looks is None:
             return {}
-        name, *looks = _looks(stat)
-        entry = self._files.get(name)
-        return entry[3] if entry is not None and entry[:3] == looks else {}
+        entry = self._files.get(looks.inode)
+        return entry[3] if entry is not None and entry[:3] == list(looks[1:]) else {}
 
-    def learn(self, before: os.stat_result | None, after: os.stat_result | None, facts: Facts) -> None:
+    def learn(self, before: Looks | None, after: Looks | None, facts: Facts) -> None:
         """Remember `facts`, read between `before` and `after`, if the file did not change and was at rest."""
-        if before is None or after is None or _looks(before) != _looks(after):
+        if before is None or before != after:
             return
-        tick = _COARSE_TICK_NS if before.st_mtime_ns % 1_000_000_000 == 0 else _TICK_NS
-        if self._clock() - max(before.st_mtime_ns, before.st_ctime_ns) <= tick:
+        tick = _COARSE_TICK_NS if before.modified_ns % 1_000_000_000 == 0 else _TICK_NS
+        if self._clock() - max(before.modified_ns, before.changed_ns) <= tick:
             return
-        name, *looks = _looks(before)
-        self._files[name] = [*looks, {**self.facts(before), **facts}]
+        self._files[before.inode] = [*before[1:], {**self.facts(before), **facts}]
         self._fresh = True
-
-    def unread(self, paths: Iterable[Path], fact: str) -> list[Path]:
-        """Return those of `paths` that would have to be opened for the `fact`: ``digest`` or ``sensor``."""
-        return [path for path in paths if path not in self.digests and fact not in self.facts(stat_of(path))]
 
     def digest(self, path: Path) -> str:
         """Return the content digest of a recording; raises RecordingError if it cannot be read."""
         if path not in self.digests:
-            before = stat_of(path)
+            before = looks_of(path)
             facts = self.facts(before)
             if not facts.get("digest"):
                 facts = read_digest(path)
-                self.learn(before, stat_of(path), facts)
+                self.learn(before, looks_of(path), facts)
             self.digests[path] = str(facts["digest"])
         return self.digests[path]
 
@@ -100,17 +104,17 @@ class Recorded:
 
         There is no scene where nobody planned it, for example that of an imported table.
         """
-        before = stat_of(path)
+        before = looks_of(path)
         facts = self.facts(before)
         if facts.get("sensor") is None:
             facts = read_sensor_and_scene(path)
-            self.learn(before, stat_of(path), facts)
+            self.learn(before, looks_of(path), facts)
         return str(facts["sensor"]), facts["scene"]
 
     def save(self) -> None:
         """Write what was learned; a folder that cannot be written only costs time."""
         for path, before in self.made.items():
-            self.learn(before, stat_of(path), {"digest": self.digests[path]})
+            self.learn(before, looks_of(path), {"digest": self.digests[path]})
         if not self._fresh:
             return
         content = json.dumps({"format": _FORMAT, "files": self._files}, separators=(",", ":")).encode()
@@ -137,40 +141,42 @@ def read_sensor_and_scene(path: Path) -> Facts:
     return {"sensor": meta.sensor.name, "scene": meta.scene.name if meta.scene else None}
 
 
-def stat_of(path: Path) -> os.stat_result | None:
+def looks_of(path: Path) -> Looks | None:
     """Return what a file looks like; None where there is none."""
     try:
-        return path.stat()
+        stat = path.stat()
     except OSError:
         return None
+    return Looks(f"{stat.st_dev:x}:{stat.st_ino:x}", stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns)
 
 
 def read_all(
-    read: Callable[[Path], Facts], paths: Sequence[Path], recorded: Recorded, limits: Limits
+    read: Callable[[Path], Facts], fact: str, paths: Iterable[Path], recorded: Recorded, limits: Limits
 ) -> dict[Path, BaseException]:
-    """Have `recorded` learn what `read` finds in every path; return what stopped it where it did.
+    """Have `recorded` learn what `read` finds in every path of which it does not know the `fact`, such as its digest.
 
     One child process reads one file after the other; a file that ends it, or takes longer than a cell may, costs its
     own result only.
+
+    Returns
+    -------
+    failed
+        What stopped it, by path.
     """
+    paths = [path for path in paths if path not in recorded.digests and fact not in recorded.facts(looks_of(path))]
     if not paths:
         return {}
     importlib.import_module("h5py")  # once here, not once in every process that reads
-    before = {path: stat_of(path) for path in paths}
+    before = {path: looks_of(path) for path in paths}
     failed: dict[Path, BaseException] = {}
     for path, facts in Pool(1, limits, reuse=True).each(read, paths):
         if isinstance(facts, BaseException):
             failed[path] = facts
             continue
-        recorded.learn(before[path], stat_of(path), facts)
+        recorded.learn(before[path], looks_of(path), facts)
         if facts.get("digest"):
             recorded.digests[path] = str(facts["digest"])
     return failed
-
-
-def _looks(stat: os.stat_result) -> tuple[str, int, int, int]:
-    """Return which file it is, not by its path (a folder that is handed on names none), and its size and times."""
-    return f"{stat.st_dev:x}:{stat.st_ino:x}", stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns
 
 
 def _is_entry(entry: object) -> bool:

@@ -120,7 +120,6 @@ class Pool:
                 kill_below(worker.pid)
                 idle.append(worker)
             else:
-                worker.kill()
                 worker.close()
 
 
@@ -145,8 +144,6 @@ def _children_of_items(busy: list[Worker], idle: list[Worker]) -> Iterator[set[i
                 worker.give_grace()
         finally:
             with interrupts_blocked():
-                for worker in (*busy, *idle):
-                    worker.kill()
                 for worker in (*busy, *idle):
                     worker.close()
                 if before is not None:

@@ -84,7 +84,7 @@ class Worker:
             child_end.close()
         os.set_blocking(self.connection.fileno(), False)
         self._inbox = Inbox(self.connection.fileno())
-        self._shared_mb = memory.resident_mb(os.getpid()) if fork else 0.0
+        self._shared_mb = memory.resident_mb(os.getpid()) if fork and limits.memory_mb else 0.0
         """What it holds without having taken it."""
         self._kills = memory.oom_kills()
 
@@ -100,7 +100,8 @@ class Worker:
         self._closed_s: float | None = None
         """When the pipe of its result was found closed."""
         self._ends_s: float | None = self._began_s + START_S
-        self._shared_mb = max(self._shared_mb, memory.resident_mb(self.pid))
+        if self._limits.memory_mb:
+            self._shared_mb = max(self._shared_mb, memory.resident_mb(self.pid))
         with suppress(OSError):  # it has ended: `outcome` says so
             self.connection.send_bytes(str(index).encode())
 
@@ -147,7 +148,8 @@ class Worker:
     def _stop(self, why: CellStopped) -> CellStopped:
         """End the process; return why."""
         self._stopped = self._stopped or why
-        self.kill()
+        if self.alive:
+            kill_tree(self.pid)
         return self._ended()
 
     def _ended(self) -> CellStopped:
@@ -214,13 +216,10 @@ class Worker:
             self._ask_to_end()
             self._process.join(self._limits.grace_s)
 
-    def kill(self) -> None:
-        """Kill it, and whatever it has started."""
+    def close(self) -> None:
+        """Kill it and whatever it has started, wait for its end, and let go of it."""
         if self.alive:
             kill_tree(self.pid)
-
-    def close(self) -> None:
-        """Wait for its end, once it was killed, and let go of it."""
         self._process.join()
         self._process.close()
         self.connection.close()

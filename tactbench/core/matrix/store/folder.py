@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import FormatError, RecordingError
-from tactbench.core.files import read_regular, replace_file, write_file
+from tactbench.core.files import read_regular, replace_file, sha256, write_file
 from tactbench.core.matrix.store import leftovers, limits
 from tactbench.core.matrix.store.disk import sync_path, writing
-from tactbench.core.matrix.store.image import digest_of, read_image
+from tactbench.core.matrix.store.image import read_image
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
 from tactbench.core.matrix.store.rows import NAMING, NotPlainError, Row, named, text_of
-from tactbench.core.matrix.store.sharing import canonical, provenance_id
+from tactbench.core.matrix.store.sharing import PROVENANCE_ID, canonical
 
 if TYPE_CHECKING:
     from tactbench.core.samples import Answers
@@ -82,7 +82,7 @@ class Store:
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Keep who computes from now on, with what, and return its id: equal provenances have equal ones."""
         text = canonical(dict(provenance))
-        name = provenance_id(text.encode())
+        name = sha256(text)[:PROVENANCE_ID]
         path = self.folder / "provenance" / f"{name}.json"
         with self._written():
             if not path.exists():
@@ -123,7 +123,7 @@ class Store:
         text = text_of({**row, "key": key})
         written: Row = json.loads(text)
         image = shard.build(text, self._provenance[1], sets)
-        entry = Entry(written, (digest_of(image), len(image)))
+        entry = Entry(written, (sha256(image), len(image)))
         path = self._shard(key)
         aside = self._cells / f".{key}.h5.{os.getpid()}.partial"
         with self._written():
@@ -256,18 +256,18 @@ class Store:
             image = read_image(self._shard(entry.key))
         except FormatError:
             return None
-        return image if (digest_of(image), len(image)) == entry.shard else None
+        return image if (sha256(image), len(image)) == entry.shard else None
 
     def provenance(self, name: str) -> dict[str, Any]:
         """Return who computed a cell, with what, by the id in ``row["made_by"]``; empty if not known."""
-        if len(name) != 16 or not name.isalnum():  # it becomes the name of a file
+        if len(name) != PROVENANCE_ID or not name.isalnum():  # it becomes the name of a file
             return {}
         try:
             content = read_regular(self.folder / "provenance" / f"{name}.json", limits.PROVENANCE_BYTES).strip()
             provenance = json.loads(content)
         except (OSError, ValueError, RecursionError):
             return {}
-        whole = provenance_id(content) == name and isinstance(provenance, dict)
+        whole = sha256(content)[:PROVENANCE_ID] == name and isinstance(provenance, dict)
         return provenance if whole else {}
 
     def recording(self, path: str, digest: str = "") -> Path | None:
@@ -318,7 +318,7 @@ class Store:
 
         try:
             image = read_image(self._shard(key))
-            entry = Entry(shard.row_in(self._shard(key), image), (digest_of(image), len(image)))
+            entry = Entry(shard.row_in(self._shard(key), image), (sha256(image), len(image)))
         except FormatError as error:
             ledger.troubles.append(str(error))
             return

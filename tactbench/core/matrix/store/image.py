@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 
 from tactbench.core.errors import FormatError
@@ -10,11 +9,6 @@ from tactbench.core.files import read_regular
 from tactbench.core.matrix.store import limits
 
 SEE = "Delete it, and the next run computes the cell again."
-
-
-def digest_of(image: bytes) -> str:
-    """Return the digest under which the ledger knows a shard."""
-    return hashlib.sha256(image).hexdigest()
 
 
 def read_image(path: Path) -> bytes:

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import FolderError
-from tactbench.core.files import read_regular, write_all
+from tactbench.core.files import read_regular, sha256, write_all
 from tactbench.core.matrix.store import limits
 from tactbench.core.matrix.store.rows import Row, fault_in_row, too_deep
-from tactbench.core.matrix.store.sharing import DEFINITION, canonical, definition, digest_of, joined, parted
+from tactbench.core.matrix.store.sharing import DEFINITION, canonical, definition, joined, parted
 
 NAME = "index.jsonl"
 
@@ -58,7 +58,10 @@ class Ledger:
         text = "".join(f"{line}\n" for line in lines).encode()
         file = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
         try:
-            end = _whole(file)
+            end = os.fstat(file).st_size
+            if end and os.pread(file, 1, end - 1) != b"\n":
+                end = os.pread(file, end, 0).rfind(b"\n") + 1
+                os.ftruncate(file, end)
             try:
                 write_all(file, text)
             except BaseException:
@@ -175,7 +178,7 @@ def _lines(entry: Entry, known: set[str]) -> tuple[list[str], set[str]]:
         record["shard"] = list(entry.shard)
     text = canonical(record)
     shared = (DEFINITION.format(digest, value) for digest, value in fresh.items())
-    return [*shared, f'{text[:-1]}{_DIGEST}{digest_of(text)}"}}'], set(fresh)
+    return [*shared, f'{text[:-1]}{_DIGEST}{sha256(text)[:32]}"}}'], set(fresh)
 
 
 _DIGEST = ', "sha256": "'
@@ -185,7 +188,7 @@ _ITS_DIGEST = re.compile(r'(.*), "sha256": "([0-9a-f]{32})"}')
 
 def _is_altered(line: str) -> bool:
     found = _ITS_DIGEST.fullmatch(line)
-    return found is not None and digest_of(f"{found[1]}}}") != found[2]
+    return found is not None and sha256(f"{found[1]}}}")[:32] != found[2]
 
 
 def _parsed(content: bytes) -> Iterator[tuple[str, Any]]:
@@ -225,12 +228,3 @@ def _is_shard(shard: Any) -> bool:
         isinstance(shard, list) and len(shard) == 2 and isinstance(shard[0], str) and len(shard[0]) == 64
         and type(shard[1]) is int and 0 < shard[1] <= limits.SHARD_BYTES
     )  # fmt: skip
-
-
-def _whole(file: int) -> int:
-    """Cut away a last line that is not whole, and return where the ledger ends."""
-    end = os.fstat(file).st_size
-    if end and os.pread(file, 1, end - 1) != b"\n":
-        end = os.pread(file, end, 0).rfind(b"\n") + 1
-        os.ftruncate(file, end)
-    return end

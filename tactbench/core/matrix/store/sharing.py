@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from collections.abc import Mapping
 from typing import Any
 
+from tactbench.core.files import sha256
 from tactbench.core.matrix.store.rows import Row
 
 SHARED = (
@@ -22,14 +22,10 @@ canonical = json.JSONEncoder(sort_keys=True).encode
 """Return plain data as one line of JSON: the same text for the same data."""
 
 
-def provenance_id(content: bytes) -> str:
-    """Return what rows and files call a provenance by, from the bytes of its canonical text."""
-    return hashlib.sha256(content).hexdigest()[:16]
-
-
-def digest_of(text: str) -> str:
-    """Return the name under which a value is shared, from its canonical text."""
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+PROVENANCE_ID = 16
+"""Rows and files call a provenance by so many digits of the SHA-256 of its canonical text."""
+SHARED_ID = 32
+"""A value is shared under so many digits of that of its canonical text."""
 
 
 def parted(row: Row) -> tuple[Row, dict[str, str], dict[str, str]]:
@@ -45,7 +41,7 @@ def parted(row: Row) -> tuple[Row, dict[str, str], dict[str, str]]:
         value = row.get(key)
         text = canonical(value) if isinstance(value, str | list | dict) else ""
         if len(text) >= WORTH_CHARACTERS:
-            references[key] = digest_of(text)
+            references[key] = sha256(text)[:SHARED_ID]
             texts[references[key]] = text
             del slim[key]
     return slim, references, texts
@@ -66,4 +62,4 @@ _DEFINITION = re.compile(r'\{"shared": "([0-9a-f]{32})", "value": (.*)\}')
 def definition(line: str) -> str | None:
     """Return the digest that a line defines if the line holds what the digest says, else None."""
     found = _DEFINITION.fullmatch(line)
-    return found[1] if found is not None and digest_of(found[2]) == found[1] else None
+    return found[1] if found is not None and sha256(found[2])[:SHARED_ID] == found[1] else None
