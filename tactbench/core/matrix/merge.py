@@ -113,7 +113,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path, Sequence[
             image = found.store.image(found.entry)
             if image is None:
                 raise FolderError(f"The shard of {found.cell} changed in {found.store.folder}.", hint="Merge again.")
-            (aside / "cells" / f"{found.entry.row['key']}.h5").write_bytes(image)
+            (aside / "cells" / f"{found.entry.key}.h5").write_bytes(image)
         for name, content in _provenances(stores).items():
             (aside / "provenance" / name).write_text(content, encoding="utf-8")
         for relative, (_, path) in recordings.items():
