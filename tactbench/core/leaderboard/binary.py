@@ -9,15 +9,14 @@ from typing import Any
 
 import tactbench
 from tactbench.core.errors import UsageError
-from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.names import metric_name
-from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, keys, records
+from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, flat_records, keys, records
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.spec.row import FORMAT
 from tactbench.core.tables.text import json_text, visible
 
 FORMAT_VERSION = "1"
-_RANKS = {"rank": "whole", "rank_low": "whole", "rank_high": "whole", "rank_tied": "boolean"}
+_RANKS = {"rank": int, "rank_low": int, "rank_high": int, "rank_tied": bool}
 _FIRST = (*RANK_KEYS, "sensor", "estimator", "score")
 _LONGEST_NAME, _LONGEST_TEXT = 31, 32_767
 """Characters that Excel takes in a sheet's name and in a cell."""
@@ -36,24 +35,24 @@ def parquet(table: Table) -> bytes:
         import pyarrow.parquet as pq
     except ImportError as error:
         raise _lacking("Parquet", "pyarrow", "parquet", error) from error
-    types = {"whole": pa.int64(), "boolean": pa.bool_(), "float": pa.float64(), "text": pa.string()}
-    values: dict[str, list[Any]] = {name: [] for name in (*keys(table), *RANK_KEYS)}
-    values |= {f"shown_{SHOWN[name]}": [] for name in table.columns}
-    for row, shown in records(table):
-        for name, value in row.items():
-            values[name].append(_stored(name, value))
-        for name, text in shown.items():
-            values[f"shown_{name}"].append(text)
+    types = {bool: pa.bool_(), float: pa.float64(), int: pa.int64(), str: pa.string()}
+    names, lines = flat_records(table)
+    kinds = list(map(_kind, names))
     metadata = {
         "tactbench.format": "tactbench-leaderboard",
         "tactbench.format_version": FORMAT_VERSION,
         "tactbench.version": tactbench.__version__,
         "tactbench.provenance": json_text(list(table.provenance), sort_keys=True),
     }
-    schema = pa.schema([(name, types[kind(name)]) for name in values], metadata=metadata)
+    schema = pa.schema([(name, types[kind]) for name, kind in zip(names, kinds, strict=True)], metadata=metadata)
+    columns = list(zip(*lines, strict=True)) or [()] * len(names)
     out = io.BytesIO()
     try:
-        pq.write_table(pa.table(values, schema=schema), out, compression="zstd")
+        arrays = [
+            [None if one is None else float(one) for one in column] if kind is float else list(column)
+            for column, kind in zip(columns, kinds, strict=True)
+        ]
+        pq.write_table(pa.table(arrays, schema=schema), out, compression="zstd")
     except (pa.ArrowException, OverflowError) as error:
         raise UsageError(f"These rows do not fit Parquet: {error}.", hint="Use --format json.") from error
     return out.getvalue()
@@ -66,21 +65,10 @@ def _lacking(what: str, library: str, extra: str, error: ImportError) -> UsageEr
     )
 
 
-def kind(name: str) -> str:
-    """Return what a column holds: whole, float, boolean or text; lists and tables are text."""
-    types = FORMAT.get(name, frozenset())
-    for label, one in (("boolean", bool), ("float", float), ("whole", int)):
-        if one in types:
-            return label
-    return _RANKS.get(name, "text")
-
-
-def _stored(name: str, value: Any) -> Any:
-    if name in NESTED:
-        return json_text(value)
-    if value is None or kind(name) in ("boolean", "whole"):
-        return value
-    return float(value) if kind(name) == "float" else visible(str(value))
+def _kind(name: str) -> type:
+    """Return what a column holds: truth values, numbers, whole numbers or text; lists and tables are text."""
+    types = FORMAT.get(name) or {_RANKS.get(name, str)}
+    return next((one for one in (bool, float, int) if one in types), str)
 
 
 def xlsx(table: Table) -> bytes:

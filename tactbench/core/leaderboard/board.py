@@ -19,7 +19,7 @@ import tactbench
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import NUMERIC, Line
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
-from tactbench.core.leaderboard.records import GROUPS, TITLES
+from tactbench.core.leaderboard.records import APART, GROUPS, TITLES
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.view import full_grid
 from tactbench.core.matrix.store.sharing import canonical, provenance_id
@@ -64,6 +64,8 @@ _IN_THE_TABLE = (
 """Where there are many cells, these are told as the table shows them."""
 _LARGE = ("scores", "confusion", "search", "replicates")
 """What is large and each cell's own."""
+_GROUPED = {*chain.from_iterable(GROUPS.values()), *TITLES, *APART, "log"}
+"""Keys that have a place among a cell's details."""
 _text = json.JSONEncoder(sort_keys=True).encode
 
 
@@ -91,7 +93,9 @@ def page_of(table: Table) -> str:
     head = _head(table, lines)
     taken = len(frame.encode()) + sum(map(len, columns)) + len(deflated(head)) + _SPARE
     fields, left_out = details(rows, LARGEST - taken)
-    head |= {"fields": list(fields), "leftOut": left_out}
+    others = [key for key in fields if key not in _GROUPED]
+    head |= {"fields": list(fields), "leftOut": left_out, "groups": {**GROUPS, "Also": others}}
+    head |= {"titles": {**TITLES, **dict(zip(others, others, strict=True))}}
     data = json.dumps([deflated(head), *columns, *fields.values()])
     # The last one: a name may say the same.
     before, _, after = frame.rpartition(_DATA_HERE)
@@ -118,8 +122,6 @@ def _head(table: Table, lines: Sequence[Line]) -> dict[str, Any]:
         ],
         "columns": [{"name": name, "numeric": name in NUMERIC} for name in table.columns],
         "times": [name for name in DURATIONS if name in table.columns],
-        "groups": GROUPS,
-        "titles": TITLES,
         "notes": notes,
         "provenance": [[_id(entry), plain(entry)] for entry in table.provenance],
     }  # fmt: skip

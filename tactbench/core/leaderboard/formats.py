@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.latex import latex
-from tactbench.core.leaderboard.records import NESTED, RANK_KEYS, keys, records
+from tactbench.core.leaderboard.records import flat_records, records
 from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document
 from tactbench.core.tables import csv_text as csv_format
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
-from tactbench.core.tables.text import json_text, visible
+from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -49,15 +48,7 @@ def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
 
 def csv_text(table: Table) -> str:
     """Return a leaderboard's records as CSV."""
-    names = [*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)]
-    lines = ([*(_stored(*one) for one in values.items()), *shown.values()] for values, shown in records(table))
-    return csv_format.csv_text(names, lines)
-
-
-def _stored(key: str, value: Any) -> Any:
-    if key in NESTED:
-        return json_text(value)
-    return visible(value) if isinstance(value, str) else value
+    return csv_format.csv_text(*flat_records(table))
 
 
 def json_array(table: Table) -> str:

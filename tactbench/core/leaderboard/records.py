@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from tactbench.core.leaderboard.columns import SHOWN, Line
+from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.spec.row import FORMAT, ReplicatedRow, RowModel
+from tactbench.core.tables.text import json_text, visible
 
 _ELSEWHERE = ("simulation", "traceback", "log", "plan", "digests")
 """What is large or of no use to a program: `why`, the page and the cell's own file have it."""
@@ -78,19 +79,23 @@ def keys(table: Table) -> tuple[str, ...]:
 
 
 def records(table: Table) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
-    """Yield each line's row, ranks among it, and its text by column."""
+    """Yield each line's row, ranks among it, and its texts by what their columns are called for programs."""
     chosen = keys(table)
     for line in table.lines:
-        yield {key: line.row.get(key) for key in chosen} | _ranks(line), shown(line)
+        one = line.placing
+        ranks = (one.place, one.low, one.high, one.tied) if one else (None, None, None, None)
+        row = {key: line.row.get(key) for key in chosen} | dict(zip(RANK_KEYS, ranks, strict=True))
+        yield row, {SHOWN[name]: text for name, text in line.texts.items()}
 
 
-def shown(line: Line) -> dict[str, str]:
-    """Return the text of a line, by what its columns are called for programs."""
-    return {SHOWN[name]: text for name, text in line.texts.items()}
+def flat_records(table: Table) -> tuple[list[str], Iterator[list[Any]]]:
+    """Return names of columns and lines for formats whose cells hold one value: lists and tables are JSON."""
+    names = [*keys(table), *RANK_KEYS, *(f"shown_{SHOWN[name]}" for name in table.columns)]
+    lines = ([*(_flat(*one) for one in row.items()), *shown.values()] for row, shown in records(table))
+    return names, lines
 
 
-def _ranks(line: Line) -> dict[str, Any]:
-    one = line.placing
-    return dict(
-        zip(RANK_KEYS, (one.place, one.low, one.high, one.tied) if one else (None, None, None, None), strict=True)
-    )
+def _flat(key: str, value: Any) -> Any:
+    if key in NESTED:
+        return json_text(value)
+    return visible(value) if isinstance(value, str) else value

@@ -168,13 +168,13 @@ def against_trivial(row: Row, trivial: float) -> str:
     Returns
     -------
     str
-        ``no better`` where its whole interval lies at or beyond that score; ``not shown`` where its interval, or
-        without one its score, reaches it; else nothing.
+        ``no better`` where its whole interval lies at or beyond that score; ``not shown to be better`` where its
+        interval, or without one its score, reaches it; else nothing.
     """
     if _reaches(row, "ci_low", "ci_high", trivial):
         return "no better"
     reached = _reaches(row, "ci_high", "ci_low", trivial) or _reaches(row, "score", "score", trivial)
-    return "not shown" if reached else ""
+    return "not shown to be better" if reached else ""
 
 
 def _reaches(row: Row, of_errors: str, of_shares: str, trivial: float | None) -> bool:
