@@ -14,14 +14,13 @@ from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
-from tactbench.core.leaderboard.names import distinct, grouped, hardware_name, metric_name, sign_of
+from tactbench.core.leaderboard.names import Row, distinct, grouped, hardware_name, metric_name, sign_of
 from tactbench.core.leaderboard.verdict import verdict_of
 from tactbench.core.statistics.excess import beyond_floor, excess_of
 from tactbench.core.statistics.median import FEWEST
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.text import visible
 
-Row = Mapping[str, Any]
 _Key = tuple[str, str, str, str]
 MOST_RANKED = 20_000
 """Answers of one block beyond which comparing all pairs takes too long."""

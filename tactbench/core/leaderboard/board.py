@@ -18,7 +18,7 @@ from typing import Any
 import tactbench
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import NUMERIC, Line
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED, Row
 from tactbench.core.leaderboard.records import APART, GROUPS, TITLES
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.view import full_grid
@@ -26,8 +26,6 @@ from tactbench.core.matrix.store.sharing import canonical, provenance_id
 from tactbench.core.spec.row import FORMAT
 from tactbench.core.tables.html import render
 from tactbench.core.tables.text import visible
-
-Row = Mapping[str, Any]
 
 LARGEST = 4_000_000
 """Bytes of a page: what does not fit is left to the cells' files, and the page says so."""

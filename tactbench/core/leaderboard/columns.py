@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from tactbench.core.leaderboard.hosts import timing_mark
 from tactbench.core.leaderboard.levels import KEY as LEVEL
-from tactbench.core.leaderboard.names import answer_name, sensor_name
+from tactbench.core.leaderboard.names import Row, answer_name, sensor_name
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, tail, whole
 from tactbench.core.tables.text import visible
 
-Row = Mapping[str, Any]
 Value = Callable[[Row], float | None]
 Text = Callable[[Row], str]
 Kind = Literal["result", "baseline", "failed", "skipped"]
@@ -75,26 +74,22 @@ def row_interval(row: Row) -> str:
     return "one replicate" if count == 1 else spread if spread == ABSENT else f"range {spread}"
 
 
-def _beyond(row: Row) -> str:
-    return interval(row.get("beyond_floor_ci_low"), row.get("beyond_floor_ci_high"), row["unit"])
-
-
 def _right(row: Row) -> str:
     """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
     right, total = row.get("recordings_right"), row.get("recordings_asked")
     return ABSENT if right is None or total is None else f"{right:.3g} of {total:.3g}"
 
 
-def _delay(row: Row) -> str:
-    return delay(row.get("answer_delay_ms"), row.get("delay_parts_ms"))
-
-
 def _p95(row: Row) -> str:
     return tail(row.get("latency_ms_p95"), row.get("latency_ms_max"), row.get("latency_n"))
 
 
+def _beyond(row: Row) -> str:
+    return interval(row.get(_ENDS[0]), row.get(_ENDS[1]), row["unit"])
+
+
 _BEYOND = "score_beyond_floor"
-_ENDS = _middle("beyond_floor_ci_low", "beyond_floor_ci_high")
+_ENDS = ("beyond_floor_ci_low", "beyond_floor_ci_high")
 _ALL: dict[str, Column | str] = {
     "#": "rank",
     "sensor": "sensor",
@@ -103,23 +98,26 @@ _ALL: dict[str, Column | str] = {
     "score": _score("score", "score"),
     "95 % interval": Column("interval", row_interval, _middle("ci_low", "ci_high")),
     "beyond floor": _score("beyond_floor", _BEYOND, _BEYOND),
-    "95 % beyond": Column("beyond_floor_interval", _beyond, _ENDS, if_known=_BEYOND),
+    "95 % beyond": Column("beyond_floor_interval", _beyond, _middle(*_ENDS), if_known=_BEYOND),
     "true error": _score("true_error", "true_score", "true_score"),
     "rank 95 %": "rank_interval",
     "recordings right": Column(
-        "recordings_right", _right, lambda row: row.get("recordings_right"), if_known="recordings_right"
+        "recordings_right", _right, lambda row: row.get("recordings_right"), if_known="recordings_right",
     ),
     "published": _score("published", "published"),
     "baseline": _score("baseline", "baseline"),
     "n test": _count("n_test", "n_test"),
     "sessions": _count("sessions", "n_sessions"),
     "sim": _duration("sim", lambda row: row["sim_s"]),
-    "delay": Column("answer_delay", _delay, _seconds("answer_delay_ms"), timed=True),
+    "delay": Column(
+        "answer_delay", lambda row: delay(row.get("answer_delay_ms"), row.get("delay_parts_ms")),
+        _seconds("answer_delay_ms"), timed=True,
+    ),
     "fit": _duration("fit", lambda row: row["fit_s"]),
     "latency p50": _duration("latency_p50", _seconds("latency_ms_p50")),
     "p95": Column("latency_p95", _p95, _tail, timed=True),
     "batch/row": _duration("batch_row", _per_row),
-}
+}  # fmt: skip
 """All columns in order; of those that are names, or that the block of a row decides, only what programs call them."""
 
 OF_ROWS = {name: one for name, one in _ALL.items() if isinstance(one, Column)}

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tactbench.core.errors import UsageError
 from tactbench.core.files import replace_file
 from tactbench.core.leaderboard.latex import latex
-from tactbench.core.leaderboard.records import flat_records, records
+from tactbench.core.leaderboard.names import Row
+from tactbench.core.leaderboard.records import csv_text, json_array, parquet, xlsx
 from tactbench.core.leaderboard.table import Table, build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, document
-from tactbench.core.tables import csv_text as csv_format
 from tactbench.core.tables import markdown as markdown_format
 from tactbench.core.tables import terminal
-from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-Row = Mapping[str, Any]
 
 SUFFIXES = {
     ".json": "json", ".csv": "csv", ".md": "md", ".tex": "latex", ".html": "html", ".parquet": "parquet",
@@ -46,17 +44,6 @@ def markdown(table: Table, view: View = DEFAULT_VIEW) -> str:
     return markdown_format.markdown(document(table, view))
 
 
-def csv_text(table: Table) -> str:
-    """Return a leaderboard's records as CSV."""
-    return csv_format.csv_text(*flat_records(table))
-
-
-def json_array(table: Table) -> str:
-    """Return a table's records as a JSON array, one a line: every key, and the text of its columns in ``shown``."""
-    lines = (json_text(values | {"shown": shown}) for values, shown in records(table))
-    return "[\n" + ",\n".join(lines) + "\n]\n"
-
-
 def page(table: Table) -> str:
     """Return the page of a table: one HTML file, every cell behind its numbers, times among them."""
     from tactbench.core.leaderboard.board import page_of
@@ -77,8 +64,6 @@ def rendered(table: Table, shape: str, view: View = WHOLE, width: int = 240) -> 
     UsageError
         If Parquet or Excel is asked for and its library is not installed.
     """
-    from tactbench.core.leaderboard.binary import parquet, xlsx
-
     if shape == "table":
         return plain_text(table, width, view).encode("utf-8", "backslashreplace")
     if shape in ("parquet", "xlsx"):

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from itertools import count, product
 from string import ascii_uppercase
-from typing import Any
 
+from tactbench.core.leaderboard.names import Row, distinct
 from tactbench.core.tables.text import visible
-
-Row = Mapping[str, Any]
 
 
 def host_letters(rows: Iterable[Row]) -> dict[str, str]:
@@ -32,10 +30,10 @@ def timing_notes(rows: Iterable[Row], letters: Mapping[str, str], provenance: It
     if letters:
         notes.append("Times marked with different letters are of different hosts: compare none of them. Scores do not "
                      "depend on the host and are ranked together.")  # fmt: skip
-    clocks = _clocks(rows)
-    for at_once in sorted({at_once for _, at_once in clocks} - {1}):
-        hosts = {host for host, cells in clocks if cells == at_once}
-        crowded = sorted({visible(host) for host in hosts if at_once > _cores(machines.get(host), at_once)})
+    hosts = distinct((at_once, host) for host, at_once in _clocks(rows))
+    for at_once in sorted(hosts.keys() - {1}):
+        cores = {host: machines.get(host, {}).get("cores") for host in hosts[at_once]}
+        crowded = sorted(visible(host) for host, n in cores.items() if type(n) is int and at_once > n)
         more = f", more than the cores of host {' and of host '.join(crowded)}" if crowded else ""
         notes.append(f"‖{at_once}: timed while {at_once} cells ran at once{more}: not comparable with times measured "
                      "alone.")  # fmt: skip
@@ -58,11 +56,6 @@ def _host(row: Row) -> str:
 
 def _at_once(row: Row) -> int:
     return int(row.get("concurrency") or 1)
-
-
-def _cores(machine: Row | None, otherwise: int) -> int:
-    cores = machine.get("cores") if machine else None
-    return cores if isinstance(cores, int) and not isinstance(cores, bool) else otherwise
 
 
 def _machine(host: str, machine: Row | None) -> str:

@@ -31,14 +31,8 @@ METRIC_NAMES = {
 
 def sensor_name(row: Row) -> str:
     """Return a sensor's name, marked where it was simulated."""
-    return visible(" ".join(filter(None, (str(row["sensor"]), origin_mark(row)))))
-
-
-def origin_mark(row: Row) -> str:
-    """Return ``SIM`` or ``EMULATED`` for a row that no sensor was pressed for, else nothing."""
-    if row.get("emulated"):
-        return EMULATED
-    return "SIM" if row["simulated"] else ""
+    mark = EMULATED if row.get("emulated") else "SIM" if row["simulated"] else ""
+    return visible(" ".join(filter(None, (str(row["sensor"]), mark))))
 
 
 def answer_name(row: Row) -> str:

@@ -7,12 +7,12 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from operator import itemgetter
-from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.names import (
     METRIC_NAMES,
+    Row,
     answer_name,
     answer_or_probe,
     distinct,
@@ -24,8 +24,6 @@ from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
 from tactbench.core.spec.status import STATUSES, STOPPED
 from tactbench.core.tables.numbers import score, score_with_unit
 from tactbench.core.tables.text import command_line, cut, visible
-
-Row = Mapping[str, Any]
 
 RANKS = (
     "A place with = is shared: the data do not tell these answers apart. Rank 95 % holds the places that the data do "

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.names import EMULATED, SIMULATED, answer_name, grouped, hardware_name, metric_name
+from tactbench.core.leaderboard.names import EMULATED, SIMULATED, Row, answer_name, grouped, hardware_name, metric_name
 from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.aggregate import Aggregate, aggregate
 from tactbench.core.statistics.holm import holm
@@ -19,7 +19,6 @@ from tactbench.core.statistics.paired import Difference, difference
 from tactbench.core.tables.numbers import ABSENT, interval, score, signed, suffix
 from tactbench.core.tables.text_table import TextTable
 
-Row = Mapping[str, Any]
 Kind = Literal["sensors", "estimators", "folders"]
 Key = tuple[Any, ...]
 COLUMNS = (

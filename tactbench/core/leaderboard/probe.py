@@ -8,13 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
-from tactbench.core.leaderboard.names import answer_name, sensor_name, sign_of
+from tactbench.core.leaderboard.names import Row, answer_name, sensor_name, sign_of
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
 from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit, suffix
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable, sort_value
-
-Row = Mapping[str, Any]
 
 LEAK_SHARE = 0.5
 """Share of the skill (score beyond the trivial answer's) from which on the first frame's is called a leak: what came

@@ -6,11 +6,9 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tactbench.core.leaderboard.names import answer_name, grouped, hardware_name, metric_name, sensor_name
+from tactbench.core.leaderboard.names import Row, answer_name, grouped, hardware_name, metric_name, sensor_name
 from tactbench.core.tables.numbers import ABSENT, interval, score, signed
 from tactbench.core.tables.text_table import Entry, TextTable, finite
-
-Row = Mapping[str, Any]
 
 _NOTE = (
     "Differences are against the first column; intervals are those of each score alone, and two that overlap may still "
