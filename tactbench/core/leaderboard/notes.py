@@ -34,6 +34,7 @@ DAGGER = (
     "`karl2016` scales each set, the test set too, by its own. A deployed sensor cannot; protocol `deployable` shows "
     "what it can."
 )
+TRUE_ERRORS = "True error (SIM): against the force that the twin exerted, free of the reference's noise."
 _SET = re.compile(r"^(training|validation|test) (?=rows )")
 _SIGMA = re.compile(r"^rows with (.+) beyond three sigma$")
 MOST_CHANNELS = 4
@@ -63,7 +64,7 @@ def notes_of(rows: Sequence[Row], blocks: Sequence[Block]) -> list[str]:
         *_no_better(rows),
         *_tared(rows),
         *_ranks(blocks),
-        *_true_errors(rows),
+        *([TRUE_ERRORS] if any(row.get("true_score") is not None for row in rows) else []),
         *_timed_only(rows),
         *_stopped(rows, frozenset(STATUSES) - STOPPED),
         *_labels(rows),
@@ -131,11 +132,6 @@ def _floor(found: Sequence[float], unit: str) -> str:
     text = score_with_unit(math.sqrt(sum(one * one for one in found) / len(found)), unit)
     ends = f"{score(min(found), unit)} … {score(max(found), unit)}"
     return text if len(found) == 1 else f"{text} (of {len(found)}: {ends})"
-
-
-def _true_errors(rows: Sequence[Row]) -> list[str]:
-    known = any(row.get("true_score") is not None for row in rows)
-    return ["True error (SIM): against the force that the twin exerted, free of the reference's noise."] * known
 
 
 def interval_notes(rows: Sequence[Row]) -> list[str]:

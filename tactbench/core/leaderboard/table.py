@@ -12,8 +12,7 @@ from operator import itemgetter
 from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
-from tactbench.core.leaderboard.columns import Line, columns
-from tactbench.core.leaderboard.hosts import host_letters, timing_notes
+from tactbench.core.leaderboard.columns import Line, columns, host_letters, timing_notes
 from tactbench.core.leaderboard.names import Row
 from tactbench.core.leaderboard.notes import notes_of
 from tactbench.core.leaderboard.probe import build_probe

@@ -1,7 +1,6 @@
 """Rows in each format, as the command writes their table."""
 
-from tactbench.core.leaderboard.formats import markdown, page
-from tactbench.core.leaderboard.latex import latex
+from tactbench.core.leaderboard.formats import latex, markdown, page
 from tactbench.core.leaderboard.records import csv_text, json_array, parquet
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW
