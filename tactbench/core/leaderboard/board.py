@@ -15,10 +15,9 @@ from dataclasses import replace
 from itertools import chain
 from typing import Any
 
-import tactbench
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import NUMERIC, Line
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED, Row
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED, Row, metric_name
 from tactbench.core.leaderboard.records import APART, GROUPS, TITLES
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.view import full_grid
@@ -108,13 +107,12 @@ def _head(table: Table, lines: Sequence[Line]) -> dict[str, Any]:
     if len(notes) > MOST_NOTES:
         notes = [*notes[:MOST_NOTES], f"{len(notes) - MOST_NOTES} more notes are not in this page."]
     return {
-        "version": tactbench.__version__,
         "rows": len(lines),
         "order": [places[id(line)] for line in table.lines],
         "kinds": column([line.kind for line in lines]),
         "blocks": [
             {"title": block.title, "verdict": list(block.verdict), "size": len(block.lines)}
-            | {"lower": first["metric"] in LOWER_IS_BETTER, "metric": first["metric"], "unit": first["unit"]}
+            | {"lower": first["metric"] in LOWER_IS_BETTER, "metric": metric_name(first)}
             | {"simulated": _is_simulated(block)}
             for block, first in zip(table.blocks, firsts, strict=True)
         ],

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from tactbench.core.leaderboard.records import JSON_KEYS
 from tactbench.core.matrix.store.rows import fault_in_row
-from tactbench.core.spec.row import ReplicatedRow
+from tactbench.core.spec.row import JSON_KEYS, ReplicatedRow
 
 Row = dict[str, Any]
 

@@ -16,22 +16,12 @@ from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import SHOWN
 from tactbench.core.leaderboard.names import metric_name
 from tactbench.core.leaderboard.table import Table
-from tactbench.core.spec.row import FORMAT, ReplicatedRow, RowModel
+from tactbench.core.spec.row import FORMAT, JSON_KEYS, NESTED, OF_REPLICATES
 from tactbench.core.tables import csv_text as csv_format
 from tactbench.core.tables.text import json_text, visible
 
-_ELSEWHERE = ("simulation", "traceback", "log", "plan", "digests")
-"""What is large or of no use to a program: `why`, the page and the cell's own file have it."""
-_OF_CELL = [key for key in RowModel.model_fields if key not in _ELSEWHERE]
-JSON_KEYS = (*_OF_CELL[:-1], "key", _OF_CELL[-1])
-"""Keys of a JSON row, in order."""
-OF_REPLICATES = tuple(key for key in ReplicatedRow.model_fields if key not in ("key", *RowModel.model_fields))
-"""Keys of a row that stands for all replicates of its cell; they follow."""
 RANK_KEYS = ("rank", "rank_low", "rank_high", "rank_tied")
 """Where a row stands in its block; they follow the keys of the row."""
-
-NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key].isdisjoint({list, dict}))
-"""Keys whose values are lists or tables: JSON inside a cell of CSV and Parquet."""
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "Configuration": (

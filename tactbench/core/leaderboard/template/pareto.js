@@ -104,8 +104,6 @@ const drawFigure = (width, points, front, block, axis) => {
   const quick = points[0].time / 1.25, slow = points.at(-1).time * 1.25;
   const x = (time) => left + (Math.log(time / quick) / Math.log(slow / quick)) * (width - left - right);
   const y = (score) => top + ((high - score) / (high - low)) * (height - top - bottom);
-  const unit = block.unit && block.unit !== "1" ? ` [${block.unit}]` : "";
-  const metric = block.title.split(" · ")[1]?.split(",")[0] ?? `${block.metric}${unit}`;
   const rule = (x1, x2, y1, y2) => draw("line", { class: "rule", x1, x2, y1, y2 });
   const text = (kind, x, y, shown, more) => draw("text", { class: kind, x, y, ...more }, shown);
   const middle = { "text-anchor": "middle" };
@@ -123,7 +121,7 @@ const drawFigure = (width, points, front, block, axis) => {
     picture.append(text("tick", x(value), height - bottom + 18, timeText(value), middle));
   }
   picture.append(text("axis", (left + width - right) / 2, height - 6, `${axis.name}, logarithmic`, middle),
-    text("axis", 0, 0, metric, { ...middle, transform: `translate(14 ${(top + height - bottom) / 2}) rotate(-90)` }));
+    text("axis", 0, 0, block.metric, { ...middle, transform: `translate(14 ${(top + height - bottom) / 2}) rotate(-90)` }));
   for (const [one, [from, to]] of ends) {
     if (to !== undefined) picture.append(draw("line", { class: "interval", x1: x(one.time), x2: x(one.time), y1: y(from), y2: y(to) }));
   }

@@ -14,7 +14,7 @@ const readBoard = async () => {
   const fields = new Map(head.fields.map((name, place) => [name, readColumn(read[columns.length + place])]));
   const byName = new Map(columns.map((one) => [one.name, one]));
   const isSilent = ({ column }) => column.dictionary.every((one) => ["", ABSENT].includes(asText(one)));
-  const shown = new Uint8Array(head.rows).fill(1), blockOf = new Int32Array(head.rows).fill(-1);
+  const shown = new Uint8Array(head.rows).fill(1), blockOf = new Int32Array(head.rows);
   let start = 0;
   const blocks = head.blocks.map(({ size }) => head.order.slice(start, start += size));
   blocks.forEach((rows, place) => rows.forEach((row) => { blockOf[row] = place; }));
