@@ -47,6 +47,11 @@ class Table:
         """The lines of all blocks."""
         return [line for block in self.blocks for line in block.lines]
 
+    @property
+    def rows(self) -> list[Row]:
+        """The rows, in the order of the lines."""
+        return [line.row for line in self.lines]
+
 
 def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: bool = True) -> Table:
     """Arrange `rows` into blocks, ranked, with their notes.
