@@ -123,7 +123,7 @@ class _Choosing:
         trivial: dict[str, None] = {}
         for row in self.answers:
             trivial[row["sensor"]] = None
-            if row.get("baseline") is None or not no_better(self.sign * row["score"], self.sign, row["baseline"]):
+            if not no_better(row):
                 by_sensor.setdefault(row["sensor"], []).append(self.candidate(row))
         chosen = sorted((min(found, key=self.order) for found in by_sensor.values()), key=self.order)
         left_out = [

@@ -12,7 +12,7 @@ from tactbench.core.cli.comparisons import COMPARISON_FORMATS, print_comparisons
 from tactbench.core.cli.options import options
 from tactbench.core.cli.results import opened, provenance_of, shown_rows
 from tactbench.core.cli.tables import DEFAULT_FOLDER, TABLE_FORMATS, VIEW, format_of, print_table, view_of
-from tactbench.core.leaderboard.axes import AXES
+from tactbench.core.leaderboard import AXES
 
 if TYPE_CHECKING:
     from tactbench.core.leaderboard.view import View

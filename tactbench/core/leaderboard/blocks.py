@@ -7,21 +7,20 @@ The order of blocks and lines depends on the rows alone, never on the order they
 from __future__ import annotations
 
 import math
-from collections import Counter
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.columns import Line, line_of
-from tactbench.core.leaderboard.names import hardware_name, metric_name, sign_of
+from tactbench.core.leaderboard.names import Row, distinct, grouped, hardware_name, metric_name, sign_of
 from tactbench.core.leaderboard.verdict import verdict_of
 from tactbench.core.statistics.excess import beyond_floor, excess_of
 from tactbench.core.statistics.median import FEWEST
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.text import visible
 
-Row = Mapping[str, Any]
 _Key = tuple[str, str, str, str]
 MOST_RANKED = 20_000
 """Answers of one block beyond which comparing all pairs takes too long."""
@@ -67,80 +66,80 @@ def _grouped(rows: Sequence[Row]) -> dict[_Key, list[Row]]:
     A cell that was not begun knows neither its split, if nobody asked for one, nor whether it would have been
     simulated: it stands with the finished cells of its rig, if these agree.
     """
-    kinds: dict[str, set[str]] = {}
-    for row in rows:
-        if row["status"] == "done":
-            kinds.setdefault(row["rig"], set()).add(hardware_name(row))
-    splits: dict[tuple[str, str, str], set[str]] = {}
-    for row in rows:
-        if row["split"] is not None:
-            splits.setdefault(_without_split(row, kinds), set()).add(row["split"])
-    groups: dict[_Key, list[Row]] = {}
-    for row in rows:
-        task, protocol, kind = _without_split(row, kinds)
-        known = splits.get((task, protocol, kind), set())
-        split = row["split"] if row["split"] is not None else next(iter(known)) if len(known) == 1 else ""
-        groups.setdefault((task, protocol, split, kind), []).append(row)
-    return groups
+    finished = distinct((row["rig"], hardware_name(row)) for row in rows if row["status"] == "done")
 
+    def without_split(row: Row) -> tuple[str, str, str]:
+        known = finished.get(row["rig"], [])
+        return row["task"], row["protocol"], known[0] if len(known) == 1 else hardware_name(row)
 
-def _without_split(row: Row, kinds: Mapping[str, set[str]]) -> tuple[str, str, str]:
-    known = kinds.get(row["rig"], set())
-    kind = next(iter(known)) if row["status"] != "done" and len(known) == 1 else hardware_name(row)
-    return row["task"], row["protocol"], kind
+    splits = distinct((without_split(row), row["split"]) for row in rows if row["split"] is not None)
+
+    def key(row: Row) -> _Key:
+        task, protocol, hardware = without_split(row)
+        known = splits.get((task, protocol, hardware), [])
+        split = row["split"] if row["split"] is not None else known[0] if len(known) == 1 else ""
+        return task, protocol, split, hardware
+
+    return grouped(rows, key)
 
 
 def _arranged(members: Sequence[Row]) -> tuple[list[tuple[Row, Rank | None]], str]:
     """Return the rows of a block in order with their places, and why places have no intervals, if so."""
-    sign = sign_of(members[0])
-
-    def error(row: Row) -> float:
-        return sign * row["score"] if math.isfinite(row["score"]) else math.inf
-
-    answers: list[Row] = []
-    below: list[Row] = []
-    for row in members:
-        if row["status"] == "done" and not row["is_baseline"]:
-            (below if no_better(error(row), sign, row.get("baseline")) else answers).append(row)
+    finished = [row for row in members if row["status"] == "done"]
+    answers = [row for row in finished if not row["is_baseline"] and not no_better(row)]
     # What is equal stays in the order of the names.
-    ordered = sorted(zip(errors(answers), answers, strict=True), key=lambda one: (one[0], error(one[1])))
+    ordered = sorted(zip(errors(answers), answers, strict=True), key=lambda one: (one[0], _error(one[1])))
     found, unranked = places([row for _, row in ordered])
     # Of equal place stays the better one first.
     results = sorted(((row, found[row["cell"]]) for _, row in ordered), key=lambda one: one[1].place)
-    baselines = [row for row in members if row["status"] == "done" and row["is_baseline"]]
-    stopped = [row for row in members if row["status"] != "done"]
     unplaced = [
-        *sorted(below, key=error),
-        *sorted(baselines, key=lambda row: (row["sensor"], error(row))),
-        *sorted(stopped, key=lambda row: row["status"]),
+        *sorted((row for row in finished if not row["is_baseline"] and no_better(row)), key=_error),
+        *sorted((row for row in finished if row["is_baseline"]), key=lambda row: (row["sensor"], _error(row))),
+        *sorted((row for row in members if row["status"] != "done"), key=lambda row: row["status"]),
     ]
     return [*results, *((row, None) for row in unplaced)], unranked
 
 
-def no_better(error: float, sign: float, baseline: float | None) -> bool:
-    """Return whether an answer is no better than the trivial one and gets no place; its error is ``sign`` x score."""
-    return baseline is not None and error >= sign * baseline
+def _error(row: Row) -> float:
+    """Return a score as a number that is the lower the better; one that is no finite number is the worst."""
+    return sign_of(row) * row["score"] if math.isfinite(row["score"]) else math.inf
+
+
+def no_better(row: Row) -> bool:
+    """Return whether an answer is no better than the trivial one and gets no place."""
+    baseline = row.get("baseline")
+    return baseline is not None and _error(row) >= sign_of(row) * baseline
 
 
 def places(results: Sequence[Row]) -> tuple[dict[str, Rank], str]:
     """Return where each of `results` stands, by the name of its cell, and why there are no rank intervals, if so.
 
-    They are the finished answers of one block, no baselines, the best score first.
+    They are the finished answers of one block, no baselines, the best score first. A row without replicates enters
+    with its own interval.
     """
-    counts = [row.get("n_replicates") for row in results]
-    if any(n is not None and n < FEWEST for n in counts):
+    if any(row.get("n_replicates") is not None and row["n_replicates"] < FEWEST for row in results):
         shared = Rank(1, None, None, len(results) > 1)
         return dict.fromkeys((row["cell"] for row in results), shared), f"fewer than {FEWEST} replicates carry them"
-    reason = _unrankable(results)
-    if not results or reason:
-        return _by_score(results), reason
-    from tactbench.core.statistics.ranking import ranks  # numerics
+    if not results:
+        return {}, ""
+    if not any(row.get("replicates") for row in results):
+        unranked = "rows keep no replicates"
+    elif len(results) > MOST_RANKED:
+        unranked = f"there are more than {MOST_RANKED} answers"
+    elif not all(math.isfinite(row["score"]) for row in results):
+        unranked = "a score is no finite number"
+    else:
+        from tactbench.core.statistics.ranking import ranks  # numerics
 
-    try:
-        return ranks(results), ""
-    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-        # Rows of a stranger's folder: their replicates may be anything.
-        return _by_score(results), f"their replicates cannot be used ({type(error).__name__})"
+        try:
+            return ranks(results), ""
+        except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+            # Rows of a stranger's folder: their replicates may be anything.
+            unranked = f"their replicates cannot be used ({type(error).__name__})"
+    ordered = errors(results)
+    spans = [(bisect_left(ordered, error), bisect_right(ordered, error)) for error in ordered]
+    by_score = [Rank(first + 1, None, None, after - first > 1) for first, after in spans]
+    return dict(zip((row["cell"] for row in results), by_score, strict=True)), unranked
 
 
 def errors(results: Sequence[Row]) -> list[float]:
@@ -151,32 +150,12 @@ def errors(results: Sequence[Row]) -> list[float]:
     """
     if beyond_floor(results):
         return [one if math.isfinite(one) else math.inf for one in map(excess_of, results)]
-    return [sign_of(row) * row["score"] if math.isfinite(row["score"]) else math.inf for row in results]
-
-
-def _unrankable(results: Sequence[Row]) -> str:
-    """Return why places have no intervals, if they have none; a row without replicates enters with its own interval."""
-    if not any(row.get("replicates") for row in results):
-        return "rows keep no replicates" if results else ""
-    if len(results) > MOST_RANKED:
-        return f"there are more than {MOST_RANKED} answers"
-    return "" if all(math.isfinite(row["score"]) for row in results) else "a score is no finite number"
-
-
-def _by_score(results: Sequence[Row]) -> dict[str, Rank]:
-    ordered = errors(results)
-    many = Counter(ordered)
-    first = {error: place for place, error in reversed(list(enumerate(ordered, 1)))}
-    return {
-        row["cell"]: Rank(first[error], None, None, many[error] > 1)
-        for row, error in zip(results, ordered, strict=True)
-    }
+    return list(map(_error, results))
 
 
 def _title(key: _Key, members: Sequence[Row]) -> str:
-    _, protocol, split, kind = key
-    first = members[0]
-    direction = "lower" if sign_of(first) > 0 else "higher"
+    task, protocol, split, hardware = key
+    direction = "lower" if sign_of(members[0]) > 0 else "higher"
     dagger = " †" if any(row["dagger"] for row in members) else ""
-    parts = [first["task"], f"{metric_name(first)}, {direction} is better", protocol + dagger]
-    return visible(" · ".join([*parts, *([f"split {split}"] if split else []), kind]))
+    metric = f"{metric_name(members[0])}, {direction} is better"
+    return visible(" · ".join([task, metric, f"{protocol}{dagger}", *([f"split {split}"] if split else []), hardware]))

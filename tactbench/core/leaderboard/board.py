@@ -15,20 +15,17 @@ from dataclasses import replace
 from itertools import chain
 from typing import Any
 
-import tactbench
 from tactbench.core.files import sha256
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import NUMERIC, Line
-from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED
-from tactbench.core.leaderboard.records import GROUPS, TITLES
+from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED, Row, metric_name
+from tactbench.core.leaderboard.records import APART, GROUPS, TITLES
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.view import full_grid
 from tactbench.core.matrix.store.sharing import PROVENANCE_ID, canonical
 from tactbench.core.spec.row import FORMAT
 from tactbench.core.tables.html import render
 from tactbench.core.tables.text import visible
-
-Row = Mapping[str, Any]
 
 LARGEST = 4_000_000
 """Bytes of a page: what does not fit is left to the cells' files, and the page says so."""
@@ -65,6 +62,8 @@ _IN_THE_TABLE = (
 """Where there are many cells, these are told as the table shows them."""
 _LARGE = ("scores", "confusion", "search", "replicates")
 """What is large and each cell's own."""
+_GROUPED = {*chain.from_iterable(GROUPS.values()), *TITLES, *APART, "log"}
+"""Keys that have a place among a cell's details."""
 _text = json.JSONEncoder(sort_keys=True).encode
 
 
@@ -92,7 +91,9 @@ def page_of(table: Table) -> str:
     head = _head(table, lines)
     taken = len(frame.encode()) + sum(map(len, columns)) + len(deflated(head)) + _SPARE
     fields, left_out = details(rows, LARGEST - taken)
-    head |= {"fields": list(fields), "leftOut": left_out}
+    others = [key for key in fields if key not in _GROUPED]
+    head |= {"fields": list(fields), "leftOut": left_out, "groups": {**GROUPS, "Also": others}}
+    head |= {"titles": {**TITLES, **dict(zip(others, others, strict=True))}}
     data = json.dumps([deflated(head), *columns, *fields.values()])
     # The last one: a name may say the same.
     before, _, after = frame.rpartition(_DATA_HERE)
@@ -107,20 +108,17 @@ def _head(table: Table, lines: Sequence[Line]) -> dict[str, Any]:
     if len(notes) > MOST_NOTES:
         notes = [*notes[:MOST_NOTES], f"{len(notes) - MOST_NOTES} more notes are not in this page."]
     return {
-        "version": tactbench.__version__,
         "rows": len(lines),
         "order": [places[id(line)] for line in table.lines],
         "kinds": column([line.kind for line in lines]),
         "blocks": [
             {"title": block.title, "verdict": list(block.verdict), "size": len(block.lines)}
-            | {"lower": first["metric"] in LOWER_IS_BETTER, "metric": first["metric"], "unit": first["unit"]}
+            | {"lower": first["metric"] in LOWER_IS_BETTER, "metric": metric_name(first)}
             | {"simulated": _is_simulated(block)}
             for block, first in zip(table.blocks, firsts, strict=True)
         ],
         "columns": [{"name": name, "numeric": name in NUMERIC} for name in table.columns],
         "times": [name for name in DURATIONS if name in table.columns],
-        "groups": GROUPS,
-        "titles": TITLES,
         "notes": notes,
         "provenance": [[_id(entry), plain(entry)] for entry in table.provenance],
     }  # fmt: skip

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from tactbench.core.leaderboard.records import JSON_KEYS
 from tactbench.core.matrix.store.rows import fault_in_row
-from tactbench.core.spec.row import ReplicatedRow
+from tactbench.core.spec.row import JSON_KEYS, ReplicatedRow
 
 Row = dict[str, Any]
 
@@ -20,12 +19,14 @@ def checked(rows: Iterable[object]) -> tuple[list[Row], list[str]]:
     good: list[Row] = []
     wrong: list[str] = []
     for given in rows:
-        row = with_added(given) if isinstance(given, dict) else given
-        trouble = _fault(row) if isinstance(row, dict) else "it is no row"
-        if trouble:
-            name = row.get("cell") if isinstance(row, dict) else None
+        if not isinstance(given, dict):
+            wrong.append("a row without a name: it is no row")
+            continue
+        row = with_added(given)
+        if trouble := _fault(row):
+            name = row.get("cell")
             wrong.append(f"{name if isinstance(name, str) else 'a row without a name'}: {trouble}")
-        elif isinstance(row, dict):
+        else:
             good.append(row)
     return good, wrong
 
@@ -53,10 +54,9 @@ def _fault(row: Row) -> str:
     if any(type(count) is not int for count in row["counts"].values()):
         return "its counts are not all whole numbers"
     table = row["confusion"] or []
-    if any(not isinstance(line, list) or len(line) != len(table) for line in table) or any(
-        type(count) is not int for line in table for count in line
-    ):
-        return "its confusion is no square of whole numbers"
+    for line in table:
+        if not isinstance(line, list) or len(line) != len(table) or any(type(count) is not int for count in line):
+            return "its confusion is no square of whole numbers"
     return ""
 
 

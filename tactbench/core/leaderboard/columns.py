@@ -1,20 +1,24 @@
-"""The columns of a leaderboard, and a row as the texts that stand in them."""
+"""The columns of a leaderboard, and a row as the texts that stand in them.
+
+Every time is marked with whose clock it was taken by, and beside how many other cells: what keeps times apart that are
+not comparable.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from itertools import count, product
+from string import ascii_uppercase
+from typing import Literal, NamedTuple
 
-from tactbench.core.leaderboard.hosts import timing_mark
 from tactbench.core.leaderboard.levels import KEY as LEVEL
-from tactbench.core.leaderboard.names import answer_name, sensor_name
+from tactbench.core.leaderboard.names import Row, answer_name, distinct, sensor_name
 from tactbench.core.spec.status import STOPPED
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.numbers import ABSENT, delay, duration, interval, score, tail, whole
 from tactbench.core.tables.text import visible
 
-Row = Mapping[str, Any]
 Value = Callable[[Row], float | None]
 Text = Callable[[Row], str]
 Kind = Literal["result", "baseline", "failed", "skipped"]
@@ -75,26 +79,22 @@ def row_interval(row: Row) -> str:
     return "one replicate" if count == 1 else spread if spread == ABSENT else f"range {spread}"
 
 
-def _beyond(row: Row) -> str:
-    return interval(row.get("beyond_floor_ci_low"), row.get("beyond_floor_ci_high"), row["unit"])
-
-
 def _right(row: Row) -> str:
     """Return how many recordings were classified rightly, the mean over replicates: ``3.1 of 5``."""
     right, total = row.get("recordings_right"), row.get("recordings_asked")
     return ABSENT if right is None or total is None else f"{right:.3g} of {total:.3g}"
 
 
-def _delay(row: Row) -> str:
-    return delay(row.get("answer_delay_ms"), row.get("delay_parts_ms"))
-
-
 def _p95(row: Row) -> str:
     return tail(row.get("latency_ms_p95"), row.get("latency_ms_max"), row.get("latency_n"))
 
 
+def _beyond(row: Row) -> str:
+    return interval(row.get(_ENDS[0]), row.get(_ENDS[1]), row["unit"])
+
+
 _BEYOND = "score_beyond_floor"
-_ENDS = _middle("beyond_floor_ci_low", "beyond_floor_ci_high")
+_ENDS = ("beyond_floor_ci_low", "beyond_floor_ci_high")
 _ALL: dict[str, Column | str] = {
     "#": "rank",
     "sensor": "sensor",
@@ -103,23 +103,26 @@ _ALL: dict[str, Column | str] = {
     "score": _score("score", "score"),
     "95 % interval": Column("interval", row_interval, _middle("ci_low", "ci_high")),
     "beyond floor": _score("beyond_floor", _BEYOND, _BEYOND),
-    "95 % beyond": Column("beyond_floor_interval", _beyond, _ENDS, if_known=_BEYOND),
+    "95 % beyond": Column("beyond_floor_interval", _beyond, _middle(*_ENDS), if_known=_BEYOND),
     "true error": _score("true_error", "true_score", "true_score"),
     "rank 95 %": "rank_interval",
     "recordings right": Column(
-        "recordings_right", _right, lambda row: row.get("recordings_right"), if_known="recordings_right"
+        "recordings_right", _right, lambda row: row.get("recordings_right"), if_known="recordings_right",
     ),
     "published": _score("published", "published"),
     "baseline": _score("baseline", "baseline"),
     "n test": _count("n_test", "n_test"),
     "sessions": _count("sessions", "n_sessions"),
     "sim": _duration("sim", lambda row: row["sim_s"]),
-    "delay": Column("answer_delay", _delay, _seconds("answer_delay_ms"), timed=True),
+    "delay": Column(
+        "answer_delay", lambda row: delay(row.get("answer_delay_ms"), row.get("delay_parts_ms")),
+        _seconds("answer_delay_ms"), timed=True,
+    ),
     "fit": _duration("fit", lambda row: row["fit_s"]),
     "latency p50": _duration("latency_p50", _seconds("latency_ms_p50")),
     "p95": Column("latency_p95", _p95, _tail, timed=True),
     "batch/row": _duration("batch_row", _per_row),
-}
+}  # fmt: skip
 """All columns in order; of those that are names, or that the block of a row decides, only what programs call them."""
 
 OF_ROWS = {name: one for name, one in _ALL.items() if isinstance(one, Column)}
@@ -199,3 +202,58 @@ def _range(one: Rank | None) -> str:
     if one is None or one.low is None or one.high is None:
         return ABSENT
     return str(one.low) if one.low == one.high else f"{one.low}–{one.high}"
+
+
+def host_letters(rows: Iterable[Row]) -> dict[str, str]:
+    """Return a letter for each host that timed one of the rows, in order of their ids; none if there is but one."""
+    hosts = sorted({host for host, _ in _clocks(rows)})
+    letters = ("".join(letters) for length in count(1) for letters in product(ascii_uppercase, repeat=length))
+    return dict(zip(hosts, letters, strict=False)) if len(hosts) > 1 else {}
+
+
+def timing_mark(row: Row, letters: Mapping[str, str]) -> str:
+    """Return what stands behind every time of a row: ``[A]`` for the host, ``‖4`` for four cells at once."""
+    letter, at_once = letters.get(_host(row)), _at_once(row)
+    return (f" [{letter}]" if letter else "") + (f" ‖{at_once}" if at_once > 1 else "")
+
+
+def timing_notes(rows: Iterable[Row], letters: Mapping[str, str], provenance: Iterable[Row]) -> list[str]:
+    """Return what the marks of times mean; `provenance` tells of the runs, among it `host`, `cpu` and `cores`."""
+    machines = {str(one.get("host", "")): one for one in provenance}
+    notes = [f"[{letter}] timed on {_machine(host, machines.get(host))}." for host, letter in letters.items()]
+    if letters:
+        notes.append("Times marked with different letters are of different hosts: compare none of them. Scores do not "
+                     "depend on the host and are ranked together.")  # fmt: skip
+    hosts = distinct((at_once, host) for host, at_once in _clocks(rows))
+    for at_once in sorted(hosts.keys() - {1}):
+        cores = {host: machines.get(host, {}).get("cores") for host in hosts[at_once]}
+        crowded = sorted(visible(host) for host, n in cores.items() if type(n) is int and at_once > n)
+        more = f", more than the cores of host {' and of host '.join(crowded)}" if crowded else ""
+        notes.append(f"‖{at_once}: timed while {at_once} cells ran at once{more}: not comparable with times measured "
+                     "alone.")  # fmt: skip
+    return notes
+
+
+def _clocks(rows: Iterable[Row]) -> set[tuple[str, int]]:
+    """Return by which hosts rows were timed, and while how many cells ran at once."""
+    times = ("fit_s", "sim_s", "predict_s", "latency_ms_p50", "latency_ms_p95")
+    return {
+        (_host(row), _at_once(row))
+        for row in rows
+        if row["status"] == "done" and any(row[time] is not None for time in times)
+    }
+
+
+def _host(row: Row) -> str:
+    return str(row.get("host") or "")
+
+
+def _at_once(row: Row) -> int:
+    return int(row.get("concurrency") or 1)
+
+
+def _machine(host: str, machine: Row | None) -> str:
+    name = f"host {visible(host)}" if host else "a host that its rows do not name"
+    if not machine:
+        return f"{name}, of which nothing else is known"
+    return f"{name}: {visible(str(machine.get('cpu') or 'unknown CPU'))}, {visible(str(machine.get('cores')))} cores"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
 from tactbench.core.evaluation.protocols import is_probe
@@ -31,14 +31,8 @@ METRIC_NAMES = {
 
 def sensor_name(row: Row) -> str:
     """Return a sensor's name, marked where it was simulated."""
-    return visible(" ".join(filter(None, (str(row["sensor"]), origin_mark(row)))))
-
-
-def origin_mark(row: Row) -> str:
-    """Return ``SIM`` or ``EMULATED`` for a row that no sensor was pressed for, else nothing."""
-    if row.get("emulated"):
-        return EMULATED
-    return "SIM" if row["simulated"] else ""
+    mark = EMULATED if row.get("emulated") else "SIM" if row["simulated"] else ""
+    return visible(" ".join(filter(None, (str(row["sensor"]), mark))))
 
 
 def answer_name(row: Row) -> str:
@@ -73,6 +67,14 @@ def question_name(row: Row) -> str:
 def answer_or_probe(row: Row) -> str:
     """Return the estimator or, for a probe, its protocol: what makes no sense to probe makes none with any other."""
     return visible(str(row["protocol"])) if is_probe(row["protocol"]) else answer_name(row)
+
+
+def grouped(members: Iterable[_Value], key: Callable[[_Value], _Key]) -> dict[_Key, list[_Value]]:
+    """Return the members of each key, both in the order in which they come."""
+    groups: dict[_Key, list[_Value]] = {}
+    for one in members:
+        groups.setdefault(key(one), []).append(one)
+    return groups
 
 
 def distinct(pairs: Iterable[tuple[_Key, _Value]]) -> dict[_Key, list[_Value]]:

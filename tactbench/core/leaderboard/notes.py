@@ -6,18 +6,24 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from typing import Any
+from operator import itemgetter
 
 from tactbench.core.evaluation.protocols import is_probe
 from tactbench.core.leaderboard.blocks import Block
-from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, answer_or_probe, distinct, question_name
+from tactbench.core.leaderboard.names import (
+    METRIC_NAMES,
+    Row,
+    answer_name,
+    answer_or_probe,
+    distinct,
+    grouped,
+    question_name,
+)
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
 from tactbench.core.spec.row import HIGH_ERROR, MEDIAN_ERROR
 from tactbench.core.spec.status import STATUSES, STOPPED
 from tactbench.core.tables.numbers import score, score_with_unit
 from tactbench.core.tables.text import command_line, cut, visible
-
-Row = Mapping[str, Any]
 
 RANKS = (
     "A place with = is shared: the data do not tell these answers apart. Rank 95 % holds the places that the data do "
@@ -28,6 +34,7 @@ DAGGER = (
     "`karl2016` scales each set, the test set too, by its own. A deployed sensor cannot; protocol `deployable` shows "
     "what it can."
 )
+TRUE_ERRORS = "True error (SIM): against the force that the twin exerted, free of the reference's noise."
 _SET = re.compile(r"^(training|validation|test) (?=rows )")
 _SIGMA = re.compile(r"^rows with (.+) beyond three sigma$")
 MOST_CHANNELS = 4
@@ -57,7 +64,7 @@ def notes_of(rows: Sequence[Row], blocks: Sequence[Block]) -> list[str]:
         *_no_better(rows),
         *_tared(rows),
         *_ranks(blocks),
-        *_true_errors(rows),
+        *([TRUE_ERRORS] if any(row.get("true_score") is not None for row in rows) else []),
         *_timed_only(rows),
         *_stopped(rows, frozenset(STATUSES) - STOPPED),
         *_labels(rows),
@@ -81,15 +88,15 @@ def _ranks(blocks: Sequence[Block]) -> Iterator[str]:
 
 def _tared(rows: Sequence[Row]) -> list[str]:
     """Return one sentence on which recordings were tared, where some row's protocol is one that may."""
-    held = sorted({f"{row['tare_s']:g} s" for row in rows if row.get("tare_s")})
-    sentences = []
-    if held:
-        sentences.append(
-            f"`deployable`: each recording is tared on its own unloaded hold before its press ({', '.join(held)})"
-        )
-    if any(row["protocol"] == "deployable-untared" and row["status"] == "done" for row in rows):
-        sentences.append("`deployable-untared`: readings as they are")
-    return [f"{'; '.join(sentences)}."] if sentences else []
+    held = ", ".join(sorted({f"{row['tare_s']:g} s" for row in rows if row.get("tare_s")}))
+    tared = f"`deployable`: each recording is tared on its own unloaded hold before its press ({held})"
+    untared = any(row["protocol"] == "deployable-untared" and row["status"] == "done" for row in rows)
+    return _listed("", [tared] * bool(held) + ["`deployable-untared`: readings as they are"] * untared)
+
+
+def _listed(about: str, texts: Collection[str]) -> list[str]:
+    """Return one sentence that lists texts; none without any."""
+    return [visible(f"{about}{'; '.join(texts)}.")] if texts else []
 
 
 def _percentiles(rows: Sequence[Row]) -> list[str]:
@@ -101,7 +108,7 @@ def _percentiles(rows: Sequence[Row]) -> list[str]:
         for row in rows
         if MEDIAN_ERROR in (row["scores"] or {}) and not row["is_baseline"]
     ]
-    return [visible(f"Median and 95th percentile of the error over test rows: {'; '.join(found)}.")] if found else []
+    return _listed("Median and 95th percentile of the error over test rows: ", found)
 
 
 def _floors(rows: Sequence[Row]) -> list[str]:
@@ -127,19 +134,11 @@ def _floor(found: Sequence[float], unit: str) -> str:
     return text if len(found) == 1 else f"{text} (of {len(found)}: {ends})"
 
 
-def _true_errors(rows: Sequence[Row]) -> list[str]:
-    known = any(row.get("true_score") is not None for row in rows)
-    return ["True error (SIM): against the force that the twin exerted, free of the reference's noise."] * known
-
-
 def interval_notes(rows: Sequence[Row]) -> list[str]:
     """Return one sentence a task and kind of interval; what is in brackets only where it is the same for all."""
     among = _among(rows)
-    kinds: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        if row["ci_method"] and not row["is_baseline"]:
-            short = re.sub(r" \([^)]*\)", "", visible(row["ci_method"]))
-            kinds.setdefault((row["task"], short), []).append(row)
+    shown = [row for row in rows if row["ci_method"] and not row["is_baseline"]]
+    kinds = grouped(shown, lambda row: (row["task"], re.sub(r" \([^)]*\)", "", visible(row["ci_method"]))))
     notes = []
     for (task, short), members in kinds.items():
         texts = {visible(row["ci_method"]) for row in members}
@@ -202,15 +201,12 @@ def _no_better(rows: Sequence[Row]) -> list[str]:
         if shown:
             where = question_name(row)
             look = "" if where in probed else f": `{_probing(row)}`"
-            name = f"{answer_name(row)} ({row['protocol']}, split {row['split']})"
-            pairs.append(((where, shown, _trivial_name(trivial), score_with_unit(bar, row["unit"]), look), name))
-    words = {"no better": "no better", "not shown": "not shown to be better"}
+            than = f"{_trivial_name(trivial)}, {score_with_unit(bar, row['unit'])}"
+            says = f"{shown} than {than}; see how the recordings differ before blaming the sensor{look}."
+            pairs.append(((where, says), f"{answer_name(row)} ({row['protocol']}, split {row['split']})"))
     return [
-        visible(
-            f"{where}/{', '.join(names)} {'is' if len(names) == 1 else 'are'} {words[shown]} than {trivial}, {value}; "
-            f"see how the recordings differ before blaming the sensor{look}."
-        )
-        for (where, shown, trivial, value, look), names in distinct(pairs).items()
+        visible(f"{where}/{', '.join(names)} {'is' if len(names) == 1 else 'are'} {says}")
+        for (where, says), names in distinct(pairs).items()
     ]
 
 
@@ -244,14 +240,14 @@ def _timed_only(rows: Sequence[Row]) -> list[str]:
 
 def _labels(rows: Sequence[Row]) -> list[str]:
     """Return the scores of answers to frames under halved and doubled thresholds of their labels."""
-    notes = []
+    found = []
     for row in rows:
         name = METRIC_NAMES.get(row["metric"], row["metric"])
-        found = [row["scores"].get(f"{name} with label thresholds {how}") for how in ("halved", "doubled")]
-        if row["status"] == "done" and not row["is_baseline"] and None not in found:
-            ends = " … ".join(f"{one:.3f}" for one in found)
-            notes.append(f"{row['sensor']}/{row['task']}/{answer_name(row)} {ends}")
-    return [visible(f"With the thresholds of the labels halved … doubled: {'; '.join(notes)}.")] if notes else []
+        scores = [row["scores"].get(f"{name} with label thresholds {how}") for how in ("halved", "doubled")]
+        if row["status"] == "done" and not row["is_baseline"] and None not in scores:
+            ends = " … ".join(f"{one:.3f}" for one in scores)
+            found.append(f"{row['sensor']}/{row['task']}/{answer_name(row)} {ends}")
+    return _listed("With the thresholds of the labels halved … doubled: ", found)
 
 
 def _left_out(rows: Sequence[Row]) -> list[str]:
@@ -282,17 +278,14 @@ def count_texts(counts: Mapping[str, int]) -> list[str]:
     if beyond:
         listed = ", ".join(f"{channel} {count}" for channel, count in beyond.most_common(MOST_CHANNELS))
         more = len(beyond) - MOST_CHANNELS
-        rest = f" and {more} more channels" if more > 0 else ""
-        texts.append(f"rows beyond three sigma in {listed}{rest}")
+        texts.append(f"rows beyond three sigma in {listed}" + (f" and {more} more channels" if more > 0 else ""))
     return texts
 
 
 def _stopped(rows: Sequence[Row], statuses: Collection[str]) -> Iterator[str]:
     """Yield one sentence for all cells that ended alike in one of `statuses`: which, why, how to look into it."""
-    alike: dict[tuple[str, int | None, str], list[Row]] = {}
-    for row in rows:
-        if row["status"] in statuses and row["status"] != "done":
-            alike.setdefault((row["status"], row["signal"], row["reason"]), []).append(row)
+    stopped = [row for row in rows if row["status"] in statuses and row["status"] != "done"]
+    alike = grouped(stopped, itemgetter("status", "signal", "reason"))
     for (status, signal, reason), members in alike.items():
         names = list(dict.fromkeys(f"{question_name(row)}/{answer_or_probe(row)}" for row in members))
         more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""

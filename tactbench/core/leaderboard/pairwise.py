@@ -5,19 +5,12 @@ Comparisons become one table a question, and records, with the same digits in ev
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from tactbench.core.errors import UnknownNameError
-from tactbench.core.leaderboard.names import (
-    EMULATED,
-    SIMULATED,
-    answer_name,
-    distinct,
-    hardware_name,
-    metric_name,
-)  # fmt: skip
+from tactbench.core.leaderboard.names import EMULATED, SIMULATED, Row, answer_name, grouped, hardware_name, metric_name
 from tactbench.core.spec.matrix import ComparisonChoice
 from tactbench.core.statistics.aggregate import Aggregate, aggregate
 from tactbench.core.statistics.holm import holm
@@ -26,7 +19,6 @@ from tactbench.core.statistics.paired import Difference, difference
 from tactbench.core.tables.numbers import ABSENT, interval, score, signed, suffix
 from tactbench.core.tables.text_table import TextTable
 
-Row = Mapping[str, Any]
 Kind = Literal["sensors", "estimators", "folders"]
 Key = tuple[Any, ...]
 COLUMNS = (
@@ -71,33 +63,36 @@ def comparisons(rows: Sequence[Row], first: str, second: str, task: str | None =
         If these rows have no such task, no sensor and no estimator of such a name, or not both names are of one kind.
     """
     rows = _in_task(rows, task)
-    sensors = list(dict.fromkeys(str(row["sensor"]) for row in rows))
-    estimators = list(dict.fromkeys(answer_name(row) for row in rows))
+    sensors, estimators = grouped(rows, lambda row: str(row["sensor"])), grouped(rows, answer_name)
     if first in sensors and second in sensors:
-        chosen = [row for row in rows if not row["is_baseline"]]
-        return _compared("sensors", first, second, *_of(chosen, lambda row: str(row["sensor"]), first, second))
+        return _compared("sensors", first, second, *map(_answers, (sensors[first], sensors[second])))
     if first in estimators and second in estimators:
-        return _compared("estimators", first, second, *_of(rows, answer_name, first, second))
-    known = estimators if first in estimators else sensors if first in sensors else [*sensors, *estimators]
-    wrong = second if first in (*sensors, *estimators) else first
-    kind = "estimator" if known is estimators else "sensor" if known is sensors else "sensor or estimator"
-    raise UnknownNameError(f"{kind} in these results", wrong, known)
+        return _compared("estimators", first, second, estimators[first], estimators[second])
+    if first in estimators:
+        raise UnknownNameError("estimator in these results", second, estimators)
+    if first in sensors:
+        raise UnknownNameError("sensor in these results", second, sensors)
+    raise UnknownNameError("sensor or estimator in these results", first, [*sensors, *estimators])
 
 
 def folder_comparisons(
     first_rows: Iterable[Row], second_rows: Iterable[Row], first: str, second: str, task: str | None = None
 ) -> list[PairwiseComparison]:
     """Compare the same cells of two result folders; raises UnknownNameError for a task that one has not."""
-    one, other = ([row for row in _in_task(rows, task) if not row["is_baseline"]] for rows in (first_rows, second_rows))
-    return _compared("folders", first, second, one, other)
+    return _compared("folders", first, second, *(_answers(_in_task(rows, task)) for rows in (first_rows, second_rows)))
+
+
+def _answers(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if not row["is_baseline"]]
 
 
 def _in_task(rows: Iterable[Row], task: str | None) -> list[Row]:
-    rows = list(rows)
-    tasks = list(dict.fromkeys(str(row["task"]) for row in rows))
-    if task is not None and task not in tasks:
+    if task is None:
+        return list(rows)
+    tasks = grouped(rows, lambda row: str(row["task"]))
+    if task not in tasks:
         raise UnknownNameError("task in these results", task, tasks)
-    return [row for row in rows if task is None or row["task"] == task]
+    return tasks[task]
 
 
 def with_declared(
@@ -108,14 +103,13 @@ def with_declared(
     The family of tests is every declared pair of cells in `rows`, the whole leaderboard.
     """
     family: dict[frozenset[str], float | None] = {}
-    for choice in declared:
-        for pair in _declared(rows, choice):
-            if pair.difference is not None:
-                family.setdefault(_cells(pair), pair.difference.p)
+    for pair in (pair for choice in declared for pair in _declared(rows, choice)):
+        if pair.difference is not None:
+            family.setdefault(_cells(pair), pair.difference.p)
     corrected = dict(zip(family, holm(list(family.values())), strict=True))
     return [
         replace(pair, declared=_cells(pair) in corrected, p_corrected=corrected.get(_cells(pair)))
-        if pair.kind != "folders" and pair.difference is not None
+        if pair.difference is not None
         else pair
         for pair in found
     ]
@@ -135,10 +129,6 @@ def _cells(pair: PairwiseComparison) -> frozenset[str]:
     return frozenset(str(row["cell"]) for row in (pair.first_row, pair.second_row) if row is not None)
 
 
-def _of(rows: Sequence[Row], name: Callable[[Row], str], first: str, second: str) -> tuple[list[Row], list[Row]]:
-    return [row for row in rows if name(row) == first], [row for row in rows if name(row) == second]
-
-
 def _compared(
     kind: Kind, first: str, second: str, first_rows: Sequence[Row], second_rows: Sequence[Row]
 ) -> list[PairwiseComparison]:
@@ -147,31 +137,26 @@ def _compared(
     for key in dict.fromkeys([*keys[0], *keys[1]]):
         one, other = keys[0].get(key), keys[1].get(key)
         result, folds = None, None
-        if one is None or other is None:
-            missing, there, others = (first, keys[1][key], keys[0]) if one is None else (second, one, keys[1])
-            refused = _why_alone(kind, there, missing, others)
-        else:
-            refused = _why_not(one, other, first, second)
-            if not refused:
-                result, folds = difference(one, other), over_folds([(one, other)])
+        if one is None:
+            refused = _why_alone(key, first, keys[0])
+        elif other is None:
+            refused = _why_alone(key, second, keys[1])
+        elif not (refused := _why_not(one, other, first, second)):
+            result, folds = difference(one, other), over_folds([(one, other)])
         found.append(PairwiseComparison(kind, first, second, key[-1], one, other, result, folds, refused))
     return found
 
 
 def _key(kind: Kind, row: Row) -> Key:
     """Return what two rows must have in common: hardware first, then protocol, then all else."""
-    return (hardware_name(row), row["protocol"], row["split"], row["task"], row["repeat"], _common(kind, row))
+    sensor, answer = str(row["sensor"]), answer_name(row)
+    of = {"sensors": answer, "estimators": sensor, "folders": f"{sensor}, {answer}"}[kind]
+    return (hardware_name(row), row["protocol"], row["split"], row["task"], row["repeat"], of)
 
 
-def _common(kind: Kind, row: Row) -> str:
-    if kind == "sensors":
-        return answer_name(row)
-    return str(row["sensor"]) if kind == "estimators" else f"{row['sensor']}, {answer_name(row)}"
-
-
-def _why_alone(kind: Kind, row: Row, missing: str, others: Mapping[Key, Row]) -> str:
-    """Return why `row` has nothing to stand against."""
-    hardware, protocol, split, *rest = _key(kind, row)
+def _why_alone(alone: Key, missing: str, others: Iterable[Key]) -> str:
+    """Return why a row with the key `alone` has nothing to stand against among `others`, which are of `missing`."""
+    hardware, protocol, split, *rest = alone
     near = [key for key in others if list(key[3:]) == rest]
     elsewhere = {key[0] for key in near if key[1:3] == (protocol, split)} - {hardware}
     if any(name.startswith(EMULATED) for name in (*elsewhere, hardware)) and elsewhere:
@@ -196,18 +181,18 @@ def _why_not(one: Row, other: Row, first: str, second: str) -> str:
 
 def tables_of(comparisons: Sequence[PairwiseComparison]) -> list[TextTable]:
     """Return a table for each question: task, metric, protocol, split and hardware."""
-    groups: dict[str, list[tuple[str, ...]]] = {}
-    for pair in comparisons:
-        groups.setdefault(_title(pair), []).append(_line(pair))
-    return [TextTable(title, COLUMNS, tuple(lines), frozenset(COLUMNS[1:-1])) for title, lines in groups.items()]
+    groups = grouped(comparisons, _title)
+    return [
+        TextTable(title, COLUMNS, tuple(map(_line, pairs)), frozenset(COLUMNS[1:-1])) for title, pairs in groups.items()
+    ]
 
 
 def _title(pair: PairwiseComparison) -> str:
     row = pair.row
-    dagger = " †" if row["dagger"] else ""
-    parts = [f"A = {pair.first}, B = {pair.second}", row["task"], metric_name(row), f"{row['protocol']}{dagger}"]
+    names = f"A = {pair.first}, B = {pair.second}"
+    protocol = f"{row['protocol']}{' †' if row['dagger'] else ''}"
     split = [f"split {row['split']}"] if row["split"] else []
-    return " · ".join([*parts, *split, hardware_name(row)])
+    return " · ".join([names, row["task"], metric_name(row), protocol, *split, hardware_name(row)])
 
 
 def _line(pair: PairwiseComparison) -> tuple[str, ...]:
@@ -254,18 +239,20 @@ def probability(p: float | None) -> str:
 def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
     """Return what must be known to read the tables."""
     found = [pair for pair in comparisons if pair.difference is not None]
+    if not found:
+        return []
     notes = [
         "A − B is in the metric's unit; p is of no difference at all, by exchanging A and B within replicates; effect "
         "is the difference over the standard deviation of the replicates' differences; n counts replicates."
-    ] if found else []  # fmt: skip
+    ]
     for pair in found:
         assert pair.difference is not None, "these were compared"
-        notes.append(f"{pair.row['task']}: {pair.difference.method}.")
-        region = pair.row.get("equivalence")
+        task, region = pair.row["task"], pair.row.get("equivalence")
+        notes.append(f"{task}: {pair.difference.method}.")
         notes.append(
-            f"{pair.row['task']}: scores within {region:g}{suffix(pair.row['unit'])} are practically the same."
+            f"{task}: scores within {region:g}{suffix(pair.row['unit'])} are practically the same."
             if region
-            else f"{pair.row['task']} declares no region of practical equivalence."
+            else f"{task} declares no region of practical equivalence."
         )
         least = pair.difference.smallest_p
         if least and least > 0.01:
@@ -275,11 +262,11 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
                 f"p folds: {pair.folds.method}; training data of folds overlap, so p over replicates is too small "
                 "for a claim about estimators trained anew."
             )
-    if found and all(pair.declared for pair in found):
+    if all(pair.declared for pair in found):
         notes.append("p Holm is corrected for all declared comparisons of these results.")
     elif any(pair.declared for pair in found):
         notes.append("p Holm is corrected for all declared comparisons; the others are exploratory.")
-    elif found:
+    else:
         notes.append("None of these was declared in the matrix: exploratory, p is not corrected for being one of many.")
     if any(pair.row["simulated"] for pair in found):
         notes.append("SIM, EMULATED: simulated by the twin; says nothing of hardware.")
@@ -288,21 +275,17 @@ def notes_of(comparisons: Sequence[PairwiseComparison]) -> list[str]:
 
 def _averages(found: Sequence[PairwiseComparison]) -> list[str]:
     """Return the interquartile mean over tasks of either, where two tasks or more were compared under one protocol."""
-    groups = distinct(((hardware_name(pair.row), pair.row["protocol"]), place) for place, pair in enumerate(found))
     notes = []
-    for (_, protocol), places in groups.items():
-        members = [found[place] for place in places]
-        one, other = (
-            aggregate([row for row in rows if row is not None])
-            for rows in zip(*((pair.first_row, pair.second_row) for pair in members), strict=True)
-        )
-        if len({pair.row["task"] for pair in members}) < 2 or one is None or other is None:
+    for (_, protocol), pairs in grouped(found, lambda pair: (hardware_name(pair.row), pair.row["protocol"])).items():
+        one = aggregate([pair.first_row for pair in pairs if pair.first_row is not None])
+        other = aggregate([pair.second_row for pair in pairs if pair.second_row is not None])
+        if len({pair.row["task"] for pair in pairs}) < 2 or one is None or other is None:
             continue
-        averages = f"{members[0].first} {_average(one)}, {members[0].second} {_average(other)}"
+        left_out = "".join(f" Left out: {reason}." for reason in dict.fromkeys(one.left_out + other.left_out))
         notes.append(
             f"Interquartile mean over {one.tasks} tasks under {protocol} ({one.entries} scores; 0 is the trivial "
-            f"baseline, 1 the reference): {averages}."
-            + "".join(f" Left out: {reason}." for reason in dict.fromkeys(one.left_out + other.left_out))
+            f"baseline, 1 the reference): {pairs[0].first} {_average(one)}, {pairs[0].second} {_average(other)}."
+            f"{left_out}"
         )
     return notes
 
@@ -313,17 +296,16 @@ def _average(side: Aggregate) -> str:
 
 def record_of(pair: PairwiseComparison) -> dict[str, Any]:
     """Return a pair as one flat record; all have the same keys."""
-    row, found, folds = pair.row, pair.difference, pair.folds
-    each: Mapping[str, Any] = {} if found is None else vars(found)
+    row, folds = pair.row, pair.folds
+    found: Mapping[str, Any] = {} if pair.difference is None else vars(pair.difference)
     shared = ("task", "rig", "simulated", "protocol", "split", "repeat", "metric", "unit")
     return {
         "compared": pair.kind, "a": pair.first, "b": pair.second, "of": pair.of, **{key: row[key] for key in shared},
         "score_a": pair.first_row and pair.first_row["score"], "score_b": pair.second_row and pair.second_row["score"],
-        "difference": each.get("value"), "low": each.get("low"), "high": each.get("high"), "p": each.get("p"),
-        "smallest_p": each.get("smallest_p"), "p_folds": folds and folds.p, "folds_low": folds and folds.low,
-        "folds_high": folds and folds.high, "declared": pair.declared, "p_holm": pair.p_corrected,
-        "effect": each.get("effect"), "improved": each.get("improved"), "equivalence": row.get("equivalence"),
-        "verdict": each.get("verdict"), "beyond": each.get("beyond"), "paired": each.get("paired"),
-        "replicates": each.get("replicates"), "replicate_unit": each.get("unit"), "method": each.get("method"),
-        "refused": pair.refused,
+        "difference": found.get("value"), **{key: found.get(key) for key in ("low", "high", "p", "smallest_p")},
+        "p_folds": folds and folds.p, "folds_low": folds and folds.low, "folds_high": folds and folds.high,
+        "declared": pair.declared, "p_holm": pair.p_corrected, "effect": found.get("effect"),
+        "improved": found.get("improved"), "equivalence": row.get("equivalence"),
+        **{key: found.get(key) for key in ("verdict", "beyond", "paired", "replicates")},
+        "replicate_unit": found.get("unit"), "method": found.get("method"), "refused": pair.refused,
     }  # fmt: skip

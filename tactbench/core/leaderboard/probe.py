@@ -8,13 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tactbench.core.evaluation.protocols import DEPLOYABLE, FIRST_FRAME
-from tactbench.core.leaderboard.names import answer_name, sensor_name, sign_of
+from tactbench.core.leaderboard.names import Row, answer_name, grouped, sensor_name, sign_of
 from tactbench.core.leaderboard.verdict import against_trivial, best_trivials, comparison_key
 from tactbench.core.tables.numbers import ABSENT, interval, score, score_with_unit, suffix
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import Entry, TextTable, sort_value
-
-Row = Mapping[str, Any]
 
 LEAK_SHARE = 0.5
 """Share of the skill (score beyond the trivial answer's) from which on the first frame's is called a leak: what came
@@ -33,10 +31,8 @@ NUMERIC = frozenset(COLUMNS[4:9])
 
 def build_probe(rows: Sequence[Row]) -> TextTable | None:
     """Put each finished answer under `deployable` beside its probes; None if nothing was probed."""
-    probes: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        if row["protocol"] == FIRST_FRAME.name or row["split"] in ("shuffled", None):
-            probes.setdefault(_key(row, row["protocol"]), []).append(row)
+    asked = (row for row in rows if row["protocol"] == FIRST_FRAME.name or row["split"] in ("shuffled", None))
+    probes = grouped(asked, lambda row: _key(row, row["protocol"]))
     best = best_trivials(rows)
     lines: list[tuple[str, ...]] = []
     skipped: dict[str, None] = {}

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from operator import itemgetter
+from typing import TYPE_CHECKING
 
 from tactbench.core.evaluation.protocols import is_probe
-from tactbench.core.leaderboard.names import answer_name, distinct, metric_name, sensor_name
+from tactbench.core.leaderboard.names import Row, answer_name, distinct, grouped, metric_name, sensor_name
 from tactbench.core.tables.numbers import ABSENT, interval, score
 from tactbench.core.tables.text import visible
 from tactbench.core.tables.text_table import TextTable
 
-Row = Mapping[str, Any]
+if TYPE_CHECKING:
+    from tactbench.core.statistics.aggregate import Aggregate
 
-_WHOSE = ("task", "sensor", "estimator")
+
 _FIGURES = {
     "precision": ("precision", ".2f"),
     "recall": ("recall", ".2f"),
@@ -47,10 +49,10 @@ MOST_ROWS = 2000
 _OTHERS = "another model than ours"
 
 
-def sections_of(rows: Sequence[Row], *, times: bool) -> list[TextTable]:
+def sections_of(rows: Sequence[Row], *, times: bool) -> tuple[TextTable | None, ...]:
     """Return the tables that rows in the order of the leaderboard's lines make; those on events hold times."""
     events = (events_section(rows), operating_points_section(rows)) if times else ()
-    return [section for section in (*events, over_tasks(rows), published_section(rows)) if section is not None]
+    return (*events, over_tasks(rows), published_section(rows))
 
 
 def events_section(rows: Sequence[Row]) -> TextTable | None:
@@ -59,14 +61,14 @@ def events_section(rows: Sequence[Row]) -> TextTable | None:
     lines = []
     for row in finished:
         figures = row["events"]
-        texts = {name: _figure(figures.get(key), form) for name, (key, form) in _FIGURES.items()}
+        texts = {name: _figure(figures, key, form) for name, (key, form) in _FIGURES.items()}
         if "misses" in figures:
             texts["misses"] += f" of {figures['events']:g}"
-        lines.append((visible(row["task"]), sensor_name(row), answer_name(row), *texts.values()))
+        lines.append((*_whose(row), *texts.values()))
     policies = distinct((str(row["answer_from"]), str(row["task"])) for row in finished)
     labels = [
         f"{row['sensor']}/{row['task']}/{answer_name(row)} "
-        + " … ".join(_figure(row["events"].get(key), ".2f") for key in _OTHER_LABELS)
+        + " … ".join(_figure(row["events"], key, ".2f") for key in _OTHER_LABELS)
         for row in finished
         if not row["is_baseline"] and any(key in row["events"] for key in _OTHER_LABELS)
     ]
@@ -78,8 +80,8 @@ def events_section(rows: Sequence[Row]) -> TextTable | None:
         *(f"{name} reads the reference sensor and knows the friction: an oracle, and no bar." for name in oracles),
     ]
     title = "Events · at the threshold that validation recordings chose"
-    kinds = tuple("baseline" if row["is_baseline"] else "result" for row in finished)
-    return _section(title, (*_WHOSE, *_FIGURES), lines, notes, kinds)
+    kinds = ["baseline" if row["is_baseline"] else "result" for row in finished]
+    return _section(title, tuple(_FIGURES), lines, notes, kinds)
 
 
 def operating_points_section(rows: Sequence[Row]) -> TextTable | None:
@@ -89,30 +91,34 @@ def operating_points_section(rows: Sequence[Row]) -> TextTable | None:
     lines = []
     for row in finished:
         points = {point["bound"]: _point(point) for point in row["operating_points"]}
-        texts = [points.get(bound, ABSENT) for bound in bounds]
-        lines.append((visible(row["task"]), sensor_name(row), answer_name(row), *texts))
-    columns = (*_WHOSE, *(f"{bound:g}/min" for bound in bounds))
-    return _section("Events · where more false alarms are put up with", columns, lines, [_POINTS])
+        lines.append((*_whose(row), *(points.get(bound, ABSENT) for bound in bounds)))
+    title = "Events · where more false alarms are put up with"
+    return _section(title, tuple(f"{bound:g}/min" for bound in bounds), lines, [_POINTS])
+
+
+def _whose(row: Row) -> tuple[str, str, str]:
+    return visible(row["task"]), sensor_name(row), answer_name(row)
 
 
 def _section(
-    title: str, columns: tuple[str, ...], lines: Sequence[tuple[str, ...]], notes: Sequence[str],
-    kinds: tuple[str, ...] = (),
+    title: str, figures: tuple[str, ...], lines: Sequence[tuple[str, ...]], notes: Sequence[str],
+    kinds: Sequence[str] = (),
 ) -> TextTable | None:  # fmt: skip
-    """Return a table whose first three columns are words; None without lines."""
-    if not lines:
-        return None
-    return TextTable(title, columns, tuple(lines), frozenset(columns[3:]), kinds=kinds, notes=tuple(notes))
+    """Return a table of figures, with whose they are before them; None without lines."""
+    columns = ("task", "sensor", "estimator", *figures)
+    table = TextTable(title, columns, tuple(lines), frozenset(figures), kinds=tuple(kinds), notes=tuple(notes))
+    return table if lines else None
 
 
 def _point(point: Mapping[str, float]) -> str:
     """Return recall, false alarms a minute and latency of one operating point."""
     late = point.get("onset latency p50 ms")
-    recall, rate = _figure(point.get("recall"), ".2f"), _figure(point.get("false alarms per minute"), ".2g")
+    recall, rate = _figure(point, "recall", ".2f"), _figure(point, "false alarms per minute", ".2g")
     return f"{recall}, {rate}/min" + ("" if late is None else f", {late:.0f} ms")
 
 
-def _figure(value: float | None, form: str) -> str:
+def _figure(figures: Mapping[str, float | None], key: str, form: str) -> str:
+    value = figures.get(key)
     return ABSENT if value is None else f"{value:{form}}"
 
 
@@ -121,14 +127,15 @@ def over_tasks(rows: Sequence[Row]) -> TextTable | None:
 
     A task that was asked under several splits is left out: none of them stands for it.
     """
-    groups: dict[tuple[Any, ...], dict[str, list[Row]]] = {}
-    for row in filter(_is_averaged, rows):
-        key = sensor_name(row), answer_name(row), visible(row["protocol"]), row["rig"]
-        groups.setdefault(key, {}).setdefault(row["task"], []).append(row)
-    alone = {
-        key: [members[0] for _, members in sorted(tasks.items()) if len(members) == 1] for key, tasks in groups.items()
-    }
-    several = {key: members for key, members in sorted(alone.items()) if len(members) > 1}
+    groups = grouped(
+        filter(_is_averaged, rows),
+        lambda row: (sensor_name(row), answer_name(row), visible(row["protocol"]), row["rig"]),
+    )
+    several = {}
+    for key, members in sorted(groups.items()):
+        alone = [same[0] for _, same in sorted(grouped(members, itemgetter("task")).items()) if len(same) == 1]
+        if len(alone) > 1:
+            several[key] = alone
     if sum(map(len, several.values())) > MOST_ROWS:
         return None
     lines = []
@@ -137,11 +144,11 @@ def over_tasks(rows: Sequence[Row]) -> TextTable | None:
         found = _mean(members)
         if found is None:
             continue
-        value, low, high, left_out = found
-        absent = {reason.partition(":")[0] for reason in left_out}
+        absent = {reason.partition(":")[0] for reason in found.left_out}
         names = ", ".join(visible(row["task"]) for row in members if row["task"] not in absent)
-        lines.append((sensor, answer, protocol, score(value, "1"), interval(low, high, "1"), names))
-        notes |= dict.fromkeys(visible(f"Not in the mean of {sensor}/{answer}: {reason}.") for reason in left_out)
+        mean, between = score(found.value, "1"), interval(found.low, found.high, "1")
+        lines.append((sensor, answer, protocol, mean, between, names))
+        notes |= dict.fromkeys(visible(f"Not in the mean of {sensor}/{answer}: {reason}.") for reason in found.left_out)
     if not lines:
         return None
     title = "Over tasks · interquartile mean between the trivial baseline, 0, and the reference of each task, 1"
@@ -161,15 +168,15 @@ def _is_averaged(row: Row) -> bool:
     )
 
 
-def _mean(members: Sequence[Row]) -> tuple[float, float, float, tuple[str, ...]] | None:
-    """Return mean, interval and what is left out; None where fewer than two tasks are in it, or nothing can be told."""
+def _mean(members: Sequence[Row]) -> Aggregate | None:
+    """Return the mean; None where fewer than two tasks are in it, or nothing can be told."""
     from tactbench.core.statistics.aggregate import aggregate
 
     try:
         found = aggregate(members)
     except (ArithmeticError, LookupError, TypeError, ValueError):
         return None  # rows of a stranger's folder: their replicates may be anything
-    return (found.value, found.low, found.high, found.left_out) if found and found.tasks > 1 else None
+    return found if found and found.tasks > 1 else None
 
 
 def published_section(rows: Sequence[Row]) -> TextTable | None:

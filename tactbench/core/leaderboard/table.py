@@ -6,22 +6,21 @@ escapes what its own syntax would act on, and changes no digit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import Any
 
 from tactbench.core.leaderboard.blocks import Block, blocks_of
-from tactbench.core.leaderboard.columns import Line, columns
-from tactbench.core.leaderboard.hosts import host_letters, timing_notes
+from tactbench.core.leaderboard.columns import Line, columns, host_letters, timing_notes
+from tactbench.core.leaderboard.names import Row
 from tactbench.core.leaderboard.notes import notes_of
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.sections import sections_of
 from tactbench.core.tables.text import cut, visible
 from tactbench.core.tables.text_table import TextTable
 
-Row = Mapping[str, Any]
-
+_REPLICATES = "One a replicate, which is everything recorded anew; scores are medians, intervals those of the median."
 MOST_SEEDS = 12
 LONGEST = 1000
 """Characters of a sentence in the footer; the whole provenance lies in the result folder."""
@@ -72,41 +71,30 @@ def build_table(rows: Sequence[Row], provenance: Sequence[Row] = (), *, times: b
     names = columns(rows, times=times)
     blocks = blocks_of(rows, names, letters, times)
     ordered = [line.row for block in blocks for line in block.lines]
-    notes = [*notes_of(ordered, blocks), *(timing_notes(rows, letters, known) if times else ())]
-    sections = sections_of(ordered, times=times)
-    probe = build_probe(ordered)
-    if probe is not None:
-        sections.append(probe)
-    return Table(blocks, names, tuple(notes), tuple(sections), _footer(rows, known, times), known, times)
+    notes = (*notes_of(ordered, blocks), *(timing_notes(rows, letters, known) if times else ()))
+    sections = tuple(one for one in (*sections_of(ordered, times=times), build_probe(ordered)) if one is not None)
+    return Table(blocks, names, notes, sections, _footer(rows, known, times), known, times)
 
 
 def _footer(rows: Sequence[Row], provenance: Sequence[Row], times: bool) -> tuple[str, ...]:
     """Return how many runs a table is of, and who computed them, with what, where."""
-    seeds = _seeds([seed for row in rows for seed in row.get("seeds") or [row["seed"]]])
+    seeds = _seeds(seed for row in rows for seed in row.get("seeds") or [row["seed"]])
     if not times:
         return (f"Times, memory and hosts are left out: a seed decides all that stands here. {seeds}",)
     runs = len({row.get("made_by") for row in rows} - {None, ""})
     of_runs = f" of {runs} kind{'s' if runs != 1 else ''} of runs (versions, machine, settings)" if runs else ""
     if any((row.get("n_replicates") or 0) > 1 and row.get("replicate_unit") == "replicate" for row in rows):
-        seeds += (
-            " One a replicate, which is everything recorded anew; scores are medians, intervals those of the median."
-        )
-    return (
-        f"{len(rows)} cells{of_runs}. {seeds}",
-        *(cut(visible(sentence), LONGEST) for sentence in _made_by(provenance)),
-    )
-
-
-def _made_by(provenance: Sequence[Row]) -> tuple[str, ...]:
+        seeds += f" {_REPLICATES}"
     from tactbench.core.provenance.gather import foot
 
     try:
-        return foot(provenance) if provenance else ()
+        made_by = foot(provenance) if provenance else ()
     except (AttributeError, ArithmeticError, LookupError, TypeError, ValueError):
-        return ("The provenance of these rows cannot be read.",)  # a stranger's folder may say anything
+        made_by = ("The provenance of these rows cannot be read.",)  # a stranger's folder may say anything
+    return (f"{len(rows)} cells{of_runs}. {seeds}", *(cut(visible(sentence), LONGEST) for sentence in made_by))
 
 
-def _seeds(values: Sequence[Any]) -> str:
+def _seeds(values: Iterable[Any]) -> str:
     seeds = sorted({seed for seed in values if isinstance(seed, int)})
     if not seeds:
         return "Seeds are not known."

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from operator import itemgetter
 from typing import Any
 
-from tactbench.core.leaderboard.names import METRIC_NAMES, answer_name, sign_of
+from tactbench.core.leaderboard.names import METRIC_NAMES, Row, answer_name, grouped, sign_of
+from tactbench.core.spec.row import INTERVALS
 from tactbench.core.statistics.excess import beyond_floor
 from tactbench.core.statistics.median import FEWEST, counted, percent
 from tactbench.core.statistics.rank import Rank
 from tactbench.core.tables.numbers import interval, score, score_with_unit
 from tactbench.core.tables.text import visible
-
-Row = Mapping[str, Any]
 
 PUBLISHED = "Published figures"
 """How the sentence on them begins."""
@@ -22,6 +21,9 @@ _CHEAPER = 1.2
 """A cost that is so many times lower is said: less is within what timings of one machine differ by."""
 _SPARES = {"answer_delay_ms": "answers {:.3g} times sooner", "fit_s": "fits {:.3g} times quicker"}
 """Costs by which equal scores are told apart, the first that all rows have."""
+
+_WORST = ("ci_high", "ci_low")
+"""The worse end of an interval: of an error, and of what is the higher the better."""
 
 comparison_key = itemgetter("sensor", "task", "rig", "protocol", "split")
 """What answers must share to be held against a trivial one."""
@@ -52,7 +54,7 @@ def verdict_of(
         return (_too_few(rows, names), *_without_touch(rows, trivial))
     leaders = [place for place, (_, one) in enumerate(ranked) if not one.behind]
     best = rows[0]
-    if may_be_trivial(best):
+    if _reaches(best, *_WORST, best["baseline"]):
         bar = score_with_unit(best["baseline"], best["unit"])
         sentence = f"Not enough to tell: {names[0]} leads, and its interval holds the trivial answer's {bar}."
     elif len(rows) == 1:
@@ -101,22 +103,23 @@ def _published(rows: Sequence[Row], names: Sequence[str]) -> list[str]:
 
 def _without_touch(rows: Sequence[Row], trivial: Sequence[Row]) -> list[str]:
     """Return a sentence where an answer that reads no sensor scores within the interval of the best one that does."""
-    best = rows[0]
-    sign = sign_of(best)
-    end = best["ci_high" if sign > 0 else "ci_low"]
+    best, sign = rows[0], sign_of(rows[0])
+    end = best[_WORST[0] if sign > 0 else _WORST[1]]
     bar = best["score"] if end is None else end
     found = [row for row in trivial if row.get("looks_at") == "time" and sign * (row["score"] - bar) <= 0]
     if not found or best.get("looks_at") == "time":
         return []
     one = min(found, key=lambda row: sign * row["score"])
-    scores = score_with_unit(one["score"], one["unit"])
-    known = f"{answer_name(one)} reads no sensor, only the time since the press began, and scores {scores}"
-    return [f"{known}: every recording is pressed alike, so these scores need no touch."]
+    return [
+        f"{answer_name(one)} reads no sensor, only the time since the press began, and scores "
+        f"{score_with_unit(one['score'], one['unit'])}: every recording is pressed alike, so these scores need no "
+        "touch."
+    ]
 
 
 def _too_few(rows: Sequence[Row], names: Sequence[str]) -> str:
     """Return what can be said of fewer replicates than an interval needs."""
-    n = min((row.get("n_replicates") or 0 for row in rows), default=0)
+    n = min(row.get("n_replicates") or 0 for row in rows)
     if not n:
         return f"Not enough to tell: these rows keep no replicates. {names[0]} has the best score."
     unit = str(rows[0].get("replicate_unit") or "replicate")
@@ -132,34 +135,22 @@ def _names(rows: Sequence[Row], like: Sequence[Row] = ()) -> list[str]:
 
 
 def _measured(row: Row) -> str:
-    if beyond_floor([row]):
-        value, ends, what = "score_beyond_floor", ("beyond_floor_ci_low", "beyond_floor_ci_high"), " beyond the floor"
-    else:
-        value, ends, what = "score", ("ci_low", "ci_high"), ""
-    low, high = (row.get(end) for end in ends)
-    held = ""
-    if low is not None:
-        n, unit = row.get("n_replicates"), row.get("replicate_unit")
-        over = counted(n, str(unit)) if n else "replicates"
-        held = f" ({percent(n, unit)} over {over}: {interval(low, high, row['unit'])})"
-    name = METRIC_NAMES.get(row["metric"], visible(str(row["metric"])))
-    return f"{name} {score_with_unit(row[value], row['unit'])}{what}{held}"
-
-
-def may_be_trivial(row: Row) -> bool:
-    """Return whether the interval of a row holds its trivial answer's score, or lies beyond it on the worse side."""
-    return _reaches(row, "ci_high", "ci_low", row["baseline"])
+    floor = beyond_floor([row])
+    value, low, high = INTERVALS[floor]
+    text = f"{METRIC_NAMES.get(row['metric'], visible(str(row['metric'])))} {score_with_unit(row[value], row['unit'])}"
+    text += " beyond the floor" if floor else ""
+    if row.get(low) is None:
+        return text
+    n, unit = row.get("n_replicates"), row.get("replicate_unit")
+    over = counted(n, str(unit)) if n else "replicates"
+    return f"{text} ({percent(n, unit)} over {over}: {interval(row[low], row.get(high), row['unit'])})"
 
 
 def best_trivials(rows: Iterable[Row]) -> dict[tuple[Any, ...], Row]:
     """Return the best of all finished trivial answers by their `comparison_key`; an oracle is none."""
-    best: dict[tuple[Any, ...], Row] = {}
-    for row in rows:
-        if row["is_baseline"] and row["status"] == "done" and row.get("looks_at") != "reference":
-            known = best.setdefault(comparison_key(row), row)
-            if sign_of(row) * row["score"] < sign_of(row) * known["score"]:
-                best[comparison_key(row)] = row
-    return best
+    finished = (row for row in rows if row["is_baseline"] and row["status"] == "done")
+    groups = grouped((row for row in finished if row.get("looks_at") != "reference"), comparison_key)
+    return {key: min(alike, key=lambda row: sign_of(row) * row["score"]) for key, alike in groups.items()}
 
 
 def against_trivial(row: Row, trivial: float) -> str:
@@ -168,13 +159,13 @@ def against_trivial(row: Row, trivial: float) -> str:
     Returns
     -------
     str
-        ``no better`` where its whole interval lies at or beyond that score; ``not shown`` where its interval, or
-        without one its score, reaches it; else nothing.
+        ``no better`` where its whole interval lies at or beyond that score; ``not shown to be better`` where its
+        interval, or without one its score, reaches it; else nothing.
     """
-    if _reaches(row, "ci_low", "ci_high", trivial):
+    if _reaches(row, *_WORST[::-1], trivial):
         return "no better"
-    reached = _reaches(row, "ci_high", "ci_low", trivial) or _reaches(row, "score", "score", trivial)
-    return "not shown" if reached else ""
+    reached = _reaches(row, *_WORST, trivial) or _reaches(row, "score", "score", trivial)
+    return "not shown to be better" if reached else ""
 
 
 def _reaches(row: Row, of_errors: str, of_shares: str, trivial: float | None) -> bool:
@@ -223,5 +214,5 @@ def _resolution(ranked: Sequence[tuple[Row, Rank]], leaders: int, names: Sequenc
     others = {names[place]: one.first_without for place, (_, one) in enumerate(ranked) if place and one.first_without}
     if not others:
         return f"{sentence} Without any one {ranked[0][0].get('replicate_unit') or 'replicate'} the first stays first."
-    instead = ", ".join(others)
-    return f"{sentence} Without one of them ({sum(others.values())} of {ways} ways) the first would be {instead}."
+    ways_of = f"{sum(others.values())} of {ways} ways"
+    return f"{sentence} Without one of them ({ways_of}) the first would be {', '.join(others)}."

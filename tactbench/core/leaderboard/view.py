@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from tactbench.core.errors import UnknownNameError
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import COLUMNS, INTERVALS, NUMERIC, SHOWN
-from tactbench.core.leaderboard.names import metric_name
+from tactbench.core.leaderboard.names import Row, metric_name
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.statistics.median import counted, percent
 from tactbench.core.tables.numbers import ABSENT
 from tactbench.core.tables.text import command_line, visible
-from tactbench.core.tables.text_table import Entry, TextTable, finite
-
-Row = Mapping[str, Any]
+from tactbench.core.tables.text_table import Entry, TextTable, finite, text_table
 
 CELL = "cell"
 """The column of cells' names, as `why` and `rerun` take them."""
@@ -68,10 +65,8 @@ def known_columns(names: Sequence[str]) -> tuple[str, ...]:
 def document(table: Table, view: View) -> list[TextTable | tuple[str, ...]]:
     """Return the tables and notes that are printed, from above."""
     sentences = (*notes(table, view), *commands(table, view))
-    parts: tuple[TextTable | tuple[str, ...], ...] = (
-        *grids(table, view), sentences, *sections(table, view), footer(table, view),
-    )  # fmt: skip
-    return [part for part in parts if part]
+    parts: list[TextTable | tuple[str, ...]] = [*grids(table, view), sentences, *sections(table, view)]
+    return [part for part in (*parts, footer(table, view)) if part]
 
 
 def grids(table: Table, view: View) -> list[TextTable]:
@@ -93,33 +88,27 @@ def _grid(block: Block, view: View) -> TextTable:
         names = [name for name in (OF_FLOOR if floor else DEFAULT) if name in texts[0]]
     rows = [line.row for line in block.lines]
     return TextTable(
-        block.title,
-        tuple(names),
-        tuple(tuple(text[name] for name in names) for text in texts),
-        NUMERIC,
-        tuple(header(name, rows) for name in names),
-        tuple(line.kind for line in block.lines),
-        block.verdict,
-        first_to_go=() if view.columns else _FIRST_TO_GO,
-        intervals=frozenset(INTERVALS),
+        block.title, tuple(names), tuple(tuple(text[name] for name in names) for text in texts), NUMERIC,
+        headings=tuple(header(name, rows) for name in names), kinds=tuple(line.kind for line in block.lines),
+        summary=block.verdict, first_to_go=() if view.columns else _FIRST_TO_GO, intervals=frozenset(INTERVALS),
         unbroken=frozenset({CELL}),
-    )
+    )  # fmt: skip
 
 
 def full_grid(block: Block) -> TextTable:
     """Return a block with every column, what numbers are sorted by, and why cells did not end well."""
     lines = []
     for line in block.lines:
-        cell = line.row["cell"]
+        row = line.row
         texts = [
-            text if name not in NUMERIC or text in ("", ABSENT) else Entry(text, finite(line.value(name)), cell=cell)
+            text
+            if name not in NUMERIC or text in ("", ABSENT)
+            else Entry(text, finite(line.value(name)), cell=row["cell"])
             for name, text in line.texts.items()
         ]
-        why = "" if line.row["status"] == "done" else visible(f"{line.row['status']}: {line.row['reason']}")
-        lines.append((*texts, why))
-    columns = (*block.lines[0].texts, "reason")
-    kinds = tuple(line.kind for line in block.lines)
-    return TextTable(block.title, columns, tuple(lines), NUMERIC, kinds=kinds, summary=block.verdict).compact()
+        lines.append([*texts, "" if row["status"] == "done" else visible(f"{row['status']}: {row['reason']}")])
+    columns, kinds = (*block.lines[0].texts, "reason"), [line.kind for line in block.lines]
+    return replace(text_table(block.title, columns, lines, numeric=NUMERIC, kinds=kinds), summary=block.verdict)
 
 
 def _cell(row: Row) -> str:
@@ -174,16 +163,15 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
         details = [section.title.split(" · ")[0].lower() for section in table.sections if section.detail]
         more += ["all columns", *details]
         options.append("--wide")
-    where, out = ((view.folder,), ("--out", view.folder)) if view.folder else ((), ())
+    folder = [view.folder] * bool(view.folder)
     found = []
     if more:
-        listed = " and ".join([", ".join(more[:-1]), more[-1]] if len(more) > 1 else more)
-        found.append(
-            f"{listed[0].upper()}{listed[1:]}: `{command_line('tactbench', 'leaderboard', *where, *options)}`."
-        )
+        listed = " and ".join(filter(None, (", ".join(more[:-1]), more[-1])))
+        shown = command_line("tactbench", "leaderboard", *folder, *options)
+        found.append(f"{listed[0].upper()}{listed[1:]}: `{shown}`.")
     first = next((line.row for line in table.lines if line.kind == "result"), None)
     if first is not None:
-        why = command_line("tactbench", "why", _cell(first), *out)
+        why = command_line("tactbench", "why", _cell(first), *(["--out"] * bool(folder)), *folder)
         found.append(f"What a row rests on, its delay part by part: `{why}`.")
     return tuple(found)
 
@@ -200,11 +188,10 @@ def best(table: Table, count: int) -> Table:
         found: Counter[str] = Counter()
         kept = []
         for line in block.lines:
-            found[str(line.row["sensor"])] += line.kind == "result"
-            if line.kind == "result" and found[str(line.row["sensor"])] <= count:
+            found[line.row["sensor"]] += line.kind == "result"
+            if line.kind == "result" and found[line.row["sensor"]] <= count:
                 kept.append(line)
-        if kept:
-            blocks.append(replace(block, lines=tuple(kept)))
+        blocks.append(replace(block, lines=tuple(kept)))
     which = "the first answer" if count == 1 else f"the first {count} answers"
     note = f"Of each block only {which} of each sensor; places are those among all answers."
-    return replace(table, blocks=tuple(blocks), notes=(note, *table.notes))
+    return replace(table, blocks=tuple(block for block in blocks if block.lines), notes=(note, *table.notes))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactbench.core.leaderboard.axes import AXES
+from tactbench.core.leaderboard import AXES
 from tactbench.core.leaderboard.probe import build_probe
 from tactbench.core.leaderboard.side_by_side import compare
 from tactbench.core.report.section import ReportData, Section

@@ -9,7 +9,6 @@ from typing import Any
 
 from tactbench.core.errors import UnwritableError, UsageError
 from tactbench.core.files import replace_file
-from tactbench.core.leaderboard.records import JSON_KEYS
 from tactbench.core.matrix.progress import Progress
 from tactbench.core.report.calibrated import Calibrated
 from tactbench.core.report.figures.saving import draw_sensitivity
@@ -17,6 +16,7 @@ from tactbench.core.report.page import make_page
 from tactbench.core.report.published import published_table, records, reproduce
 from tactbench.core.report.results import Results, SavedFigure
 from tactbench.core.report.section import ReportData
+from tactbench.core.spec.row import JSON_KEYS
 from tactbench.core.tables.text_table import TextTable
 
 Drawer = Callable[[Results, Path, Progress, Callable[[str], None]], Sequence[SavedFigure]]

@@ -179,3 +179,13 @@ def _types(annotation: Any) -> frozenset[type]:
 FORMAT: Mapping[str, frozenset[type]] = {name: _types(kind) for name, kind in get_type_hints(ReplicatedRow).items()
                                          if name in ReplicatedRow.model_fields}  # fmt: skip
 """Types of what may stand under a key. A row may have other keys, of which nothing is asked."""
+
+_ELSEWHERE = ("simulation", "traceback", "log", "plan", "digests")
+"""What is large or of no use to a program: `why`, the page and the cell's own file have it."""
+_OF_CELL = [key for key in RowModel.model_fields if key not in _ELSEWHERE]
+JSON_KEYS = (*_OF_CELL[:-1], "key", _OF_CELL[-1])
+"""Keys of a JSON row, in order."""
+OF_REPLICATES = tuple(key for key in ReplicatedRow.model_fields if key not in ("key", *RowModel.model_fields))
+"""Keys of a row that stands for all replicates of its cell; they follow."""
+NESTED = frozenset(key for key in (*JSON_KEYS, *OF_REPLICATES) if not FORMAT[key].isdisjoint({list, dict}))
+"""Keys whose values are lists or tables: JSON inside a cell of CSV and Parquet."""

@@ -1,8 +1,7 @@
 """Rows in each format, as the command writes their table."""
 
-from tactbench.core.leaderboard.binary import parquet
-from tactbench.core.leaderboard.formats import csv_text, json_array, markdown, page
-from tactbench.core.leaderboard.latex import latex
+from tactbench.core.leaderboard.formats import latex, markdown, page
+from tactbench.core.leaderboard.records import csv_text, json_array, parquet
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW
 

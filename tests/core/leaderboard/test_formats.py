@@ -14,8 +14,7 @@ from rich.cells import cell_len
 
 from tactbench.core.errors import UsageError
 from tactbench.core.leaderboard.columns import COLUMNS, SHOWN
-from tactbench.core.leaderboard.formats import csv_text, markdown, plain_text
-from tactbench.core.leaderboard.latex import COLUMN_PT, latex
+from tactbench.core.leaderboard.formats import COLUMN_PT, csv_text, latex, markdown, plain_text
 from tactbench.core.leaderboard.records import JSON_KEYS, OF_REPLICATES, OF_THE_MACHINE, RANK_KEYS
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import DEFAULT_VIEW, WHOLE, View, grids, notes, sections

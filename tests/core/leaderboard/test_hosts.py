@@ -1,6 +1,6 @@
 """Times of different hosts are never mistaken for comparable; scores do not depend on the host."""
 
-from tactbench.core.leaderboard.hosts import host_letters
+from tactbench.core.leaderboard.columns import host_letters
 from tactbench.core.leaderboard.table import build_table
 
 from .rows import row

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from tactbench.core.leaderboard.latex import COLUMN_PT, latex
+from tactbench.core.leaderboard.formats import COLUMN_PT, latex
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import WHOLE
 from tactbench.core.tables.latex import points

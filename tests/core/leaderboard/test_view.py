@@ -6,9 +6,9 @@ import sys
 import pytest
 
 from tactbench.core.errors import UnknownNameError, UsageError
-from tactbench.core.leaderboard.binary import xlsx
 from tactbench.core.leaderboard.columns import COLUMNS
 from tactbench.core.leaderboard.formats import plain_text
+from tactbench.core.leaderboard.records import xlsx
 from tactbench.core.leaderboard.table import build_table
 from tactbench.core.leaderboard.view import (
     DEFAULT_VIEW,

@@ -1,7 +1,8 @@
 // One cell with everything that the page knows of it.
 const ABSENT = "–";
-const tableOf = (title, names, lines, attributes = {}) => make("table", attributes, make("caption", {}, title),
-  ...(names.length ? [make("thead", {}, make("tr", {}, ...names.map((name) => make("th", { scope: "col" }, name))))] : []),
+const tableOf = (title, columns, lines, attributes = {}) => make("table", attributes, make("caption", {}, title),
+  ...(columns.length ? [make("thead", {}, make("tr", {}, ...columns.map(({ name, numeric }) =>
+    make("th", { scope: "col", class: numeric ? "number" : null }, name))))] : []),
   make("tbody", {}, ...lines.map((cells) => make("tr", {}, ...cells))));
 
 const pairs = (title, entries) => {
@@ -12,12 +13,13 @@ const pairs = (title, entries) => {
 
 const records = (title, list) => {
   const names = [...new Set(list.flatMap((one) => Object.keys(one)))];
-  return tableOf(title, names, list.map((one) => names.map((name) => make("td", {}, asText(one[name])))));
+  return tableOf(title, names.map((name) => ({ name })), list.map((one) => names.map((name) => make("td", {}, asText(one[name])))));
 };
 
 const crossed = (title, counts, classes) => {
   const names = counts.map((_, place) => (classes?.length === counts.length ? asText(classes[place]) : String(place)));
-  return tableOf(title, ["true", ...names.map((name) => `as ${name}`)], counts.map((line, place) =>
+  const columns = ["true", ...names.map((name) => `as ${name}`)];
+  return tableOf(title, columns.map((name) => ({ name })), counts.map((line, place) =>
     [make("th", { scope: "row" }, names[place]), ...[].concat(line).map((count) => make("td", { class: "number" }, asText(count)))]));
 };
 
@@ -60,19 +62,16 @@ const provenanceTables = (entry) => {
 };
 
 const cellBody = (row) => {
-  const { head, columns } = board;
+  const { groups, titles } = board.head;
   const value = (name) => board.raw(name, row);
   const isSingle = (name) => !isEmpty(value(name)) && typeof value(name) !== "object";
-  const singles = (title, names) => pairs(title, names.filter(isSingle).map((name) => [name, asText(value(name))]));
-  const told = new Set(["traceback", "log", "classes", ...Object.keys(head.titles), ...Object.values(head.groups).flat()]);
-  const others = head.fields.filter((name) => !told.has(name));
-  const line = columns.map((one) => [one.name, one.column.text(row)]).filter(([, text]) => text !== ABSENT);
+  const line = board.columns.map((one) => [one.name, one.column.text(row)]).filter(([, text]) => text !== ABSENT);
   return [
     ...pairs("As the table shows it", line),
-    ...Object.entries(head.groups).flatMap(([title, names]) => singles(title, names)),
-    ...singles("Also", others),
-    ...Object.entries(head.titles).flatMap(([name, title]) => shownAs(title, value(name), value("classes"))),
-    ...others.filter((name) => !isSingle(name)).flatMap((name) => shownAs(name, value(name))),
+    ...Object.entries(groups).flatMap(([title, names]) =>
+      pairs(title, names.filter(isSingle).map((name) => [name, asText(value(name))]))),
+    ...Object.entries(titles).filter(([name]) => !isSingle(name))
+      .flatMap(([name, title]) => shownAs(title, value(name), value("classes"))),
   ];
 };
 

@@ -16,11 +16,12 @@ const pointsOf = (place, axis) => {
 // In the order of time, each of the front scores better than all before it; without a place (no better than the trivial
 // answer) nobody is on it.
 const frontOf = (points, lower) => {
-  const better = (one, other) => (lower ? one < other : one > other);
-  const inOrder = points.filter((one) => one.kind === "result" && one.placed)
-    .sort((one, other) => one.time - other.time || (lower ? one.score - other.score : other.score - one.score));
+  const worse = (one, other) => (lower ? one.score - other.score : other.score - one.score);
   const front = [];
-  for (const one of inOrder) if (!front.length || better(one.score, front.at(-1).score)) front.push(one);
+  for (const one of points.filter(({ kind, placed }) => kind === "result" && placed)
+    .sort((one, other) => one.time - other.time || worse(one, other))) {
+    if (!front.length || worse(one, front.at(-1)) < 0) front.push(one);
+  }
   return front;
 };
 
@@ -62,9 +63,8 @@ const drawTime = () => {
   const place = Number(byId("time-block").value), block = head.blocks[place];
   const axis = axes.find((one) => one.name === byId("time-axis").value);
   const scored = pointsOf(place, axis), all = scored.filter((one) => one.time > 0);
-  const counts = new Map();
-  for (const one of all) counts.set(one.host, (counts.get(one.host) ?? 0) + 1);
-  const hosts = [...counts].sort((one, other) => other[1] - one[1] || words.compare(one[0], other[0]));
+  const hosts = counted(all.map(({ host }) => host))
+    .sort((one, other) => other[1] - one[1] || words.compare(one[0], other[0]));
   fillPicker(byId("time-host"), hosts.map(([host, count]) => [host, `${host} (${whole(count)} cells)`]), byId("time-host").value);
   byId("time-host-label").hidden = hosts.length < 2;
   if (!all.length) return nothing("No cell of this block has both a score and this time.");
@@ -86,11 +86,10 @@ const drawTime = () => {
 
 const frontTable = (front, axis) => {
   const columns = [axis, ...["rank", "sensor", "estimator", "score", "interval"].map(board.role).filter((one) => one)];
-  const type = (one) => ({ class: one.numeric ? "number" : "" });
-  const cell = (row, { name, numeric, column }) => (numeric ? link(row, column.text(row), name === ROLES.score) : column.text(row));
-  return make("div", { class: "box" }, make("table", {}, make("caption", {}, "The front, the quickest first"),
-    make("thead", {}, make("tr", {}, ...columns.map((one) => make("th", { scope: "col", ...type(one) }, one.name)))),
-    make("tbody", {}, ...front.map(({ row }) => make("tr", {}, ...columns.map((one) => make("td", type(one), cell(row, one))))))));
+  const cell = (row, { name, numeric, column }) => make("td", { class: numeric ? "number" : null },
+    numeric ? link(row, column.text(row), name === ROLES.score) : column.text(row));
+  return make("div", { class: "box" }, tableOf("The front, the quickest first", columns,
+    front.map(({ row }) => columns.map((one) => cell(row, one)))));
 };
 
 const MANY_POINTS = 250;
@@ -105,69 +104,61 @@ const drawFigure = (width, points, front, block, axis) => {
   const quick = points[0].time / 1.25, slow = points.at(-1).time * 1.25;
   const x = (time) => left + (Math.log(time / quick) / Math.log(slow / quick)) * (width - left - right);
   const y = (score) => top + ((high - score) / (high - low)) * (height - top - bottom);
-  const unit = block.unit && block.unit !== "1" ? ` [${block.unit}]` : "";
-  const metric = block.title.split(" · ")[1]?.split(",")[0] ?? `${block.metric}${unit}`;
+  const rule = (x1, x2, y1, y2) => draw("line", { class: "rule", x1, x2, y1, y2 });
+  const text = (kind, x, y, shown, more) => draw("text", { class: kind, x, y, ...more }, shown);
+  const middle = { "text-anchor": "middle" };
   const picture = draw("svg", { viewBox: `0 0 ${width} ${height}`, width, height, role: "group",
     "aria-label": `${block.title}: score against ${axis.name}. Arrow keys go from point to point, Enter opens the cell.` });
-  for (const [value, text] of steps(low, high, 6)) {
-    picture.append(draw("line", { class: "rule", x1: left, x2: width - right, y1: y(value), y2: y(value) }),
-      draw("text", { class: "tick", x: left - 8, y: y(value) + 4, "text-anchor": "end" }, text));
+  for (const [value, shown] of steps(low, high, 6)) {
+    picture.append(rule(left, width - right, y(value), y(value)),
+      text("tick", left - 8, y(value) + 4, shown, { "text-anchor": "end" }));
   }
   let taken = -Infinity;
   for (const value of decades(quick, slow)) {
-    picture.append(draw("line", { class: "rule", x1: x(value), x2: x(value), y1: top, y2: height - bottom }));
+    picture.append(rule(x(value), x(value), top, height - bottom));
     if (x(value) - taken < 48) continue;
     taken = x(value);
-    picture.append(draw("text", { class: "tick", x: x(value), y: height - bottom + 18, "text-anchor": "middle" }, timeText(value)));
+    picture.append(text("tick", x(value), height - bottom + 18, timeText(value), middle));
   }
-  picture.append(
-    draw("text", { class: "axis", x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, `${axis.name}, logarithmic`),
-    draw("text", { class: "axis", x: 0, y: 0, "text-anchor": "middle", transform: `translate(14 ${(top + height - bottom) / 2}) rotate(-90)` }, metric));
+  picture.append(text("axis", (left + width - right) / 2, height - 6, `${axis.name}, logarithmic`, middle),
+    text("axis", 0, 0, block.metric, { ...middle, transform: `translate(14 ${(top + height - bottom) / 2}) rotate(-90)` }));
   for (const [one, [from, to]] of ends) {
     if (to !== undefined) picture.append(draw("line", { class: "interval", x1: x(one.time), x2: x(one.time), y1: y(from), y2: y(to) }));
   }
   if (front.length) {
-    const path = front.map((one, at) => (at ? `H${x(one.time).toFixed(1)}V${y(one.score).toFixed(1)}`
-      : `M${x(one.time).toFixed(1)} ${y(one.score).toFixed(1)}`)).join("") + `H${width - right}`;
-    picture.append(draw("path", { class: "front", d: path }));
+    const corners = front.map((one) => `H${x(one.time).toFixed(1)}V${y(one.score).toFixed(1)}`).join("");
+    const start = `M${x(front[0].time).toFixed(1)} ${y(front[0].score).toFixed(1)}`;
+    picture.append(draw("path", { class: "front", d: `${start}${corners}H${width - right}` }));
   }
   const tip = make("div", { class: "tip", hidden: true, "aria-hidden": "true" });
-  const onFront = new Set(front);
-  const small = points.length > MANY_POINTS ? 2.4 : 3.8;
-  const drawn = points.map((one) => {
-    const kind = `point ${one.kind}${onFront.has(one) ? " on-front" : ""}`;
-    const shared = { class: kind, tabindex: -1, role: "link", "aria-label": tellPoint(one, axis).join(", ") };
-    const size = onFront.has(one) ? 5.5 : small;
-    const mark = one.kind === "baseline"
-      ? draw("rect", { ...shared, x: x(one.time) - small, y: y(one.score) - small, width: 2 * small, height: 2 * small })
-      : draw("circle", { ...shared, cx: x(one.time), cy: y(one.score), r: size });
-    mark.point = one;
-    return mark;
+  const onFront = new Set(front), small = points.length > MANY_POINTS ? 2.4 : 3.8;
+  const drawn = points.map((point) => {
+    const kind = `point ${point.kind}${onFront.has(point) ? " on-front" : ""}`;
+    const shared = { class: kind, tabindex: -1, role: "link", "aria-label": tellPoint(point, axis).join(", ") };
+    const cx = x(point.time), cy = y(point.score), r = onFront.has(point) ? 5.5 : small;
+    return Object.assign(point.kind === "baseline"
+      ? draw("rect", { ...shared, x: cx - small, y: cy - small, width: 2 * small, height: 2 * small })
+      : draw("circle", { ...shared, cx, cy, r }), { point });
   });
-  picture.append(...drawn.filter((one) => !onFront.has(one.point)), ...drawn.filter((one) => onFront.has(one.point)));
+  picture.append(...[false, true].flatMap((above) => drawn.filter(({ point }) => onFront.has(point) === above)));
   const labelled = [];
   for (const one of front) {
-    const text = nameOf(one.row).slice(0, 48);
-    const wide = text.length * 6.3, at = { x: x(one.time) + 8, y: y(one.score) - 8 };
+    const name = nameOf(one.row).slice(0, 48);
+    const wide = name.length * 6.3, at = { x: x(one.time) + 8, y: y(one.score) - 8 };
     if (at.x + wide > width - right) at.x = x(one.time) - 8 - wide;
     if (at.x < left || labelled.some((other) => Math.abs(other.y - at.y) < 14 && other.x < at.x + wide && at.x < other.x + other.wide)) continue;
     labelled.push({ ...at, wide });
-    picture.append(draw("text", { class: "label", x: at.x, y: Math.max(at.y, 12) }, text));
+    picture.append(text("label", at.x, Math.max(at.y, 12), name));
   }
   const open = (mark) => { location.hash = `cell=${address(board.field("cell", mark.point.row))}`; };
   const tell = (mark) => {
-    tip.replaceChildren(...tellPoint(mark.point, axis).map((text, at) => make("div", at ? {} : { class: "who" }, text)));
+    tip.replaceChildren(...tellPoint(mark.point, axis).map((part, at) => make("div", at ? {} : { class: "who" }, part)));
     tip.hidden = false;
-    const middle = x(mark.point.time);
-    tip.style.left = `${Math.max(0, Math.min(middle + 12, width - tip.offsetWidth - 4))}px`;
+    tip.style.left = `${Math.max(0, Math.min(x(mark.point.time) + 12, width - tip.offsetWidth - 4))}px`;
     const below = y(mark.point.score) + 12;
     tip.style.top = `${below + tip.offsetHeight > height ? Math.max(0, below - tip.offsetHeight - 24) : below}px`;
   };
-  const walk = (from, to) => {
-    from?.setAttribute("tabindex", -1);
-    to.setAttribute("tabindex", 0);
-  };
-  walk(null, drawn.find((one) => onFront.has(one.point)) ?? drawn[0]);
+  (drawn.find(({ point }) => onFront.has(point)) ?? drawn[0]).tabIndex = 0;
   const listen = (type, act) => picture.addEventListener(type, (event) => { if (event.target.point) act(event.target, event); });
   const rest = () => { tip.hidden = true; };
   // A pointer that rests beside the points does not silence the one that the keyboard is at.
@@ -187,7 +178,8 @@ const drawFigure = (width, points, front, block, axis) => {
     else if (event.key === "Escape") rest();
     else if (next === undefined) return;
     else if (drawn[next]) {
-      walk(mark, drawn[next]);
+      mark.tabIndex = -1;
+      drawn[next].tabIndex = 0;
       drawn[next].focus({ preventScroll: true });
     }
     event.preventDefault();

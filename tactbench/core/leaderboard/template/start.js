@@ -14,7 +14,7 @@ const readBoard = async () => {
   const fields = new Map(head.fields.map((name, place) => [name, readColumn(read[columns.length + place])]));
   const byName = new Map(columns.map((one) => [one.name, one]));
   const isSilent = ({ column }) => column.dictionary.every((one) => ["", ABSENT].includes(asText(one)));
-  const shown = new Uint8Array(head.rows).fill(1), blockOf = new Int32Array(head.rows).fill(-1);
+  const shown = new Uint8Array(head.rows).fill(1), blockOf = new Int32Array(head.rows);
   let start = 0;
   const blocks = head.blocks.map(({ size }) => head.order.slice(start, start += size));
   blocks.forEach((rows, place) => rows.forEach((row) => { blockOf[row] = place; }));
@@ -30,7 +30,7 @@ const readBoard = async () => {
 
 const ANY = "";
 const HARDWARE = ["hardware", "SIM"];
-const pickers = { sensor: "sensor", task: "task", estimator: "estimator", status: "status" };
+const PICKED = ["sensor", "task", "estimator", "status"];
 
 const fillPicker = (select, entries, wanted) => {
   select.replaceChildren(...entries.map(([value, text]) => make("option", { value }, text)));
@@ -39,10 +39,9 @@ const fillPicker = (select, entries, wanted) => {
 
 const fillFilters = () => {
   const fill = (name, entries, all = `all (${whole(entries.length)})`) => fillPicker(byId(`pick-${name}`), [[ANY, all], ...entries], ANY);
-  for (const [name, field] of Object.entries(pickers)) {
-    const column = board.fields.get(field), counts = new Map();
-    for (const place of column?.index ?? []) counts.set(place, (counts.get(place) ?? 0) + 1);
-    const entries = [...counts].map(([place, count]) => [String(place), asText(column.dictionary[place]), count])
+  for (const name of PICKED) {
+    const column = board.fields.get(name);
+    const entries = counted(column?.index ?? []).map(([place, count]) => [String(place), asText(column.dictionary[place]), count])
       .sort((one, other) => words.compare(one[1], other[1]));
     fill(name, entries.map(([place, text, count]) => [place, name === "status" ? `${text} (${whole(count)})` : text]));
   }
@@ -51,36 +50,26 @@ const fillFilters = () => {
 };
 
 const SEARCHED = ["sensor", "task", "status", "reason", "protocol", "split", "rig"];
+// Whether a row has a word in one of these texts.
 const searched = (term) => {
-  const hit = new Uint8Array(board.head.rows);
-  const columns = [...SEARCHED.map((name) => board.fields.get(name)), board.role("estimator").column, board.role("sensor").column];
-  for (const column of columns) {
-    if (!column) continue;
-    const matches = column.dictionary.map((one) => visible(asText(one)).toLowerCase().includes(term));
-    if (matches.includes(true)) for (let row = 0; row < hit.length; row += 1) if (matches[column.index[row]]) hit[row] = 1;
-  }
-  return hit;
+  const columns = [...SEARCHED.map((name) => board.fields.get(name)), board.role("estimator").column, board.role("sensor").column]
+    .filter((column) => column)
+    .map(({ dictionary, index }) => [dictionary.map((one) => visible(asText(one)).toLowerCase().includes(term)), index]);
+  return (row) => columns.some(([matches, index]) => matches[index[row]]);
 };
 
 const filter = () => {
-  const { shown, blockOf, head } = board;
-  shown.fill(1);
-  const keep = (test) => { for (let row = 0; row < shown.length; row += 1) if (shown[row] && !test(row)) shown[row] = 0; };
-  keep((row) => blockOf[row] >= 0);
-  const block = byId("pick-block").value, hardware = byId("pick-hardware").value;
-  if (block !== ANY) keep((row) => blockOf[row] === Number(block));
-  if (hardware !== ANY) keep((row) => head.blocks[blockOf[row]].simulated === (hardware === "SIM"));
-  for (const [name, field] of Object.entries(pickers)) {
-    const value = byId(`pick-${name}`).value;
-    if (value !== ANY) { const { index } = board.fields.get(field); keep((row) => index[row] === Number(value)); }
+  const { shown, blockOf, head } = board, { find, block, hardware, ...picked } = Object.fromEntries(new FormData(byId("filters")));
+  const tests = find.toLowerCase().split(/\s+/).filter((term) => term).map(searched);
+  if (block !== ANY) tests.push((row) => blockOf[row] === Number(block));
+  if (hardware !== ANY) tests.push((row) => head.blocks[blockOf[row]].simulated === (hardware === "SIM"));
+  for (const [name, value] of Object.entries(picked)) {
+    if (value !== ANY) tests.push((row) => board.fields.get(name).index[row] === Number(value));
   }
-  for (const term of byId("find").value.toLowerCase().split(/\s+/).filter((one) => one)) {
-    const hit = searched(term);
-    keep((row) => hit[row]);
-  }
+  for (const row of shown.keys()) shown[row] = tests.every((test) => test(row));
   const count = shown.reduce((sum, one) => sum + one, 0), all = head.order.length;
   byId("found").textContent = `${count === all ? "" : `${whole(count)} of `}${whole(all)} cells`;
-  state.page = state.matrixPage = 0;
+  state.lines.page = state.matrix.page = 0;
   if (block !== ANY) byId("time-block").value = block;
   redraw();
 };
@@ -121,10 +110,8 @@ const listen = () => {
   let waiting = 0;
   const soon = () => { cancelAnimationFrame(waiting); waiting = requestAnimationFrame(filter); };
   byId("filters").addEventListener("input", soon);
-  byId("filters").addEventListener("submit", (event) => event.preventDefault());
   byId("filters").addEventListener("reset", soon);
   byId("axes").addEventListener("input", drawTime);
-  byId("axes").addEventListener("submit", (event) => event.preventDefault());
   const tabs = [...document.querySelectorAll("#views [role=tab]")];
   for (const tab of tabs) {
     tab.addEventListener("click", () => { history.replaceState(null, "", `#view=${tab.dataset.view}`); show(tab.dataset.view); });
@@ -143,8 +130,9 @@ const listen = () => {
   dialog.addEventListener("click", (event) => { if (event.target === dialog) dialog.close(); });
   window.addEventListener("hashchange", follow);
   window.addEventListener("resize", () => { if (state.view === "time") requestAnimationFrame(drawTime); });
-  window.addEventListener("beforeprint", () => { state.size = PRINTED; state.page = 0; if (state.view === "tables") drawTables(); });
-  window.addEventListener("afterprint", () => { state.size = PAGE; if (state.view === "tables") drawTables(); });
+  const turnTo = (size) => { state.size = size; state.lines.page = 0; if (state.view === "tables") drawTables(); };
+  window.addEventListener("beforeprint", () => turnTo(PRINTED));
+  window.addEventListener("afterprint", () => turnTo(PAGE));
 };
 
 const start = async () => {

@@ -2,7 +2,8 @@
 const PAGE = 200;
 const PRINTED = 2000;
 
-const state = { sort: null, page: 0, matrixSort: null, matrixPage: 0, size: PAGE, view: "tables" };
+// What a grid is sorted by, and which of its pages is shown.
+const state = { view: "tables", size: PAGE, lines: { sort: null, page: 0 }, matrix: { sort: null, page: 0 } };
 
 // What rows are compared by in a column: numbers by value, texts by their place among all texts.
 const keysOf = ({ column }) => {
@@ -13,83 +14,81 @@ const keysOf = ({ column }) => {
   return column.sort;
 };
 
-const turn = (sort, place, first = false) =>
-  sort && sort.place === place ? { place, descending: !sort.descending } : { place, descending: first };
+// The headings of a grid; each sorts by its place, again the other way round.
+const drawHead = (id, headings, redraw) => {
+  const grid = state[id], { tHead } = byId(id);
+  const focused = tHead.contains(document.activeElement) ? document.activeElement.parentElement.cellIndex : -1;
+  tHead.replaceChildren(make("tr", {}, ...headings.map(({ name, numeric, place, descending = false, below = [] }) => {
+    const mine = grid.sort?.place === place;
+    const again = () => {
+      grid.sort = { place, descending: mine ? !grid.sort.descending : descending };
+      grid.page = 0;
+      redraw();
+    };
+    const order = mine ? (grid.sort.descending ? "descending" : "ascending") : "none";
+    return make("th", { scope: "col", class: numeric ? "number" : "", "aria-sort": order },
+      make("button", { type: "button", onclick: again }, name), ...below);
+  })));
+  tHead.rows[0].cells[focused]?.querySelector("button").focus();
+};
 
-const heading = (name, numeric, place, sort, again) =>
-  make("th", { scope: "col", class: numeric ? "number" : "", "aria-sort":
-    sort && sort.place === place ? (sort.descending ? "descending" : "ascending") : "none" },
-    make("button", { type: "button", onclick: () => again(place) }, name));
-
-const linesOfBlocks = () => {
-  const keys = state.sort ? keysOf(board.columns[state.sort.place]) : null;
-  return board.head.blocks.map((block, place) => ({ block, rows: board.rowsOf(place) })).filter(({ rows }) => rows.length)
-    .map(({ block, rows }) => ({ block, rows: keys ? sorted(rows, keys, state.sort.descending) : rows }));
+// The buttons that turn the pages of a grid; returns the first line of the page.
+const drawPager = (id, total, size, redraw) => {
+  const grid = state[id], pager = byId(`${id}-pager`);
+  const last = Math.max(0, Math.ceil(total / size) - 1);
+  grid.page = Math.min(grid.page, last);
+  const from = grid.page * size;
+  const focused = pager.contains(document.activeElement) ? document.activeElement.dataset.go : null;
+  const go = (page) => {
+    grid.page = page;
+    redraw();
+    byId(id).parentElement.scrollTop = 0;
+    byId(id).scrollIntoView({ block: "nearest" });
+  };
+  const button = (name, label, page) => make("button", { type: "button", "data-go": name,
+    disabled: page === grid.page, onclick: () => go(page) }, label);
+  pager.hidden = !last;
+  pager.replaceChildren(
+    button("first", "First", 0), button("before", "Previous", Math.max(0, grid.page - 1)),
+    make("span", {}, `lines ${whole(total && from + 1)} to ${whole(Math.min(total, from + size))} of ${whole(total)}`),
+    button("next", "Next", Math.min(last, grid.page + 1)), button("last", "Last", last));
+  if (focused) (pager.querySelector(`[data-go="${focused}"]:enabled`) ?? pager.querySelector("button:enabled"))?.focus();
+  return from;
 };
 
 const isStopped = (kind) => kind !== "result" && kind !== "baseline";
 
 const drawLine = (row) => {
   const kind = board.kinds.text(row), line = make("tr", { class: kind }), columns = board.visibleColumns;
-  let onTheWay = true;
   for (const [place, { name, numeric, column }] of columns.entries()) {
     const text = column.text(row), isNumber = numeric && text !== "" && text !== ABSENT;
     if (isStopped(kind) && numeric && !isNumber && place > 0) {
       const why = board.field("reason", row) || board.field("status", row);
-      line.append(make("td", { class: "reason", colspan: columns.length - place }, link(row, why, onTheWay)));
+      line.append(make("td", { class: "reason", colspan: columns.length - place }, link(row, why, false)));
       break;
     }
-    const isScore = name === ROLES.score;
-    line.append(make("td", { class: numeric ? "number" : "" }, isNumber ? link(row, text, onTheWay && isScore) : text));
-    if (isNumber && isScore) onTheWay = false;
+    line.append(make("td", { class: numeric ? "number" : "" }, isNumber ? link(row, text, name === ROLES.score) : text));
   }
   return line;
 };
 
 const drawTables = () => {
-  const table = byId("lines");
-  const active = document.activeElement?.closest?.("#lines th")?.cellIndex;
-  const blocks = linesOfBlocks();
-  const total = blocks.reduce((sum, one) => sum + one.rows.length, 0);
-  state.page = Math.min(state.page, Math.max(0, Math.ceil(total / state.size) - 1));
-  const from = state.page * state.size, to = from + state.size;
-  const again = (place) => { state.sort = turn(state.sort, place); state.page = 0; drawTables(); };
-  table.tHead.replaceChildren(make("tr", {}, ...board.visibleColumns.map((one) =>
-    heading(one.name, one.numeric, one.place, state.sort, again))));
+  const table = byId("lines"), columns = board.visibleColumns, { sort } = state.lines;
+  const blocks = board.head.blocks.map((block, place) => ({ block, rows: board.rowsOf(place) }));
+  const from = drawPager("lines", blocks.reduce((sum, { rows }) => sum + rows.length, 0), state.size, drawTables);
+  drawHead("lines", columns, drawTables);
   for (const body of [...table.tBodies]) body.remove();
   let at = 0;
   for (const { block, rows } of blocks) {
-    if (at < to && at + rows.length > from) {
-      const some = rows.slice(Math.max(0, from - at), to - at);
-      const part = some.length < rows.length || rows.length < block.size
-        ? ` · ${whole(some.length)} of ${whole(block.size)} cells` : "";
-      table.append(make("tbody", {},
-        make("tr", { class: "block" }, make("th", { scope: "rowgroup", colspan: board.visibleColumns.length },
-          make("span", {}, block.title, make("small", {}, part)),
-          ...block.verdict.map((said) => make("p", { class: "verdict" }, said)))),
-        ...some.map(drawLine)));
-    }
+    const ordered = sort ? sorted(rows, keysOf(board.columns[sort.place]), sort.descending) : rows;
+    const some = ordered.slice(Math.max(0, from - at), Math.max(0, from + state.size - at));
     at += rows.length;
+    if (!some.length) continue;
+    const part = some.length < block.size ? ` · ${whole(some.length)} of ${whole(block.size)} cells` : "";
+    table.append(make("tbody", {},
+      make("tr", { class: "block" }, make("th", { scope: "rowgroup", colspan: columns.length },
+        make("span", {}, block.title, make("small", {}, part)),
+        ...block.verdict.map((said) => make("p", { class: "verdict" }, said)))),
+      ...some.map(drawLine)));
   }
-  drawPager("lines-pager", "lines", state.page, state.size, total, (page) => {
-    state.page = page;
-    drawTables();
-    table.parentElement.scrollTop = 0;
-    table.scrollIntoView({ block: "nearest" });
-  });
-  if (active !== undefined && active >= 0) table.tHead.rows[0].cells[active]?.querySelector("button")?.focus();
-};
-
-const drawPager = (id, what, page, size, total, go) => {
-  const pager = byId(id);
-  const last = Math.max(0, Math.ceil(total / size) - 1);
-  const focused = pager.contains(document.activeElement) ? document.activeElement.dataset.go : null;
-  const button = (name, label, target) => make("button", { type: "button", "data-go": name,
-    disabled: target === page, onclick: () => go(target) }, label);
-  pager.hidden = !last;
-  pager.replaceChildren(
-    button("first", "First", 0), button("before", "Previous", Math.max(0, page - 1)),
-    make("span", {}, `${what} ${whole(total ? page * size + 1 : 0)} to ${whole(Math.min(total, (page + 1) * size))} of ${whole(total)}`),
-    button("next", "Next", Math.min(last, page + 1)), button("last", "Last", last));
-  if (focused) (pager.querySelector(`[data-go="${focused}"]:not([disabled])`) ?? pager.querySelector("button:not([disabled])"))?.focus();
 };

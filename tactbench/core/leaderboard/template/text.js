@@ -18,8 +18,7 @@ const asText = (value) => {
 const SVG = "http://www.w3.org/2000/svg";
 const filled = (one, attributes, children) => {
   for (const [name, value] of Object.entries(attributes)) {
-    if (name === "class") one.setAttribute("class", value);
-    else if (name.startsWith("on")) one.addEventListener(name.slice(2), value);
+    if (name.startsWith("on")) one.addEventListener(name.slice(2), value);
     else if (value === true) one.setAttribute(name, "");
     else if (value !== false && value !== null && value !== undefined) one.setAttribute(name, value);
   }
@@ -38,6 +37,12 @@ const prose = (text) => {
 };
 
 const whole = (count) => count.toLocaleString("en");
+// The different values of a list, and how often each is in it.
+const counted = (values) => {
+  const counts = new Map();
+  for (const value of values) counts.set(value, (counts.get(value) ?? 0) + 1);
+  return [...counts];
+};
 
 // A stable address of a cell: its name in plain letters, and a digest of the name as it is (FNV-1a, 32 bits).
 const address = (name) => {
