@@ -11,6 +11,7 @@ import pytest
 from tests.conftest import Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
 from tests.core.pool.patience import ending
+from tests.core.report.unrendered import unrendered
 
 PROCEDURE = """
 title: Small
@@ -39,9 +40,10 @@ CALIBRATE = ("calibrate", "--config", "small.yaml", "--format", "json")
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
-    verbs = Verbs(tmp_path_factory.mktemp("calibrate"))
+    verbs = Verbs(tmp_path_factory.mktemp("calibrate"), here=True)
     (verbs.folder / "small.yaml").write_text(PROCEDURE)
-    return verbs, verbs(*CALIBRATE, "--out", "whole", "--jobs", "2")
+    with unrendered():
+        return verbs, verbs(*CALIBRATE, "--out", "whole")
 
 
 def test_tables_on_stdout_progress_on_stderr(calibrated):
@@ -85,7 +87,8 @@ def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
     assert "goes on from there" in said
     kept = journal.read_text().count("\n") - 1
     assert 1 <= kept < 11
-    rest = verbs(*CALIBRATE, "--out", "cut")
+    with unrendered():
+        rest = verbs(*CALIBRATE, "--out", "cut")
     assert f"{kept} of 11 draws were found finished" in rest.stderr
     whole = verbs.folder / "whole" / "calibration"
     for name in ("draws.csv", "ranges.json", "findings.json", "sensitivity.json"):

@@ -9,6 +9,7 @@ from tactbench.core.cli.config import matrix_called, packaged_matrices
 from tactbench.core.errors import ConfigError, UnknownNameError
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.plugin import load_registry
+from tests.conftest import Verbs
 
 ROOT = Path(__file__).parents[3]
 
@@ -35,7 +36,8 @@ def test_a_file_is_taken_before_a_name_and_a_missing_one_is_named(tmp_path, monk
         matrix_called("nowhere.yaml")
 
 
-def test_protocols_and_splits_side_by_side(verbs):
+def test_protocols_and_splits_side_by_side(tmp_path):
+    verbs = Verbs(tmp_path, here=True)
     asked = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force", "--estimator", "lasso", "--out", "out")
     asked += ("--protocol", "karl2016", "--protocol", "deployable", "--split", "roles", "--split", "unit")
     done = verbs(*asked, "--rung", "closed-form", "--no-latency")  # the cheapest

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from tests.conftest import Shell, Verbs
+from tests.conftest import Verbs
 from tests.core.matrix.plugin_packages import write_acme
 
 RUN = (
@@ -29,7 +29,7 @@ def made(tmp_path_factory):
     """A folder with a plugin and the results of a run with it; one cell of it failed."""
     folder = tmp_path_factory.mktemp("why")
     write_acme(folder / "site")
-    Shell(folder)(*RUN, "--out", "results", plugins=(str(folder / "site"),), code=1)
+    Verbs(folder, here=True)(*RUN, "--out", "results", plugins=(str(folder / "site"),), code=1)
     return folder
 
 
@@ -40,7 +40,7 @@ def here(made, tmp_path):
     folder = tmp_path / "copy"
 
     def call(*arguments, code=0):
-        ask = Shell(folder) if arguments[0] == "run" else Verbs(folder)  # it computes with a plugin
+        ask = Verbs(folder, here=True)
         return ask(*arguments, "--out", "results", plugins=(str(folder / "site"),), code=code)
 
     call.folder = folder
