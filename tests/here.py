@@ -5,6 +5,7 @@ Recordings that were read are remembered by their paths: other ones at the same 
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -38,7 +39,7 @@ def forget(folders: Iterable[Path]) -> None:
 
     evaluate_cell.dataset.cache_clear()
     record._rig.cache_clear()
-    for name, module in list(sys.modules.items()):
-        place = getattr(module, "__file__", None)
-        if place and any(Path(place).is_relative_to(folder) for folder in folders):
-            del sys.modules[name]
+    for folder in folders:
+        for name, module in list(sys.modules.items()):
+            if (getattr(module, "__file__", None) or "").startswith(f"{folder}{os.sep}"):
+                del sys.modules[name]

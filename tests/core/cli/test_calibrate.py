@@ -26,14 +26,14 @@ nuisances:
      prior: {kind: log-uniform, low: 0.1, high: 10}}
 outputs:
   - {name: ramp, title: Time index, sensor: ideal, task: force, unit: N, estimator: {name: time-index}}
-  - {name: ridge, title: Ridge, sensor: ideal, task: force, unit: N, estimator: {name: ridge}}
+  - {name: ols, title: OLS, sensor: ideal, task: force, unit: N, estimator: {name: ols}}
 published:
   - {output: ramp, value: 0.6, scale: 0.15, scale_reason: s, use: fitted, source: {tag: assumed, reference: x}}
-  - {output: ridge, value: 0.6, scale: 0.15, scale_reason: s, use: held out, source: {tag: assumed, reference: x}}
+  - {output: ols, value: 0.6, scale: 0.15, scale_reason: s, use: held out, source: {tag: assumed, reference: x}}
 tolerance: 2
 findings:
   - {name: bound, statement: Time is the bound, reason: r, source: {tag: assumed, reference: x},
-     all_of: [{above: ridge, below: ramp, margin: -0.01}]}
+     all_of: [{above: ols, below: ramp, margin: -0.01}]}
 """
 CALIBRATE = ("calibrate", "--config", "small.yaml", "--format", "json")
 
