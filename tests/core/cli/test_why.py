@@ -1,7 +1,10 @@
 """``tactbench why``: hit or miss, what changed in words, and how a stopped cell ended."""
 
 import json
+import os
 import shutil
+import subprocess
+import sys
 
 import pytest
 
@@ -159,16 +162,9 @@ def test_a_cached_run_loads_no_numerical_library(here):
         "try:\n    main()\nexcept SystemExit as end:\n    assert end.code == 0\n"
         "print(sorted({'numpy', 'h5py', 'scipy', 'sklearn', 'matplotlib', 'pandas'} & set(sys.modules)))\n"
     )
-    import os
-    import subprocess
-    import sys
-
     env = {**os.environ, "PYTHONPATH": str(here.folder / "site")}
-
-    def loaded():
-        done = subprocess.run([sys.executable, "-c", text], cwd=here.folder, env=env, capture_output=True, text=True,
-                              check=True)  # fmt: skip
-        return done.stdout.splitlines()[-1]
-
-    loaded()  # the copied recordings are read once: they are other files than those that the run remembered
-    assert loaded() == "[]"
+    # The copied recordings are read once: they are other files than those that the run remembered.
+    here(*RUN[:-2], "--format", "csv")
+    done = subprocess.run([sys.executable, "-c", text], cwd=here.folder, env=env, capture_output=True, text=True,
+                          check=True)  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "[]"
