@@ -92,17 +92,27 @@ class Verbs:
     """Calls the command line in this process, for what needs no fresh interpreter.
 
     Cells have processes of their own all the same, forked by a server that knows no plugin of others: to compute with
-    one takes a `Shell`.
+    one takes a `Shell`, or `here`.
+
+    Parameters
+    ----------
+    folder
+        Where the commands are called.
+    here
+        Recordings and cells are made in this process too, with the plugins of others as well, which it forgets
+        afterwards: for what is not about processes, limits or several jobs.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, here: bool = False) -> None:
         self.folder = folder
+        self.here = here
 
     def __call__(
         self, *arguments: str, plugins: tuple[str, ...] = (), code: int | None = 0
     ) -> subprocess.CompletedProcess[str]:
         from tactbench.core.cli import main
         from tactbench.core.plugins.registry import installed
+        from tests.here import forget, make_here
 
         thresholds = gc.get_threshold()
         out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
@@ -115,6 +125,9 @@ class Verbs:
         ):
             patch.setenv("COLUMNS", "200")
             patch.setattr(sys, "stdin", nothing)
+            if self.here:
+                forget(())
+                make_here(patch)
             for name in plugins:
                 patch.syspath_prepend(THIRD_PARTY / name)
             if plugins:
@@ -127,6 +140,8 @@ class Verbs:
                 gc.set_threshold(*thresholds)
                 if plugins:
                     installed.cache_clear()
+                if self.here:
+                    forget([THIRD_PARTY / name for name in plugins])
         said, told = (stream.buffer.getvalue().decode() for stream in (out, err))  # type: ignore[attr-defined]
         if code is not None:
             assert ended.value.code == code, f"exit {ended.value.code}\n{said}\n{told}"

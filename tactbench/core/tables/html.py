@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Sequence
+from functools import lru_cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import tactbench
 from tactbench.core.tables.text_table import WORDY, sort_value
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
     from markupsafe import Markup
 
 _HERE = "tactbench.core.tables"
@@ -31,8 +33,29 @@ def render(
     values
         What else the template shows; it extends ``base.html`` and can import the macros of ``table.html``.
     """
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
+
+    style = _texts(_HERE, ["page.css"]) + _texts(package, styles) + _texts(_HERE, ["print.css"])
+    script = '\n"use strict";\n(() => {\n' + _texts(_HERE, ["sort.js"]) + _texts(package, scripts) + "})();\n"
+    return (
+        _environment(package)
+        .get_template(template)
+        .render(
+            title=title,
+            version=tactbench.__version__,
+            style=Markup(style),
+            script=Markup(script),
+            style_hash=_digest(style),
+            script_hash=_digest(script),
+            **values,
+        )
+    )
+
+
+@lru_cache(maxsize=4)
+def _environment(package: str) -> Environment:
+    """Return what renders the templates of a package; each is compiled once."""
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     loader = ChoiceLoader([PackageLoader(one, "template") for one in (package, _HERE)])
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
@@ -40,17 +63,7 @@ def render(
     environment.filters["prose"] = prose
     environment.filters["sort_value"] = sort_value
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode()
-    style = _texts(_HERE, ["page.css"]) + _texts(package, styles) + _texts(_HERE, ["print.css"])
-    script = '\n"use strict";\n(() => {\n' + _texts(_HERE, ["sort.js"]) + _texts(package, scripts) + "})();\n"
-    return environment.get_template(template).render(
-        title=title,
-        version=tactbench.__version__,
-        style=Markup(style),
-        script=Markup(script),
-        style_hash=_digest(style),
-        script_hash=_digest(script),
-        **values,
-    )
+    return environment
 
 
 def _texts(package: str, names: Sequence[str]) -> str:

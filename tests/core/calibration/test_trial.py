@@ -10,7 +10,7 @@ FOREST = {"name": "forest", "params": {"n_estimators": 10}}
 
 
 def _output(name, figure=None, **more):
-    asked = {"name": name, "title": name, "sensor": "icub", "task": "curvature", "estimator": FOREST, "every": 20}
+    asked = {"name": name, "title": name, "sensor": "ideal", "task": "curvature", "estimator": FOREST, "every": 20}
     return {**asked, **more, **({"figure": figure} if figure else {})}
 
 

@@ -11,6 +11,7 @@ import pytest
 from tests.conftest import Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
 from tests.core.pool.patience import ending
+from tests.core.report.unrendered import unrendered
 
 PROCEDURE = """
 title: Small
@@ -25,23 +26,24 @@ nuisances:
      prior: {kind: log-uniform, low: 0.1, high: 10}}
 outputs:
   - {name: ramp, title: Time index, sensor: ideal, task: force, unit: N, estimator: {name: time-index}}
-  - {name: ridge, title: Ridge, sensor: ideal, task: force, unit: N, estimator: {name: ridge}}
+  - {name: ols, title: OLS, sensor: ideal, task: force, unit: N, estimator: {name: ols}}
 published:
   - {output: ramp, value: 0.6, scale: 0.15, scale_reason: s, use: fitted, source: {tag: assumed, reference: x}}
-  - {output: ridge, value: 0.6, scale: 0.15, scale_reason: s, use: held out, source: {tag: assumed, reference: x}}
+  - {output: ols, value: 0.6, scale: 0.15, scale_reason: s, use: held out, source: {tag: assumed, reference: x}}
 tolerance: 2
 findings:
   - {name: bound, statement: Time is the bound, reason: r, source: {tag: assumed, reference: x},
-     all_of: [{above: ridge, below: ramp, margin: -0.01}]}
+     all_of: [{above: ols, below: ramp, margin: -0.01}]}
 """
 CALIBRATE = ("calibrate", "--config", "small.yaml", "--format", "json")
 
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
-    verbs = Verbs(tmp_path_factory.mktemp("calibrate"))
+    verbs = Verbs(tmp_path_factory.mktemp("calibrate"), here=True)
     (verbs.folder / "small.yaml").write_text(PROCEDURE)
-    return verbs, verbs(*CALIBRATE, "--out", "whole", "--jobs", "2")
+    with unrendered():
+        return verbs, verbs(*CALIBRATE, "--out", "whole")
 
 
 def test_tables_on_stdout_progress_on_stderr(calibrated):
@@ -85,7 +87,8 @@ def test_it_goes_on_after_an_interruption_to_the_same_draws(calibrated):
     assert "goes on from there" in said
     kept = journal.read_text().count("\n") - 1
     assert 1 <= kept < 11
-    rest = verbs(*CALIBRATE, "--out", "cut")
+    with unrendered():
+        rest = verbs(*CALIBRATE, "--out", "cut")
     assert f"{kept} of 11 draws were found finished" in rest.stderr
     whole = verbs.folder / "whole" / "calibration"
     for name in ("draws.csv", "ranges.json", "findings.json", "sensitivity.json"):

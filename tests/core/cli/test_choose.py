@@ -1,17 +1,17 @@
 """The verb ``choose``, and the pages of ``show``: read by people on narrow terminals, and by programs."""
 
-import fcntl
+import contextlib
+import gc
 import json
 import os
 import pty
-import struct
-import subprocess
 import sys
-import termios
+import threading
 from pathlib import Path
 
 import pytest
 
+from tactbench.core.cli import main
 from tactbench.core.cli.config import shipped_results
 from tactbench.core.report.datasheet import OF_DEVICES
 from tactbench.core.spec.sensor import SensorSpec
@@ -24,33 +24,38 @@ WISH = ("--task", "force", "--max-delay-ms", "2", "--range-n", "5", "--rate-hz",
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    verbs = Verbs(tmp_path_factory.mktemp("ran"))
+    verbs = Verbs(tmp_path_factory.mktemp("ran"), here=True)
     asked = ("--sensor", "icub", "--task", "force", "--estimator", "ols", "--protocol", "karl2016")
     verbs("run", *asked, "--repeats", "1")
     return verbs
 
 
-def on_a_terminal(folder, *arguments, columns=80):
-    """Return what a terminal of so many columns is sent."""
+def on_a_terminal(*arguments):
+    """Return what a terminal of 80 columns is sent: so wide is one that says that it is dumb."""
     ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
-    env = {key: value for key, value in os.environ.items() if key != "COLUMNS"} | {
-        "TERM": "dumb",
-        "PYTHONPATH": str(ROOT),
-    }
-    with subprocess.Popen([sys.executable, "-m", "tactbench", *arguments], cwd=folder, stdin=theirs, stdout=theirs,
-                          stderr=theirs, env=env) as process:  # fmt: skip
-        os.close(theirs)
-        seen = b""
-        try:
+    seen = []
+
+    def read():
+        with contextlib.suppress(OSError):  # the other side has closed
             while piece := os.read(ours, 65536):
-                seen += piece
-        except OSError:  # the other side has closed
-            pass
-        finally:
-            os.close(ours)
-    assert process.returncode == 0
-    return seen.decode().replace("\r\n", "\n")
+                seen.append(piece)
+
+    reader, thresholds = threading.Thread(target=read), gc.get_threshold()
+    reader.start()
+    try:
+        with os.fdopen(theirs, "w", buffering=1) as terminal, pytest.MonkeyPatch.context() as patch:
+            patch.delenv("COLUMNS", raising=False)
+            patch.setenv("TERM", "dumb")
+            for stream in ("stdout", "stderr"):
+                patch.setattr(sys, stream, terminal)
+            with pytest.raises(SystemExit) as ended:
+                main(list(arguments))
+    finally:
+        gc.set_threshold(*thresholds)
+        reader.join()
+        os.close(ours)
+    assert ended.value.code == 0
+    return b"".join(seen).decode().replace("\r\n", "\n")
 
 
 def test_without_results_it_answers_from_those_that_came_along(verbs):
@@ -99,8 +104,9 @@ PAGES = (
 
 
 @pytest.mark.parametrize("arguments", PAGES)
-def test_eighty_columns_break_no_word(tmp_path, verbs, arguments):
-    narrow = on_a_terminal(tmp_path, *arguments)
+def test_eighty_columns_break_no_word(tmp_path, monkeypatch, verbs, arguments):
+    monkeypatch.chdir(tmp_path)
+    narrow = on_a_terminal(*arguments)
     assert max(map(len, (line.rstrip() for line in narrow.splitlines() if "See them all" not in line))) <= 80
     told = {word for word in verbs(*arguments).stdout.split() if "─" not in word}
     assert {word for word in narrow.split() if "─" not in word} == told
@@ -138,8 +144,8 @@ def test_the_shipped_results_are_of_a_run_and_travel_in_the_wheel():
     assert '"examples/results" = "tactbench/results"' in (ROOT / "pyproject.toml").read_text()
 
 
-def test_a_task_is_a_page(tmp_path, verbs):
-    page = on_a_terminal(tmp_path, "show", "force")
+def test_a_task_is_a_page(verbs):
+    page = on_a_terminal("show", "force")
     assert len(page.splitlines()) < 60
     for said in ("How large is the normal force?", "RMSE N, lower is better", "0.05 N", "validation", "flat", "60 s",
                  "mean, time-index", "deployable-untared", "few-shot-10", "0.7307 N", "section III-A"):  # fmt: skip

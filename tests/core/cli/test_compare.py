@@ -10,18 +10,24 @@ from tactbench.core.matrix.run import run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.spec.matrix import MatrixSpec
 from tests.conftest import Verbs
-from tests.here import IN_THIS_PROCESS
+from tests.here import make_here
 
 MATRIX = {
-    "repeats": 5, "sensors": ["biotac", "icub"], "latency": False,
+    "repeats": 5, "latency": False,
     "tasks": [{"name": "force", "protocol": "deployable", "estimators": ["ols", "lasso"]}],
 }  # fmt: skip
+CHEAPEST = {"biotac": "default", "icub": "closed-form"}
+"""Rungs of the simulation."""
 
 
 @pytest.fixture(scope="module")
 def verbs(tmp_path_factory):
     verbs = Verbs(tmp_path_factory.mktemp("compared"))
-    run_matrix(MatrixSpec.model_validate(MATRIX), Store(verbs.folder / "here"), choice=IN_THIS_PROCESS)
+    for sensor, rung in CHEAPEST.items():
+        matrix = MatrixSpec.model_validate({**MATRIX, "sensors": [sensor], "simulation": {"rung": rung}})
+        with pytest.MonkeyPatch.context() as patch:
+            make_here(patch)
+            run_matrix(matrix, Store(verbs.folder / "here"))
     return verbs
 
 

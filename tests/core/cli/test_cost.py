@@ -27,13 +27,14 @@ def test_whoever_breaks_costs_its_own_row_only(shell):
     assert "the timed model scores" in rows["wavers"]["notes"][0]
     assert json.loads((shell.folder / "tactbench-results/cost/made-force.json").read_text())["rows"]
     assert "timing: " in done.stderr
-    again = Verbs(shell.folder)(*ASKED, "--estimator", "ols", "--rounds", "1", "--format", "csv")
+    again = Verbs(shell.folder, here=True)(*ASKED, "--estimator", "ols", "--rounds", "1", "--format", "csv")
     listed = list(csv.DictReader(io.StringIO(again.stdout)))
     assert {row["estimator"] for row in listed} == {"ols", "mean", "time-index"}
     assert all(float(row["answer_delay_ms"]) > 0 for row in listed)
 
 
-def test_what_is_timed_adds_no_row_to_a_leaderboard_and_what_a_run_has_finished_is_not_done_again(verbs):
+def test_what_is_timed_adds_no_row_to_a_leaderboard_and_what_a_run_has_finished_is_not_done_again(tmp_path):
+    verbs = Verbs(tmp_path, here=True)
     presses(verbs.folder / "shelf")
     asked = ("--sensor", "made", "--task", "force", "--recordings", "shelf", "--split", "session", "--out", "out")
     verbs("run", *asked, "--estimator", "ols")
@@ -51,7 +52,8 @@ def test_what_is_timed_adds_no_row_to_a_leaderboard_and_what_a_run_has_finished_
             assert (row["made_by"], row["wall_s"]) == (made_by[row["estimator"]], wall[row["estimator"]])
 
 
-def test_the_table_states_what_its_times_mean(verbs):
+def test_the_table_states_what_its_times_mean(tmp_path):
+    verbs = Verbs(tmp_path, here=True)
     presses(verbs.folder / "shelf")
     done = verbs(*ASKED, "--estimator", "ols", "--estimator", "knn", "--out", "there")
     assert "made, force: RMSE, lower is better · deployable · split session · 2 rounds, 1 thread" in done.stdout

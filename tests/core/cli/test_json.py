@@ -8,6 +8,7 @@ import pytest
 
 from tactbench.core.cli import cli
 from tests.conftest import Verbs
+from tests.core.report.unrendered import unrendered
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "rigs" / "emulated.yaml"
 CELL = "ideal/force/twin/karl2016/ols/1"
@@ -37,7 +38,7 @@ VERBS = {
 @pytest.fixture(scope="module")
 def there(tmp_path_factory):
     """The verbs in the folder of a run and of a recording."""
-    verbs = Verbs(tmp_path_factory.mktemp("json"))
+    verbs = Verbs(tmp_path_factory.mktemp("json"), here=True)
     verbs("run", *VERBS["run"])
     verbs("record", "--sensor", "ideal", "--seconds", "1", "--out", "ideal.h5")
     return verbs
@@ -64,7 +65,8 @@ def _verbs(command, words):
 @pytest.mark.parametrize("verb", VERBS)
 def test_what_is_printed_is_json(there, verb):
     code = None if verb == "doctor" else 0  # something may be wrong with this machine's ports
-    found = json.loads(there(*verb.split(), *VERBS[verb], "--format", "json", code=code).stdout)
+    with unrendered():
+        found = json.loads(there(*verb.split(), *VERBS[verb], "--format", "json", code=code).stdout)
     assert found, "and it says something"
 
 

@@ -18,7 +18,7 @@ RUN = ("run", "--repeats", "5", "--sensor", "ideal", "--task", "force", "--estim
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     """The verbs in the folder of a run."""
-    verbs = Verbs(tmp_path_factory.mktemp("ran"))
+    verbs = Verbs(tmp_path_factory.mktemp("ran"), here=True)
     verbs(*RUN)
     return verbs
 

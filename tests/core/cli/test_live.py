@@ -3,8 +3,6 @@
 import os
 import re
 import select
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 
@@ -213,10 +211,8 @@ def test_ctrl_c_leaves_the_terminal_as_it_was(tmp_path):
     assert (tmp_path / "press.h5").exists()
 
 
-def test_without_a_terminal_a_line_says_it(tmp_path):
-    env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run([sys.executable, *RECORD], cwd=tmp_path, env=env, capture_output=True, text=True, check=True,
-                          stdin=subprocess.DEVNULL, timeout=100)  # fmt: skip
+def test_without_a_terminal_a_line_says_it(verbs):
+    done = verbs(*RECORD[2:])
     assert "icub on twin (SIM), cap R 10 mm: 60.0 of 60.0 s; force " in done.stderr
     assert "taxels 83.33/83.33 Hz" in done.stderr
     assert "\x1b" not in done.stderr

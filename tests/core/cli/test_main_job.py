@@ -17,7 +17,7 @@ FORCE = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force")
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    verbs = Verbs(tmp_path_factory.mktemp("run"))
+    verbs = Verbs(tmp_path_factory.mktemp("run"), here=True)
     done = verbs(*FORCE, "--format", "json")
     return verbs, json.loads(done.stdout), done
 
@@ -80,7 +80,7 @@ def test_a_second_run_computes_nothing_and_says_the_same(ran):
 def test_the_same_seed_gives_the_same_bytes_serially_and_with_two_jobs(ran):
     verbs, rows, _ = ran
     serial = (verbs.folder / "tactbench-results" / "scores.json").read_bytes()
-    verbs(*FORCE, "--jobs", "2", "--out", "parallel")
+    Verbs(verbs.folder)(*FORCE, "--jobs", "2", "--out", "parallel")
     assert (verbs.folder / "parallel" / "scores.json").read_bytes() == serial
     other = json.loads(verbs(*FORCE, "--estimator", "ols", "--seed", "2", "--out", "other", "--format", "json").stdout)
     before = {row["estimator"]: row["score"] for row in rows if row["estimator"] in ("ols", "mean", "time-index")}
@@ -107,7 +107,7 @@ def test_a_cell_that_fails_is_a_row_and_stops_nobody(ran):
         path.unlink()
         path.write_bytes(damaged)
     asked = ("--sensor", "icub", "--sensor", "ideal", "--task", "force", "--estimator", "ols")
-    done = verbs("run", "--repeats", "1", *asked, "--no-latency", "--format", "json", code=1)
+    done = Verbs(verbs.folder)("run", "--repeats", "1", *asked, "--no-latency", "--format", "json", code=1)
     rows = json.loads(done.stdout)
     assert {row["status"] for row in rows if row["sensor"] == "icub"} == {"failed"}
     assert {row["status"] for row in rows if row["sensor"] == "ideal"} == {"done"}
@@ -169,13 +169,14 @@ def test_ctrl_c_leaves_nothing_half_written_and_the_next_run_continues(tmp_path,
     assert not list(results.rglob("*.partial"))
     finished = {path.name: path.read_bytes() for path in results.rglob("*.h5")}
     assert finished
-    Verbs(folder)(*FORCE, "--estimator", "ols")
+    Verbs(folder, here=True)(*FORCE, "--estimator", "ols")
     for name, content in finished.items():
         (path,) = results.rglob(name)
         assert path.read_bytes() == content, "what was finished is reused, not made again"
 
 
-def test_a_row_over_several_places_states_all_of_them(verbs):
+def test_a_row_over_several_places_states_all_of_them(tmp_path):
+    verbs = Verbs(tmp_path, here=True)
     asked = ("--sensor", "icub", "--task", "force", "--split", "placement", "--protocol", "deployable")
     asked += ("--rung", "closed-form")  # the cheapest
     rows = json.loads(

@@ -95,22 +95,23 @@ def test_every_kind_passes_its_checks(made):
     assert ends == [(kind, "0", "silver") for kind in KINDS], done.stdout
 
 
-def scores(shell, *arguments, made):
-    done = shell("run", "--repeats", "1", "--no-latency", "--format", "json", *arguments, plugins=folders(made))
+def scores(folder, *arguments, made):
+    verbs = Verbs(folder, here=True)
+    done = verbs("run", "--repeats", "1", "--no-latency", "--format", "json", *arguments, plugins=folders(made))
     rows = json.loads(done.stdout)
     assert {row["status"] for row in rows} == {"done"}
     return {row["estimator"]: row["score"] for row in rows}
 
 
-def test_the_sensor_runs_with_the_estimator_and_the_effect(shell, made):
-    found = scores(shell, "--sensor", "my-sensor", "--task", "force", "--estimator", "my-estimator",
+def test_the_sensor_runs_with_the_estimator_and_the_effect(tmp_path, made):
+    found = scores(tmp_path, "--sensor", "my-sensor", "--task", "force", "--estimator", "my-estimator",
                    "--effects", "+my-effect", made=made)  # fmt: skip
     assert found["my-estimator"] < found["mean"] / 2
 
 
-def test_the_task_runs_on_the_rig(shell, made):
+def test_the_task_runs_on_the_rig(tmp_path, made):
     # Its taxels all answer alike: nobody can say on which side they are touched.
-    found = scores(shell, "--sensor", "my-sensor", "--task", "my-task", "--rig", "my-rig", made=made)
+    found = scores(tmp_path, "--sensor", "my-sensor", "--task", "my-task", "--rig", "my-rig", made=made)
     assert 0 < found["logistic"] < 0.6
 
 

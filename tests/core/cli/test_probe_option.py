@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.conftest import Verbs
 from tests.core.evaluation.made import record
 
 ROOT = Path(__file__).parents[3]
@@ -23,7 +24,8 @@ def grasps(folder, offset):
 
 
 @pytest.mark.parametrize(("offset", "leaks"), [(3.0, True), (0.0, False)])
-def test_the_table_the_files_and_the_verb_leaderboard_say_whether_the_first_frame_tells(verbs, offset, leaks):
+def test_the_table_the_files_and_the_verb_leaderboard_say_whether_the_first_frame_tells(tmp_path, offset, leaks):
+    verbs = Verbs(tmp_path, here=True)
     grasps(verbs.folder / "grasps", offset)
     run = ("run", "--recordings", "grasps", "--task", "object-identity", "--estimator", "logistic", "--probe")
     done = verbs(*run)
@@ -40,7 +42,8 @@ def test_the_table_the_files_and_the_verb_leaderboard_say_whether_the_first_fram
     assert ways == [("deployable", "trial"), ("first-frame", "trial"), ("deployable", "shuffled")]
 
 
-def test_from_foreign_tables_to_the_probe_without_a_script(verbs, shared_data):
+def test_from_foreign_tables_to_the_probe_without_a_script(tmp_path, shared_data):
+    verbs = Verbs(tmp_path, here=True)
     for name in ("eflesh-normal", "eflesh-normal-raw"):
         mapping = ROOT / "examples" / "mappings" / f"{name}.yaml"
         verbs("import", str(mapping), "--root", str(shared_data / "eflesh"), "--out", f"recordings/eflesh/{name}")

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Shell
-
 MAPPING = """
 version: 1
 title: a scale
@@ -183,9 +181,7 @@ def test_a_log_of_a_sensor_becomes_a_recording(logged):
     assert meta["counts"] == {"frames of others": 100}
     (stream,) = about["streams"]
     assert (stream["rows"], round(stream["mean_rate_hz"], 3)) == (50, 50.0)
-    run = Shell(logged.folder)(
-        "run", "--rig", "replay", "--recordings", "recordings", "--sensor", "icub", "--task", "force"
-    )
+    run = logged("run", "--rig", "replay", "--recordings", "recordings", "--sensor", "icub", "--task", "force")
     assert "no recording has it" in run.stdout  # it was found, and has no reference force
 
 

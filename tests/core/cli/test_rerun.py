@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -23,9 +22,10 @@ CELLS = [f"ideal/force/twin/karl2016/{name}/1" for name in ("acme", "ols", "mean
 def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rerun")
     write_acme(folder / "site")
-    Shell(folder)(*RUN, "--out", "results", plugins=(str(folder / "site"),), code=1)
-    Verbs(folder)("run", "--rig", "replay", "--recordings", "results/recordings/ideal", "--task", "force",
-                  "--estimator", "ols", "--protocol", "karl2016", "--out", "replayed")  # fmt: skip
+    verbs = Verbs(folder, here=True)
+    verbs(*RUN, "--out", "results", plugins=(str(folder / "site"),), code=1)
+    verbs("run", "--rig", "replay", "--recordings", "results/recordings/ideal", "--task", "force",
+          "--estimator", "ols", "--protocol", "karl2016", "--out", "replayed")  # fmt: skip
     return folder
 
 
@@ -35,10 +35,8 @@ def here(made, tmp_path):
     shutil.copytree(made, folder)
 
     def ask(*words, call=None, code=0):
-        done = (call or Verbs(folder))(*words, "--out", "results", plugins=(str(folder / "site"),), code=code)
-        for name in [name for name in sys.modules if name.partition(".")[0] == "acme"]:
-            del sys.modules[name]
-        return done.stdout
+        ask = call or Verbs(folder, here=True)
+        return ask(*words, "--out", "results", plugins=(str(folder / "site"),), code=code).stdout
 
     def rerun(cell, *words, **options):
         return json.loads(ask("rerun", cell, *words, "--format", "json", **options))

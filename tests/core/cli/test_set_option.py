@@ -19,7 +19,7 @@ def rows_of(done):
 @pytest.fixture(scope="module")
 def here(tmp_path_factory):
     """A folder with the same cells as they are, and with two nuisances set."""
-    verbs = Verbs(tmp_path_factory.mktemp("set"))
+    verbs = Verbs(tmp_path_factory.mktemp("set"), here=True)
     verbs.usual = rows_of(verbs(*RUN, "--format", "json"))
     verbs.set = rows_of(verbs(*RUN, *SET, "--format", "json"))
     return verbs

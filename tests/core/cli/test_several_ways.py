@@ -9,6 +9,7 @@ from tactbench.core.cli.config import matrix_called, packaged_matrices
 from tactbench.core.errors import ConfigError, UnknownNameError
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.plugin import load_registry
+from tests.conftest import Verbs
 
 ROOT = Path(__file__).parents[3]
 
@@ -35,14 +36,15 @@ def test_a_file_is_taken_before_a_name_and_a_missing_one_is_named(tmp_path, monk
         matrix_called("nowhere.yaml")
 
 
-def test_protocols_and_splits_side_by_side(verbs):
-    asked = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force", "--estimator", "lasso", "--out", "out")
+def test_protocols_and_splits_side_by_side(tmp_path):
+    verbs = Verbs(tmp_path, here=True)
+    asked = ("run", "--repeats", "1", "--sensor", "icub", "--task", "force", "--estimator", "ols", "--out", "out")
     asked += ("--protocol", "karl2016", "--protocol", "deployable", "--split", "roles", "--split", "unit")
     done = verbs(*asked, "--rung", "closed-form", "--no-latency")  # the cheapest
     assert "by protocol" in done.stdout
     assert "by split" in done.stdout
     rows = json.loads((verbs.folder / "out" / "leaderboard.json").read_text())
-    by_way = {(row["protocol"], row["split"]): row for row in rows if row["estimator"] == "lasso"}
+    by_way = {(row["protocol"], row["split"]): row for row in rows if row["estimator"] == "ols"}
     assert {way: row["status"] for way, row in by_way.items()} == {
         ("karl2016", "roles"): "done", ("karl2016", "unit"): "skipped",
         ("deployable", "roles"): "done", ("deployable", "unit"): "done",
@@ -59,14 +61,14 @@ def test_protocols_and_splits_side_by_side(verbs):
     assert len(list((verbs.folder / "out" / "recordings" / "icub").glob("*.h5"))) == 3 + 5
 
     records = json.loads(verbs("leaderboard", "out", "--compare", "split", "--format", "json").stdout)
-    (found,) = [r for r in records if r["estimator"] == "lasso" and r["difference"] is not None]
+    (found,) = [r for r in records if r["estimator"] == "ols" and r["difference"] is not None]
     assert found["difference"] == unit["score"] - by_way["deployable", "roles"]["score"]
     refused = verbs("leaderboard", "out", "--compare", "split", "--format", "latex", code=2)
     assert "md" in refused.stderr
 
     replayed = verbs("run", "--rig", "replay", "--recordings", "out/recordings", "--task", "force", "--split", "unit",
-                     "--estimator", "lasso", "--format", "json", "--out", "again")  # fmt: skip
-    again = [row for row in json.loads(replayed.stdout) if row["estimator"] == "lasso"]
+                     "--estimator", "ols", "--format", "json", "--out", "again")  # fmt: skip
+    again = [row for row in json.loads(replayed.stdout) if row["estimator"] == "ols"]
     assert [row["score"] for row in again] == [unit["score"]]
 
 

@@ -6,7 +6,13 @@ import pytest
 
 from tactbench.core.cli import explanations
 from tactbench.core.plugins.registry import load_registry
+from tests.conftest import Verbs
 from tests.core.cli.test_screens import assert_one_clear_screen
+
+
+@pytest.fixture
+def verbs(tmp_path):
+    return Verbs(tmp_path, here=True)
 
 
 def test_a_plan_is_explained_with_reasons_costs_and_bounds(verbs):
@@ -55,9 +61,9 @@ def test_what_an_effect_that_is_left_out_does_to_the_score_shows(verbs):
     assert "score" not in row
 
 
-def test_the_twins_cost_says_what_a_rung_scores_and_what_a_sensor_cannot_have(shell):
+def test_the_twins_cost_says_what_a_rung_scores_and_what_a_sensor_cannot_have(verbs):
     words = ("cost", "--twin", "--sensor", "bonded-pad", "--rounds", "1", "--task", "force", "--format", "json")
-    done = shell(*words, "--rung", "closed-form", "--rung", "default", plugins=("bonded",), timeout=300)
+    done = verbs(*words, "--rung", "closed-form", "--rung", "default", plugins=("bonded",))
     rows = {row["way"].rpartition(", up")[0] + (row["rung"] or ""): row for row in json.loads(done.stdout)}
     default = rows["newton, 32 x 32default"]
     assert default["error_rms"] > 0
@@ -67,7 +73,7 @@ def test_the_twins_cost_says_what_a_rung_scores_and_what_a_sensor_cannot_have(sh
     assert "Poisson's ratio 0.45" in closed["reason"]
     assert closed["score_force"] is None
     assert "Poisson's ratio 0.45" in closed["score_force_reason"]
-    assert (shell.folder / "tactbench-results/cost/twin.png").exists()
+    assert (verbs.folder / "tactbench-results/cost/twin.png").exists()
 
 
 def test_what_was_asked_for_shows(verbs):

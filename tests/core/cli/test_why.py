@@ -1,11 +1,14 @@
 """``tactbench why``: hit or miss, what changed in words, and how a stopped cell ended."""
 
 import json
+import os
 import shutil
+import subprocess
+import sys
 
 import pytest
 
-from tests.conftest import Shell, Verbs
+from tests.conftest import Verbs
 from tests.core.matrix.plugin_packages import write_acme
 
 RUN = (
@@ -29,7 +32,7 @@ def made(tmp_path_factory):
     """A folder with a plugin and the results of a run with it; one cell of it failed."""
     folder = tmp_path_factory.mktemp("why")
     write_acme(folder / "site")
-    Shell(folder)(*RUN, "--out", "results", plugins=(str(folder / "site"),), code=1)
+    Verbs(folder, here=True)(*RUN, "--out", "results", plugins=(str(folder / "site"),), code=1)
     return folder
 
 
@@ -40,7 +43,7 @@ def here(made, tmp_path):
     folder = tmp_path / "copy"
 
     def call(*arguments, code=0):
-        ask = Shell(folder) if arguments[0] == "run" else Verbs(folder)  # it computes with a plugin
+        ask = Verbs(folder, here=True)
         return ask(*arguments, "--out", "results", plugins=(str(folder / "site"),), code=code)
 
     call.folder = folder
@@ -159,16 +162,9 @@ def test_a_cached_run_loads_no_numerical_library(here):
         "try:\n    main()\nexcept SystemExit as end:\n    assert end.code == 0\n"
         "print(sorted({'numpy', 'h5py', 'scipy', 'sklearn', 'matplotlib', 'pandas'} & set(sys.modules)))\n"
     )
-    import os
-    import subprocess
-    import sys
-
     env = {**os.environ, "PYTHONPATH": str(here.folder / "site")}
-
-    def loaded():
-        done = subprocess.run([sys.executable, "-c", text], cwd=here.folder, env=env, capture_output=True, text=True,
-                              check=True)  # fmt: skip
-        return done.stdout.splitlines()[-1]
-
-    loaded()  # the copied recordings are read once: they are other files than those that the run remembered
-    assert loaded() == "[]"
+    # The copied recordings are read once: they are other files than those that the run remembered.
+    here(*RUN[:-2], "--format", "csv")
+    done = subprocess.run([sys.executable, "-c", text], cwd=here.folder, env=env, capture_output=True, text=True,
+                          check=True)  # fmt: skip
+    assert done.stdout.splitlines()[-1] == "[]"

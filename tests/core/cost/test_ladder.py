@@ -18,6 +18,7 @@ from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import load_registry
 from tactbench.core.spec.matrix import EstimatorChoice, MatrixSpec, TaskChoice
 from tests.core.evaluation.made import record
+from tests.core.report.unrendered import unrendered
 from tests.here import IN_THIS_PROCESS
 
 QUICK = ("ols", "ridge", "knn", "svm", "forest-10", "mean")
@@ -111,7 +112,8 @@ def test_what_is_no_ladder_is_left_out_and_what_cannot_be_written_is_said(ladder
     (tmp_path / "cost" / "twin.json").write_text("[]")
     (tmp_path / "cost" / "torn.json").write_text('{"version": 2, "rows"')
     (tmp_path / "cost" / "later.json").write_text('{"version": 3, "rows": []}')
-    write_ladder(ladder, tmp_path)
+    with unrendered():
+        write_ladder(ladder, tmp_path)
     assert [found["task"] for found in read_ladders(tmp_path)] == ["force"]
     (tmp_path / "file").write_text("")
     with pytest.raises(UnwritableError, match="--out"):

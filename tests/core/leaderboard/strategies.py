@@ -24,7 +24,7 @@ counts = st.one_of(st.none(), st.integers(0, 10**7))
 
 
 @st.composite
-def some_rows(draw, most=6):
+def some_rows(draw, most=4):
     """Rows with names of their own."""
     return [draw(one_row(place)) for place in range(draw(st.integers(1, most)))]
 

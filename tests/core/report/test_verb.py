@@ -12,11 +12,14 @@ from tactbench.core.report.making import make_report
 from tactbench.core.report.results import open_results
 from tests.conftest import Verbs
 
+from .unrendered import unrendered
+
 
 @pytest.fixture(scope="module")
 def reported(results):
-    verbs = Verbs(results.parent)
-    return verbs, verbs("report")
+    verbs = Verbs(results.parent, here=True)
+    with unrendered():
+        return verbs, verbs("report")
 
 
 def test_page_on_disk_table_on_stdout_the_rest_on_stderr(reported, results):
@@ -31,7 +34,8 @@ def test_page_on_disk_table_on_stdout_the_rest_on_stderr(reported, results):
 
 def test_the_same_table_for_programs_and_the_same_page_in_another_folder(reported, results):
     verbs, _ = reported
-    found = json.loads(verbs("report", "tactbench-results", "--out", "elsewhere", "--format", "json").stdout)
+    with unrendered():
+        found = json.loads(verbs("report", "tactbench-results", "--out", "elsewhere", "--format", "json").stdout)
     (ours,) = [one for one in found if one["cell"] == "icub/force/twin/karl2016/lasso"]
     assert ours["published"] == 0.7659
     assert (ours["verdict"], ours["ci_low"], ours["ci_high"]) == ("no interval", None, None)
@@ -75,5 +79,6 @@ def test_a_row_of_another_version_is_left_out_and_named(results, tmp_path):
     first["row"].pop("search", None)
     del first["sha256"]  # as earlier versions wrote it
     index.write_text("\n".join([*lines[:place], json.dumps(first), *lines[place + 1 :]]) + "\n")
-    found = make_report(open_results(Store(old), load_registry()), tmp_path / "report", Silence())
+    with unrendered():
+        found = make_report(open_results(Store(old), load_registry()), tmp_path / "report", Silence())
     assert f"{first['row']['cell']}: its row is of another version; run it again" in found.missing

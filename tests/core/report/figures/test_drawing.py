@@ -9,6 +9,7 @@ import pytest
 
 from tactbench.core.errors import UsageError
 from tactbench.core.report.figures import draw_figures
+from tests.core.report.unrendered import unrendered
 
 from .made import opened, results
 
@@ -109,7 +110,8 @@ def test_the_same_bytes_in_another_process_whatever_the_user_s_style(all_of_it, 
 
 
 def test_a_failed_cell_is_named_and_the_others_are_drawn(one_failed, tmp_path):
-    drawn, said = draw(one_failed, tmp_path / "figures")
+    with unrendered():
+        drawn, said = draw(one_failed, tmp_path / "figures")
     assert kinds(drawn) == PUBLISHED + FORCE
     assert all(len(one.keys) == 1 for one in drawn)
     (reason,) = (one for one in said if one.startswith("beta/force"))
@@ -119,7 +121,8 @@ def test_a_failed_cell_is_named_and_the_others_are_drawn(one_failed, tmp_path):
 def test_a_figure_that_cannot_be_written_stops_no_other(one_failed, tmp_path, all_of_it):
     blocked = tmp_path / "figures" / all_of_it[0][len(PUBLISHED)].png.name
     blocked.mkdir(parents=True)
-    drawn, said = draw(one_failed, tmp_path / "figures")
+    with unrendered():
+        drawn, said = draw(one_failed, tmp_path / "figures")
     assert kinds(drawn) == PUBLISHED + FORCE[1:]
     assert any(one.startswith("No prediction against time of force") for one in said)
 
@@ -131,7 +134,8 @@ def test_an_unreadable_shard_costs_its_own_panel_and_where_it_is_all_its_figures
     ]  # fmt: skip
     for row, content in zip(lost, (b"", b"no HDF5", b"\x89HDF\r\n\x1a\n"), strict=True):
         (folder / "cells" / f"{row['key']}.h5").write_bytes(content)
-    drawn, said = draw(folder, tmp_path / "figures")
+    with unrendered():
+        drawn, said = draw(folder, tmp_path / "figures")
     assert kinds(drawn) == PUBLISHED + FORCE
     assert [len(one.keys) for one in drawn[len(PUBLISHED) :]] == [1, 1, 1]
     for row in lost:
@@ -142,7 +146,8 @@ def test_an_unreadable_shard_costs_its_own_panel_and_where_it_is_all_its_figures
 def test_one_sensor_fills_its_row_and_missing_recordings_cost_the_embedding_only(tmp_path):
     folder = results(tmp_path, sensors=("alpha",))
     (tmp_path / "recordings").rename(tmp_path / "elsewhere")
-    drawn, said = draw(folder, tmp_path / "figures")
+    with unrendered():
+        drawn, said = draw(folder, tmp_path / "figures")
     assert kinds(drawn) == PUBLISHED + FORCE + CURVATURE[:-1]
     assert all(len(one.keys) == 1 for one in drawn)
     assert any(one.startswith("No embedding of alpha/curvature") and "is not there any more" in one for one in said)
@@ -150,7 +155,8 @@ def test_one_sensor_fills_its_row_and_missing_recordings_cost_the_embedding_only
 
 def test_folds_have_figures_of_their_test_sets(tmp_path):
     folder = results(tmp_path, protocol="deployable", split="shuffled", simulated=False, sensors=("alpha",), kept=40)
-    drawn, said = draw(folder, tmp_path / "figures")
+    with unrendered():
+        drawn, said = draw(folder, tmp_path / "figures")
     assert kinds(drawn) == ["residuals", "validation-curve", "confusion", "score-by-force"]
     assert all("SIM" not in one.caption and "‡: leaks" in one.caption for one in drawn)
     assert any("has a training set a fold" in one for one in said)

@@ -35,13 +35,21 @@ def test_every_nth_row_and_no_more_than_allowed(n):
     assert step == 1 or math.ceil(n / (step - 1)) > AT_MOST  # the next smaller step leaves too many
 
 
+@pytest.fixture(scope="module", autouse=True)
+def few_steps():
+    """As few as t-SNE can take: nobody looks at where its points end up."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(embedding, "ITERATIONS", 250)
+        yield
+
+
 def the_first(folder):
     panel = group_of(folder, "curvature").panels[0]
     return opened(folder), panel.row, panel.answers["test"]
 
 
 @pytest.fixture(scope="module")
-def first(finished, tmp_path_factory):
+def first(few_steps, finished, tmp_path_factory):
     """A result folder with one embedding, and that."""
     folder = shutil.copytree(
         finished, tmp_path_factory.mktemp("embedded") / "results", ignore=shutil.ignore_patterns("report")
