@@ -76,7 +76,7 @@ def test_a_missing_file_and_an_empty_one_are_config_errors(tmp_path):
 
 @given(st.text(max_size=200))
 def test_any_text_is_a_model_or_a_config_error(tmp_path_factory, text):
-    path = tmp_path_factory.mktemp("yaml") / "any.yaml"
+    path = tmp_path_factory.getbasetemp() / "any.yaml"
     path.write_text(text, encoding="utf-8", errors="replace")
     with contextlib.suppress(ConfigError):
         assert isinstance(load_yaml(path, MatrixSpec), MatrixSpec)
