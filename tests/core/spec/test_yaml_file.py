@@ -90,6 +90,12 @@ def test_a_text_that_grows_when_it_is_built_is_refused(tmp_path, name):
     assert plain_value(BOMBS[name]) is not None
 
 
+@pytest.mark.parametrize(("aliases", "says"), [(101, "more than 100 aliases"), (100, "the key 'b' is not known")])
+def test_aliases_are_counted(tmp_path, aliases, says):
+    with pytest.raises(ConfigError, match=says):
+        load(tmp_path, f"tasks: [&a force]\nb: [{'*a, ' * aliases}]\n")
+
+
 @pytest.mark.parametrize(("text", "value"), [("3", 3), ("0.5", 0.5), ("yes", True), ("a b", "a b"), ("[1]", "[1]")])
 def test_a_plain_value(text, value):
     assert plain_value(text) == value
