@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -47,7 +48,7 @@ class Unwrap:
             raise UsageError(f"A counter's rate of {rate_hz} Hz is not positive.", hint="Give counts per second.")
         self.breaks = 0
         self._modulus = 1 << bits
-        self._longest_ns = np.inf if rate_hz is None else 1e9 * self._modulus / 2 / rate_hz
+        self._longest_ns = math.inf if rate_hz is None else 1e9 * self._modulus / 2 / rate_hz
         self._highest: int | None = None
         self._seen_ns: int | None = None
         self._restarted = False
@@ -80,31 +81,35 @@ class Unwrap:
         UsageError
             If `rate_hz` was given and there are no times.
         """
-        now = np.asarray(counts).astype(np.int64) % self._modulus
-        if t_ns is None and np.isfinite(self._longest_ns):
+        if t_ns is None and self._longest_ns < math.inf:
             raise UsageError("Breaks of a counter are found by time, and none came.", hint="Give t_ns, or no rate_hz.")
+        now = np.asarray(counts).astype(np.int64)
         if not len(now):
             return now
-        # Drivers give a row or two a millisecond: what numpy does for any shape would cost more than the rest.
-        times = np.zeros_like(now) if t_ns is None else np.broadcast_to(np.asarray(t_ns, dtype=np.int64), now.shape)
+        now %= self._modulus
+        times = np.asarray(0 if t_ns is None else t_ns, dtype=np.int64)
         highest = int(now[0]) if self._highest is None else self._highest
-        seen_ns = int(times[0]) if self._seen_ns is None else self._seen_ns
+        seen_ns = int(times.flat[0]) if self._seen_ns is None else self._seen_ns
         restarted, self._restarted = self._restarted, False
-        if len(now) > 1:  # of a single row, which drivers give each millisecond, numpy takes longer than one by one
-            steps = _steps(highest, now) % self._modulus
-            broken = _steps(seen_ns, times) > self._longest_ns
-            broken[0] |= restarted
-            if np.all((steps < self._modulus // 2) | broken):
-                numbers = highest + np.cumsum(np.where(broken & (steps == 0), self._modulus, steps))
-                self.breaks += int(np.count_nonzero(broken))
-                self._highest, self._seen_ns = int(numbers[-1]), int(times[-1])
-                return numbers
-        return self._with_late(now, times, highest, seen_ns, restarted=restarted)
+        if len(now) == 1:  # drivers give a row or two a millisecond, of which numpy takes longer than one by one
+            return self._with_late(now, [times.item()], highest, seen_ns, restarted=restarted)
+        times = np.broadcast_to(times, now.shape)
+        steps = _steps(highest, now) % self._modulus
+        broken = _steps(seen_ns, times) > self._longest_ns
+        broken[0] |= restarted
+        if np.all((steps < self._modulus // 2) | broken):
+            numbers = highest + np.cumsum(np.where(broken & (steps == 0), self._modulus, steps))
+            self.breaks += int(np.count_nonzero(broken))
+            self._highest, self._seen_ns = int(numbers[-1]), int(times[-1])
+            return numbers
+        return self._with_late(now, times.tolist(), highest, seen_ns, restarted=restarted)
 
-    def _with_late(self, counts: IntArray, times: IntArray, highest: int, seen_ns: int, *, restarted: bool) -> IntArray:
+    def _with_late(
+        self, counts: IntArray, times: list[int], highest: int, seen_ns: int, *, restarted: bool
+    ) -> IntArray:
         """Return the numbers one by one: after a late count, differences are from the highest, not from it."""
         numbers = np.empty_like(counts)
-        for k, (count, t_ns) in enumerate(zip(counts.tolist(), times.tolist(), strict=True)):
+        for k, (count, t_ns) in enumerate(zip(counts.tolist(), times, strict=True)):
             step = (count - highest) % self._modulus
             if (restarted and k == 0) or t_ns - seen_ns > self._longest_ns:
                 self.breaks += 1

@@ -27,6 +27,7 @@ from distributed.core import Status  # noqa: TID253
 from distributed.versions import VersionMismatchWarning  # noqa: TID253
 
 from tactbench.core.errors import Crashed, EngineError, UsageError
+from tactbench.core.matrix.in_folder import in_folder
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.message import dump_error, load_error, pack, unpack
@@ -173,16 +174,11 @@ def carry_out(request: bytes) -> bytes:
 
     concurrency = on_host.get(worker.address, worker.state.nthreads)
     pool = Pool(1, limits, is_needed=is_needed)
-    for _, outcome in pool.each(partial(_in_folder, folder, concurrency, work), [item]):
+    for _, outcome in pool.each(partial(in_folder, folder, concurrency, work), [item]):
         if isinstance(outcome, BaseException):
             return pack({"error": dump_error(outcome)})
         return pack({"value": outcome})
     return pack({"error": dump_error(EngineError("Nobody waits for this cell any more."))})
-
-
-def _in_folder(folder: str, concurrency: int, work: Callable[..., Any], item: Any) -> Any:
-    os.chdir(folder)  # relative paths count from where the run was started
-    return work(item, concurrency=concurrency)
 
 
 class SameEnvironment(WorkerPlugin):

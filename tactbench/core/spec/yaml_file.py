@@ -49,8 +49,7 @@ def load_yaml(path: Path, model: type[M]) -> M:
     except UnicodeDecodeError as error:
         raise ConfigError(str(path), None, "is not UTF-8 text.", hint="Save it as UTF-8.") from error
     try:
-        _require_small(text, str(path))
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = _composed(text, str(path))
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         problem = getattr(error, "problem", None) or "is not YAML"
@@ -70,24 +69,43 @@ def load_yaml(path: Path, model: type[M]) -> M:
 def plain_value(text: str) -> Any:
     """Return what YAML reads `text` as if that is a number, a truth value or a text, else `text` itself."""
     try:
-        _require_small(text, "")
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = _composed(text, "")
         value = _scalar(node, "") if isinstance(node, yaml.ScalarNode) else text
     except (yaml.YAMLError, ConfigError):
         return text
     return value if isinstance(value, str | int | float | bool) else text
 
 
-def _require_small(text: str, file: str) -> None:
-    """Refuse what nests too deep, or repeats itself too often, before it is built; ConfigError, yaml.YAMLError."""
-    depth = aliases = 0
-    for event in yaml.parse(text, Loader=yaml.SafeLoader):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        aliases += isinstance(event, yaml.AliasEvent)
-        if depth > MOST_DEPTH or aliases > MOST_ALIASES:
+class _SmallLoader(yaml.SafeLoader):
+    """Refuses what nests too deep, or repeats itself too often, as soon as it is read; raises ConfigError."""
+
+    def __init__(self, text: str, file: str) -> None:
+        super().__init__(text)
+        self._file = file
+        self._depth = self._aliases = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        inside = isinstance(event, yaml.CollectionStartEvent)
+        self._depth += inside
+        self._aliases += isinstance(event, yaml.AliasEvent)
+        if self._depth > MOST_DEPTH or self._aliases > MOST_ALIASES:
             line = event.start_mark.line + 1 if event.start_mark else None
-            what = f"it nests {depth} deep" if depth > MOST_DEPTH else f"it has more than {MOST_ALIASES} aliases"
-            raise ConfigError(file, line, f"{what}.", hint="Write it out plainly.")
+            deep = self._depth > MOST_DEPTH
+            what = f"it nests {self._depth} deep" if deep else f"it has more than {MOST_ALIASES} aliases"
+            raise ConfigError(self._file, line, f"{what}.", hint="Write it out plainly.")
+        node = super().compose_node(parent, index)
+        self._depth -= inside
+        return node
+
+
+def _composed(text: str, file: str) -> yaml.Node | None:
+    """Return the nodes of a text, nothing built of them yet; raises ConfigError, yaml.YAMLError."""
+    loader = _SmallLoader(text, file)
+    try:
+        return loader.get_single_node()
+    finally:
+        loader.dispose()
 
 
 def _construct(node: yaml.Node, at: Path_, lines: dict[Path_, int], file: str) -> Any:

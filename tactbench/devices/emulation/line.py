@@ -137,7 +137,8 @@ class Line:
         while self._in and self._in[0][0] <= until_s:
             t_s, piece = self._in.popleft()
             self._send(self._emulator.feed(piece, t_s))
-        self._send(self._emulator.poll(until_s))
+        if self._emulator.next_s() <= until_s:
+            self._send(self._emulator.poll(until_s))
         while self._out and self._out[0][0] <= now_s and self._out[0][0] < self._unplugged_s:
             t_s, piece = self._out.popleft()
             self.bytes_to_host += _size(piece)

@@ -5,16 +5,16 @@ An unknown force counts as too large a force.
 
 from __future__ import annotations
 
+import math
+import operator
 from collections import deque
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from itertools import chain, pairwise
 
 import numpy as np
 
 from tactbench.plugin import Block, Quality, StreamSpec
 from tactbench.rigs.parallel_manipulator.guard_interface import Limits, Trigger
-
-if TYPE_CHECKING:
-    from tactbench.plugin import FloatArray
 
 DELAY_WINDOW_NS = 1_000_000_000
 """The least delay of a device's samples is looked for in this one and the one before (assumed: clocks that differ by
@@ -23,6 +23,8 @@ _LOOKED_AT = 3
 """Samples of which two are a touch."""
 
 Problem = tuple[Trigger, str]
+_Rows = Sequence[Sequence[float]]
+"""Samples as plain numbers: a guard looks at one or two at a time, of which numpy takes longer."""
 
 
 class ForceWatch:
@@ -54,11 +56,11 @@ class ForceWatch:
         kinds = [channel.kind for channel in stream.channels]
         self._forces = [n for n, kind in enumerate(kinds) if kind == "force"]
         self._torques = [n for n, kind in enumerate(kinds) if kind == "torque"]
-        self.force_n = self.norm_n = np.nan
+        self.force_n = self.norm_n = math.nan
         self.sequence, self.t_ns, self.changed, self.received = -1, 0, -1, 0
         self._delay_ns = 0
         self._offsets: deque[tuple[int, int]] = deque(maxlen=2)
-        self._last: FloatArray | None = None
+        self._last: Sequence[float] | None = None
         self._same = 0
         self._pressing: deque[float] = deque(maxlen=_LOOKED_AT)
 
@@ -68,7 +70,7 @@ class ForceWatch:
 
     def age_s(self, now_ns: int) -> float:
         """Return the age of the newest sample [s]; infinite: there is none."""
-        return 1e-9 * (now_ns - self.t_ns + self._delay_ns) if self.received else np.inf
+        return 1e-9 * (now_ns - self.t_ns + self._delay_ns) if self.received else math.inf
 
     def old(self, now_ns: int, limits: Limits) -> Problem | None:
         """Return what is wrong if nothing newer has come by now."""
@@ -92,36 +94,34 @@ class ForceWatch:
         lost, same = (0, self._same) if newer is None else self._take_newer(newer)
         if limits is None or not len(block.data):
             return None
-        wrench = np.asarray(block.data, dtype=np.float64) - np.asarray(limits.zero)
-        forces = _norms(wrench[:, self._forces])
+        wrenches = _without_zero(block, limits)
         if newer is not None:
-            own = wrench if newer.data is block.data else newer.data - np.asarray(limits.zero)
-            pressing = limits.sign * own[:, limits.channel]
-            self._pressing.extend(pressing[-_LOOKED_AT:].tolist())
-            self.force_n = float(pressing[-1])
-            self.norm_n = float(_norms(own[-1:, self._forces])[0])
+            own = wrenches if newer is block else _without_zero(newer, limits)
+            self._pressing.extend([limits.sign * wrench[limits.channel] for wrench in own[-_LOOKED_AT:]])
+            self.force_n = self._pressing[-1]
+            self.norm_n = _norm(own[-1], self._forces)
         return (
-            self._unknown(block.data, block.quality)
-            or self._too_large(wrench, forces, limits)
+            self._unknown(wrenches, block.quality)
+            or self._too_large(wrenches, limits)
             or self._irregular(lost, same, limits)
         )
 
     def _take_newer(self, block: Block) -> tuple[int, int]:
         """Keep up numbers and times; return the most samples lost in a row, and the most that were the same."""
-        data, first = np.asarray(block.data, dtype=np.float64), self.sequence + 1
-        numbers = np.arange(first, first + len(data)) if block.sequence is None else block.sequence
-        before = self.sequence if self.received else int(numbers[0]) - 1
-        lost = int((numbers[1:] - numbers[:-1]).max(initial=int(numbers[0]) - before)) - 1
-        same = self._same_in_a_row(data, numbers)
-        self.received += len(data)
-        self.sequence = int(numbers[-1])
+        rows, first = block.data.tolist(), self.sequence + 1
+        numbers = range(first, first + len(rows)) if block.sequence is None else block.sequence.tolist()
+        before = self.sequence if self.received else numbers[0] - 1
+        lost = max([number - last for last, number in pairwise((before, *numbers))]) - 1
+        same = self._same_in_a_row(rows, numbers)
+        self.received += len(rows)
+        self.sequence = numbers[-1]
         self.t_ns = 0 if block.t_ns is None else int(block.t_ns[-1])
         if block.device_ns is not None:
             self._delay_ns = self._delayed(self.t_ns, int(block.device_ns[-1]))
         return lost, same
 
-    def _unknown(self, data: FloatArray, quality: np.typing.NDArray[np.uint8] | None) -> Problem | None:
-        if not np.isfinite(data).all():
+    def _unknown(self, wrenches: _Rows, quality: np.typing.NDArray[np.uint8] | None) -> Problem | None:
+        if not all(map(math.isfinite, chain.from_iterable(wrenches))):
             return Trigger.FORCE_NOT_A_NUMBER, "a sample of the force sensor is not a number"
         if quality is None:
             return None
@@ -132,12 +132,12 @@ class ForceWatch:
             return Trigger.FORCE_FLAGGED, "a sample of the force sensor is flagged as missing or suspect"
         return None
 
-    def _too_large(self, wrench: FloatArray, forces: FloatArray, limits: Limits) -> Problem | None:
-        largest = float(forces.max())
+    def _too_large(self, wrenches: _Rows, limits: Limits) -> Problem | None:
+        largest = max([_norm(wrench, self._forces) for wrench in wrenches])
         if largest >= limits.force_ceiling_n:
             return Trigger.FORCE_CEILING, f"{largest:.3f} N, the ceiling is {limits.force_ceiling_n:g} N"
         if limits.torque_ceiling_nm is not None and self._torques:
-            torque = float(_norms(wrench[:, self._torques]).max())
+            torque = max([_norm(wrench, self._torques) for wrench in wrenches])
             if torque >= limits.torque_ceiling_nm:
                 return Trigger.TORQUE_CEILING, f"{torque:.4f} N m, the ceiling is {limits.torque_ceiling_nm:g} N m"
         return None
@@ -149,16 +149,16 @@ class ForceWatch:
             return Trigger.FORCE_STUCK, f"{same} force samples in a row are the same in every channel"
         return None
 
-    def _same_in_a_row(self, data: FloatArray, numbers: np.typing.NDArray[np.int64]) -> int:
+    def _same_in_a_row(self, rows: _Rows, numbers: Sequence[int]) -> int:
         """Return the longest run of equal samples that ends in these; 1: each is another one than that before."""
-        before = data[:1] + 1.0 if self._last is None else self._last
-        differs = np.flatnonzero((np.concatenate((before, data[:-1])) != data).any(axis=1))
-        if len(differs):
-            self.changed = int(numbers[differs[-1]])
-        ends = np.concatenate(([-self._same], differs, [len(data)]))
-        runs = ends[1:] - ends[:-1]
-        self._last, self._same = data[-1:].copy(), int(runs[-1])
-        return int(runs.max())
+        longest = 0
+        for row, number in zip(rows, numbers, strict=True):
+            if self._last is None or any(map(operator.ne, row, self._last)):
+                longest = max(longest, self._same)
+                self.changed, self._same = number, 0
+            self._last = row
+            self._same += 1
+        return max(longest, self._same)
 
     def _delayed(self, t_ns: int, device_ns: int) -> int:
         """Return by how much a sample took longer than the quickest of late [ns]."""
@@ -170,7 +170,12 @@ class ForceWatch:
         return offset - min(least for _, least in self._offsets)
 
 
-def _norms(vectors: FloatArray) -> FloatArray:
-    """Return the norm of each row, as np.linalg.norm does; that one takes three times as long for a row or two."""
-    norms: FloatArray = np.sqrt((vectors * vectors).sum(axis=1))
-    return norms
+def _without_zero(block: Block, limits: Limits) -> _Rows:
+    return [[value - zero for value, zero in zip(row, limits.zero, strict=True)] for row in block.data.tolist()]
+
+
+def _norm(wrench: Sequence[float], channels: Sequence[int]) -> float:
+    square = 0.0  # added up in order: `sum` rounds otherwise from Python 3.12 on
+    for channel in channels:
+        square += wrench[channel] * wrench[channel]
+    return math.sqrt(square)

@@ -15,7 +15,7 @@ from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.pool.limits import Limits
 from tests.core.matrix.started import LIGHT, posing_as, started
 from tests.core.pool.patience import ending, gone, until
-from tests.core.pool.remote_work import kill_once, misbehave, parent_of, process, square, wait_for, where
+from tests.core.pool.remote_work import is_imported, kill_once, misbehave, parent_of, process, square, wait_for, where
 
 LIMITS = Limits(timeout_s=60)
 
@@ -44,6 +44,11 @@ def test_a_cell_is_a_process_below_one_of_two_workers_and_knows_how_many_are_bes
     assert {concurrency for _, _, _, concurrency in outcomes} == {2}
     assert until(lambda: all(gone(cell) for cell, _, _, _ in outcomes))
     assert not any(gone(worker) for _, _, worker, _ in outcomes)
+
+
+def test_a_cell_imports_nothing_of_what_its_worker_needs(engine):
+    outcomes = dict(engine.each(is_imported, ["tests.core.pool.remote_work", "distributed", "dask"]))
+    assert outcomes == {"tests.core.pool.remote_work": True, "distributed": False, "dask": False}
 
 
 def test_paths_count_from_the_folder_of_the_run(engine, tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -19,6 +20,10 @@ def process(_, concurrency=1):
 
 def where(_, concurrency=1):
     return str(Path.cwd())
+
+
+def is_imported(module, concurrency=1):
+    return module in sys.modules
 
 
 def parent_of(pid):

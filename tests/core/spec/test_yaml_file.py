@@ -76,7 +76,7 @@ def test_a_missing_file_and_an_empty_one_are_config_errors(tmp_path):
 
 @given(st.text(max_size=200))
 def test_any_text_is_a_model_or_a_config_error(tmp_path_factory, text):
-    path = tmp_path_factory.mktemp("yaml") / "any.yaml"
+    path = tmp_path_factory.getbasetemp() / "any.yaml"
     path.write_text(text, encoding="utf-8", errors="replace")
     with contextlib.suppress(ConfigError):
         assert isinstance(load_yaml(path, MatrixSpec), MatrixSpec)
@@ -88,6 +88,12 @@ def test_a_text_that_grows_when_it_is_built_is_refused(tmp_path, name):
     with pytest.raises(ConfigError):
         load(tmp_path, BOMBS[name])
     assert plain_value(BOMBS[name]) is not None
+
+
+@pytest.mark.parametrize(("aliases", "says"), [(101, "more than 100 aliases"), (100, "the key 'b' is not known")])
+def test_aliases_are_counted(tmp_path, aliases, says):
+    with pytest.raises(ConfigError, match=says):
+        load(tmp_path, f"tasks: [&a force]\nb: [{'*a, ' * aliases}]\n")
 
 
 @pytest.mark.parametrize(("text", "value"), [("3", 3), ("0.5", 0.5), ("yes", True), ("a b", "a b"), ("[1]", "[1]")])

@@ -15,7 +15,8 @@ SHOWN = re.compile(r"([\d.]+) of 15\.0 s")
 
 @pytest.mark.parametrize("times", [1, 3])
 def test_ctrl_c_in_the_recorded_part(tmp_path, times):
-    (tmp_path / "rig.yaml").write_text(EXAMPLE.read_text(encoding="utf-8"), encoding="utf-8")
+    own = EXAMPLE.read_text(encoding="utf-8")
+    (tmp_path / "rig.yaml").write_text(own.replace("settle_s: 8.0", "settle_s: 1.0"), encoding="utf-8")
     with on_terminal([*RECORD, "--out", "press.h5"], columns=120, cwd=tmp_path) as terminal:
         for _ in range(200):
             shown = SHOWN.findall(plain(terminal.seen))

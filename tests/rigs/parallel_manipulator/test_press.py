@@ -24,6 +24,8 @@ QUICK = {
     "settings__touch__settle_s": 0.3,
 }
 """k K = 10 at 5 N/mm."""
+RARER = {**QUICK, "force__options__rate_hz": 250.0}
+"""Less to compute, where no figure is of each millisecond."""
 
 
 @pytest.fixture(scope="module")
@@ -108,14 +110,14 @@ def test_a_first_touch_stays_within_its_bound(stiffness):
 
 
 def test_a_motor_that_does_not_come_out_is_said():
-    found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=6"], **QUICK)
+    found = on_spring(5.0, ramp(5.0, 0.5, 20.0), devices__motor__faults=["unplug:start_s=6"], **RARER)
     assert "in ramp: motor's link is gone" in found.acquisition.ended
     assert "stand clear" in found.acquisition.ended
     assert found.acquisition.stop("stopped by hand") == found.press.not_out != ""
 
 
 def test_a_press_that_is_stopped_retreats_within_a_control_period():
-    rig = ParallelManipulator(file_of(**QUICK), None, SpringRig(5.0))
+    rig = ParallelManipulator(file_of(**RARER), None, SpringRig(5.0))
     with rig.open(load_registry().sensors["icub"], ramp(5.0, 0.5, 20.0), seed=1) as acquisition:
         next(block for block in acquisition if block.t_ns[-1] > acquisition.begin_ns + 2e9)
         assert acquisition.control.press.state is PressState.RAMP
@@ -132,7 +134,7 @@ def test_no_contact_ends_with_a_retreat():
     # The skin of this seed is lower than the motor may go.
     heights = {"settings__heights__surface_spread_mm": 0.4, "settings__heights__depth_mm": 0.01}
     with pytest.raises(RigError, match="no contact down to"):
-        on_spring(5.0, **{**QUICK, **heights}, seed=2)
+        on_spring(5.0, **{**RARER, **heights}, seed=2)
 
 
 def test_scenes_that_the_rig_cannot_press_are_refused():
@@ -146,14 +148,14 @@ def test_scenes_that_the_rig_cannot_press_are_refused():
 
 
 def test_the_same_seed_gives_the_same_bytes():
-    first, second = (on_spring(5.0, ramp(1.0, 0.3, 1.0), **QUICK) for _ in range(2))
+    first, second = (on_spring(5.0, ramp(1.0, 0.3, 1.0), **RARER) for _ in range(2))
     for name in first.data:
         assert np.array_equal(first.data[name], second.data[name])
         assert np.array_equal(first.t_s[name], second.t_s[name])
 
 
 def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
-    said = with_joints(settings__places__reach_x_mm=[-15.0, 15.0], settings__places__scatter_mm=0.5, **QUICK)
+    said = with_joints(settings__places__reach_x_mm=[-15.0, 15.0], settings__places__scatter_mm=0.5, **RARER)
     rig = ParallelManipulator(RigFile.model_validate(said), None, SpringRig(5.0))
     scene = ramp(1.0, 0.3, 1.5)
     place = scene.placement.model_copy(update={"x": assumed(12.0, "mm", "a test")})

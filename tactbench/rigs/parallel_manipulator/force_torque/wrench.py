@@ -36,7 +36,7 @@ def stream(rate_hz: float | None) -> StreamSpec:
 
 def wrench_of(senses: Mapping[str, float]) -> tuple[float, ...]:
     """Return fx, fy, fz [N], tx, ty, tz [N*m]; those that `senses` leaves out are 0."""
-    return tuple(senses.get(name, 0.0) for name in AXES)
+    return tuple([senses.get(name, 0.0) for name in AXES])
 
 
 class SampleCounter:

@@ -180,7 +180,7 @@ def test_a_process_that_ends_while_it_writes_a_finished_recording_leaves_no_half
         "    synced(descriptor)\n"
         "os.fsync = sync\nmain(sys.argv[1:])\n"
     )
-    asked = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "curvature", "--estimator", "logistic")
+    asked = ("run", "--repeats", "1", "--sensor", "ideal", "--task", "force", "--estimator", "ols")
     done_ = subprocess.run(
         [sys.executable, "-c", code, *asked, "--jobs", "2", "--out", str(tmp_path)],
         capture_output=True, text=True, cwd=ROOT,

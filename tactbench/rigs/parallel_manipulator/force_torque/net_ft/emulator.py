@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 from xml.sax.saxutils import escape
 
-import numpy as np
-import numpy.typing as npt
-
 from tactbench.plugin import UsageError
 from tactbench.plugin.devices import CanFrame, DeviceEmulator, EmulatorSettings, Fault, Sent, fault_concerns
 from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
+    GREATEST_COUNT,
+    LEAST_COUNT,
     MOST_BUFFERED,
     SENSOR_RATE_HZ,
     SEQUENCE_MODULUS,
@@ -30,9 +29,8 @@ from tactbench.rigs.parallel_manipulator.force_torque.net_ft.codec import (
     Status,
     decode_request,
     encode_record,
-    within_32_bits,
 )
-from tactbench.rigs.parallel_manipulator.force_torque.wrench import wrench_of
+from tactbench.rigs.parallel_manipulator.force_torque.wrench import AXES, wrench_of
 from tactbench.rigs.parallel_manipulator.options import read_file, read_options
 
 
@@ -94,13 +92,13 @@ class RdtEmulator(DeviceEmulator):
         self.rejected = 0
         """Datagrams that were no request."""
         self._wrench = wrench
-        self._largest = np.asarray(largest, dtype=float)
+        self._largest = tuple(largest)
         self._threshold_n = threshold_n
         self._buffer_records = buffer_records
         self._first_sequence = first_sequence
         self.faults = list(faults)
         self._seen: Counter[Fault] = Counter()
-        self._bias: npt.NDArray[np.int64] = np.zeros(6, dtype=np.int64)
+        self._bias = [0] * len(AXES)
         self._latched = False
         self._now_s = 0.0
         self._next: int | None = None
@@ -163,30 +161,32 @@ class RdtEmulator(DeviceEmulator):
             case Command.STOP:
                 return self._ended(self._now_s)
             case Command.SET_SOFTWARE_BIAS:
-                self._bias = self.scale.counts(self._sensed(self._now_s)[0])
+                self._bias = self.scale.counts(self._sensed(self._now_s)[0]).tolist()
             case Command.RESET_CONDITION_LATCH:
                 self._latched = False
         return []
 
-    def _sensed(self, at_s: float) -> tuple[npt.NDArray[np.float64], bool]:
+    def _sensed(self, at_s: float) -> tuple[list[float], bool]:
         """Return what the sensor can read of the wrench, and whether it is at an end of its range."""
-        wrench = np.asarray(self._wrench(at_s), dtype=float)
-        beyond = bool((np.abs(wrench) >= self._largest).any()) or any(
+        # Number by number: numpy would take longer for six, and this is done a thousand times a second.
+        wrench = list(zip(self._wrench(at_s), self._largest, strict=True))
+        beyond = any(abs(value) >= end for value, end in wrench) or any(
             fault.name == "saturated" and fault.active(at_s) for fault in self.faults
         )
-        # np.clip would take ten times as long, and this is done a thousand times a second.
-        return np.minimum(np.maximum(wrench, -self._largest), self._largest), beyond
+        return [min(max(value, -end), end) for value, end in wrench], beyond
 
     def _one(self, sample: int) -> list[Sent]:
         at_s = sample / SENSOR_RATE_HZ
         wrench, saturated = self._sensed(at_s)
-        if self._threshold_n is not None and (np.abs(wrench[:3]) > self._threshold_n).any():
+        if self._threshold_n is not None and max(map(abs, wrench[:3])) > self._threshold_n:
             self._latched = True
         status = (Status.SATURATION_OR_CONVERTER if saturated else 0) | (
             Status.CONDITION_LATCHED if self._latched else 0
         )
-        counts = within_32_bits(self.scale.counts(wrench) - self._bias)
-        fx, fy, fz, tx, ty, tz = counts.tolist()
+        fx, fy, fz, tx, ty, tz = (
+            min(max(count - zero, LEAST_COUNT), GREATEST_COUNT)
+            for count, zero in zip(self.scale.counts(wrench).tolist(), self._bias, strict=True)
+        )
         record = Record(
             self._sequence,
             (sample + self._first_sequence) % SEQUENCE_MODULUS,
