@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
+from types import FrameType
 from typing import Any, NamedTuple
 
 from tactbench.core.errors import LinkError, RigError
@@ -68,7 +71,11 @@ def acquire(
         If the file cannot be written.
     """
     began = clock()
-    with _one_thread(descriptor), rig.open(sensor, scene, seed=seed) as acquisition:
+    with (
+        _one_thread(descriptor),
+        _one_interrupt() as ignore_interrupts,
+        rig.open(sensor, scene, seed=seed) as acquisition,
+    ):
         meta = _meta(acquisition, sensor, descriptor, scene, role, seed)
         spent = clock() - began
         key = "sim_s" if descriptor.simulated else "acquisition_s"
@@ -91,6 +98,7 @@ def acquire(
                         hint="Look at the rig, and record it again.",
                     )
             except (KeyboardInterrupt, LinkError, RigError) as error:
+                ignore_interrupts()
                 alarm = _stopped(acquisition, error)
                 if interrupted is not None and not descriptor.simulated and any(writer.rows.values()):
                     _conclude(writer, acquisition, descriptor, {**provenance, key: spent}, _why(error))
@@ -108,6 +116,31 @@ def _one_thread(descriptor: RigDescriptor) -> AbstractContextManager[Any]:
         return nullcontext()
     importlib.import_module("scipy.linalg")  # it brings a BLAS of its own: only what is loaded can be held
     return thread_limit(1)
+
+
+@contextmanager
+def _one_interrupt() -> Iterator[Callable[[], None]]:
+    """Raise KeyboardInterrupt for the first Ctrl-C and ignore further ones: what it leaves time to keep is kept.
+
+    Yields what ignores them from then on. Other threads, and who has a handler of their own, are left alone.
+    """
+
+    def ignore() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def first(_number: int, _frame: FrameType | None) -> None:
+        ignore()
+        raise KeyboardInterrupt
+
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield lambda: None
+        return
+    signal.signal(signal.SIGINT, first)
+    try:
+        yield ignore
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _conclude(

@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import signal
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -256,6 +257,31 @@ def test_what_moves_is_stopped_before_anything_is_completed(tmp_path, stops, rai
     assert says in why
     assert not kept
     assert rig.kept.exists()
+
+
+class Impatient(Moving):
+    """Somebody presses Ctrl-C while it is told to stop, and again while its devices are let go of."""
+
+    def stop(self, why):
+        os.kill(os.getpid(), signal.SIGINT)
+        return super().stop(why)
+
+    @contextmanager
+    def open(self, *arguments, **more):
+        with super().open(*arguments, **more) as opened:
+            yield opened
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.mark.parametrize("stops", [None, LinkUnplugged("the cable is gone")])
+def test_further_interrupts_do_not_cost_what_the_first_one_keeps(tmp_path, stops):
+    rig = Impatient(tmp_path / "kept.h5", stops=stops)
+    with pytest.raises(KeyboardInterrupt if stops is None else LinkUnplugged):
+        run(tmp_path / "r.h5", rig, simulated=False, interrupted=rig.kept,
+            watch=None if stops else lambda block: os.kill(os.getpid(), signal.SIGINT))  # fmt: skip
+    with open_recording(rig.kept) as recording:
+        recording.verify()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_an_interrupt_after_which_it_still_moves_is_an_error_that_says_so(tmp_path):
