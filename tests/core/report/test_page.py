@@ -238,19 +238,25 @@ def test_a_number_leads_to_the_one_cell_that_it_can_be_from_or_to_none(material)
     assert twice.anchor_of(told) == ""
 
 
-def test_a_hundred_cells_take_less_than_a_second(material):
+def test_a_hundred_cells_take_twelve_times_three_million_additions_at_most(material):
+    """A second, where Python adds 36 million numbers in one: machines differ by a factor of two from day to day."""
     copies = itertools.product(range(1, 13), material.rows)
     rows = [{**row, "cell": f"{row['cell']}-{copy}", "repeat": copy} for copy, row in copies]
     assert len(rows) >= 100
     subject = ReportData(Results(material.store, material.registry, tuple(rows[:100])))
 
-    def seconds():
+    def add():
+        total = 0
+        for number in range(3_000_000):
+            total += number
+
+    def seconds(work):
         began = time.process_time()  # of this process alone: what else runs on the machine is not asked
-        make_page(subject)
+        work()
         return time.process_time() - began
 
-    # The promise is one second; the quickest of three is least disturbed.
-    assert any(seconds() < 1.0 for _ in range(3))
+    # Turn and turn about; the best of five pairs is least disturbed.
+    assert any(seconds(lambda: make_page(subject)) < 12 * seconds(add) for _ in range(5))
 
 
 def replicated(material, scores):
