@@ -39,6 +39,10 @@ def sensitivity_figure(spec: CalibrationSpec, found: Sequence[Sensitivity]) -> F
         axis.set_yticks(range(len(own)), [line.parameter.replace("_", " ") for line in own])
         axis.grid(True, axis="x", alpha=0.3)
     panels[0].invert_yaxis()
+    if not shown:
+        figure.text(0.5, 0.5, "no correlations:\ntoo few draws, or nothing varies", ha="center", va="center")
+        panels[0].set_axis_off()
+        return figure
     figure.supxlabel("partial rank correlation [1]; bars: 95 %; filled circles: interval without 0", fontsize=9)
     return figure
 

@@ -22,7 +22,7 @@ from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED, Row, me
 from tactbench.core.leaderboard.records import APART, GROUPS, TITLES
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.view import full_grid
-from tactbench.core.matrix.store.sharing import PROVENANCE_ID, canonical
+from tactbench.core.matrix.store.sharing import PROVENANCE_DIGITS, canonical
 from tactbench.core.spec.row import FORMAT
 from tactbench.core.tables.html import render
 from tactbench.core.tables.text import visible
@@ -132,7 +132,7 @@ def _is_simulated(block: Block) -> bool:
 def _id(entry: Mapping[str, Any]) -> str:
     """Return what rows call their provenance by (`made_by`); "" if it is no plain data."""
     try:
-        return sha256(canonical(dict(entry)))[:PROVENANCE_ID]
+        return sha256(canonical(dict(entry)))[:PROVENANCE_DIGITS]
     except (TypeError, ValueError, RecursionError):
         return ""
 

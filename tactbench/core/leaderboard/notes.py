@@ -88,10 +88,12 @@ def _ranks(blocks: Sequence[Block]) -> Iterator[str]:
 
 def _tared(rows: Sequence[Row]) -> list[str]:
     """Return one sentence on which recordings were tared, where some row's protocol is one that may."""
-    held = ", ".join(sorted({f"{row['tare_s']:g} s" for row in rows if row.get("tare_s")}))
-    tared = f"`deployable`: each recording is tared on its own unloaded hold before its press ({held})"
-    untared = any(row["protocol"] == "deployable-untared" and row["status"] == "done" for row in rows)
-    return _listed("", [tared] * bool(held) + ["`deployable-untared`: readings as they are"] * untared)
+    sentences = []
+    if held := ", ".join(sorted({f"{row['tare_s']:g} s" for row in rows if row.get("tare_s")})):
+        sentences.append(f"`deployable`: each recording is tared on its own unloaded hold before its press ({held})")
+    if any(row["protocol"] == "deployable-untared" and row["status"] == "done" for row in rows):
+        sentences.append("`deployable-untared`: readings as they are")
+    return _listed("", sentences)
 
 
 def _listed(about: str, texts: Collection[str]) -> list[str]:

@@ -163,15 +163,15 @@ def commands(table: Table, view: View) -> tuple[str, ...]:
         details = [section.title.split(" · ")[0].lower() for section in table.sections if section.detail]
         more += ["all columns", *details]
         options.append("--wide")
-    folder = [view.folder] * bool(view.folder)
+    where, out = ((view.folder,), ("--out", view.folder)) if view.folder else ((), ())
     found = []
     if more:
         listed = " and ".join(filter(None, (", ".join(more[:-1]), more[-1])))
-        shown = command_line("tactbench", "leaderboard", *folder, *options)
+        shown = command_line("tactbench", "leaderboard", *where, *options)
         found.append(f"{listed[0].upper()}{listed[1:]}: `{shown}`.")
     first = next((line.row for line in table.lines if line.kind == "result"), None)
     if first is not None:
-        why = command_line("tactbench", "why", _cell(first), *(["--out"] * bool(folder)), *folder)
+        why = command_line("tactbench", "why", _cell(first), *out)
         found.append(f"What a row rests on, its delay part by part: `{why}`.")
     return tuple(found)
 

@@ -27,7 +27,7 @@ from distributed.core import Status  # noqa: TID253
 from distributed.versions import VersionMismatchWarning  # noqa: TID253
 
 from tactbench.core.errors import Crashed, EngineError, UsageError
-from tactbench.core.matrix.in_folder import in_folder
+from tactbench.core.matrix.evaluate_cell import in_folder
 from tactbench.core.plugins.registry import Registry, installed
 from tactbench.core.pool.limits import Limits
 from tactbench.core.pool.message import dump_error, load_error, pack, unpack

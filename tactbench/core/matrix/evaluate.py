@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from functools import partial
-from itertools import chain, groupby
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,12 +87,10 @@ def evaluate_all(run: RunContext, cells: Sequence[Cell], stage: str) -> tuple[li
         engine = choice.engine(len(jobs))
         working = progress.working if isinstance(engine, InProcess) else None
         work = partial(solve, concurrency=max(1, min(choice.jobs, len(jobs))), working=working)
-        ordered = _ordered(jobs, engine, choice.limits)
-        batches: Iterable[Iterable[Job]] = [ordered]
-        if choice.name == "in-process":  # cells of one estimator share a process: what its import changes is its own
-            batches = (batch for _, batch in groupby(ordered, _shared))
-        for batch in batches:
-            with closing(engine.each(work, batch)) as outcomes:
+        batches = _batches(jobs, engine, choice.limits)
+        # In process, those of one estimator share a process: what its import changes there, it changes for itself.
+        for some in batches if choice.name == "in-process" else [chain.from_iterable(batches)]:
+            with closing(engine.each(work, some)) as outcomes:
                 for job, outcome in outcomes:
                     rows[job.cell.name] = _kept(run, job.cell, outcome, key_of[job.cell.name])
                     progress.advance(job.cell.name, stopped=rows[job.cell.name]["status"] in STOPPED)
@@ -129,8 +127,8 @@ def _kept(run: RunContext, cell: Cell, outcome: Any, key: str) -> Row:
     return store.note({**unanswered(cell, refused), **known})
 
 
-def _ordered(jobs: Sequence[Job], engine: Pool | InProcess | Dask, limits: Limits) -> Iterator[Job]:
-    """Yield `jobs` group by group of one task and the same recordings, and in a group estimator by estimator.
+def _batches(jobs: Sequence[Job], engine: Pool | InProcess | Dask, limits: Limits) -> Iterator[list[Job]]:
+    """Yield `jobs` group by group of one task and the same recordings, those of one estimator together.
 
     Before each group, what cells share that are forked off this process is imported and read here. A child process
     reads it first: what stops that is not read here, and stops each of the cells in its own process.
@@ -151,11 +149,7 @@ def _ordered(jobs: Sequence[Job], engine: Pool | InProcess | Dask, limits: Limit
         by_estimator: dict[str, list[Job]] = {}
         for job in members:
             by_estimator.setdefault(job.cell.estimator, []).append(job)
-        yield from chain.from_iterable(by_estimator.values())
-
-
-def _shared(job: Job) -> tuple[str, tuple[Path, ...], str]:
-    return job.cell.task_key, job.recordings, job.cell.estimator
+        yield from by_estimator.values()
 
 
 def _is_readable(task_and_recordings: tuple[str, tuple[Path, ...]]) -> bool:

@@ -131,6 +131,15 @@ def solve(job: Job, concurrency: int = 1, working: Callable[[str], None] | None 
     }
 
 
+def in_folder(folder: str, concurrency: int, work: Callable[..., Any], item: Any) -> Any:
+    """Return `work(item, concurrency=concurrency)`, done in `folder`: relative paths count from the run's.
+
+    For a child process of a Dask worker, which would take a second to import `distributed` with a function beside it.
+    """
+    os.chdir(folder)
+    return work(item, concurrency=concurrency)
+
+
 def _check_content(recordings: Sequence[Path], digests: Sequence[str]) -> None:
     """Raise EngineError if this process sees other recordings than the run does."""
     from tactbench.core.recording.reader import content_digest

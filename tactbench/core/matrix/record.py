@@ -16,7 +16,7 @@ from tactbench.core.matrix.context import RunContext
 from tactbench.core.matrix.installed import rig_of
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingRequest, request_key
-from tactbench.core.matrix.recorded import looks_of
+from tactbench.core.matrix.recorded import stat_signature
 from tactbench.core.matrix.why import recording_entry
 from tactbench.core.plugins.interfaces import Operator, Rig
 from tactbench.core.plugins.registry import installed, load_object
@@ -78,7 +78,7 @@ def acquire_missing(run: RunContext, cells: Sequence[Cell], operator: Operator |
                     refused[request.path] = outcome
                     _discard(request)
                 else:
-                    recorded.digests[request.path], recorded.made[request.path] = outcome, looks_of(request.path)
+                    recorded.digests[request.path], recorded.made[request.path] = outcome, stat_signature(request.path)
                 progress.advance(f"{request.sensor} {request.scene.name}", stopped=isinstance(outcome, BaseException))
     except BaseException:
         # Workers that were ended in the middle could not tidy up behind themselves.

@@ -20,8 +20,8 @@ from tactbench.core.pool.pool import Pool
 Facts = Mapping[str, str | None]
 
 
-class Looks(NamedTuple):
-    """What a file looks like: which one it is, not by its path (a folder that is handed on names none), and when."""
+class StatSignature(NamedTuple):
+    """What tells a file from a changed one: which it is, not by its path (a folder handed on names none), and when."""
 
     inode: str
     """Device and inode."""
@@ -58,8 +58,8 @@ class Recorded:
     def __init__(self, memory: Path, clock: Callable[[], int] = time.time_ns) -> None:
         self.digests: dict[Path, str] = {}
         """Of the content, known in this run."""
-        self.made: dict[Path, Looks | None] = {}
-        """What recordings that were made in this run looked like then."""
+        self.made: dict[Path, StatSignature | None] = {}
+        """Of recordings that were made in this run, as they were then."""
         self._path = memory
         self._clock = clock
         self._files: dict[str, list[Any]] = {}
@@ -71,14 +71,14 @@ class Recorded:
         except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
             pass
 
-    def facts(self, looks: Looks | None) -> Facts:
-        """Return what is known about the file that looks so; nothing if it looks otherwise now, or is none."""
-        if looks is None:
+    def facts(self, signature: StatSignature | None) -> Facts:
+        """Return what is known about the file with this signature; nothing if it has another one now, or is none."""
+        if signature is None:
             return {}
-        entry = self._files.get(looks.inode)
-        return entry[3] if entry is not None and entry[:3] == list(looks[1:]) else {}
+        entry = self._files.get(signature.inode)
+        return entry[3] if entry is not None and entry[:3] == list(signature[1:]) else {}
 
-    def learn(self, before: Looks | None, after: Looks | None, facts: Facts) -> None:
+    def learn(self, before: StatSignature | None, after: StatSignature | None, facts: Facts) -> None:
         """Remember `facts`, read between `before` and `after`, if the file did not change and was at rest."""
         if before is None or before != after:
             return
@@ -91,11 +91,11 @@ class Recorded:
     def digest(self, path: Path) -> str:
         """Return the content digest of a recording; raises RecordingError if it cannot be read."""
         if path not in self.digests:
-            before = looks_of(path)
+            before = stat_signature(path)
             facts = self.facts(before)
             if not facts.get("digest"):
                 facts = read_digest(path)
-                self.learn(before, looks_of(path), facts)
+                self.learn(before, stat_signature(path), facts)
             self.digests[path] = str(facts["digest"])
         return self.digests[path]
 
@@ -104,17 +104,17 @@ class Recorded:
 
         There is no scene where nobody planned it, for example that of an imported table.
         """
-        before = looks_of(path)
+        before = stat_signature(path)
         facts = self.facts(before)
         if facts.get("sensor") is None:
             facts = read_sensor_and_scene(path)
-            self.learn(before, looks_of(path), facts)
+            self.learn(before, stat_signature(path), facts)
         return str(facts["sensor"]), facts["scene"]
 
     def save(self) -> None:
         """Write what was learned; a folder that cannot be written only costs time."""
         for path, before in self.made.items():
-            self.learn(before, looks_of(path), {"digest": self.digests[path]})
+            self.learn(before, stat_signature(path), {"digest": self.digests[path]})
         if not self._fresh:
             return
         content = json.dumps({"format": _FORMAT, "files": self._files}, separators=(",", ":")).encode()
@@ -141,13 +141,13 @@ def read_sensor_and_scene(path: Path) -> Facts:
     return {"sensor": meta.sensor.name, "scene": meta.scene.name if meta.scene else None}
 
 
-def looks_of(path: Path) -> Looks | None:
-    """Return what a file looks like; None where there is none."""
+def stat_signature(path: Path) -> StatSignature | None:
+    """Return the signature of a file; None where there is none."""
     try:
         stat = path.stat()
     except OSError:
         return None
-    return Looks(f"{stat.st_dev:x}:{stat.st_ino:x}", stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns)
+    return StatSignature(f"{stat.st_dev:x}:{stat.st_ino:x}", stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns)
 
 
 def read_all(
@@ -163,17 +163,19 @@ def read_all(
     failed
         What stopped it, by path.
     """
-    paths = [path for path in paths if path not in recorded.digests and fact not in recorded.facts(looks_of(path))]
+    paths = [
+        path for path in paths if path not in recorded.digests and fact not in recorded.facts(stat_signature(path))
+    ]
     if not paths:
         return {}
     importlib.import_module("h5py")  # once here, not once in every process that reads
-    before = {path: looks_of(path) for path in paths}
+    before = {path: stat_signature(path) for path in paths}
     failed: dict[Path, BaseException] = {}
     for path, facts in Pool(1, limits, reuse=True).each(read, paths):
         if isinstance(facts, BaseException):
             failed[path] = facts
             continue
-        recorded.learn(before[path], looks_of(path), facts)
+        recorded.learn(before[path], stat_signature(path), facts)
         if facts.get("digest"):
             recorded.digests[path] = str(facts["digest"])
     return failed

@@ -148,8 +148,7 @@ class Worker:
     def _stop(self, why: CellStopped) -> CellStopped:
         """End the process; return why."""
         self._stopped = self._stopped or why
-        if self.alive:
-            kill_tree(self.pid)
+        self._kill()
         return self._ended()
 
     def _ended(self) -> CellStopped:
@@ -216,10 +215,14 @@ class Worker:
             self._ask_to_end()
             self._process.join(self._limits.grace_s)
 
-    def close(self) -> None:
-        """Kill it and whatever it has started, wait for its end, and let go of it."""
+    def _kill(self) -> None:
+        """Kill it, and whatever it has started."""
         if self.alive:
             kill_tree(self.pid)
+
+    def close(self) -> None:
+        """Kill it, wait for its end, and let go of it."""
+        self._kill()
         self._process.join()
         self._process.close()
         self.connection.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
 import os
 import platform
@@ -10,6 +9,8 @@ import re
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
+
+from tactbench.core.files import sha256
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 """What numerical libraries read when they are loaded, the most particular first."""
@@ -19,7 +20,7 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 def host_id() -> str:
     """Return a digest that tells hosts apart without naming them."""
     parts = (platform.node(), platform.machine(), cpu_model(), str(os.cpu_count()))
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:12]
+    return sha256("\0".join(parts))[:12]
 
 
 @lru_cache(maxsize=1)

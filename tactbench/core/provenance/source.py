@@ -7,7 +7,6 @@ the packages it imports: their version if they were installed, their source if t
 from __future__ import annotations
 
 import ast
-import hashlib
 import importlib.machinery
 import importlib.util
 import os
@@ -20,6 +19,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
+
+from tactbench.core.files import sha256
 
 Purpose = Literal["recording", "answer"]
 
@@ -118,7 +119,7 @@ class SourceDigests:
                 except OSError:
                     digests[_free(name, digests)] = f"unreadable {uuid.uuid4().hex}"
                     continue
-                digests[_free(name, digests)] = hashlib.sha256(content).hexdigest()[:32]
+                digests[_free(name, digests)] = sha256(content)[:32]
                 if package != PACKAGE and name.endswith((".py", ".pyw")):
                     imported.update(imports_of(content))
             if not digests:
@@ -130,7 +131,7 @@ class SourceDigests:
 def digest_of(facts: Mapping[str, str]) -> str:
     """Return one digest of a mapping, whatever its order."""
     text = "".join(f"{name}\0{facts[name]}\0" for name in sorted(facts))
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+    return sha256(text)[:32]
 
 
 def _free(name: str, taken: Mapping[str, str]) -> str:

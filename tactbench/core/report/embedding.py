@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import json
 import math
@@ -20,7 +19,7 @@ from tactbench.core.evaluation.preparation import assigned, prepared
 from tactbench.core.evaluation.protocols import protocol_called
 from tactbench.core.evaluation.selection import features_of
 from tactbench.core.evaluation.summaries import summarised
-from tactbench.core.files import read_regular, replace_file
+from tactbench.core.files import read_regular, replace_file, sha256
 from tactbench.core.provenance.source import versions
 from tactbench.core.report.results import Results
 from tactbench.core.samples import Answers, FloatArray, IntArray
@@ -50,7 +49,7 @@ def stored(results: Path, kind: str, facts: Mapping[str, Any], compute: Callable
     A file that is damaged is made anew, and a folder that cannot be written costs the next reader the time, no more.
     """
     key_text = json.dumps(facts, sort_keys=True)
-    path = results / FOLDER / kind / f"{hashlib.sha256(key_text.encode()).hexdigest()[:32]}.json"
+    path = results / FOLDER / kind / f"{sha256(key_text)[:32]}.json"
     try:
         found = json.loads(read_regular(path, _MOST_BYTES))
         if found["facts"] == json.loads(key_text):

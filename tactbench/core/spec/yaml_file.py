@@ -76,7 +76,7 @@ def plain_value(text: str) -> Any:
     return value if isinstance(value, str | int | float | bool) else text
 
 
-class _SmallLoader(yaml.SafeLoader):
+class _LimitedLoader(yaml.SafeLoader):
     """Refuses what nests too deep, or repeats itself too often, as soon as it is read; raises ConfigError."""
 
     def __init__(self, text: str, file: str) -> None:
@@ -101,7 +101,7 @@ class _SmallLoader(yaml.SafeLoader):
 
 def _composed(text: str, file: str) -> yaml.Node | None:
     """Return the nodes of a text, nothing built of them yet; raises ConfigError, yaml.YAMLError."""
-    loader = _SmallLoader(text, file)
+    loader = _LimitedLoader(text, file)
     try:
         return loader.get_single_node()
     finally:

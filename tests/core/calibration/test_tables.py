@@ -51,6 +51,9 @@ def test_figures_of_many_draws_are_saved(tmp_path):
         assert path.stat().st_size > 1000
 
 
-def test_figures_of_few_draws_can_be_drawn():
-    for figure in _figures(3):
+def test_figures_of_few_draws_show_what_there_is_and_say_what_is_not():
+    sensitivity, draws = _figures(3)
+    assert [text.get_text() for text in sensitivity.texts] == ["no correlations:\ntoo few draws, or nothing varies"]
+    assert all(axes.has_data() for axes in draws.axes)
+    for figure in (sensitivity, draws):
         figure.draw_without_rendering()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tactbench.core.errors import FormatError, MissingRecordingError
-from tactbench.core.matrix.recorded import Recorded, looks_of
+from tactbench.core.matrix.recorded import Recorded, stat_signature
 from tactbench.core.recording.reader import content_digest
 from tests.core.evaluation.made import record
 
@@ -53,14 +53,14 @@ assert not {{"h5py", "numpy"}} & set(sys.modules), "a library was loaded"
 
 def test_a_recording_made_now_is_remembered_with_its_writers_digest(tmp_path, recording):
     first = rested(tmp_path / "memory")
-    first.digests[recording], first.made[recording] = "as the writer says", looks_of(recording)
+    first.digests[recording], first.made[recording] = "as the writer says", stat_signature(recording)
     first.save()
     assert Recorded(tmp_path / "memory").digest(recording) == "as the writer says"
 
 
 def test_one_made_now_and_replaced_before_the_run_ended_is_read_again(tmp_path, recording):
     first = rested(tmp_path / "memory")
-    first.digests[recording], first.made[recording] = "as the writer said", looks_of(recording)
+    first.digests[recording], first.made[recording] = "as the writer said", stat_signature(recording)
     record(recording, np.zeros((20, 3)))
     first.save()
     assert Recorded(tmp_path / "memory").digest(recording) == content_digest(recording)

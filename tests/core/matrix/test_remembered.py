@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tactbench.core.matrix.recorded import Looks, Recorded, looks_of
+from tactbench.core.matrix.recorded import Recorded, StatSignature, stat_signature
 
 LATER_NS = 10**10
 
@@ -20,7 +20,7 @@ def later():
 def learnt(path, file, clock=later):
     memory = Recorded(path, clock)
     stat = file.stat()
-    memory.learn(looks_of(file), looks_of(file), {"digest": file.read_text()})
+    memory.learn(stat_signature(file), stat_signature(file), {"digest": file.read_text()})
     memory.save()
     return stat
 
@@ -34,14 +34,14 @@ def file(tmp_path):
 
 def test_a_file_at_rest_is_remembered(tmp_path, file):
     learnt(tmp_path / "memory", file)
-    assert Recorded(tmp_path / "memory").facts(looks_of(file)) == {"digest": "a"}
+    assert Recorded(tmp_path / "memory").facts(stat_signature(file)) == {"digest": "a"}
 
 
 def test_facts_of_a_file_are_learnt_bit_by_bit(tmp_path, file):
     memory = Recorded(tmp_path / "memory", later)
-    memory.learn(looks_of(file), looks_of(file), {"digest": "a"})
-    memory.learn(looks_of(file), looks_of(file), {"sensor": "s", "scene": None})
-    assert memory.facts(looks_of(file)) == {"digest": "a", "sensor": "s", "scene": None}
+    memory.learn(stat_signature(file), stat_signature(file), {"digest": "a"})
+    memory.learn(stat_signature(file), stat_signature(file), {"sensor": "s", "scene": None})
+    assert memory.facts(stat_signature(file)) == {"digest": "a", "sensor": "s", "scene": None}
 
 
 @pytest.mark.parametrize(
@@ -50,17 +50,17 @@ def test_facts_of_a_file_are_learnt_bit_by_bit(tmp_path, file):
 def test_a_young_file_or_one_from_the_future_is_not_remembered(tmp_path, file, clock):
     memory = Recorded(tmp_path / "memory", clock)
     file.write_text("b")
-    memory.learn(looks_of(file), looks_of(file), {"digest": "b"})
-    assert memory.facts(looks_of(file)) == {}
+    memory.learn(stat_signature(file), stat_signature(file), {"digest": "b"})
+    assert memory.facts(stat_signature(file)) == {}
 
 
 def test_a_disk_that_counts_whole_seconds_needs_longer_rest(tmp_path, file):
     os.utime(file, ns=(0, file.stat().st_mtime_ns // 10**9 * 10**9))
     second_ns = 10**9
     learnt(tmp_path / "memory", file, lambda: file.stat().st_ctime_ns + second_ns)
-    assert Recorded(tmp_path / "memory").facts(looks_of(file)) == {}
+    assert Recorded(tmp_path / "memory").facts(stat_signature(file)) == {}
     learnt(tmp_path / "memory", file, lambda: file.stat().st_ctime_ns + 3 * second_ns)
-    assert Recorded(tmp_path / "memory").facts(looks_of(file)) == {"digest": "a"}
+    assert Recorded(tmp_path / "memory").facts(stat_signature(file)) == {"digest": "a"}
 
 
 def test_other_bytes_of_the_same_length_with_the_old_time_put_back_are_noticed(tmp_path, file):
@@ -68,7 +68,7 @@ def test_other_bytes_of_the_same_length_with_the_old_time_put_back_are_noticed(t
     file.write_text("b")
     os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
     assert (file.stat().st_size, file.stat().st_mtime_ns) == (stat.st_size, stat.st_mtime_ns)
-    assert Recorded(tmp_path / "memory").facts(looks_of(file)) == {}
+    assert Recorded(tmp_path / "memory").facts(stat_signature(file)) == {}
 
 
 def test_another_file_renamed_into_the_place_is_noticed(tmp_path, file):
@@ -77,21 +77,21 @@ def test_another_file_renamed_into_the_place_is_noticed(tmp_path, file):
     other.write_text("b")
     os.utime(other, ns=(stat.st_atime_ns, stat.st_mtime_ns))
     other.replace(file)
-    assert Recorded(tmp_path / "memory").facts(looks_of(file)) == {}
+    assert Recorded(tmp_path / "memory").facts(stat_signature(file)) == {}
 
 
 def test_a_file_that_changed_while_it_was_read_is_not_remembered(tmp_path, file):
     memory = Recorded(tmp_path / "memory", later)
-    before = looks_of(file)
+    before = stat_signature(file)
     file.write_text("longer")
-    memory.learn(before, looks_of(file), {"digest": "a"})
-    assert memory.facts(looks_of(file)) == memory.facts(before) == {}
+    memory.learn(before, stat_signature(file), {"digest": "a"})
+    assert memory.facts(stat_signature(file)) == memory.facts(before) == {}
 
 
 def seen(size, changed_ns, tick_ns):
     """What a disk whose clock moves every `tick_ns` says of a file."""
     stamp = changed_ns // tick_ns * tick_ns
-    return Looks("1:7", size, stamp, stamp)
+    return StatSignature("1:7", size, stamp, stamp)
 
 
 @given(
@@ -123,9 +123,9 @@ def test_whatever_happens_and_however_coarse_the_disk_counts_a_fact_is_true(tmp_
 )
 def test_a_memory_that_is_rubbish_is_as_good_as_none(tmp_path, file, content):
     (tmp_path / "memory").write_bytes(content)
-    assert Recorded(tmp_path / "memory").facts(looks_of(file)) == {}
+    assert Recorded(tmp_path / "memory").facts(stat_signature(file)) == {}
     learnt(tmp_path / "memory", file)
-    assert Recorded(tmp_path / "memory").facts(looks_of(file)) == {"digest": "a"}
+    assert Recorded(tmp_path / "memory").facts(stat_signature(file)) == {"digest": "a"}
 
 
 @pytest.mark.parametrize("entry", [None, 3, [], [1, 2, 3], [1, 2, 3, "text"], [1, 2, 3, {"digest": 4}]])
@@ -137,7 +137,7 @@ def test_an_entry_of_another_shape_is_passed_over(tmp_path, file, entry):
         [stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, {"digest": 4}] if entry == [] else entry
     )
     (tmp_path / "memory").write_text(json.dumps(content))
-    assert Recorded(tmp_path / "memory").facts(looks_of(file)) == {}
+    assert Recorded(tmp_path / "memory").facts(stat_signature(file)) == {}
 
 
 def test_what_was_not_asked_for_is_kept(tmp_path, file):
@@ -146,7 +146,10 @@ def test_what_was_not_asked_for_is_kept(tmp_path, file):
     learnt(tmp_path / "memory", other)
     learnt(tmp_path / "memory", file)
     memory = Recorded(tmp_path / "memory")
-    assert (memory.facts(looks_of(file)), memory.facts(looks_of(other))) == ({"digest": "a"}, {"digest": "b"})
+    assert (memory.facts(stat_signature(file)), memory.facts(stat_signature(other))) == (
+        {"digest": "a"},
+        {"digest": "b"},
+    )
 
 
 def test_nothing_about_paths_is_written_down(tmp_path, file):

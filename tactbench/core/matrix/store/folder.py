@@ -18,7 +18,7 @@ from tactbench.core.matrix.store.image import read_image
 from tactbench.core.matrix.store.ledger import Entry, Ledger, read_ledger
 from tactbench.core.matrix.store.lock import Lock
 from tactbench.core.matrix.store.rows import NAMING, NotPlainError, Row, named, text_of
-from tactbench.core.matrix.store.sharing import PROVENANCE_ID, canonical
+from tactbench.core.matrix.store.sharing import PROVENANCE_DIGITS, canonical
 
 if TYPE_CHECKING:
     from tactbench.core.samples import Answers
@@ -82,7 +82,7 @@ class Store:
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Keep who computes from now on, with what, and return its id: equal provenances have equal ones."""
         text = canonical(dict(provenance))
-        name = sha256(text)[:PROVENANCE_ID]
+        name = sha256(text)[:PROVENANCE_DIGITS]
         path = self.folder / "provenance" / f"{name}.json"
         with self._written():
             if not path.exists():
@@ -260,14 +260,14 @@ class Store:
 
     def provenance(self, name: str) -> dict[str, Any]:
         """Return who computed a cell, with what, by the id in ``row["made_by"]``; empty if not known."""
-        if len(name) != PROVENANCE_ID or not name.isalnum():  # it becomes the name of a file
+        if len(name) != PROVENANCE_DIGITS or not name.isalnum():  # it becomes the name of a file
             return {}
         try:
             content = read_regular(self.folder / "provenance" / f"{name}.json", limits.PROVENANCE_BYTES).strip()
             provenance = json.loads(content)
         except (OSError, ValueError, RecursionError):
             return {}
-        whole = sha256(content)[:PROVENANCE_ID] == name and isinstance(provenance, dict)
+        whole = sha256(content)[:PROVENANCE_DIGITS] == name and isinstance(provenance, dict)
         return provenance if whole else {}
 
     def recording(self, path: str, digest: str = "") -> Path | None:

@@ -22,9 +22,9 @@ canonical = json.JSONEncoder(sort_keys=True).encode
 """Return plain data as one line of JSON: the same text for the same data."""
 
 
-PROVENANCE_ID = 16
+PROVENANCE_DIGITS = 16
 """Rows and files call a provenance by so many digits of the SHA-256 of its canonical text."""
-SHARED_ID = 32
+_SHARED_DIGITS = 32
 """A value is shared under so many digits of that of its canonical text."""
 
 
@@ -41,7 +41,7 @@ def parted(row: Row) -> tuple[Row, dict[str, str], dict[str, str]]:
         value = row.get(key)
         text = canonical(value) if isinstance(value, str | list | dict) else ""
         if len(text) >= WORTH_CHARACTERS:
-            references[key] = sha256(text)[:SHARED_ID]
+            references[key] = sha256(text)[:_SHARED_DIGITS]
             texts[references[key]] = text
             del slim[key]
     return slim, references, texts
@@ -62,4 +62,4 @@ _DEFINITION = re.compile(r'\{"shared": "([0-9a-f]{32})", "value": (.*)\}')
 def definition(line: str) -> str | None:
     """Return the digest that a line defines if the line holds what the digest says, else None."""
     found = _DEFINITION.fullmatch(line)
-    return found[1] if found is not None and sha256(found[2])[:SHARED_ID] == found[1] else None
+    return found[1] if found is not None and sha256(found[2])[:_SHARED_DIGITS] == found[1] else None
