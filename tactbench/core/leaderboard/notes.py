@@ -121,12 +121,14 @@ def _floors(rows: Sequence[Row]) -> list[str]:
         for row in rows
         if row.get("reference_floor") is not None
     )
+    if not floors:
+        return []
     each = "; ".join(f"{where} {_floor(found, unit)}" for (where, unit), found in floors.items())
     return [
         f"Floor, the deviation of the reference in the unloaded hold of the tested recordings: {each}. Beyond "
         "floor is sqrt(max(0, RMSE² − floor²)) of each replicate; a smaller RMSE is below it by chance. Ranks go "
         "by it where all answers of a block have it."
-    ] * bool(floors)
+    ]
 
 
 def _floor(found: Sequence[float], unit: str) -> str:

@@ -187,7 +187,8 @@ def _none_better(below: int, trivial: Sequence[Row]) -> str:
     bars = [
         f"{name} {score_with_unit(row['score'], row['unit'])}" for name, row in zip(_names(rows), rows, strict=True)
     ]
-    return f"None of {below} answers scores better than the trivial one{': ' * bool(bars)}{', '.join(bars)}."
+    listed = f": {', '.join(bars)}" if bars else ""
+    return f"None of {below} answers scores better than the trivial one{listed}."
 
 
 def _cheapest(rows: Sequence[Row], names: Sequence[str]) -> str:

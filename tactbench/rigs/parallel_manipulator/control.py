@@ -5,10 +5,12 @@ A beat is a step of the press, so a controller that hangs is a beat that does no
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections import deque
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from tactbench.plugin import Block, StreamSpec, TactbenchError
@@ -129,11 +131,16 @@ class Control:
             yield self._events.popleft()
 
     def carry(self, until_ns: int) -> None:
-        """Let time go on until a nanosecond of the clock, beating whenever it is due: for virtual time."""
+        """Let time go on until a nanosecond of the clock, beating whenever it is due: for virtual time.
+
+        A Ctrl-C is raised between two periods: within one, a command may be out whose answer would be another's.
+        """
         while self._next_ns <= until_ns:
-            self._guard.advance(self._next_ns)
-            self._period()
-        self._guard.advance(until_ns)
+            with _interrupts_deferred():
+                self._guard.advance(self._next_ns)
+                self._period()
+        with _interrupts_deferred():
+            self._guard.advance(until_ns)
 
     def start(self) -> None:
         """Beat from a thread of its own, until :meth:`stop`: for real time."""
@@ -218,6 +225,22 @@ class Control:
         self._report = self._guard.beat(
             Beat(self._beats, now_ns, str(press.state), force_sequence=self._report.force_sequence, **request)
         )
+
+
+@contextmanager
+def _interrupts_deferred() -> Iterator[None]:
+    """Handle a Ctrl-C at the end, as it would have been at the beginning; in the main thread, which alone gets any."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[tuple[int, FrameType | None]] = []
+    handler = signal.signal(signal.SIGINT, lambda *one: came.append(one))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if came and callable(handler):
+        handler(*came[0])
 
 
 def _error_text(error: Exception) -> str:
