@@ -17,6 +17,7 @@ from tactbench.devices.emulation.lawicel_adapter import LawicelAdapter
 from tactbench.devices.emulation.line import Line, LinkFault
 from tactbench.devices.emulation.real_time import PseudoTerminal, RealTimeServer, UdpEnd
 from tactbench.plugin.devices import CanFrame, open_link
+from tests.core.pool.patience import until
 from tests.devices.emulation.models import Answerer, Complement, Recorder
 
 needs_pty = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
@@ -131,12 +132,17 @@ def test_virtual_and_real_time_give_the_same_device_data():
     def recorded(time):
         device = on("datagram", Recorder(0.01, lambda t_s: {"a": 1000 * t_s}))
         with EmulatedDevices({"a": device}, time=time, keep_log=True) as devices:
+
+            def sent():
+                return [(t_s, piece) for t_s, sender, piece in devices.log_of("a") if sender == "device"]
+
             with devices.open_link("a") as link:
                 link.send(b"I am here")
                 while devices.clock() < 300_000_000:
                     with contextlib.suppress(LinkTimeout):
                         link.receive(0.05)
-            return [(t_s, piece) for t_s, sender, piece in devices.log_of("a") if sender == "device"]
+                assert until(lambda: len(sent()) >= 30)  # in real time the device's thread may be late
+            return sent()
 
     virtual, real = recorded("virtual"), recorded("real")
     assert len(virtual) == 30
