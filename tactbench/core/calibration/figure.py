@@ -24,8 +24,11 @@ def sensitivity_figure(spec: CalibrationSpec, found: Sequence[Sensitivity]) -> F
 
     shown = [one.output for one in spec.published if any(line.output == one.output for line in found)]
     figure = Figure(figsize=(2.6 * max(len(shown), 1) + 1.6, 4.4), layout="constrained")
-    panels = figure.subplots(1, max(len(shown), 1), squeeze=False, sharey=True)[0]
-    for axis, name in zip(panels, shown, strict=False):
+    if not shown:
+        figure.text(0.5, 0.5, "no correlations:\ntoo few draws, or nothing varies", ha="center", va="center")
+        return figure
+    panels = figure.subplots(1, len(shown), squeeze=False, sharey=True)[0]
+    for axis, name in zip(panels, shown, strict=True):
         own = [line for line in found if line.output == name]
         for place, line in enumerate(own):
             apart = line.low > 0 or line.high < 0
@@ -39,10 +42,6 @@ def sensitivity_figure(spec: CalibrationSpec, found: Sequence[Sensitivity]) -> F
         axis.set_yticks(range(len(own)), [line.parameter.replace("_", " ") for line in own])
         axis.grid(True, axis="x", alpha=0.3)
     panels[0].invert_yaxis()
-    if not shown:
-        figure.text(0.5, 0.5, "no correlations:\ntoo few draws, or nothing varies", ha="center", va="center")
-        panels[0].set_axis_off()
-        return figure
     figure.supxlabel("partial rank correlation [1]; bars: 95 %; filled circles: interval without 0", fontsize=9)
     return figure
 

@@ -89,8 +89,8 @@ def evaluate_all(run: RunContext, cells: Sequence[Cell], stage: str) -> tuple[li
         work = partial(solve, concurrency=max(1, min(choice.jobs, len(jobs))), working=working)
         batches = _batches(jobs, engine, choice.limits)
         # In process, those of one estimator share a process: what its import changes there, it changes for itself.
-        for some in batches if choice.name == "in-process" else [chain.from_iterable(batches)]:
-            with closing(engine.each(work, some)) as outcomes:
+        for batch in batches if choice.name == "in-process" else [chain.from_iterable(batches)]:
+            with closing(engine.each(work, batch)) as outcomes:
                 for job, outcome in outcomes:
                     rows[job.cell.name] = _kept(run, job.cell, outcome, key_of[job.cell.name])
                     progress.advance(job.cell.name, stopped=rows[job.cell.name]["status"] in STOPPED)

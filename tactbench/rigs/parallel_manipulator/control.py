@@ -229,7 +229,10 @@ class Control:
 
 @contextmanager
 def _interrupts_deferred() -> Iterator[None]:
-    """Handle a Ctrl-C at the end, as it would have been at the beginning; in the main thread, which alone gets any."""
+    """Leave a Ctrl-C to its handler at the end; only the main thread handles any.
+
+    A signal mask would not do: another thread takes the signal, and Python calls the handler here all the same.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
