@@ -143,13 +143,18 @@ def _warm_up(one: TimedEstimator) -> None:
 
 @contextmanager
 def _what_is_there_kept() -> Iterator[None]:
-    """Let collections pass over the modules that are loaded: they take longer than most of what is timed."""
+    """Let collections pass over the modules that are loaded: they take longer than most of what is timed.
+
+    What the caller had kept from collections stays kept: both cannot be told apart afterwards.
+    """
+    was_kept = gc.get_freeze_count() > 0
     gc.collect()
     gc.freeze()
     try:
         yield
     finally:
-        gc.unfreeze()
+        if not was_kept:
+            gc.unfreeze()
 
 
 @contextmanager

@@ -96,6 +96,18 @@ def test_nobody_collects_garbage_while_a_clock_runs_and_everybody_may_afterwards
     assert gc.isenabled()
 
 
+@pytest.mark.parametrize("kept_before", [True, False])
+def test_what_was_kept_from_collections_before_is_afterwards_and_nothing_else(kept_before):
+    was_kept = gc.get_freeze_count() > 0
+    (gc.freeze if kept_before else gc.unfreeze)()
+    kept = gc.get_freeze_count()
+    try:
+        run(Hours(), timed_estimator(Hours(), "a"))
+        assert gc.get_freeze_count() >= kept if kept_before else gc.get_freeze_count() == 0
+    finally:
+        (gc.freeze if was_kept else gc.unfreeze)()
+
+
 def test_a_fit_beyond_the_budget_is_done_once_and_its_row_says_so():
     clock = Hours()
     slow = timed_estimator(clock, "slow", fit_s=21.0, batch_s=22.0)
