@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,6 @@ from tactbench.core.tables.text import command_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from tactbench.core.matrix.store import Row
 
 
 @click.command(name="merge")
@@ -29,7 +28,7 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     from tactbench.core.cli.screen import remark
     from tactbench.core.matrix.merge import merge
 
-    merged = merge(folders, out, also=_tables)
+    merged = merge(folders, out, also=partial(_write_tables, folders))
     done = sum(row["status"] == "done" for row in merged.rows)
     hosts = len({row.get("host", "") for row in merged.rows})
     remark(f"{len(merged.rows)} cells, {done} of them finished, on {hosts} host{'s' if hosts != 1 else ''}; "
@@ -41,12 +40,14 @@ def command(ctx: click.Context, folders: tuple[Path, ...], out: Path) -> None:
     ctx.exit(1 if merged.left_out else 0)
 
 
-def _tables(folder: Path, rows: Sequence[Row]) -> None:
-    """Write what `tactbench leaderboard` shows."""
-    from tactbench.core.cli.results import provenance_of
+def _write_tables(folders: Sequence[Path], merged: Path) -> None:
+    """Write what was checked of sensors, and what `tactbench leaderboard` shows, into a merged folder."""
+    from tactbench.core.cli.results import provenance_of, shown_rows
     from tactbench.core.leaderboard.formats import write_tables
+    from tactbench.core.leaderboard.levels import merge_levels
     from tactbench.core.matrix.store import Store
-    from tactbench.core.matrix.summary import fill_baselines
 
-    fill_baselines(list(rows))
-    write_tables(rows, folder, provenance_of(Store(folder), rows))
+    merge_levels(folders, merged)
+    store = Store(merged)
+    rows = shown_rows(store)
+    write_tables(rows, merged, provenance_of(store, rows))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -50,9 +51,22 @@ def read_levels(folder: Path) -> dict[str, dict[str, Any]]:
             facts = json.loads(read_regular(path, _MOST_BYTES))
         except (OSError, ValueError, RecursionError):
             continue
-        if isinstance(facts, dict) and facts.get("level") in _LEVELS and isinstance(facts.get("sensor"), str):
-            found[facts["sensor"]] = facts
+        if isinstance(facts, dict) and facts.get("level") in _LEVELS and facts.get("sensor") == path.stem:
+            found[path.stem] = facts
     return found
+
+
+def merge_levels(folders: Sequence[Path], into: Path) -> None:
+    """Write what was checked in any of `folders` into another one; of two levels of one sensor the lower one."""
+    found: dict[str, dict[str, Any]] = {}
+    for sensor, facts in chain.from_iterable(read_levels(folder).items() for folder in folders):
+        found[sensor] = min(found.get(sensor, facts), facts, key=_how_high)
+    for sensor, facts in found.items():
+        write_level(into, sensor, facts)
+
+
+def _how_high(facts: Mapping[str, Any]) -> tuple[int, str]:
+    return _LEVELS.index(facts["level"]), json.dumps(facts, sort_keys=True)
 
 
 def with_levels(rows: Sequence[Row], folder: Path, provenance: Callable[[str], Mapping[str, Any]]) -> list[Row]:

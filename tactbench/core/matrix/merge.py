@@ -70,7 +70,7 @@ class _Union:
     left_out: list[str] = field(default_factory=list)
 
 
-def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path, Sequence[Row]], None] | None = None) -> Merged:
+def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | None = None) -> Merged:
     """Make `out` from all `folders`; nothing is left of it if anything goes wrong.
 
     Parameters
@@ -80,7 +80,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path, Sequence[
     out
         A folder that does not exist yet.
     also
-        Writes more files into the new folder, which it is given with the rows, before it gets its name.
+        Writes more files into the new folder, which it is given, before that gets its name.
 
     Raises
     ------
@@ -119,10 +119,9 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path, Sequence[
         for relative, (_, path) in recordings.items():
             _link(path, aside / "recordings" / relative)
         (aside / NAME).write_text(whole_text(entries), encoding="utf-8")
-        rows = [dict(entry.row) for entry in entries]
         if also is not None:
-            also(aside, rows)
-    return Merged(tuple(rows), len(recordings), tuple(union.left_out))
+            also(aside)
+    return Merged(tuple(dict(entry.row) for entry in entries), len(recordings), tuple(union.left_out))
 
 
 def _add(union: _Union, found: _Found) -> None:

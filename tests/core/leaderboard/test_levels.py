@@ -6,7 +6,16 @@ import shutil
 
 import pytest
 
-from tactbench.core.leaderboard.levels import KEY, NOT_CHECKED, OTHER_VERSION, identity_of, with_levels, write_level
+from tactbench.core.leaderboard.levels import (
+    KEY,
+    NOT_CHECKED,
+    OTHER_VERSION,
+    identity_of,
+    merge_levels,
+    read_levels,
+    with_levels,
+    write_level,
+)
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import installed
 from tactbench.core.report.results import open_results
@@ -41,6 +50,28 @@ def test_a_level_is_of_the_package_that_made_the_rows(tmp_path):
 def test_of_ours_the_commit_counts():
     assert identity_of("tactbench", MADE_WITH) == {"tactbench": "0.1.0", "commit": "1234"}
     assert identity_of("acme_pad", {"plugins": "none"}) == {}
+
+
+def test_of_two_folders_the_lower_level_of_a_sensor_is_kept_in_whatever_order(tmp_path):
+    for name, sensor, level in (("a", "pad", "gold"), ("b", "pad", "bronze"), ("b", "skin", "silver")):
+        (tmp_path / name).mkdir(exist_ok=True)
+        write_level(tmp_path / name, sensor, {"level": level})
+    folders = [tmp_path / "a", tmp_path / "b", tmp_path / "nowhere"]
+    for number, order in enumerate((folders, folders[::-1], [*folders, folders[0]])):
+        merged = tmp_path / str(number)
+        merged.mkdir()
+        merge_levels(order, merged)
+        assert {sensor: one["level"] for sensor, one in read_levels(merged).items()} == {
+            "pad": "bronze",
+            "skin": "silver",
+        }
+        assert sorted(path.name for path in merged.rglob("*.json")) == ["pad.json", "skin.json"]
+
+
+def test_a_file_that_speaks_of_another_sensor_is_no_level(tmp_path):
+    write_level(tmp_path, "pad", {"level": "gold"})
+    (tmp_path / "conformance" / "pad.json").rename(tmp_path / "conformance" / "skin.json")
+    assert read_levels(tmp_path) == {}
 
 
 def test_a_row_declares_no_level_of_its_own(tmp_path):

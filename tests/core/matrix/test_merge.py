@@ -1,5 +1,6 @@
 """Merging: the same bytes in whatever order, however often; contradictions are refused and leave nothing."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tactbench.core.errors import FolderError
+from tactbench.core.leaderboard.levels import OTHER_VERSION, write_level
 from tactbench.core.matrix.merge import merge
 from tactbench.core.matrix.store import Store
 from tactbench.core.recording.writer import RecordingWriter
@@ -215,3 +217,18 @@ def test_the_verb_merges_and_its_folder_can_be_shown(shell):
     again = shell("merge", "two", "one", "--out", "both", code=2)
     assert "exists already" in again.stderr
     assert "Traceback" not in again.stderr
+
+
+def test_its_tables_are_those_that_leaderboard_shows_over_replicates_and_with_levels(verbs):
+    from .store.made import whole
+
+    for repeat, name in ((1, "one"), (2, "two")):
+        cell = f"icub/force/twin/karl2016/mean/{repeat}"
+        store = Store(verbs.folder / name)
+        store.keep(key(cell), whole(cell, repeat=repeat, repeats=2, seed=repeat), {"test": answers(3)})
+    write_level(verbs.folder / "two", "icub", {"level": "silver"})
+    verbs("merge", "one", "two", "--out", "both")
+    written = (verbs.folder / "both" / "leaderboard.json").read_text()
+    (row,) = json.loads(written)
+    assert (row["n_replicates"], row["shown"]["level"]) == (2, OTHER_VERSION)
+    assert verbs("leaderboard", "both", "--format", "json").stdout == written
