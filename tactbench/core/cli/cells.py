@@ -35,11 +35,11 @@ class StoredCell:
 
     def explain(self) -> Explanation:
         """Return whether its result would be reused, and what differs."""
-        from tactbench.core.matrix.key_book import KeyBook
+        from tactbench.core.matrix.key_book import book_of
         from tactbench.core.matrix.why import explain
 
         known = str(self.row["key"]) if self.row is not None and self.row["status"] == "done" else ""
-        book = KeyBook(self.store.folder / "cache" / "keys")
+        book = book_of(self.store.folder)
         return explain(self.cell, self.paths, self.requests, self.keys, self.recorded, book, self.store, known)
 
 

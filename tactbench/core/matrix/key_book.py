@@ -15,8 +15,9 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -82,6 +83,25 @@ class KeyBook:
             return
         known.update((line["name"], line) for line in lines)
 
+    def take(self, books: Iterable[tuple[KeyBook, Collection[str]]]) -> None:
+        """Add what each of other books says of its keys; of two lines on one key the one whose text is smaller."""
+        found: dict[str, tuple[tuple[str, int], Entry]] = {}
+        for book, keys in books:
+            parts: dict[str, dict[str, Any]] = {}
+            """Many lines share one: it is read once, and written once."""
+            for line in book._read().values():
+                key = str(line["key"])
+                if key not in keys:
+                    continue
+                for digest in map(str, (line.get("fixed"), line.get("data"))):
+                    if digest not in parts:
+                        parts[digest] = book._part(digest)
+                fixed, data = (parts[str(line.get(name))] for name in ("fixed", "data"))
+                order = json.dumps(line, sort_keys=True), (not fixed) + (not data)
+                if key not in found or order < found[key][0]:
+                    found[key] = order, Entry(str(line["name"]), key, line["configuration"], Fixed("", fixed), data)
+        self.write(entry for _, entry in sorted(found.values(), key=itemgetter(0)))
+
     def sections(self, name: str, key: str = "") -> Sections | None:
         """Return what went into `key`, or into the latest key of that name; None if the book does not know."""
         lines = self._read()
@@ -96,7 +116,8 @@ class KeyBook:
             return {}
         path = self.folder / f"{digest}.json"
         try:
-            found = json.loads(read_regular(path, _LARGEST))
+            content = read_regular(path, _LARGEST)
+            found = json.loads(content) if sha256(content)[:KEY_DIGITS] == digest else None
         except (OSError, ValueError, RecursionError):
             found = None
         return found if isinstance(found, dict) and all(isinstance(one, dict) for one in found.values()) else {}
@@ -118,6 +139,11 @@ class KeyBook:
                 except (ValueError, KeyError, TypeError, RecursionError):
                     continue  # a line cut short
         return self._lines
+
+
+def book_of(folder: Path) -> KeyBook:
+    """Return the book of a result folder, which may have none yet."""
+    return KeyBook(folder / "cache" / "keys")
 
 
 def recording_names(paths: Sequence[Path]) -> list[str]:

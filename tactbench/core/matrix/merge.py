@@ -11,6 +11,7 @@ rule chooses the largest of an order or refuses, merging is idempotent, commutat
 - Two of one key that differ in a score, or two of one name with different keys, contradict each other: refused.
 - Recordings of one name hold the same content, else refused; of their bytes, which also tell when they were made, the
   smaller digest is kept.
+- Of what the folders' books say of one key, the smaller text.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tactbench.core.errors import FolderError, FormatError, MissingRecordingError
+from tactbench.core.matrix.key_book import book_of
 from tactbench.core.matrix.store import Row, Store
 from tactbench.core.matrix.store.disk import sync_path, writing
 from tactbench.core.matrix.store.ledger import NAME, Entry, whole_text
@@ -66,6 +68,8 @@ class _Union:
     """By key: whose shard is taken."""
     names: dict[str, _Found] = field(default_factory=dict)
     """By cell: a line that gives a finished cell this name."""
+    finished_in: dict[Path, set[str]] = field(default_factory=dict)
+    """Keys by folder."""
     against: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
 
@@ -96,6 +100,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
         if not entries:
             troubles = f" ({'; '.join(store.troubles)})" if store.troubles else ""
             raise FolderError(f"There are no results in {store.folder}{troubles}.", hint="Name what `run --out` wrote.")
+        union.finished_in[store.folder] = {entry.key for entry in entries if entry.shard is not None}
         for entry in entries:
             _add(union, _Found(entry, store))
         union.left_out += [f"{store.folder}: {trouble}" for trouble in store.troubles]
@@ -119,6 +124,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
         for relative, (_, path) in recordings.items():
             _link(path, aside / "recordings" / relative)
         (aside / NAME).write_text(whole_text(entries), encoding="utf-8")
+        book_of(aside).take((book_of(store.folder), _keys(store, union)) for store in stores)
         if also is not None:
             also(aside)
     return Merged(tuple(dict(entry.row) for entry in entries), len(recordings), tuple(union.left_out))
@@ -187,6 +193,12 @@ def _difference(one: Row, other: Row) -> str:
         if name not in NAMING and canonical(one.get(name)) != canonical(other.get(name)):
             return f"has two values of {name!r} under one key: {short(other.get(name))} and {short(one.get(name))}"
     return ""
+
+
+def _keys(store: Store, union: _Union) -> set[str]:
+    """Return the keys of a folder's finished cells and recordings."""
+    recordings = (store.folder / "recordings").rglob("*.h5")
+    return {*union.finished_in[store.folder], *(path.stem[-12:] for path in recordings)}
 
 
 def _provenances(stores: Iterable[Store]) -> dict[str, str]:

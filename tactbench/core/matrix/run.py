@@ -13,7 +13,7 @@ from typing import Any
 from tactbench.core.matrix.context import RunContext
 from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.evaluate import evaluate_all
-from tactbench.core.matrix.key_book import KeyBook
+from tactbench.core.matrix.key_book import book_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan_recordings import plan_run, request_key
 from tactbench.core.matrix.progress import Progress, Silence
@@ -97,7 +97,7 @@ def run_matrix(
         cells, recording_plan = plan_run(matrix, registry, keys, store, recordings, recorded, choice.limits)
         provenance = gather(keys.sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
         run = RunContext(
-            store, keys, KeyBook(store.folder / "cache" / "keys"), recording_plan, recorded, choice, progress,
+            store, keys, book_of(store.folder), recording_plan, recorded, choice, progress,
             made_by=store.begin(provenance),
         )  # fmt: skip
         rows: list[Row] = []

@@ -56,6 +56,23 @@ def test_a_section_that_is_lost_or_leads_elsewhere_is_empty(tmp_path):
         assert "secret" not in json.dumps(KeyBook(book).sections("cell"))
 
 
+def test_books_taken_together_hold_the_wanted_keys_of_all_in_whatever_order(tmp_path):
+    KeyBook(tmp_path / "a").write([entry("one", "1" * 32), entry("two", "2" * 32), entry("old", "0" * 32)])
+    KeyBook(tmp_path / "b").write([entry("two", "2" * 32), entry("three", "3" * 32, fixed=Fixed("g", {"task": {}}))])
+    KeyBook(tmp_path / "c").write([entry("one", "1" * 32)])
+    for part in (tmp_path / "c").glob("?" * 32 + ".json"):
+        part.write_text('{"task": {"altered": 1}}')  # not what its name says: as if it were lost
+    found = []
+    for order in ("abc", "cba", "bcab"):
+        KeyBook(tmp_path / order).take((KeyBook(tmp_path / name), {"1" * 32, "2" * 32, "3" * 32}) for name in order)
+        found.append({path.name: path.read_bytes() for path in (tmp_path / order).iterdir()})
+    assert found[0] == found[1] == found[2]
+    book = KeyBook(tmp_path / "abc")
+    assert book.sections("one") == book.sections("two") == sections()
+    assert book.sections("three") == {"task": {}, "configuration": {"seed": 1}, "data": DATA}
+    assert book.sections("old") is None
+
+
 def test_a_folder_that_cannot_be_written_costs_nothing(tmp_path):
     (tmp_path / "file").write_text("")
     KeyBook(tmp_path / "file" / "keys").write([entry()])

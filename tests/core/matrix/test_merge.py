@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 
 from tactbench.core.errors import FolderError
 from tactbench.core.leaderboard.levels import OTHER_VERSION, write_level
+from tactbench.core.matrix.key_book import Entry, book_of
+from tactbench.core.matrix.keys import Fixed
 from tactbench.core.matrix.merge import merge
 from tactbench.core.matrix.store import Store
 from tactbench.core.recording.writer import RecordingWriter
@@ -232,3 +234,21 @@ def test_its_tables_are_those_that_leaderboard_shows_over_replicates_and_with_le
     (row,) = json.loads(written)
     assert (row["n_replicates"], row["shown"]["level"]) == (2, OTHER_VERSION)
     assert verbs("leaderboard", "both", "--format", "json").stdout == written
+
+
+def test_what_went_into_the_keys_of_its_cells_and_recordings_is_known(tmp_path):
+    fixed = Fixed("f", {"versions": {"numpy": "2.0"}})
+    for name, cell in (("one", "a"), ("two", "b")):
+        store = Store(tmp_path / name)
+        store.keep(key(cell), done(cell), {"test": answers(3)})
+        record(store.folder / "recordings" / "made" / f"press-{key(cell)[:12]}.h5")
+        entries = [Entry(cell, key(cell), {"seed": 1}, fixed), Entry("of another", key("x"), {"seed": 2}, fixed)]
+        book_of(store.folder).write([*entries, Entry(f"recording {cell}", key(cell)[:12], {"seed": 3}, fixed)])
+    merge([tmp_path / "one", tmp_path / "two"], tmp_path / "both")
+    book = book_of(tmp_path / "both")
+    for cell in "ab":
+        assert book.sections(cell, key(cell)) == {**fixed.sections, "configuration": {"seed": 1}}
+        assert book.sections("", key(cell)[:12]) == {**fixed.sections, "configuration": {"seed": 3}}
+    assert book.sections("of another", key("x")) is None
+    merge([tmp_path / "two", tmp_path / "both", tmp_path / "one"], tmp_path / "again")
+    assert tree(tmp_path / "again") == tree(tmp_path / "both")
