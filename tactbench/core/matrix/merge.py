@@ -16,6 +16,7 @@ rule chooses the largest of an order or refuses, merging is idempotent, commutat
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import os
 import shutil
@@ -26,7 +27,7 @@ from pathlib import Path
 
 from tactbench.core.errors import FolderError, FormatError, MissingRecordingError
 from tactbench.core.matrix.key_book import book_of
-from tactbench.core.matrix.store import Row, Store
+from tactbench.core.matrix.store import Row, Store, leftovers
 from tactbench.core.matrix.store.disk import sync_path, writing
 from tactbench.core.matrix.store.ledger import NAME, Entry, whole_text
 from tactbench.core.matrix.store.rows import NAMING, named
@@ -261,9 +262,13 @@ def _link(path: Path, target: Path) -> None:
 @contextmanager
 def _made(out: Path) -> Iterator[Path]:
     """Give a folder to fill, which becomes `out` when all went well and is removed when not."""
-    aside = out.absolute().with_name(f".{out.absolute().name}.merging")
+    named = f".{out.absolute().name}."
+    aside = out.absolute().with_name(f"{named}{os.getpid()}.merging")
     with writing(out):
-        shutil.rmtree(aside, ignore_errors=True)  # of a merge that was killed
+        for path in aside.parent.glob(f"{glob.escape(named)}*.merging"):
+            process = path.name.removeprefix(named).removesuffix(".merging")
+            if process.isdecimal() and (path == aside or not leftovers.is_alive(int(process))):
+                shutil.rmtree(path, ignore_errors=True)  # of a merge that was killed
         try:
             for part in ("cells", "provenance", "recordings", "cache"):
                 (aside / part).mkdir(parents=True, exist_ok=True)

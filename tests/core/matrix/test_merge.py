@@ -201,9 +201,28 @@ def test_a_merge_that_was_killed_leaves_no_folder_and_the_next_one_clears_up(tmp
     dead = subprocess.run([sys.executable, "-c", code, str(folder), str(tmp_path / "out")])
     assert dead.returncode == -9
     assert not (tmp_path / "out").exists()
-    assert len(list(tmp_path.glob(".out.merging"))) == 1
+    assert len(list(tmp_path.glob(".out.*.merging"))) == 1
     merge([folder], tmp_path / "out")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one", "out"]
+
+
+def test_of_two_at_once_into_one_folder_the_first_to_end_makes_it_of_its_own_files(tmp_path):
+    for name, cell in (("one", "a"), ("two", "b")):
+        Store(tmp_path / name).keep(key(cell), done(cell), {"test": answers(3)})
+    code = (
+        "import sys\nfrom pathlib import Path\nfrom tactbench.core.matrix.merge import merge\n"
+        "def wait(_):\n    print('filled', flush=True)\n    sys.stdin.readline()\n"
+        "merge([Path(sys.argv[1])], Path(sys.argv[2]), also=wait)\n"
+    )
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", code, str(tmp_path / "one"), str(out)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == b"filled\n"
+        with pytest.raises(FolderError):
+            merge([tmp_path / "two"], out, also=lambda _: other.communicate(b"\n", timeout=60))
+    assert other.returncode == 0
+    assert [row["cell"] for row in Store(out).rows()] == ["a"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one", "out", "two"]
 
 
 def test_the_verb_merges_and_its_folder_can_be_shown(shell):

@@ -22,7 +22,7 @@ def sweep(folder: Path) -> None:
     for place in (folder, folder / "cells", folder / "provenance", folder / "cache"):
         for path in place.glob(".*.partial"):
             named = _ASIDE.fullmatch(path.name)
-            if named and not _alive(int(named[1])):
+            if named and not is_alive(int(named[1])):
                 _remove(path)
     for path in (folder / "recordings").glob("*/*"):
         if path.suffix != ".h5" and not path.parent.is_symlink() and _is_over(path):
@@ -45,7 +45,8 @@ def _remove(path: Path) -> None:
             path.unlink()
 
 
-def _alive(process: int) -> bool:
+def is_alive(process: int) -> bool:
+    """Return whether a process of this machine has not ended."""
     try:
         os.kill(process, 0)
         state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]  # proc_pid_stat(5)
