@@ -446,6 +446,7 @@ def _lawicel(one: CanFrame) -> bytes:
     bus = _adapter()
     try:
         port = bus.serialPortOrig
+        port.timeout = 30.0  # as a whole: a busy machine takes longer for a line than the millisecond it is by default
         port.reset_input_buffer()
         bus.send(can.Message(arbitration_id=one.id, data=one.data, is_extended_id=one.extended))
         text: bytes = port.read_until(b"\r")
