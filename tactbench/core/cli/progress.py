@@ -26,7 +26,8 @@ class Display(Progress, Protocol):
 _QUIET_S = 5.0
 """A log gets no further line of a stage sooner."""
 _FEW = 10
-"""Stages of so few steps have a line for each."""
+"""Stages of so few steps have a line for each, and no estimate of the time to go: a forest and a mean differ by orders
+of magnitude."""
 
 
 @contextmanager
@@ -84,7 +85,7 @@ class Lines:
             self._printed_s = now_s
             texts = [f"{self._stopped} stopped"] if self._stopped else []
             left = self._total - self._done
-            if left:
+            if left and self._total > _FEW:
                 texts.append(f"about {duration((now_s - self._began_s) / self._done * left)} to go")
             more = f" ({', '.join(texts)})" if texts else ""
             remark(f"{self._stage}: {self._done}/{self._total} {what}{more}")
@@ -131,7 +132,7 @@ class _Bar:
             MofNCompleteColumn(),
             TextColumn("{task.fields[stopped]}", markup=False, style="red"),
             TimeElapsedColumn(),
-            TimeRemainingColumn(),
+            *([TimeRemainingColumn()] if total > _FEW else []),
             TextColumn("{task.fields[now]}", markup=False),
         )
         # The terminal is handed over as it is: rich must not take over streams that cells print to.

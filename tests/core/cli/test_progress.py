@@ -31,6 +31,20 @@ def test_a_line_a_tenth_says_how_far_how_many_stopped_and_how_long_still(capsys)
     assert shown[-1] == "evaluating: 40/40 cell 39 (2 stopped)"
 
 
+def test_of_few_steps_each_has_a_line_and_none_tells_how_long_others_take(capsys):
+    lines = Lines(Clock())
+    lines.begin("evaluating", 4)
+    for number in range(4):
+        lines.advance(f"cell {number}", stopped=number == 1)
+    shown = capsys.readouterr().err.splitlines()
+    assert shown[1:] == [
+        "evaluating: 1/4 cell 0",
+        "evaluating: 2/4 cell 1 (1 stopped)",
+        "evaluating: 3/4 cell 2 (1 stopped)",
+        "evaluating: 4/4 cell 3 (1 stopped)",
+    ]
+
+
 def test_ten_thousand_cells_are_ten_lines(capsys):
     lines = Lines(Clock())
     lines.begin("evaluating", 10_000)
