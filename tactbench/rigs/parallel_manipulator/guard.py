@@ -305,7 +305,8 @@ class LocalGuard:
             return
         self._closed = True
         try:
-            self.disarm()
+            if self._watch is not None:  # else it was not started: there is nothing to disarm
+                self.disarm()
         finally:
             try:
                 self._motor.close()

@@ -5,11 +5,12 @@ import re
 import selectors
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tactbench.plugin import UsageError
+from tactbench.plugin import TactbenchError, UsageError
 from tactbench.rigs.parallel_manipulator.guard import reaction
 from tactbench.rigs.parallel_manipulator.guard_interface import (
     Beat,
@@ -80,6 +81,16 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
         assert made.guard.counts()["guard"]["beats"] == press.sequence
         assert made.guard.disarm().state is GuardState.IDLE
         assert made.out
+
+
+@pytest.mark.parametrize("kind", ["local", "process"])
+def test_a_device_that_does_not_answer_at_the_start_is_what_is_told(kind, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+    with (
+        pytest.raises(TactbenchError, match="The force sensor did not answer"),
+        rig(kind, tmp_path, force_driver="tests.rigs.parallel_manipulator.broken_force:build_silent"),
+    ):
+        pass
 
 
 # In this process, and in one that is started once ---------------------------------------------------------------------
