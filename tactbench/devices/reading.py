@@ -180,17 +180,19 @@ class Reading:
         """By stream: what was dropped because the caller was behind."""
         return {name: stream.queue.loss for name, stream in self._streams.items()}
 
-    def blocks(self, duration_s: float) -> Iterator[Block]:
+    def blocks(self, duration_s: float, is_over: Callable[[], bool] = lambda: False) -> Iterator[Block]:
         """Yield blocks of all streams until the time is over or a device has ended the reading; then stop the devices.
 
         Parameters
         ----------
         duration_s
             Seconds of the clock from the first block asked for; may be infinite.
+        is_over
+            Asked at every block's time, whether or not a device has sent anything: true ends the reading too.
         """
         now_ns = self._clock()
         end_ns = now_ns + (math.inf if duration_s == math.inf else round(1e9 * duration_s))
-        while not self._over.is_set() and now_ns < end_ns:
+        while not (self._over.is_set() or is_over()) and now_ns < end_ns:
             until_ns = int(min(now_ns + round(1e9 * self._block_s), end_ns))
             if self._advance is None:
                 self._over.wait((until_ns - now_ns) / 1e9)

@@ -1,5 +1,9 @@
 """A press through real bytes in virtual time: emulated motor, force sensor and fingertip on a spring."""
 
+import re
+from contextlib import contextmanager
+from itertools import islice
+
 import numpy as np
 import pytest
 
@@ -12,6 +16,7 @@ from tactbench.rigs.parallel_manipulator.press import PressState
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.settings import settings_of
 from tactbench.rigs.parallel_manipulator.worst_case import first_touch_n
+from tactbench.sensors.icub.emulator import Bus
 from tests.rigs.parallel_manipulator.spring import SpringRig, file_of, on_spring, pressed, ramp, with_joints
 
 QUICK = {
@@ -145,6 +150,41 @@ def test_scenes_that_the_rig_cannot_press_are_refused():
     off = ramp().placement.model_copy(update={"x": assumed(5.0, "mm", "a test")})
     with pytest.raises(NotApplicable, match="reach"):
         pressed(rig, ramp().model_copy(update={"placement": off}))
+
+
+@contextmanager
+def silenced(monkeypatch):
+    """Let the iCub's boards send nothing, for at most 5 s of their time: who waits longer waits for ever."""
+    with monkeypatch.context() as patch:
+        begins_s = []
+
+        def poll(self, now_s):
+            begins_s.append(now_s)
+            assert now_s - begins_s[0] < 5.0
+            return []
+
+        patch.setattr(Bus, "poll", poll)
+        yield
+
+
+def test_a_sensor_that_sends_nothing_ends_the_search_for_the_surface(monkeypatch):
+    with silenced(monkeypatch), pytest.raises(RigError, match=r"not found: the sensor has sent nothing for 1\d\d ms"):
+        on_spring(5.0, ramp(1.0, 0.3, 1.0), **RARER)
+
+
+def test_a_sensor_that_falls_silent_ends_the_press_and_the_motor_is_out(monkeypatch):
+    rig = ParallelManipulator(file_of(**RARER), None, SpringRig(5.0))
+    with rig.open(load_registry().sensors["icub"], ramp(1.0, 0.3, 2.0), seed=1) as acquisition:
+        blocks = iter(acquisition)
+        first = list(islice(blocks, 20))
+        with silenced(monkeypatch):
+            rest = list(blocks)
+        assert acquisition.control.press.over
+        assert acquisition.control.report.state is GuardState.RETREATED
+    assert re.match(r"the sensor has sent nothing for 1\d\d ms", acquisition.ended)
+    begin_s = 1e-9 * acquisition.begin_ns
+    last_s = {block.stream: 1e-9 * block.t_ns[-1] - begin_s for block in (*first, *rest)}
+    assert 0.1 < last_s["force_torque"] < 2.0
 
 
 def test_the_same_seed_gives_the_same_bytes():
