@@ -64,7 +64,7 @@ def acquire(
     Raises
     ------
     RigError, NotApplicable, LinkError
-        If the rig cannot carry out the scene, or ended before its time.
+        If the rig cannot carry out the scene, or ended before its time, or a device sent nothing.
     KeyboardInterrupt
         If it was interrupted.
     RecordingError
@@ -97,6 +97,7 @@ def acquire(
                         f"The scene {scene.name!r} ended before its time: {ended}.",
                         hint="Look at the rig, and record it again.",
                     )
+                _check_not_silent(acquisition, writer.rows)
             except (KeyboardInterrupt, LinkError, RigError) as error:
                 ignore_interrupts()
                 alarm = _stopped(acquisition, error)
@@ -108,6 +109,19 @@ def acquire(
                 raise
             _conclude(writer, acquisition, descriptor, {**provenance, key: spent})
     return Acquired(writer.meta, writer.content_digest)
+
+
+def _check_not_silent(acquisition: Acquisition, rows: Mapping[str, int]) -> None:
+    """Raise RigError if devices were read, and nothing came of the sensor or nothing of the reference."""
+    if not hasattr(acquisition, "stream_counts"):
+        return
+    for streams in (acquisition.streams, acquisition.reference):
+        names = [stream.name for stream in streams]
+        if names and not any(rows.get(name) for name in names):
+            raise RigError(
+                f"Nothing came of {', '.join(names)} in the whole scene.",
+                hint="Is the device on, connected and set to the same speed? `tactbench doctor` asks it.",
+            )
 
 
 def _one_thread(descriptor: RigDescriptor) -> AbstractContextManager[Any]:

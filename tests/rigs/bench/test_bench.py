@@ -13,6 +13,7 @@ from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig_file import EmulationSettings
 from tactbench.plugin import ForceRamp, Quality, RigContext, Scene, load_object, load_registry
 from tactbench.plugin.devices import DeviceEntry, ForceEntry, RigFile
+from tactbench.sensors.icub.emulator import Bus
 
 REGISTRY = load_registry()
 SECONDS = 2.0
@@ -183,6 +184,18 @@ def test_a_pulled_cable_ends_the_scene_and_keeps_what_there_is(tmp_path, part):
     meta, streams = read(tmp_path / "p.h5")
     assert meta.excluded.startswith("interrupted: ")
     assert 10 < len(streams["taxels"].data) < 50 * SECONDS
+
+
+def test_a_sensor_that_sends_nothing_is_told_and_the_recording_left_out_of_every_evaluation(tmp_path, monkeypatch):
+    monkeypatch.setattr(Bus, "poll", lambda self, now_s: [])
+    path = tmp_path / "press.h5"
+    error = press(path, rig_file())
+    assert error is not None
+    assert "Nothing came of taxels in the whole scene" in error.message
+    assert "tactbench doctor" in error.hint
+    meta, streams = read(path)
+    assert meta.excluded.startswith("interrupted: Nothing came of taxels")
+    assert set(streams) == {"force_torque"}
 
 
 def test_a_force_sensor_mounted_the_other_way_gives_the_same_force(tmp_path):
