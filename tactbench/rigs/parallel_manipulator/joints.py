@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -12,8 +13,9 @@ from tactbench.plugin.devices import Driver
 from tactbench.rigs.parallel_manipulator.geometry import Delta, LinearDelta
 from tactbench.rigs.parallel_manipulator.kinematics import forward, inverse
 from tactbench.rigs.parallel_manipulator.motor.driver import FaulhaberDriver
+from tactbench.rigs.parallel_manipulator.motor.errors import MotorError
 from tactbench.rigs.parallel_manipulator.press_moves import ManipulatorMoves, Move, Place, plan_presses
-from tactbench.rigs.parallel_manipulator.settings import RigSettings
+from tactbench.rigs.parallel_manipulator.settings import JOINTS, RigSettings
 from tactbench.rigs.parallel_manipulator.trajectory import straight_move
 from tactbench.rigs.parallel_manipulator.workspace import Workspace
 
@@ -68,27 +70,28 @@ class Joints:
         workspace = workspace_of(settings)
         if workspace is None or not isinstance(workspace.delta, LinearDelta):
             raise UsageError("A fixed manipulator has no joints.", hint="Leave them out of the rig file.")
-        self._drivers: list[FaulhaberDriver] = []
-        for driver in drivers:
+        self._drivers: dict[str, FaulhaberDriver] = {}
+        for name, driver in zip(JOINTS, drivers, strict=True):
             if not isinstance(driver, FaulhaberDriver):
                 raise UsageError("The manipulator's joints are not faulhaber devices.", hint="See docs/hardware.md.")
-            self._drivers.append(driver)
+            self._drivers[name] = driver
         self._settings, self._workspace = settings, workspace
         self._delta: Delta = workspace.delta
         self.place_m: Place = (math.nan,) * 3
 
     def start(self) -> None:
         """Set the drives up, home them and give them power; raises as drivers do, and NoClosureError."""
-        for driver in self._drivers:
-            driver.identify()
-            driver.start()
-            driver.home()
-            driver.enable()
+        for name, driver in self._drivers.items():
+            with _named(name):
+                driver.identify()
+                driver.start()
+                driver.home()
+                driver.enable()
         self.place_m = self.measured_m()
 
     def measured_m(self) -> Place:
         """Return where the platform is by the joints' own answers [m]."""
-        q = np.array([driver.locate() for driver in self._drivers])
+        q = np.array([self._locate(name) for name in JOINTS])
         x, y, z = forward(self._delta, q).tolist()
         return x, y, z
 
@@ -136,8 +139,23 @@ class Joints:
             )
 
     def _to(self, q: Sequence[float]) -> None:
-        for driver, position_m in zip(self._drivers, q, strict=True):
-            driver.move_to(position_m)
-        while any(driver.moving for driver in self._drivers):
-            for driver in self._drivers:
-                driver.update(WAIT_S)
+        for (name, driver), position_m in zip(self._drivers.items(), q, strict=True):
+            with _named(name):
+                driver.move_to(position_m)
+        while any(driver.moving for driver in self._drivers.values()):
+            for name, driver in self._drivers.items():
+                with _named(name):
+                    driver.update(WAIT_S)
+
+    def _locate(self, name: str) -> float:
+        with _named(name):
+            return self._drivers[name].locate()
+
+
+@contextmanager
+def _named(joint: str) -> Iterator[None]:
+    """Say which joint it is that an error is of: they have drives of one kind."""
+    try:
+        yield
+    except MotorError as error:
+        raise type(error)(f"{joint}: {error.message}", hint=error.hint) from error

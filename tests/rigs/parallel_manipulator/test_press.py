@@ -12,6 +12,8 @@ from tactbench.plugin.devices import RigFile
 from tactbench.plugin.simulation import Slide
 from tactbench.rigs.parallel_manipulator.guard_interface import GuardState, Trigger
 from tactbench.rigs.parallel_manipulator.loop_stability import ramp_error_n
+from tactbench.rigs.parallel_manipulator.motor.emulator import MotorEmulator
+from tactbench.rigs.parallel_manipulator.motor.errors import AnswerMissingError
 from tactbench.rigs.parallel_manipulator.press import PressState
 from tactbench.rigs.parallel_manipulator.rig import ParallelManipulator
 from tactbench.rigs.parallel_manipulator.settings import settings_of
@@ -209,3 +211,22 @@ def test_the_manipulator_goes_to_the_scenes_place_before_it_presses():
     # Home, retreat, and only then anything else: the guard was not armed while the platform moved.
     events = [text for name, text in drawn.items() if name.startswith("event")]
     assert [text.split(": ")[1] for text in events][:5] == ["started", "homing", "armed", "disarmed", "armed"]
+
+
+def test_of_four_drives_of_one_kind_the_error_says_which_joint_is_silent(monkeypatch):
+    feed, poll, motors, silent = MotorEmulator.feed, MotorEmulator.poll, [], []
+
+    def fed(self, piece, now_s):
+        if self not in motors:
+            motors.append(self)
+        # The third that is spoken to, after the linear motor and joint-1, sets about homing.
+        if motors.index(self) == 2 and b"AC" in piece:
+            silent.append(self)
+        sent = feed(self, piece, now_s)
+        return [] if self in silent else sent
+
+    monkeypatch.setattr(MotorEmulator, "feed", fed)
+    monkeypatch.setattr(MotorEmulator, "poll", lambda self, now_s: [] if self in silent else poll(self, now_s))
+    rig = ParallelManipulator(RigFile.model_validate(with_joints(**RARER)), None, SpringRig(5.0))
+    with pytest.raises(AnswerMissingError, match="joint-2: The motor's drive did not answer AC"):
+        pressed(rig, ramp(1.0, 0.3, 1.0))
