@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tests.conftest import Verbs
+from tests.conftest import ROOT, Verbs
 from tests.core.matrix.plugin_packages import write_acme
 
 RUN = (
@@ -162,7 +162,7 @@ def test_a_cached_run_loads_no_numerical_library(here):
         "try:\n    main()\nexcept SystemExit as end:\n    assert end.code == 0\n"
         "print(sorted({'numpy', 'h5py', 'scipy', 'sklearn', 'matplotlib', 'pandas'} & set(sys.modules)))\n"
     )
-    env = {**os.environ, "PYTHONPATH": str(here.folder / "site")}
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(here.folder / "site"), str(ROOT)])}
     # The copied recordings are read once: they are other files than those that the run remembered.
     here(*RUN[:-2], "--format", "csv")
     done = subprocess.run([sys.executable, "-c", text], cwd=here.folder, env=env, capture_output=True, text=True,

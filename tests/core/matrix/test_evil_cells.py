@@ -12,7 +12,7 @@ import h5py
 import pytest
 
 from tactbench.core.matrix.store import Store
-from tests.conftest import Shell, Verbs
+from tests.conftest import ROOT, THIRD_PARTY, Shell, Verbs
 from tests.core.cost.test_ladder import presses
 from tests.core.pool.patience import ending, until
 
@@ -251,7 +251,7 @@ def test_number_of_jobs_and_order_change_no_score(alone, tmp_path):
 
 def test_a_parent_that_is_killed_takes_its_cells_with_it(alone, tmp_path):
     (tmp_path / "shelf").symlink_to(alone[1])
-    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2] / "third_party" / "evil")}
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(THIRD_PARTY / "evil"), str(ROOT)])}
     command = [sys.executable, "-m", "tactbench", *ASKED, "--estimator", "evil-hang", "--jobs", "2"]
     with ending(command, cwd=tmp_path, env=env, stderr=subprocess.PIPE, text=True) as running:
         for line in running.stderr:

@@ -116,7 +116,8 @@ def test_a_strangers_plugin_is_told_with_its_source_and_its_checkout(tmp_path):
     text = "import json; from tactbench.core.provenance.gather import gather; print(json.dumps(gather()['plugins']))"
 
     def told():
-        env = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+        path = os.pathsep.join([str(tmp_path), str(ROOT)])
+        env = {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
         done = subprocess.run([sys.executable, "-c", text], check=True, capture_output=True, text=True, env=env)
         return json.loads(done.stdout)
 
