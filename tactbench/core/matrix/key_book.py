@@ -146,6 +146,11 @@ def book_of(folder: Path) -> KeyBook:
     return KeyBook(folder / "cache" / "keys")
 
 
+def recording_key(path: Path) -> str:
+    """Return the key of a recording of a run, which its name ends with."""
+    return path.stem[-12:]
+
+
 def recording_names(paths: Sequence[Path]) -> list[str]:
     """Return names of recordings that stay the same when they are made anew, each once."""
     above = Path(os.path.commonpath([path.parent for path in paths])) if paths else Path()

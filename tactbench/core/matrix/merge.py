@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tactbench.core.errors import FolderError, FormatError, MissingRecordingError
-from tactbench.core.matrix.key_book import book_of
+from tactbench.core.matrix.key_book import book_of, recording_key
 from tactbench.core.matrix.store import Row, Store, leftovers
 from tactbench.core.matrix.store.disk import sync_path, writing
 from tactbench.core.matrix.store.ledger import NAME, Entry, whole_text
@@ -69,8 +69,8 @@ class _Union:
     """By key: whose shard is taken."""
     names: dict[str, _Found] = field(default_factory=dict)
     """By cell: a line that gives a finished cell this name."""
-    finished_in: dict[Path, set[str]] = field(default_factory=dict)
-    """Keys by folder."""
+    held: dict[Path, set[str]] = field(default_factory=dict)
+    """By folder: keys of its finished cells and recordings."""
     against: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
 
@@ -101,7 +101,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
         if not entries:
             troubles = f" ({'; '.join(store.troubles)})" if store.troubles else ""
             raise FolderError(f"There are no results in {store.folder}{troubles}.", hint="Name what `run --out` wrote.")
-        union.finished_in[store.folder] = {entry.key for entry in entries if entry.shard is not None}
+        union.held[store.folder] = {entry.key for entry in entries if entry.shard is not None}
         for entry in entries:
             _add(union, _Found(entry, store))
         union.left_out += [f"{store.folder}: {trouble}" for trouble in store.troubles]
@@ -125,7 +125,7 @@ def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | 
         for relative, (_, path) in recordings.items():
             _link(path, aside / "recordings" / relative)
         (aside / NAME).write_text(whole_text(entries), encoding="utf-8")
-        book_of(aside).take((book_of(store.folder), _keys(store, union)) for store in stores)
+        book_of(aside).take((book_of(folder), keys) for folder, keys in union.held.items())
         if also is not None:
             also(aside)
     return Merged(tuple(dict(entry.row) for entry in entries), len(recordings), tuple(union.left_out))
@@ -196,12 +196,6 @@ def _difference(one: Row, other: Row) -> str:
     return ""
 
 
-def _keys(store: Store, union: _Union) -> set[str]:
-    """Return the keys of a folder's finished cells and recordings."""
-    recordings = (store.folder / "recordings").rglob("*.h5")
-    return {*union.finished_in[store.folder], *(path.stem[-12:] for path in recordings)}
-
-
 def _provenances(stores: Iterable[Store]) -> dict[str, str]:
     found: dict[str, str] = {}
     for store in stores:
@@ -231,6 +225,7 @@ def _recordings(stores: Iterable[Store], union: _Union) -> dict[Path, tuple[str,
             if contents.setdefault(relative, content) != content:
                 union.against.append(f"the recording {relative} holds other data in {store.folder}")
                 continue
+            union.held[store.folder].add(recording_key(path))
             bytes_digest = _digest(path)
             if relative not in found or bytes_digest < found[relative][0]:
                 found[relative] = (bytes_digest, path)
@@ -262,12 +257,11 @@ def _link(path: Path, target: Path) -> None:
 @contextmanager
 def _made(out: Path) -> Iterator[Path]:
     """Give a folder to fill, which becomes `out` when all went well and is removed when not."""
-    named = f".{out.absolute().name}."
-    aside = out.absolute().with_name(f"{named}{os.getpid()}.merging")
+    name = out.absolute().name
+    aside = out.absolute().with_name(f".{name}.{os.getpid()}.merging")
     with writing(out):
-        for path in aside.parent.glob(f"{glob.escape(named)}*.merging"):
-            process = path.name.removeprefix(named).removesuffix(".merging")
-            if process.isdecimal() and (path == aside or not leftovers.is_alive(int(process))):
+        for path in aside.parent.glob(f".{glob.escape(name)}.*.merging"):
+            if path == aside or leftovers.is_left(path):
                 shutil.rmtree(path, ignore_errors=True)  # of a merge that was killed
         try:
             for part in ("cells", "provenance", "recordings", "cache"):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tactbench.core.errors import TactbenchError
-from tactbench.core.matrix.key_book import Entry, KeyBook, Sections, recording_names
+from tactbench.core.matrix.key_book import Entry, KeyBook, Sections, recording_key, recording_names
 from tactbench.core.matrix.keys import Fixed, Keys, Section, configuration_of
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.matrix.plan_recordings import RecordingRequest
@@ -35,7 +35,7 @@ def recording_entry(request: RecordingRequest, keys: Keys) -> Entry:
     name = f"recording {request.sensor} {request.rig} {request.scene.name} {request.role} {request.seed}"
     scene = {"role": request.role, "seed": request.seed, "scene": request.scene.model_dump()}
     maker = keys.maker(request.sensor, request.rig, request.rig_file, request.scene.indenter.shape)
-    return Entry(name, request.path.stem[-12:], scene, maker)
+    return Entry(name, recording_key(request.path), scene, maker)
 
 
 def cell_entries(

@@ -5,7 +5,6 @@ import re
 import selectors
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +23,7 @@ from tactbench.rigs.parallel_manipulator.guard_interface import (
 )
 from tactbench.rigs.parallel_manipulator.motor.profile import FaulhaberOptions
 from tactbench.rigs.parallel_manipulator.worst_case import first_touch_n
+from tests.conftest import ROOT
 from tests.rigs.parallel_manipulator.presses import FAULTS, rig
 
 
@@ -85,7 +85,7 @@ def test_a_press_goes_in_holds_and_comes_out(kind, tmp_path):
 
 @pytest.mark.parametrize("kind", ["local", "process"])
 def test_a_device_that_does_not_answer_at_the_start_is_what_is_told(kind, tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
     with (
         pytest.raises(TactbenchError, match="The force sensor did not answer"),
         rig(kind, tmp_path, force_driver="tests.rigs.parallel_manipulator.broken_force:build_silent"),

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from tactbench.core.files import try_lock
 
-_ASIDE = re.compile(r"\..+\.(\d{1,10})\.partial")
-"""Names of files written aside by `tactbench.core.files.replace_file`: hidden, with the writer's process."""
+_ASIDE = re.compile(r"\..+\.(\d{1,10})\.(partial|merging)")
+"""Names of what is written aside by `tactbench.core.files.replace_file` and `tactbench.core.matrix.merge`: hidden, with
+the writer's process."""
 
 
 def sweep(folder: Path) -> None:
@@ -21,12 +22,17 @@ def sweep(folder: Path) -> None:
     """
     for place in (folder, folder / "cells", folder / "provenance", folder / "cache"):
         for path in place.glob(".*.partial"):
-            named = _ASIDE.fullmatch(path.name)
-            if named and not is_alive(int(named[1])):
+            if is_left(path):
                 _remove(path)
     for path in (folder / "recordings").glob("*/*"):
         if path.suffix != ".h5" and not path.parent.is_symlink() and _is_over(path):
             _remove(path)
+
+
+def is_left(path: Path) -> bool:
+    """Return whether a path is that of something written aside by a process of this machine that is no more."""
+    named = _ASIDE.fullmatch(path.name)
+    return named is not None and not _alive(int(named[1]))
 
 
 def _is_over(path: Path) -> bool:
@@ -45,8 +51,7 @@ def _remove(path: Path) -> None:
             path.unlink()
 
 
-def is_alive(process: int) -> bool:
-    """Return whether a process of this machine has not ended."""
+def _alive(process: int) -> bool:
     try:
         os.kill(process, 0)
         state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]  # proc_pid_stat(5)
