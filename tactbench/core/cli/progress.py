@@ -67,7 +67,7 @@ class Lines:
         self._began_s = self._printed_s = 0.0
         self._stage, self._total, self._done, self._stopped = "", 0, 0, 0
 
-    def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
+    def begin(self, stage: str, total: int) -> None:
         """Say what begins."""
         self._stage, self._total, self._done, self._stopped = stage, total, 0, 0
         self._began_s = self._clock()
@@ -111,7 +111,7 @@ class _Bar:
         self._stopped = 0
         self._text = ""
 
-    def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
+    def begin(self, stage: str, total: int) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
         from rich.progress import Progress as RichProgress
@@ -137,7 +137,7 @@ class _Bar:
         )
         # The terminal is handed over as it is: rich must not take over streams that cells print to.
         self._shown = Shown(
-            *columns, console=Console(file=self._terminal), auto_refresh=alone, redirect_stdout=False,
+            *columns, console=Console(file=self._terminal), redirect_stdout=False,
             redirect_stderr=False, transient=True,
         )  # fmt: skip
         self._stopped = 0

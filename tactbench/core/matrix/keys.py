@@ -1,7 +1,7 @@
 """Keys: what decides a recording or a result, and nothing else, in one digest.
 
 What decides is listed in sections: the configuration, the descriptors, the versions, the source of each package, the
-data. A key is a digest of the sections' digests; the sections themselves are what ``tactbench why`` compares.
+data. A key is the digest of its sections; ``tactbench why`` compares the sections of two keys.
 """
 
 from __future__ import annotations
@@ -9,32 +9,20 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
-from tactbench.core.files import sha256
-from tactbench.core.matrix.plan import Cell
+from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.plugins.registry import Registry
-from tactbench.core.provenance.source import Source, SourceDigests, versions
+from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, sources_of, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
 
 _NOT_IN_THE_KEY = {"published", "equivalence", "reference_score", "title", "question", "scenes", "campaigns"}
 """Of a task: what changes no number, and what its recordings say themselves, by their content."""
 
-Section = Mapping[str, Any]
+Sections = dict[str, Any]
 
-KEY_DIGITS = 32
-"""Of a SHA-256, which a key is."""
-
-
-class Fixed(NamedTuple):
-    """Sections that many keys share."""
-
-    digest: str
-    sections: Mapping[str, Section]
-
-
-_canonical = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=True, default=repr).encode
+_canonical = json.JSONEncoder(sort_keys=True, separators=(",", ":"), default=repr).encode
 
 
 @dataclass
@@ -42,100 +30,110 @@ class Keys:
     """The keys of one run: what does not change from cell to cell is worked out once."""
 
     registry: Registry
-    """Where descriptors and their owners are looked up."""
-    sources: SourceDigests = field(default_factory=SourceDigests)
-    """Digests of the owners' packages."""
-    _answers: dict[tuple[str, str], Fixed] = field(default_factory=dict)
-    _makers: dict[tuple[str, str, str, str | None], Fixed] = field(default_factory=dict)
-    _data: dict[tuple[str, ...], str] = field(default_factory=dict)
+    _answers: dict[tuple[str, str], Sections] = field(default_factory=dict)
+    _makers: dict[tuple[str, ...], Sections] = field(default_factory=dict)
 
-    def of_cell(self, cell: Cell, data: Sequence[str]) -> str:
-        """Return the key of a cell's result; `data` are the content digests of its recordings, in order."""
-        several = tuple(data)
-        if several not in self._data:
-            self._data[several] = sha256("\n".join(several))[:KEY_DIGITS]
-        digests = f"{self.shared_by_cells(cell).digest} {self._data[several]}"
-        return sha256(f"{digests} {_canonical(configuration_of(cell))}")[:KEY_DIGITS]
+    def of_cell(self, cell: Cell, data: Mapping[str, str]) -> tuple[str, Sections]:
+        """Return the key of a cell's result and its sections; `data` are the content digests of its recordings."""
+        sections = {**self._answering(cell), "configuration": configuration_of(cell), "data": dict(data)}
+        decisive = {**sections, "data": list(data.values())}
+        return digest_of(_canonical(decisive)), sections
 
-    def shared_by_cells(self, cell: Cell) -> Fixed:
-        """Return what all cells of one task and one estimator share."""
-        pair = cell.task, cell.estimator
+    def _answering(self, cell: Cell) -> Sections:
+        pair = cell.task_key, cell.estimator
         if pair not in self._answers:
-            task, estimator = self.registry.tasks.owned(cell.task), self.registry.estimators.owned(cell.estimator)
-            code = [task.descriptor.spec.features_by, estimator.descriptor.where]
-            modules = [task.module, estimator.module, *(where for where in code if where)]
-            source = self.sources.behind(modules, "answer")
-            self._answers[pair] = _fixed(
-                source,
-                estimator.descriptor.distributions,
-                task=task.descriptor.spec.model_dump(exclude=_NOT_IN_THE_KEY),
-                estimator=estimator.descriptor.model_dump(exclude={"title", "linear", "rehearsal"}),
-            )
+            spec, estimator = task_of(cell.task_key, self.registry), self.registry.estimators.owned(cell.estimator)
+            modules = [self.registry.tasks.owned(cell.task).module, estimator.module, estimator.descriptor.where]
+            modules += [spec.features_by] if spec.features_by else []
+            self._answers[pair] = {
+                "task": digest_of(_canonical(spec.model_dump(exclude=_NOT_IN_THE_KEY))),
+                "estimator": estimator.descriptor.model_dump(exclude={"title", "linear", "rehearsal"}),
+                "versions": versions(estimator.descriptor.distributions),
+                "source": sources_of(modules, ANSWERING),
+            }
         return self._answers[pair]
 
-    def of_recording(self, sensor: str, rig: str, scene: Scene, role: Role, seed: int, rig_file: str = "") -> str:
-        """Return the key of a recording that `rig` is to make of `scene`."""
-        made_by = self.maker(sensor, rig, rig_file, scene.indenter.shape)
-        return sha256(f"{made_by.digest} {_canonical([scene.model_dump(), role, seed])}")[:KEY_DIGITS]
+    def of_recording(
+        self, sensor: str, rig: str, scene: Scene, role: Role | None, seed: int, rig_file: str = ""
+    ) -> tuple[str, Sections]:
+        """Return the key of a recording that a rig makes, and its sections."""
+        made_by = self._making(sensor, rig, rig_file, scene)
+        sections = {**made_by, "scene": scene.model_dump(mode="json"), "role": role, "seed": seed}
+        return digest_of(_canonical(sections)), sections
 
-    def maker(self, sensor: str, rig: str, rig_file: str = "", shape: str | None = None) -> Fixed:
-        """Return what all recordings by one rig of one sensor share, with one `shape` of indenter if a scene names one.
+    def _making(self, sensor: str, rig: str, rig_file: str, scene: Scene) -> Sections:
+        """Return what all recordings of one sensor by one rig share.
 
-        What real devices gave is no less true once the code that read them has changed: of them it is sensor, rig and
-        rig file alone, so that nobody has to press everything again.
+        Notes
+        -----
+        What real devices gave stays true when the code that read them changes: of them it is sensor, rig and rig file
+        alone, so that nobody has to press everything again.
         """
-        made = sensor, rig, rig_file, shape
+        effects = taking_part(self.registry, sensor, scene)
+        shape = scene.indenter.shape
+        made = (sensor, rig, rig_file, str(shape), *(effect.descriptor.name for effect in effects))
         if made not in self._makers:
             devices = RigFile.model_validate_json(rig_file) if rig_file else None
-            if devices is not None and not devices.emulated:
-                sections = {"sensor": {"name": sensor}, "rig": {"name": rig, "file": rig_file}}
-                return Fixed(sha256(_canonical(sections))[:KEY_DIGITS], sections)
-            maker, carrier = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig)
-            effects = [self.registry.effects.owned(effect.name) for effect in self.registry.effects]
-            modules = [maker.module, carrier.module, carrier.descriptor.where]
-            modules += [where for where in (maker.descriptor.transducer, maker.descriptor.driver) if where]
-            modules += [] if devices is None else self._behind(devices)
-            for effect in effects:
-                modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
-            named = {}
-            if shape is not None and shape in self.registry.indenters:  # of an unknown one the rig itself complains
-                body = self.registry.indenters.owned(shape)
-                modules += [body.module, body.descriptor.where]
-                named["indenter"] = body.descriptor.model_dump(exclude={"title"})
-            self._makers[made] = _fixed(
-                self.sources.behind(modules, "recording"),
-                (),
-                sensor=maker.descriptor.model_dump(),
-                rig=carrier.descriptor.model_dump(),
-                effects={owner.descriptor.name: owner.descriptor.model_dump() for owner in effects},
-                **({"rig file": {"says": rig_file}} if rig_file else {}),
-                **named,
-            )
+            sections: Sections = {"sensor": sensor, "rig": rig, "rig file": rig_file}
+            if devices is None or devices.emulated:
+                owner, carrier = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig)
+                modules = [owner.module, carrier.module, carrier.descriptor.where]
+                modules += [where for where in (owner.descriptor.transducer, owner.descriptor.driver) if where]
+                modules += [] if devices is None else self._behind(devices)
+                for effect in effects:
+                    modules += [effect.module, effect.descriptor.where, effect.descriptor.called_for]
+                if shape is not None and shape in self.registry.indenters:  # of an unknown one the rig complains
+                    indenter = self.registry.indenters.owned(shape)
+                    modules += [indenter.module, indenter.descriptor.where]
+                    sections["indenter"] = indenter.descriptor.model_dump(exclude={"title"})
+                sections |= {
+                    "sensor": digest_of(_canonical(owner.descriptor.model_dump())),
+                    "rig": carrier.descriptor.model_dump(),
+                    "effects": {one.descriptor.name: one.descriptor.model_dump() for one in effects},
+                    "versions": versions(),
+                    "source": sources_of(modules, RECORDING),
+                }
+            self._makers[made] = sections
         return self._makers[made]
 
     def _behind(self, devices: RigFile) -> list[str]:
         """Return where the code of the devices of a rig file is, and of the simulation that moves the emulated ones."""
         names = [entry.device for entry in (devices.force, *devices.devices.values()) if entry is not None]
-        owners = [self.registry.devices.owned(name) for name in names]
         physics = self.registry.rigs.owned(devices.emulation.physics)
-        return [*(owner.module for owner in owners), physics.module, physics.descriptor.where]
+        return [*(self.registry.devices.owned(name).module for name in names), physics.module, physics.descriptor.where]
 
 
-def configuration_of(cell: Cell) -> Section:
+def configuration_of(cell: Cell) -> Sections:
     """Return what a cell's key covers of its configuration. Its number among the repeats is not: the seed is."""
     return {
-        "sensor": cell.sensor,
-        "protocol": cell.protocol,
-        "split": cell.split,
-        "params": dict(cell.params),
-        "seed": cell.seed,
-        **({} if cell.latency else {"latency": False}),
-    }
+        "sensor": cell.sensor, "protocol": cell.protocol, "split": cell.split, "params": dict(cell.params),
+        "seed": cell.seed, "timed": cell.timed,
+    }  # fmt: skip
 
 
-def _fixed(source: Source, distributions: tuple[str, ...], **descriptors: Section) -> Fixed:
-    sections: dict[str, Section] = dict(descriptors)
-    imported = {f"import {name}": found for name, found in source.versions.items()}
-    sections["versions"] = {**versions(distributions), **imported}
-    sections.update({f"source of {package}": files for package, files in source.packages.items()})
-    return Fixed(sha256(_canonical(sections))[:KEY_DIGITS], sections)
+def differences(before: Mapping[str, Any], now: Mapping[str, Any], within: str = "") -> list[str]:
+    """Return one sentence for everything in which two mappings differ; none if nothing does."""
+    found = []
+    for name in sorted({*before, *now}):
+        old, new = before.get(name), now.get(name)
+        place = f"{within}{name}"
+        if isinstance(old, Mapping) and isinstance(new, Mapping):
+            found += differences(old, new, f"{place}: ")
+        elif _canonical(old) != _canonical(new):
+            found.append(f"{place} {_short(old)} -> {_short(new)}")
+    return found
+
+
+def _short(value: Any) -> str:
+    text = "nothing" if value is None else value if isinstance(value, str) else _canonical(value)
+    return text if len(text) <= 60 else f"{text[:59]}…"
+
+
+def names_of(scenes: Sequence[str]) -> list[str]:
+    """Return names of recordings, each once: the second of a name is numbered."""
+    seen: dict[str, int] = {}
+    found = []
+    for scene in scenes:
+        seen[scene] = seen.get(scene, 0) + 1
+        found.append(scene if seen[scene] == 1 else f"{scene} ({seen[scene]})")
+    return found

@@ -76,7 +76,7 @@ def cell_of(row: Mapping[str, Any]) -> Cell:
             **{name: row[name] for name in _SAME},
             params=tuple(sorted(row["params"].items())),
             baseline=row["is_baseline"],
-            latency=row["status"] != "done" or row.get("latency_n") is not None,
+            timed=row["status"] != "done" or row.get("latency_n") is not None,
             simulation=Simulation.model_validate(row.get("simulation", {})),
             declared_task=row.get("declared_task", ""),
         )

@@ -40,8 +40,8 @@ class Cell:
     repeats: int
     seed: int
     """Seed of this replicate: of the scenes it records and of its estimators."""
-    latency: bool = True
-    """Whether the latency of single rows is measured."""
+    timed: bool = True
+    """Whether fit time and latency are measured, with nothing else of the run at work: of the first replicate."""
     simulation: Simulation = _AS_PLANNED
     """How a simulated rig is asked to carry out its scenes."""
     rig_file: str = ""
@@ -120,7 +120,7 @@ def plan_cells(
                         repeat=repeat,
                         repeats=repeats,
                         seed=matrix.seed + repeat - 1,
-                        latency=matrix.latency,
+                        timed=matrix.latency and repeat == 1,
                         simulation=matrix.simulation,
                         rig_file=rig_file_text,
                         declared_task=owned.declared.model_dump_json() if owned.declared else "",

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
-from tactbench.core.errors import MissingRecordingError, NotApplicable, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.errors import MissingRecordingError, NotApplicable, RecordingError, TactbenchError, UnknownNameError, UsageError
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import FEW_SHOT, Cell, plan_cells, serves, task_of
-from tactbench.core.matrix.recorded import Recorded, read_all, read_sensor_and_scene
 from tactbench.core.matrix.store import Store
-from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.plugins.registry import Registry
 from tactbench.core.plugins.rig_files import load_rig_file
-from tactbench.core.pool.limits import UNLIMITED, Limits
-from tactbench.core.pool.pool import Pool
+from tactbench.core.pool import UNLIMITED, InProcess, Limits, Pool
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene, Simulation
@@ -61,7 +60,7 @@ def requests_for(
         requests[needed] = []
         for planned in in_drawn_order(task_of(cell.task_key, registry).scenes_for(needed[2]), cell.seed):
             scene = planned.scene.simulated_as(simulation)
-            key = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
+            key, _ = keys.of_recording(cell.sensor, cell.rig, scene, planned.role, cell.seed, cell.rig_file)
             path = store.folder / "recordings" / cell.sensor / f"{scene.name}-{key[:12]}.h5"
             requests[needed].append(
                 RecordingRequest(cell.sensor, cell.rig, scene, planned.role, cell.seed, path, cell.rig_file)
@@ -128,7 +127,6 @@ def plan_run(
     keys: Keys,
     store: Store,
     recordings: Path | None,
-    recorded: Recorded,
     limits: Limits = UNLIMITED,
 ) -> tuple[list[Cell], RecordingPlan]:
     """Return the cells of `matrix`, and where their recordings come from.
@@ -143,7 +141,9 @@ def plan_run(
     recording_plan = RecordingPlan()
     rig_file = load_rig_file(Path(matrix.rig_file), registry).checked_for(matrix.rig) if matrix.rig_file else None
     if not registry.rigs[matrix.rig].simulated:  # a simulated one replays nothing: it is built when it has to record
-        ((_, paths),) = Pool(1, limits, reuse=True).each(_replayed, [(matrix.rig, recordings, rig_file)])
+        work = partial(_replayed, registry=registry.only(rigs=[matrix.rig]), recordings=recordings, rig_file=rig_file)
+        builder = InProcess() if registry.rigs.owned(matrix.rig).ours else Pool(1, limits)
+        ((_, paths),) = builder.each(work, [matrix.rig])
         if isinstance(paths, BaseException):
             users = isinstance(paths, TactbenchError) and paths.exit_code == UsageError.exit_code
             if users or not matrix.sensors:
@@ -152,7 +152,7 @@ def plan_run(
             recording_plan.troubles = {request_key(cell): paths for cell in cells}
             return cells, recording_plan
         if paths is not None:
-            return _from_replay(matrix, registry, [Path(path) for path in paths], recorded, limits)
+            return _from_replay(matrix, registry, [Path(path) for path in paths], store)
     if not matrix.sensors:
         raise UsageError("No sensor is named.", hint=f"Give --sensor; known: {', '.join(registry.sensors.names())}.")
     cells = plan_cells(matrix, [registry.sensors[name].name for name in matrix.sensors], registry, rig_file)
@@ -167,18 +167,20 @@ def plan_run(
 
 
 def _from_replay(
-    matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], recorded: Recorded, limits: Limits
+    matrix: MatrixSpec, registry: Registry, paths: Sequence[Path], store: Store
 ) -> tuple[list[Cell], RecordingPlan]:
-    """Return the cells of recordings that exist; a child process reads them, so that a damaged one breaks nothing."""
+    """Return the cells of recordings that exist; one that cannot be read costs the cells that need it."""
     if not paths:
         raise MissingRecordingError("There are no recordings.", hint="Import recordings with `tactbench import`.")
-    broken = read_all(read_sensor_and_scene, "sensor", paths, recorded, limits)
     scenes: dict[str, dict[Path, str | None]] = {}
-    unreadable: dict[str, dict[Path, BaseException]] = {}
+    broken: dict[Path, BaseException] = {}
     for path in paths:
-        if path not in broken:
-            sensor, scene = recorded.sensor_and_scene(path)
-            scenes.setdefault(sensor, {})[path] = scene
+        try:
+            about = store.about(path)
+            scenes.setdefault(about["sensor"], {})[path] = about["scene"]
+        except RecordingError as error:
+            broken[path] = error
+    unreadable: dict[str, dict[Path, BaseException]] = {}
     for path, error in broken.items():
         unreadable.setdefault(_owner(path, matrix.sensors or list(scenes), registry), {})[path] = error
     known = sorted({*scenes, *unreadable})
@@ -206,10 +208,9 @@ def _no_scenes(key: RequestKey, matrix: MatrixSpec) -> NotApplicable:
     )
 
 
-def _replayed(arguments: tuple[str, Path | None, RigFile | None]) -> list[str] | None:
-    """Return the recordings of a rig that replays, None of one that records: in a child process, where it is built."""
-    name, recordings, rig_file = arguments
-    rig = rig_of(name, installed(), recordings, rig_file)
+def _replayed(name: str, registry: Registry, recordings: Path | None, rig_file: RigFile | None) -> list[str] | None:
+    """Return the recordings of a rig that replays, None of one that records."""
+    rig = rig_of(name, registry, recordings, rig_file)
     if not hasattr(rig, "recordings"):
         return None
     with failing_as(f"The recordings of rig {name!r} cannot be listed"):

@@ -1,14 +1,24 @@
-"""Imported by a fork server: libraries, our own estimators and the twin are loaded once, before it forks."""
+"""Imported by the fork server: libraries, our own estimators and the twin are loaded once, before it forks."""
 
 import gc
+import os
+from contextlib import suppress
+from importlib import import_module
+from importlib.metadata import entry_points
 
-gc.set_threshold(100_000, 50, 100)  # as in the command line's own process
+if hasattr(os, "setsid"):
+    with suppress(OSError):
+        os.setsid()  # Ctrl-C in a terminal reaches the run alone, which ends its workers
 
-from tactbench.core.matrix.evaluate_cell import import_estimators  # noqa: E402
-from tactbench.core.matrix.record import import_own_rigs  # noqa: E402
-from tactbench.core.plugins.registry import installed  # noqa: E402
-from tactbench.core.thread_limit import find_libraries  # noqa: E402
+for library in ("h5py", "scipy.linalg", "scipy.signal", "tactbench.core.acquisition", "tactbench.core.matrix.solve"):
+    import_module(library)
 
-import_estimators((estimator.name, kind) for estimator in installed().estimators for kind in estimator.kinds)
-import_own_rigs(("twin",))
-find_libraries()
+from tactbench.core.matrix.solve import prepare  # noqa: E402
+from tactbench.core.plugins.registry import load_object, load_registry  # noqa: E402
+
+_ours = load_registry([point for point in entry_points(group="tactbench") if point.module.startswith("tactbench.")])
+for estimator in _ours.estimators:
+    for kind in estimator.kinds:
+        prepare(estimator, kind)
+load_object(_ours.rigs["twin"].where)
+gc.freeze()  # pages shared with workers are not written to by the garbage collector

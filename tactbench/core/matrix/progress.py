@@ -8,14 +8,8 @@ from typing import Protocol
 class Progress(Protocol):
     """Receives what happens; never decides anything."""
 
-    def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
-        """Start a stage of `total` steps.
-
-        Parameters
-        ----------
-        alone
-            False: this process is about to fork, and must not be given a thread for the display.
-        """
+    def begin(self, stage: str, total: int) -> None:
+        """Start a stage of `total` steps."""
 
     def advance(self, what: str, *, stopped: bool = False) -> None:
         """Finish one step; `what` names it.
@@ -33,7 +27,7 @@ class Progress(Protocol):
 class Silence:
     """A progress that says nothing."""
 
-    def begin(self, stage: str, total: int, *, alone: bool = True) -> None:
+    def begin(self, stage: str, total: int) -> None:
         """Say nothing."""
 
     def advance(self, what: str, *, stopped: bool = False) -> None:

@@ -2,31 +2,77 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import groupby
-from operator import attrgetter
+import importlib.util
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from tactbench.core.matrix.context import RunContext
-from tactbench.core.matrix.engine import EngineChoice
-from tactbench.core.matrix.evaluate import evaluate_all
-from tactbench.core.matrix.key_book import book_of
-from tactbench.core.matrix.keys import Keys
-from tactbench.core.matrix.plan_recordings import plan_run, request_key
+from tactbench.core.errors import PluginContractError, UnwritableError, UsageError
+from tactbench.core.matrix.keys import Keys, Sections, names_of
+from tactbench.core.matrix.plan import Cell, task_of
+from tactbench.core.matrix.plan_recordings import RecordingPlan, RecordingRequest, RequestKey, plan_run, request_key
 from tactbench.core.matrix.progress import Progress, Silence
-from tactbench.core.matrix.record import acquire_missing
-from tactbench.core.matrix.recorded import Recorded
+from tactbench.core.matrix.record import GRACE_S, Recorder, is_computed, recorder_for
+from tactbench.core.matrix.solve import Job, published, solve, unanswered
 from tactbench.core.matrix.store import Row, Store
-from tactbench.core.matrix.summary import fill_baselines, scores_text
+from tactbench.core.matrix.summary import fill_baselines
 from tactbench.core.plugins.declared import declared_in, with_declared
 from tactbench.core.plugins.interfaces import Operator
-from tactbench.core.plugins.registry import installed
-from tactbench.core.provenance.gather import gather
+from tactbench.core.plugins.registry import Registry, installed
+from tactbench.core.pool import UNLIMITED, InProcess, Limits, Pool, start_server
+from tactbench.core.pool.limits import can_refuse_memory
+from tactbench.core.provenance.gather import gather, usable_cores
 from tactbench.core.spec.matrix import MatrixSpec
 from tactbench.core.spec.status import STOPPED
+
+if TYPE_CHECKING:
+    from tactbench.core.matrix.dask import Dask
+
+EngineName = Literal["in-process", "isolated", "dask"]
+ENGINES: tuple[EngineName, ...] = get_args(EngineName)
+MEASURED_MEMORY = "the limit of memory was held by measuring every 50 ms: this system cannot refuse memory"
+
+
+@dataclass(frozen=True)
+class EngineChoice:
+    """How the work is carried out."""
+
+    name: EngineName = "isolated"
+    jobs: int | None = None
+    """Processes at once; None: one for each usable core."""
+    limits: Limits = UNLIMITED
+    scheduler: str | None = None
+    """Address of a Dask scheduler; None: a cluster on this machine."""
+
+    @property
+    def processes(self) -> int:
+        """Processes at once."""
+        return self.jobs or usable_cores()
+
+    def check(self) -> None:
+        """Raise UsageError if its parts do not go together, or the library of the Dask engine is missing."""
+        if self.name == "in-process" and (self.jobs or 1) > 1:
+            raise UsageError(
+                f"The engine in-process carries out one cell at a time; --jobs {self.jobs} was given.",
+                hint="Leave out --jobs, or use --engine isolated.",
+            )
+        if self.scheduler is not None and self.name != "dask":
+            raise UsageError("--scheduler is for --engine dask.", hint="Add --engine dask, or leave it out.")
+        if self.name == "dask" and importlib.util.find_spec("distributed") is None:
+            raise UsageError(
+                "The Dask engine needs the library distributed, which is not installed.",
+                hint="Install it with: pip install 'tactbench[dask]'.",
+            )
+
+    def engine(self, jobs: int) -> Pool | InProcess | Dask:
+        """Return what carries out cells, `jobs` at once on this machine."""
+        if self.name == "dask":
+            from tactbench.core.matrix.dask import Dask
+
+            return Dask(self.processes, self.limits, self.scheduler)
+        return InProcess() if self.name == "in-process" else Pool(jobs, self.limits)
 
 
 @dataclass(frozen=True)
@@ -57,7 +103,6 @@ def run_matrix(
     operator: Operator | None = None,
     progress: Progress | None = None,
     shown: Callable[[Sequence[Row]], None] | None = None,
-    files: bool = True,
 ) -> Outcome:
     """Record and evaluate `matrix`, reusing what `store` already has.
 
@@ -68,7 +113,7 @@ def run_matrix(
     store
         Where results lie.
     choice
-        Where the work is done, how much of it at once and within which limits; results do not depend on it, times may.
+        Where the work is done, how much of it at once and within which limits; scores do not depend on it.
     recordings
         Folder for rigs that replay.
     operator
@@ -76,9 +121,7 @@ def run_matrix(
     progress
         Receives what happens.
     shown
-        Called with all rows so far after each replicate but the last.
-    files
-        Whether to write ``run.json`` and ``scores.json``; else those of the last run stay as they are.
+        Called with the rows of all complete replicates whenever one becomes complete, but for the last.
 
     Raises
     ------
@@ -89,37 +132,211 @@ def run_matrix(
     """
     choice = choice or EngineChoice()
     choice.check()
-    progress = progress or Silence()
+    if choice.name == "dask":
+        matrix = matrix.model_copy(update={"latency": False})  # a cluster's cells are never alone on their machine
     with store.hold():
+        if choice.name != "in-process":
+            start_server("tactbench.core.matrix.preloaded")
         registry = with_declared(installed(), declared_in(recordings))
         keys = Keys(registry)
-        recorded = Recorded(store.folder / "cache" / "recordings.json")
-        cells, recording_plan = plan_run(matrix, registry, keys, store, recordings, recorded, choice.limits)
-        provenance = gather(keys.sources, seed=matrix.seed, jobs=choice.jobs, engine=choice.name)
-        run = RunContext(
-            store, keys, book_of(store.folder), recording_plan, recorded, choice, progress,
-            made_by=store.begin(provenance),
-        )  # fmt: skip
-        rows: list[Row] = []
-        computed = 0
-        # Between replicates nothing is under way, so that a table can be shown. A cluster takes seconds to start, and
-        # recordings that exist are read once: all at once there.
-        rounds = [cells]
-        if recording_plan.requests and choice.name != "dask":
-            number_of = attrgetter("repeat")
-            rounds = [list(some) for _, some in groupby(sorted(cells, key=number_of), key=number_of)]
-        for number, some in enumerate(rounds, 1):
-            prefix = f"replicate {number} of {len(rounds)}: " if len(rounds) > 1 else ""
-            acquire_missing(run, some, operator, stage=f"{prefix}recording")
-            found, now = evaluate_all(run, some, stage=f"{prefix}evaluating")
-            rows += found
-            computed += now
-            if shown is not None and now and number < len(rounds):
-                shown(tuple(rows))
-        fill_baselines(rows)
-        recorded.save()
-        if files:
-            store.write("run.json", json.dumps(provenance, indent=1, sort_keys=True) + "\n")
-            store.write("scores.json", scores_text(rows))
-    used = {cell.name: tuple(recording_plan.paths.get(request_key(cell), ())) for cell in cells}
-    return Outcome(tuple(rows), provenance, computed, len(recorded.made), used)
+        cells, plan = plan_run(matrix, registry, keys, store, recordings, choice.limits)
+        provenance = gather(registry, seed=matrix.seed, engine=choice.name)
+        store.begin(provenance)
+        run = _Run(store, registry, keys, plan, choice, operator, progress or Silence(), shown, cells)
+        run.carry_out([cell for cell in cells if cell.timed], alone=True)
+        run.carry_out([cell for cell in cells if not cell.timed], alone=False)
+    rows = tuple(run.rows[cell.name] for cell in cells)
+    fill_baselines(rows)
+    used = {cell.name: tuple(plan.paths.get(request_key(cell), ())) for cell in cells}
+    return Outcome(rows, provenance, run.computed, run.recorded, used)
+
+
+@dataclass
+class _Run:
+    """What one run works with, and the rows so far."""
+
+    store: Store
+    registry: Registry
+    keys: Keys
+    plan: RecordingPlan
+    choice: EngineChoice
+    operator: Operator | None
+    progress: Progress
+    shown: Callable[[Sequence[Row]], None] | None
+    cells: Sequence[Cell]
+    rows: dict[str, Row] = field(default_factory=dict)
+    computed: int = 0
+    recorded: int = 0
+    _keys: dict[str, tuple[str, Sections]] = field(default_factory=dict)
+    """Key and sections of the cells at work, by name."""
+
+    def carry_out(self, cells: Sequence[Cell], *, alone: bool) -> None:
+        """Record what `cells` lack and evaluate them; `alone`: one cell at a time, with nothing else at work.
+
+        Else cells whose recordings are there are evaluated beside the recording of others.
+        """
+        if not cells:
+            return
+        by_need: dict[RequestKey, list[Cell]] = {}
+        for cell in cells:
+            by_need.setdefault(request_key(cell), []).append(cell)
+        requests = {one.path: one for need in by_need for one in self.plan.requests.get(need, ())}
+        missing = [request for path, request in requests.items() if not path.exists()]
+        lacking = {
+            need: {request.path for request in self.plan.requests.get(need, ()) if not request.path.exists()}
+            for need in by_need
+        }
+        ready = [self._jobs(members) for need, members in by_need.items() if not lacking[need]]
+        later = sum(len(by_need[need]) for need in by_need if lacking[need])
+        total = len(missing) + later + sum(map(len, ready))
+        if not total:
+            return
+        several = {cell.repeat for cell in self.cells}
+        numbers = sorted({cell.repeat for cell in cells})
+        which = f"{numbers[0]}" + (f" to {numbers[-1]}" if len(numbers) > 1 else "")
+        stage = "recording and evaluating" if missing else "evaluating"
+        self.progress.begin(f"replicate {which} of {len(several)}: {stage}" if len(several) > 1 else stage, total)
+        computed = all(is_computed(request, self.registry) for request in missing)
+        engine = self.choice.engine(1 if alone else self.choice.processes)
+        at_once = 1 if alone or isinstance(engine, InProcess) else self.choice.processes
+        recorder = self._recorder(engine, alone=alone, computed=computed)
+        with recorder, engine:
+            self._submit_recordings(recorder, missing, computed=computed)
+            if recorder is not engine:
+                for request, outcome in recorder.outcomes():
+                    self._recorded(request, outcome)
+                ready += [self._jobs(by_need[need]) for need in by_need if lacking[need]]
+                lacking.clear()
+            self._submit_cells(engine, ready, at_once)
+            for item, outcome in engine.outcomes():
+                if isinstance(item, Job):
+                    self._evaluated(item, outcome)
+                    continue
+                self._recorded(item, outcome)
+                for need, paths in lacking.items():
+                    if item.path in paths:
+                        paths.discard(item.path)
+                        if not paths:
+                            self._submit_cells(engine, [self._jobs(by_need[need])], at_once)
+
+    # Recordings
+
+    def _recorder(self, engine: Pool | InProcess | Dask, *, alone: bool, computed: bool) -> Pool | InProcess | Dask:
+        """Return what makes recordings: the engine itself where they may be made beside cells."""
+        if self.operator is not None and not computed:
+            return InProcess()  # the operator's terminal belongs to this process
+        if isinstance(engine, InProcess) or (isinstance(engine, Pool) and computed and not alone):
+            return engine
+        grace_s = 0.0 if computed else GRACE_S
+        return Pool(self.choice.processes if computed else 1, replace(self.choice.limits, grace_s=grace_s))
+
+    def _submit_recordings(
+        self, recorder: Pool | InProcess | Dask, missing: Sequence[RecordingRequest], *, computed: bool
+    ) -> None:
+        """Queue recordings: all of a real rig as one piece of work, simulated ones by seed and sensor."""
+        pieces: dict[tuple[int, str], list[RecordingRequest]] = {}
+        for request in missing:
+            pieces.setdefault((request.seed, request.sensor) if computed else (0, ""), []).append(request)
+        parts = self.choice.processes if computed and len(pieces) < self.choice.processes else 1
+        for piece in pieces.values():
+            for part in range(parts):
+                if requests := piece[part::parts]:
+                    work = recorder_for(requests, self.registry)
+                    if isinstance(recorder, InProcess):
+                        work = Recorder(self.registry, self.operator)
+                    recorder.submit(work, requests)
+
+    def _recorded(self, request: RecordingRequest, outcome: Any) -> None:
+        if isinstance(outcome, UnwritableError):
+            raise outcome  # the disk is no cell's fault, and refuses the next recording too
+        stopped = isinstance(outcome, BaseException)
+        if stopped:
+            for need, paths in self.plan.paths.items():
+                if request.path in paths:
+                    self.plan.troubles.setdefault(need, outcome)
+        self.recorded += not stopped
+        self.progress.advance(f"{request.sensor} {request.scene.name}", stopped=stopped)
+
+    # Cells
+
+    def _jobs(self, cells: Iterable[Cell]) -> list[Job]:
+        """Return what is to be computed of `cells` that need the same recordings; the others have their row then."""
+        jobs = []
+        for cell in cells:
+            task = task_of(cell.task_key, self.registry)
+            need = request_key(cell)
+            try:
+                trouble = self.plan.troubles.get(need)
+                if trouble is not None:
+                    raise trouble
+                paths = self.plan.paths[need]
+                digests = {path: self.store.about(path)["digest"] for path in paths}
+                data = dict(zip(names_of([path.stem for path in paths]), digests.values(), strict=True))
+                key, sections = self.keys.of_cell(cell, data)
+            except Exception as error:
+                self._keys[cell.name] = "", {}
+                self._stopped(cell, task, error)
+                continue
+            found = self.store.finished(key)
+            if found is None:
+                self._keys[cell.name] = key, sections
+                estimator = self.registry.estimators[cell.estimator]
+                jobs.append(Job(cell, task, estimator, tuple(paths), tuple(digests.values())))
+                continue
+            # Its key covers neither its number among the repeats nor what is published: they change no number.
+            naming = {"cell": cell.name, "repeat": cell.repeat, "repeats": cell.repeats}
+            row = {**found, **naming, **published(cell, task, found["split"])}
+            self.store.reuse(row)
+            self._done(cell, row)
+        return jobs
+
+    def _submit_cells(self, engine: Pool | InProcess | Dask, groups: Sequence[Sequence[Job]], at_once: int) -> None:
+        """Queue cells: those of our own estimators that share recordings as one piece, others one estimator a piece."""
+        work = partial(solve, concurrency=at_once)
+        for jobs in groups:
+            pieces: dict[object, list[Job]] = {}
+            for job in jobs:
+                ours = self.registry.estimators.owned(job.estimator.name).ours
+                together = ours and (len(groups) >= at_once or at_once == 1)
+                pieces.setdefault("ours" if together else job.estimator.name, []).append(job)
+            for piece in pieces.values():
+                engine.submit(work, piece)
+
+    def _evaluated(self, job: Job, outcome: Any) -> None:
+        self.computed += 1
+        if isinstance(outcome, BaseException):
+            self._stopped(job.cell, job.task, outcome, counted=True)
+            return
+        row, answers = outcome
+        key, sections = self._keys[job.cell.name]
+        row |= {"key": key, "recordings": [self.store.beside(Path(path)) for path in row["recordings"]]}
+        if self.choice.limits.memory_mb is not None and not can_refuse_memory():
+            row["remarks"].append(MEASURED_MEMORY)
+        try:
+            kept = self.store.keep(row, sections, answers)
+        except (TypeError, ValueError) as error:
+            hint = "Its estimator or task is at fault."
+            self._stopped(
+                job.cell, job.task, PluginContractError(f"The cell's row is no plain data: {error}.", hint=hint),
+                counted=True,
+            )  # fmt: skip
+            return
+        self._done(job.cell, kept, advance=True)
+
+    def _stopped(self, cell: Cell, task: Any, why: BaseException, *, counted: bool = False) -> None:
+        self.computed += not counted
+        row = unanswered(cell, task, why, simulated=self.registry.rigs[cell.rig].simulated)
+        key, sections = self._keys[cell.name]
+        self._done(cell, self.store.keep({**row, "key": key}, sections), advance=True)
+
+    def _done(self, cell: Cell, row: Row, *, advance: bool = False) -> None:
+        """Take the row of a cell; show all complete replicates if it completes one."""
+        self.rows[cell.name] = row
+        if not advance:
+            return
+        self.progress.advance(cell.name, stopped=row["status"] in STOPPED)
+        if self.shown is None or any(one.name not in self.rows for one in self.cells if one.repeat == cell.repeat):
+            return
+        left = {one.repeat for one in self.cells if one.name not in self.rows}
+        if left:
+            self.shown([self.rows[one.name] for one in self.cells if one.repeat not in left])

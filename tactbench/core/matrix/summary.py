@@ -1,4 +1,4 @@
-"""What a run leaves behind besides its rows: the baselines beside them, and what a seed decides as comparable text."""
+"""What a row says besides its own result: the baselines of its group, and which keys a seed decides."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from operator import itemgetter
 from typing import Any
 
 from tactbench.core.matrix.store import Row
-from tactbench.core.matrix.store.sharing import canonical
 from tactbench.core.spec.row import LOWER_IS_BETTER
 
 _group = itemgetter("sensor", "task", "rig", "protocol", "split", "repeat")
@@ -18,7 +17,7 @@ SEED_DECIDES = (
     "n_train", "n_test",
     "counts", "chosen", "scores", "confusion", "classes", "split", "stamps", "dagger",
 )  # fmt: skip
-"""Keys of a row that do not depend on machine or hour: ``scores.json`` holds these."""
+"""Keys of a row that do not depend on machine or hour, but for the last bits of numbers."""
 
 
 def fill_baselines(rows: Sequence[Row]) -> None:
@@ -42,8 +41,3 @@ def fill_baselines(rows: Sequence[Row]) -> None:
     for row in rows:
         row["baseline"] = bars.get((_group(row), row.get("looks_at") == "time"))
 
-
-def scores_text(rows: Sequence[Row]) -> str:
-    """Return what a seed decides, as text that may be compared byte by byte: JSON, one row a line."""
-    lines = (canonical({key: row[key] for key in SEED_DECIDES}) for row in rows)
-    return "[\n" + ",\n".join(lines) + "\n]\n"

@@ -164,6 +164,14 @@ class Registry:
             "profiles": self.profiles,
         }
 
+    def only(self, **names: Iterable[str]) -> Registry:
+        """Return a registry of what is named, by family: what a child process needs of it."""
+        found = Registry()
+        for kind, several in names.items():
+            for name in several:
+                found.families()[kind].add(self.families()[kind].owned(name))
+        return found
+
     @property
     def failures(self) -> list[PluginRow]:
         """The plugins that could not be used."""

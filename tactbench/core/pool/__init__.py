@@ -1,1 +1,6 @@
-"""The process pool: items of work in child processes, each within limits of time and memory."""
+"""The process pool: work in child processes, within limits of time and memory."""
+
+from tactbench.core.pool.limits import UNLIMITED, Limits
+from tactbench.core.pool.pool import InProcess, Pool, start_server
+
+__all__ = ["UNLIMITED", "InProcess", "Limits", "Pool", "start_server"]

@@ -1,130 +1,130 @@
-"""The child process's side: it carries out the items that its parent names, one at a time, and never returns."""
+"""The child process's side: it carries out the items of one piece of work, one after the other."""
 
 from __future__ import annotations
 
 import faulthandler
-import gc
+import multiprocessing
 import os
 import signal
+import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from multiprocessing import forkserver
 from multiprocessing.connection import Connection
+from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any
 
-from tactbench.core.pool.endings import out_of_memory
-from tactbench.core.pool.limits import Limits
-from tactbench.core.pool.log import flush, print_to
-from tactbench.core.pool.memory import data_limit, first_to_go
-from tactbench.core.pool.message import dump_error, pack
-from tactbench.core.pool.processes import die_with_parent, reap_finished, set_subreaper
-
-WHERE_SIGNAL = getattr(signal, "SIGUSR2", None)
-"""Has the process write the stack of every thread to its log."""
+from tactbench.core import errors
+from tactbench.core.errors import OutOfMemory, Raised, TactbenchError
+from tactbench.core.pool.limits import Limits, data_limit, resident_mb
 
 
 def run_child(
     work: Callable[[Any], Any],
     items: Sequence[Any],
     connection: Connection[Any, Any],
-    log: Connection[Any, Any],
+    log: str,
+    folder: str,
     limits: Limits,
-    parent: int | None,
-) -> NoReturn:
-    """Carry out `work` for each item whose index comes through `connection`; send what comes of it back.
+) -> None:
+    """Carry out `work` for each item; send what begins and what comes of it through `connection`.
 
     Parameters
     ----------
     log
-        Holds the descriptor of the log.
-    parent
-        The process that forked this one; None: a fork server did.
+        File that standard output and standard error are redirected to.
+    folder
+        The working folder of the parent, that relative paths of items start from.
     """
-    code = 70
-    try:
-        _set_up(log.fileno(), limits, parent)
-        me = os.getpid()
-        while True:
-            item = items[int(connection.recv_bytes())]
-            reap_finished()  # of the item before
-            os.ftruncate(log.fileno(), 0)
-            _send(connection, pack({"begun": True}))
-            message = _carry_out(work, item, limits)
-            if os.getpid() != me:
-                os._exit(0)  # forked by the work, and returned from it: only the child itself answers
-            flush()
-            _send(connection, message)
-    except EOFError:
-        code = 0  # the parent asks for no more
-    except BaseException as error:
-        os.write(2, f"{type(error).__name__}: {error}\n".encode(errors="replace"))
-    finally:
-        os._exit(code)
-
-
-def _set_up(log: int, limits: Limits, parent: int | None) -> None:
-    os.setsid()  # its descendants are in other sessions than the parent's own children
-    die_with_parent(os.getppid() if parent is None else parent)
-    set_subreaper(True)  # orphans below it stay below it while it lives
-    server = getattr(forkserver, "_forkserver", None)
-    alive = getattr(server, "_forkserver_alive_fd", None)
-    if alive is not None:
-        os.close(alive)  # as long as it is open here, a fork server outlives the process that started it
-    signal.set_wakeup_fd(-1)
-    for number in (signal.SIGALRM, signal.SIGCHLD, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
+    _redirect(log)
+    if hasattr(os, "setsid"):
+        with suppress(OSError):
+            os.setsid()  # its process group, by which the parent ends it with what it has started
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _end if limits.grace_s else signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_SETMASK, set())
-    print_to(log)
-    gc.freeze()  # pages shared with the parent are not written to by the garbage collector
-    first_to_go()
-    _no_core_dump()
-    faulthandler.enable(file=2)
-    if WHERE_SIGNAL is not None:
-        faulthandler.register(WHERE_SIGNAL, file=2, all_threads=True)
+    signal.signal(signal.SIGTERM, _terminate)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    with suppress(OSError):  # if the system runs out of memory, it ends this process before others
+        Path("/proc/self/oom_score_adj").write_text("1000")
+    faulthandler.enable()
+    os.chdir(folder)
+    me = os.getpid()
+    for item in items:
+        os.ftruncate(1, 0)  # of what is printed, only that of one item is kept
+        connection.send(("begun", resident_mb(me)))
+        outcome = _carry_out(work, item, limits)
+        if os.getpid() != me:
+            os._exit(0)  # a child that the work forked and that returned from it
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(Exception):
+                stream.flush()
+        connection.send(outcome)
+    with suppress(EOFError, OSError):
+        connection.recv()  # the parent ends this process together with its group
 
 
-class _Ended(BaseException):
-    """The parent wants this process to end, and leaves it time to close what is open."""
-
-
-def _end(_number: int, _frame: FrameType | None) -> None:
-    raise _Ended
-
-
-def _no_core_dump() -> None:
-    import resource
-
-    _, hard = resource.getrlimit(resource.RLIMIT_CORE)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, hard))
-
-
-def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> bytes:
-    """Return the message that says what came of an item."""
+def _carry_out(work: Callable[[Any], Any], item: Any, limits: Limits) -> tuple[str, Any, float]:
+    """Return what came of an item, and the seconds it took."""
+    if limits.timeout_s is not None:  # the stacks at the end of its time go to the log
+        faulthandler.dump_traceback_later(limits.timeout_s)
     began = time.perf_counter()
-    spent = None
     try:
         with data_limit(limits.memory_mb):
             value = work(item)
-        spent = time.perf_counter() - began
-        return pack({"value": value, "spent_s": spent})
-    except _Ended:
+        return "value", value, time.perf_counter() - began
+    except _Terminated:
         os._exit(0)
     except MemoryError as error:
-        text = dump_error(out_of_memory(limits, error, "".join(traceback.format_exception(error))))
+        return "error", out_of_memory(limits, error), time.perf_counter() - began
     except BaseException as error:
-        text = dump_error(error)
-        if spent is not None:
-            text["message"] = f"Its result cannot be sent as JSON and arrays: {text['message']}"
-    return pack({"error": text, "spent_s": time.perf_counter() - began if spent is None else spent})
+        return "error", plain_error(error), time.perf_counter() - began
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
-def _send(connection: Connection[Any, Any], message: bytes) -> None:
-    left = memoryview(message)
-    with suppress(InterruptedError):
-        while left:
-            left = left[os.write(connection.fileno(), left) :]
+def _redirect(log: str) -> None:
+    opened = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+    for descriptor in (1, 2):
+        os.dup2(opened, descriptor)
+    os.close(opened)
+
+
+class _Terminated(BaseException):
+    """The parent sent SIGTERM: contexts are left, so that devices are closed."""
+
+
+def _terminate(_number: int, _frame: FrameType | None) -> None:
+    raise _Terminated
+
+
+def _end_with_parent() -> None:
+    """End this process and its group when the parent has ended, however that happened."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        if hasattr(os, "killpg"):
+            os.killpg(0, signal.SIGKILL)
+        os._exit(1)
+
+
+def plain_error(error: BaseException) -> TactbenchError:
+    """Return an error that can be sent to a process that lacks the classes of plugins."""
+    where = "".join(traceback.format_exception(error))
+    if isinstance(error, TactbenchError) and getattr(errors, type(error).__name__, None) is type(error):
+        error.traceback_text = error.traceback_text or where
+        return error
+    return Raised(f"{type(error).__name__}: {error}".rstrip(": "), traceback_text=where)
+
+
+def out_of_memory(limits: Limits, error: MemoryError | None = None) -> OutOfMemory:
+    """Return the error of an item that took more memory than it may, or found none left."""
+    where = "".join(traceback.format_exception(error)) if error else ""
+    if limits.memory_mb is None:
+        return OutOfMemory("Memory ran out.", hint="Run fewer at once (--jobs).", traceback_text=where)
+    return OutOfMemory(
+        f"It took more than {limits.memory_mb} MB of memory.",
+        hint="Allow more with --memory MB.",
+        traceback_text=where,
+    )

@@ -1,151 +1,313 @@
-"""The process pool: each item of work in a child process, within limits."""
+"""The parent's side of the process pool."""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
-import threading
+import sys
+import tempfile
+import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import KW_ONLY, dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import wait
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
-from tactbench.core.pool.limits import UNLIMITED, Limits
-from tactbench.core.pool.processes import (
-    await_fork_server_end,
-    can_fork,
-    children,
-    interrupts_blocked,
-    kill_below,
-    kill_orphans,
-    set_subreaper,
-)
-from tactbench.core.pool.worker import PENDING, Worker
+import psutil
+
+from tactbench.core.errors import CellStopped, Crashed, TimedOut
+from tactbench.core.pool.child import out_of_memory, plain_error, run_child
+from tactbench.core.pool.limits import UNLIMITED, Limits, resident_mb
 
 T = TypeVar("T")
 R = TypeVar("R")
 
-_SERVER_ENDS_S = 5.0
-"""Seconds that a fork server which refuses a start may take to end: it was killed, and a busy machine is slow."""
+START_S = 60.0
+"""Seconds within which a process must begin with its first item; with `spawn` it imports libraries first."""
+POLL_S = 0.05
+"""Seconds between two looks at the memory and time of children."""
+KILL_DELAY_S = 0.2
+"""Seconds beyond its time limit after which an item is ended: it writes its stacks at the limit."""
+LOG_BYTES = 2**16
+"""Length of the end of a log that is kept."""
+MOST_LOG_BYTES = 2**24
+"""A log that grows beyond this is emptied."""
 
 
-@dataclass(frozen=True)
 class Pool:
-    """Up to `jobs` child processes.
+    """Up to `jobs` child processes, each for one piece of work.
+
+    A piece is a sequence of items that one process carries out in order. An item that raises, crashes, hangs or takes too
+    much memory has that error as its outcome; the items after it get a process of their own.
 
     Parameters
     ----------
     jobs
-        Items carried out at the same time.
+        Pieces carried out at the same time.
     limits
-        What each may take; its process is ended beyond.
-    reuse
-        Whether a process gets another item once it is through with one, which then finds what that has loaded. All
-        items are taken before the first begins. Else each has a process of its own, which shares what this process
-        holds when the item is taken, if it forks.
-    fork
-        Whether this process forks, which must have one thread. Else a fork server of `multiprocessing` does, which
-        has imported `PRELOAD`; work and items are pickled. None: it forks where it may.
-    is_needed
-        Asked while items are at work whether anybody still waits for them; the iteration ends where nobody does.
+        What one item may take.
 
     Notes
     -----
-    The process of an item is the subreaper of whatever that starts, and is ended after it. What it leaves behind when
-    it crashes becomes a child of this process and is ended then.
+    Processes come from the fork server of `multiprocessing`, or are spawned where there is none or `spawn` is the start
+    method. Work, items and results are pickled; results must be of types of the standard library, numpy or tactbench.
     """
 
-    jobs: int = 1
-    limits: Limits = UNLIMITED
-    _: KW_ONLY
-    reuse: bool = False
-    fork: bool | None = None
-    is_needed: Callable[[], bool] = lambda: True
+    def __init__(self, jobs: int = 1, limits: Limits = UNLIMITED) -> None:
+        self.jobs, self.limits = jobs, limits
+        self._waiting: deque[tuple[Callable[[Any], Any], Sequence[Any]]] = deque()
+        self._busy: list[_Worker] = []
 
-    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Generator[tuple[T, R | BaseException], None, None]:
-        """Yield every item with its result or what stopped it, in the order in which they end.
+    def __enter__(self) -> Pool:
+        return self
 
-        Notes
-        -----
-        An item whose process ends before it has begun gets another one, once.
-        """
-        every = list(items) if self.reuse else []
-        coming = enumerate(every) if self.reuse else ((0, item) for item in items)
-        again: deque[tuple[int, T]] = deque()
-        """Items whose processes ended before they had begun."""
-        busy: list[Worker] = []
-        idle: list[Worker] = []
-        fork = can_fork() if self.fork is None else self.fork
-        with _children_of_items(busy, idle) as spared:
-            while True:
-                while len(busy) < self.jobs:
-                    second = bool(again)
-                    index, item = again.popleft() if again else next(coming, (-1, None))
-                    if index < 0:
-                        break
-                    try:
-                        with interrupts_blocked():
-                            worker = idle.pop() if idle else Worker(work, every or [item], self.limits, fork)
-                            busy.append(worker)
-                            worker.begin(index, second)
-                    except Exception as error:
-                        if isinstance(error, ConnectionError | EOFError) and not second:
-                            await_fork_server_end(_SERVER_ENDS_S)
-                            again.append((index, item))  # type: ignore[arg-type]
-                        else:  # it cannot be pickled, or the system starts no more processes
-                            yield item, error  # type: ignore[misc]
-                if not busy or not self.is_needed():
-                    return
-                wait([one for worker in busy for one in worker.waits_on], min(worker.wait_s() for worker in busy))
-                for worker in list(busy):
-                    outcome = worker.outcome()
-                    if outcome is PENDING:
-                        continue
-                    item = worker.items[worker.index]
-                    retry = not (worker.begun or worker.second or worker.alive)
-                    self._end_item(worker, busy, idle)
-                    kill_orphans(spared)
-                    if retry:
-                        again.append((worker.index, item))
-                    else:
-                        yield item, outcome
+    def __exit__(self, *_: object) -> None:
+        """End every process that is at work."""
+        for worker in self._busy:
+            worker.terminate()
+        for worker in self._busy:
+            worker.end()
+        self._busy.clear()
+        self._waiting.clear()
 
-    def _end_item(self, worker: Worker, busy: list[Worker], idle: list[Worker]) -> None:
-        """End whatever an item that is over has started, and its process unless another item may have it."""
-        with interrupts_blocked():
-            busy.remove(worker)
-            if self.reuse and worker.alive:
-                kill_below(worker.pid)
-                idle.append(worker)
-            else:
-                worker.close()
+    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
+        """Queue a piece of work; may be called while `outcomes` is iterated."""
+        if items:
+            self._waiting.append((work, items))
+
+    def outcomes(self) -> Iterator[tuple[Any, Any]]:
+        """Yield every submitted item with its result or the error that stopped it, in the order in which they end."""
+        while self._waiting or self._busy:
+            while self._waiting and len(self._busy) < self.jobs:
+                work, items = self._waiting.popleft()
+                try:
+                    self._busy.append(_Worker(work, items, self.limits))
+                except Exception as error:  # it cannot be pickled, or the system starts no more processes
+                    for item in items:
+                        yield item, plain_error(error)
+            wait([source for worker in self._busy for source in worker.waits_on], POLL_S)
+            for worker in list(self._busy):
+                yield from worker.poll()
+                if worker.over:
+                    worker.end()
+                    self._busy.remove(worker)
+                    if left := worker.items[worker.index :]:
+                        self._waiting.appendleft((worker.work, left))
+
+    def each(
+        self, work: Callable[[T], R], items: Iterable[T], *, together: bool = False
+    ) -> Iterator[tuple[T, R | BaseException]]:
+        """Carry out `work` for every item, each in a process of its own or all `together` in one, and yield outcomes."""
+        with self:
+            every = list(items)
+            for piece in [every] if together else [[item] for item in every]:
+                self.submit(work, piece)
+            yield from self.outcomes()
+
+
+class InProcess:
+    """Carries out items in this process, without limits: for a debugger. Ctrl-C ends it."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[tuple[Callable[[Any], Any], Any]] = deque()
+
+    def __enter__(self) -> InProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._waiting.clear()
+
+    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
+        """Queue items."""
+        self._waiting.extend((work, item) for item in items)
+
+    def outcomes(self) -> Iterator[tuple[Any, Any]]:
+        """Yield every item with its result or the error that stopped it."""
+        while self._waiting:
+            work, item = self._waiting.popleft()
+            try:
+                outcome = work(item)
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:
+                outcome = plain_error(error)
+            yield item, outcome
+
+    def each(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R | BaseException]]:
+        """Carry out `work` for every item and yield outcomes."""
+        self.submit(work, list(items))
+        yield from self.outcomes()
+
+
+class _Worker:
+    """A child process with its piece of work."""
+
+    def __init__(self, work: Callable[[Any], Any], items: Sequence[Any], limits: Limits) -> None:
+        self.work, self.items, self.index, self.over = work, items, 0, False
+        self._limits = limits
+        context = _context()
+        self._connection, theirs = context.Pipe()
+        handle, log = tempfile.mkstemp(prefix="tactbench-", suffix=".log")
+        os.close(handle)
+        self._log: str | None = log
+        self._printed = ""
+        arguments = (work, items, theirs, log, str(Path.cwd()), limits)
+        try:
+            self._process = context.Process(target=run_child, args=arguments)
+            with _without_main():
+                self._process.start()
+        except BaseException:
+            self._connection.close()
+            Path(log).unlink(missing_ok=True)
+            raise
+        finally:
+            theirs.close()
+        self._began_s, self._begun, self._shared_mb = time.monotonic(), False, 0.0
+
+    @property
+    def waits_on(self) -> tuple[Any, ...]:
+        return self._connection, self._process.sentinel
+
+    def poll(self) -> Iterator[tuple[Any, Any]]:
+        """Yield what has come of items; set `over` once the process is of no more use."""
+        ended = not self._process.is_alive()  # before the pipe is read: what it sent last is not missed
+        while not self.over:
+            try:
+                if not self._connection.poll():
+                    break
+                kind, value, *spent_s = self._connection.recv()
+            except (EOFError, OSError):  # it has ended, or closed what is not its own
+                self._process.join(START_S if ended else 1.0)
+                ended = True
+                break
+            if kind == "begun":
+                self._began_s, self._begun, self._shared_mb = time.monotonic(), True, value
+                continue
+            if isinstance(value, CellStopped):
+                value.log, value.spent_s = self.log(), spent_s[0]
+            yield self._next(), value
+            self.over = self.index == len(self.items)
+        if self.over:
+            return
+        stopped = self._crashed() if ended else self._beyond_limits()
+        if stopped is not None:
+            stopped.spent_s = time.monotonic() - self._began_s
+            self.over = True
+            self.end()
+            stopped.log = self.log()
+            yield self._next(), stopped
+
+    def _next(self) -> Any:
+        item = self.items[self.index]
+        self.index += 1
+        self._begun = False
+        self._began_s = time.monotonic()
+        return item
+
+    def _beyond_limits(self) -> CellStopped | None:
+        """Return why the item at work must be ended; None if it need not."""
+        if self._log and Path(self._log).stat().st_size > MOST_LOG_BYTES:
+            os.truncate(self._log, 0)
+        spent_s = time.monotonic() - self._began_s
+        if not self._begun:
+            late = Crashed(f"Its process did not begin within {START_S:g} s.", hint="Run fewer at once (--jobs).")
+            return late if spent_s > START_S else None
+        timeout_s, memory_mb = self._limits.timeout_s, self._limits.memory_mb
+        if timeout_s is not None and spent_s > timeout_s + KILL_DELAY_S:
+            text = f"It was stopped: it took longer than {timeout_s:g} s."
+            return TimedOut(text, hint="Allow more with --timeout SECONDS.", traceback_text=_stacks(self.log()))
+        if memory_mb is not None and resident_mb(self._process.pid) - self._shared_mb > memory_mb:
+            return out_of_memory(self._limits)
+        return None
+
+    def _crashed(self) -> Crashed:
+        code = self._process.exitcode or 0
+        if code >= 0:
+            return Crashed(f"Its process ended with exit code {code} and gave no result.",
+                           hint="Something in it calls os._exit or closes what is not its own.")  # fmt: skip
+        name = signal.Signals(-code).name if -code in iter(signal.Signals) else "unknown"
+        hint = "What it printed last may say where."
+        if name == "SIGKILL":
+            hint = "If memory was short, run fewer at once (--jobs) or limit each (--memory MB)."
+        return Crashed(f"Its process was ended by signal {-code} ({name}).", hint=hint, signal=-code,
+                       traceback_text=_stacks(self.log()))  # fmt: skip
+
+    def log(self) -> str:
+        """Return the end of what the item at work has printed."""
+        if self._log is None:
+            return self._printed
+        with open(self._log, "rb") as file:  # noqa: PTH123  (seek from the end)
+            file.seek(max(0, file.seek(0, os.SEEK_END) - LOG_BYTES))
+            return file.read().decode(errors="replace")
+
+    def terminate(self) -> None:
+        """Send SIGTERM if it has time to close its devices."""
+        if self._limits.grace_s and self._process.is_alive():
+            self._process.terminate()
+
+    def end(self) -> None:
+        """End the process and everything in its group, after the time that it has to close its devices."""
+        if self._log is None:
+            return
+        if self._limits.grace_s and self.index < len(self.items):
+            self.terminate()
+            self._process.join(self._limits.grace_s)
+        below: list[psutil.Process] = []
+        with suppress(psutil.Error):
+            below = psutil.Process(self._process.pid).children(recursive=True)
+        if hasattr(os, "killpg"):
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+        for one in (*below, self._process):
+            with suppress(psutil.Error, OSError):
+                one.kill()
+        self._process.join()
+        self._connection.close()
+        self._printed, log, self._log = self.log(), self._log, None
+        Path(log).unlink(missing_ok=True)
+
+
+def _stacks(log: str) -> str:
+    """Return what Python's fault handler wrote at the end of a log."""
+    for mark in ("Fatal Python error", "Timeout ("):
+        if mark in log:
+            return mark + log.rpartition(mark)[2]
+    return ""
+
+
+def _context() -> Any:
+    method = multiprocessing.get_start_method(allow_none=True)
+    can_fork = "forkserver" in multiprocessing.get_all_start_methods() and hasattr(os, "fork")
+    context = multiprocessing.get_context("forkserver" if can_fork and method != "spawn" else "spawn")
+    context.set_forkserver_preload(_preload)
+    return context
+
+
+_preload = ["tactbench.core.pool.child"]
+
+
+def start_server(*modules: str) -> None:
+    """Have the fork server import `modules`, and start it now, so that it imports them while this process goes on."""
+    _preload.extend(name for name in modules if name not in _preload)
+    if _context().get_start_method() == "forkserver":
+        from multiprocessing import forkserver
+
+        with _without_main():
+            forkserver.ensure_running()
 
 
 @contextmanager
-def _children_of_items(busy: list[Worker], idle: list[Worker]) -> Iterator[set[int]]:
-    """Have orphans of items become children of this process; at the end, leave no process of an item.
-
-    Yields the children that were there before.
-    """
-    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGCHLD) == signal.SIG_IGN:
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else the system reaps children, and their exit codes are lost
-    before: bool | None = None
-    spared: set[int] = set()
+def _without_main() -> Iterator[None]:
+    """Hide the main module, which children would import anew: a script need not guard what it does."""
+    main = sys.modules["__main__"]
+    hidden = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
     try:
-        with interrupts_blocked():
-            spared |= children(os.getpid())
-            before = set_subreaper(True)
-        yield spared
+        main.__spec__ = None
+        with suppress(AttributeError):
+            del main.__file__
+        yield
     finally:
-        try:
-            for worker in busy:
-                worker.give_grace()
-        finally:
-            with interrupts_blocked():
-                for worker in (*busy, *idle):
-                    worker.close()
-                if before is not None:
-                    kill_orphans(spared)
-                    set_subreaper(before)
+        for name, value in hidden.items():
+            setattr(main, name, value)

@@ -1,85 +1,106 @@
-"""Who computed this, with what, where: gathered once a run, and said in a few sentences under a table.
+"""Which software computed a result on which machine: gathered once a run, and said in a few sentences under a table.
 
-There is no clock in it, no name of a person or host and no path: equal circumstances give equal provenance.
+It holds no clock, no name of a person or host and no path: equal circumstances give equal provenance.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import platform
-import sys
+import re
+import subprocess
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 import tactbench
-from tactbench.core.plugins.registry import Registry, installed
-from tactbench.core.provenance.checkout import checkout_of
-from tactbench.core.provenance.machine import blas, container, cpu_model, host_id, memory_mb, system
-from tactbench.core.provenance.source import (
-    PACKAGE,
-    RELEVANT,
-    SourceDigests,
-    installed_distributions,
-    is_installed,
-    location_of,
-    package_of,
-)
+from tactbench.core.files import sha256
+from tactbench.core.plugins.registry import Registry
+from tactbench.core.provenance.source import PACKAGE, RELEVANT, source_digest, version_of
 
-__all__ = ["foot", "gather", "host_id"]
+_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+"""What numerical libraries read when they are loaded."""
+GIT_S = 10.0
+"""Seconds that git may take to answer: a checkout may lie on a slow network disk."""
 
 
-def gather(sources: SourceDigests | None = None, **circumstances: Any) -> dict[str, Any]:
-    """Return versions, machine, state of the code, and the `circumstances` of the run, such as seed and jobs.
-
-    Parameters
-    ----------
-    sources
-        Digests of the plugins' packages, if somebody has them already.
-
-    Notes
-    -----
-    About 10 ms, half of it a call of git a checkout: once a run, never once a cell.
-    """
-    digests = sources or SourceDigests()
+def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
+    """Return versions, machine, state of the code, and the `circumstances` of the run, such as seed and jobs."""
     return {
         "tactbench": tactbench.__version__,
-        "commit": _state(Path(tactbench.__file__).parent),
+        "commit": _commit(Path(tactbench.__file__).parent),
         "python": platform.python_version(),
-        "implementation": platform.python_implementation(),
-        "platform": system(),
+        "platform": f"{platform.system()}-{platform.release()}-{platform.machine()}",
         "machine": platform.machine(),
         "cpu": cpu_model(),
         "cores": os.cpu_count(),
-        "memory_mb": memory_mb(),
-        "container": container(),
+        "memory_mb": psutil.virtual_memory().total // 2**20,
         "host": host_id(),
-        "blas": blas(),
-        "plugins": list(_plugins(installed(), digests)),
-        "distributions": installed_distributions(sys.path),
+        "blas": _blas(),
+        "plugins": list(_plugins(registry)),
+        "distributions": {name: version_of(name) for name in (*RELEVANT, "h5py", "pydantic")},
         **circumstances,
     }
 
 
-def _plugins(registry: Registry, digests: SourceDigests) -> Iterator[dict[str, str]]:
-    """Yield every package of a plugin that is not ours: who brought it, its version, its source and its commit."""
-    packages = {package_of(row.module): row for row in registry.plugins}
+def usable_cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@lru_cache(maxsize=1)
+def host_id() -> str:
+    """Return a digest that tells hosts apart without naming them."""
+    parts = (platform.node(), platform.machine(), cpu_model(), str(os.cpu_count()))
+    return sha256("\0".join(parts))[:12]
+
+
+@lru_cache(maxsize=1)
+def cpu_model() -> str:
+    """Return the name of the processor."""
+    with suppress(OSError):
+        found = re.search(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+        if found:
+            return found[1]
+    return platform.processor() or "unknown"
+
+
+def _plugins(registry: Registry) -> Iterator[dict[str, str]]:
+    """Yield the package of each plugin that is not ours: who brought it, its version, its source."""
+    packages = {row.module.partition(".")[0]: row for row in registry.plugins}
     for package, row in sorted(packages.items()):
-        if package == PACKAGE:
-            continue
-        place = location_of(package)
-        yield {
-            "distribution": row.distribution,
-            "version": row.version,
-            "package": package,
-            "source": digests.package(package),
-            "commit": _state(place) if place is not None and not is_installed(place) else "",
-        }
+        if package != PACKAGE:
+            source = {"package": package, "source": source_digest(package)}
+            yield {"distribution": row.distribution, "version": row.version, **source}
 
 
-def _state(folder: Path) -> str:
-    checkout = checkout_of(folder)
-    return "" if checkout is None else str(checkout)
+def _commit(folder: Path) -> str:
+    """Return the commit of the git checkout that holds `folder`, with ``+changes`` if files below it differ from it."""
+    if not any((place / ".git").exists() for place in folder.parents):
+        return ""
+    asked = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--exclude=*", "--dirty=+changes"]
+    try:
+        found = subprocess.run(asked, capture_output=True, text=True, timeout=GIT_S, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return found.stdout.strip()
+
+
+def _blas() -> dict[str, str]:
+    """Return name and version of numpy's BLAS and its number of threads, without importing numpy."""
+    found = None
+    with suppress(OSError, ImportError, ValueError):
+        spec = importlib.util.find_spec("numpy")
+        text = (Path(spec.origin).parent / "__config__.py").read_text() if spec and spec.origin else ""
+        found = re.search(r'"blas": \{\s*"name": "([^"]*)".*?"version": "([^"]*)"', text, re.DOTALL)
+    name, version = found.groups() if found else ("unknown", "")
+    threads = next((os.environ[variable] for variable in _THREADS if variable in os.environ), "as many as cores")
+    return {"name": name, "version": version, "threads": threads}
 
 
 def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
@@ -101,7 +122,7 @@ def _software(one: Mapping[str, Any]) -> str:
     if "tactbench" not in one:
         return ""
     state, _, changes = str(one.get("commit", "")).partition("+")
-    commit = f" ({state}{f', with changes {changes}' if changes else ''})" if state else ""
+    commit = f" ({state}{', with changes' if changes else ''})" if state else ""
     installed_versions = one.get("distributions", {})
     libraries = [f"{name} {installed_versions[name]}" for name in RELEVANT if name in installed_versions]
     algebra = one.get("blas", {})
@@ -112,8 +133,8 @@ def _software(one: Mapping[str, Any]) -> str:
 
 def _plugin_texts(one: Mapping[str, Any]) -> Iterator[str]:
     for plugin in one.get("plugins", ()):
-        state = plugin.get("commit") or f"source {str(plugin.get('source', ''))[:12]}"
-        yield f"Plugin {plugin.get('distribution')} {plugin.get('version')} ({state})."
+        source = str(plugin.get("source", ""))[:12]
+        yield f"Plugin {plugin.get('distribution')} {plugin.get('version')} (source {source})."
 
 
 def _place(one: Mapping[str, Any]) -> str:
@@ -122,7 +143,4 @@ def _place(one: Mapping[str, Any]) -> str:
     facts = [str(one.get("cpu", "unknown processor")), f"{one.get('cores')} cores"]
     if one.get("memory_mb"):
         facts.append(f"{one['memory_mb'] / 1024:.0f} GiB")
-    if one.get("container"):
-        facts.append(f"in a container ({one['container']})")
-    together = f"; {one['jobs']} cells at once" if one.get("jobs", 1) != 1 else ""
-    return f"Host {one['host']}: {', '.join(facts)}{together}."
+    return f"Host {one['host']}: {', '.join(facts)}."

@@ -1,0 +1,225 @@
+"""One cell: from a job to its row, in whatever process carries it out."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from tactbench.core.errors import CellStopped, EngineError, NotApplicable
+from tactbench.core.matrix.plan import Cell
+from tactbench.core.plugins.registry import load_object
+from tactbench.core.pool.child import plain_error
+from tactbench.core.provenance.gather import host_id
+from tactbench.core.spec.recording import RecordingMeta, Scalar
+from tactbench.core.spec.rig import EstimatorDescriptor
+from tactbench.core.spec.row import RowModel
+from tactbench.core.spec.task import TaskSpec
+
+if TYPE_CHECKING:
+    from tactbench.core.evaluation.cell import CellResult
+    from tactbench.core.evaluation.dataset import Dataset
+    from tactbench.core.samples import Answers
+
+Row = dict[str, Any]
+
+TIMED = "fit time and latency were measured with nothing else of the run at work"
+_TIMES = ("search_s", "fit_s", "predict_s")
+
+
+class Job(NamedTuple):
+    """A cell to be evaluated, with all that its process has to know."""
+
+    cell: Cell
+    task: TaskSpec
+    estimator: EstimatorDescriptor
+    recordings: tuple[Path, ...]
+    digests: tuple[str, ...]
+    """Of the recordings' content."""
+
+
+def prepare(estimator: EstimatorDescriptor, kind: str) -> None:
+    """Import what an estimator needs and fit it to a few made-up rows, so that no clock counts a first use.
+
+    What is wrong with the estimator is left to its cells.
+    """
+    if (os.getpid(), estimator.name, kind) in _prepared:
+        return
+    _prepared.add((os.getpid(), estimator.name, kind))
+    with suppress(Exception):
+        build = load_object(estimator.where)
+        build(kind=kind, seed=0, threads=1, **estimator.params)
+        if estimator.rehearsal is not None:
+            from tactbench.core.evaluation.rehearsal import rehearse
+
+            rehearse(build(kind=kind, seed=0, threads=1, **{**estimator.params, **estimator.rehearsal}), kind)
+
+
+_prepared: set[tuple[int, str, str]] = set()
+"""By process: after a fork, memory pages are copied at first use, which a clock would count."""
+
+
+@lru_cache(maxsize=1)
+def dataset(task: TaskSpec, recordings: tuple[Path, ...]) -> Dataset:
+    """Return `recordings` as a task needs them; the cells of one piece of work share what is read."""
+    from tactbench.core.evaluation.dataset import load_dataset
+
+    return load_dataset(task, recordings)
+
+
+Solved = tuple[Row, "dict[str, Answers]"]
+"""A row of plain data, and the answers by role."""
+
+
+def solve(job: Job, concurrency: int = 1, progress: Callable[[str], None] | None = None) -> Solved:
+    """Evaluate one cell; raises whatever its plugins and recordings raise.
+
+    Parameters
+    ----------
+    concurrency
+        Pieces of work of the run that may be at work beside this one, itself included.
+    progress
+        Called with what is being done.
+    """
+    cell, task, estimator, recordings, _ = job
+    folder = Path.cwd()
+    try:
+        prepare(estimator, task.kind)
+    finally:
+        os.chdir(folder)  # recordings lie relative to it, wherever a constructor has gone
+    import numpy as np
+
+    from tactbench.core.evaluation.cell import CellContext, evaluate
+
+    began = time.perf_counter()
+    # The global generators get the cell's seed: what is drawn from them does not depend on the cells before.
+    random.seed(cell.seed)
+    np.random.seed(cell.seed % 2**32)  # noqa: NPY002  (it is this old generator that libraries draw from)
+    data = dataset(task, recordings)
+    context = CellContext(
+        task, estimator, dict(cell.params), cell.protocol, cell.split, seed=cell.seed, clock=time.perf_counter,
+        progress=progress, latency=cell.timed,
+    )  # fmt: skip
+    result = evaluate(context, data)
+    row = {
+        **opening(cell, task),
+        **_described(data.metas),
+        **_scored(result),
+        **published(cell, task, result.split),
+        **({} if cell.timed else dict.fromkeys(_TIMES)),
+        "looks_at": estimator.looks_at,
+        "recordings": [str(path) for path in data.paths],
+        "digests": list(job.digests),
+        "status": "done",
+        "wall_s": time.perf_counter() - began,
+        "concurrency": concurrency,
+        "host": host_id(),
+    }
+    row["remarks"] += [*result.remarks, *([TIMED] if cell.timed else [])]
+    return json.loads(json.dumps(row, allow_nan=False)), dict(result.sets)
+
+
+def check_content(job: Job) -> None:
+    """Raise EngineError if this process sees other recordings than the run does."""
+    from tactbench.core.recording.reader import content_digest
+
+    for path, digest in zip(job.recordings, job.digests, strict=True):
+        if content_digest(path) != digest:
+            raise EngineError(
+                f"Host {host_id()} cannot compute this cell: its {path} is another file.",
+                hint="Every worker must see the files of the run, unchanged, at the same paths.",
+            )
+
+
+def opening(cell: Cell, task: TaskSpec, *, simulated: bool = False) -> Row:
+    """Return a row with what is known before anything is computed; every key of the format is there."""
+    unknown = {name: field.get_default(call_default_factory=True) for name, field in RowModel.model_fields.items()}
+    alike = ("sensor", "task", "rig", "protocol", "split", "estimator", "repeat", "repeats", "seed", "declared_task")
+    asked = ("answer_per", "answer_from", "metric", "unit", "equivalence", "reference_score")
+    return {
+        **unknown,
+        **{name: getattr(cell, name) for name in alike},
+        **{name: getattr(task, name) for name in asked},
+        "cell": cell.name,
+        "params": dict(cell.params),
+        "is_baseline": cell.baseline,
+        "simulation": cell.simulation.model_dump(mode="json", exclude_defaults=True),
+        "status": "planned",
+        "simulated": simulated,
+        **published(cell, task, cell.split),
+    }
+
+
+def published(cell: Cell, task: TaskSpec, split: str | None) -> Row:
+    """Return the published figure that the cell may stand beside: one of ours with its defaults only."""
+    found = task.published_for(cell.sensor, cell.protocol, cell.estimator, split)
+    if found is None or (cell.baseline if found.estimator is None else cell.params):
+        return {"published": None, "published_reference": "", "published_remark": ""}
+    own = "" if found.estimator else "another model than ours"
+    remark = "; ".join(part for part in (own, found.remark) if part)
+    return {"published": found.score, "published_reference": found.reference, "published_remark": remark}
+
+
+def unanswered(cell: Cell, task: TaskSpec, why: BaseException, *, simulated: bool) -> Row:
+    """Return the row of a cell that was skipped or stopped."""
+    error = plain_error(why)
+    row = {**opening(cell, task, simulated=simulated), "host": host_id()}
+    if isinstance(error, NotApplicable):
+        return {**row, "status": "skipped", "reason": str(error)}
+    row |= {"status": "failed", "reason": str(error).rstrip(": "), "traceback": error.traceback_text}
+    if isinstance(error, CellStopped):
+        row |= {"status": error.status, "signal": error.signal, "log": error.log, "wall_s": error.spent_s}
+    return row
+
+
+def _described(metas: Sequence[RecordingMeta]) -> Row:
+    """Return what recordings say that a reader of the row must know."""
+    seconds = [float(meta.provenance["sim_s"]) for meta in metas if "sim_s" in meta.provenance]
+    return {
+        "simulated": any(meta.simulated for meta in metas),
+        "emulated": any(meta.emulation is not None for meta in metas),
+        "sim_s": sum(seconds) if seconds else None,
+        "assumptions": _assumed(metas),
+        "plan": [entry.model_dump(mode="json") for entry in metas[0].plan],
+        "remarks": sorted({remark for meta in metas for remark in meta.remarks}),
+    }
+
+
+def _assumed(metas: Sequence[RecordingMeta]) -> dict[str, Scalar]:
+    """Return what a simulation assumed in all recordings; of what differs among them, the range or every value."""
+    found: dict[str, Scalar] = {}
+    for name in dict.fromkeys(name for meta in metas for name in meta.assumptions):
+        values = list(dict.fromkeys(meta.assumptions[name] for meta in metas if name in meta.assumptions))
+        numbers = [value for value in values if isinstance(value, int | float)]
+        if len(values) == 1:
+            found[name] = values[0]
+        elif len(numbers) == len(values):
+            found[name] = f"{min(numbers):g} to {max(numbers):g}"
+        else:
+            found[name] = ", ".join(str(value) for value in values)
+    return found
+
+
+def _scored(result: CellResult) -> Row:
+    """Return what was measured, as plain data: the result's names are those of the row."""
+    row = {name: _plain(getattr(result, name)) for name in RowModel.model_fields if hasattr(result, name)}
+    del row["remarks"]
+    if result.beyond is not None:
+        row |= {"reference_floor": result.beyond.floor, "score_beyond_floor": result.beyond.score}
+        row |= {"beyond_floor_ci_low": result.beyond.low, "beyond_floor_ci_high": result.beyond.high}
+    row["true_score"], row["true_ci_low"], row["true_ci_high"] = result.true or (None,) * 3
+    return row
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(one) for one in value]
+    return value.tolist() if hasattr(value, "tolist") else value

@@ -1,0 +1,170 @@
+"""``results.sqlite``: an index of the files of a result folder, for quick listings and for queries.
+
+The files are the truth. An index that is lost, damaged or of another version is made anew; what it says of a file
+counts as long as the file has the size and time of modification that it had when it was read. Where it cannot be
+written, on a read-only disk, the index lives in memory.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import FormatError
+from tactbench.core.matrix.store.cell_file import CellFile, read_cell
+from tactbench.core.spec.row import FORMAT
+
+VERSION = 1
+_LOCKED_S = 10.0
+"""Seconds to wait for another process that writes the index."""
+_TYPES = {str: "TEXT", int: "INTEGER", bool: "INTEGER", float: "REAL"}
+COLUMNS = {
+    name: next(_TYPES[kind] for kind in (str, float, int, bool) if kind in kinds)
+    for name, kinds in FORMAT.items()
+    if not kinds & {dict, list}
+}
+"""Keys of a row with a column of their own: all that are neither tables nor lists."""
+_SCHEMA = f"""
+CREATE TABLE IF NOT EXISTS cells (
+  file TEXT PRIMARY KEY, size INTEGER, modified_ns INTEGER, ended_ns INTEGER,
+  {", ".join(f'"{name}" {kind}' for name, kind in COLUMNS.items())}, row TEXT);
+CREATE INDEX IF NOT EXISTS names ON cells (cell, ended_ns);
+CREATE INDEX IF NOT EXISTS keys ON cells (key);
+CREATE VIEW IF NOT EXISTS latest AS SELECT * FROM cells AS one WHERE NOT EXISTS (
+  SELECT 1 FROM cells AS other WHERE other.cell = one.cell AND other.ended_ns > one.ended_ns);
+CREATE TABLE IF NOT EXISTS provenance (id TEXT PRIMARY KEY, text TEXT);
+CREATE TABLE IF NOT EXISTS recordings (
+  path TEXT PRIMARY KEY, size INTEGER, modified_ns INTEGER, digest TEXT, sensor TEXT, scene TEXT);
+PRAGMA user_version = {VERSION};
+"""
+
+
+class Index:
+    """The index of one result folder; opened when made.
+
+    Parameters
+    ----------
+    folder
+        The result folder.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.troubles: list[str] = []
+        """Files that could not be read, in sentences."""
+        self._database = _opened(folder / "results.sqlite")
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Bring the index up to date with the files."""
+        found = {}
+        with suppress(OSError):
+            found = {path.name: path for path in (self.folder / "cells").glob("[!.]*.h5")}
+        known = dict(self._all("SELECT file, size || ' ' || modified_ns FROM cells"))
+        changed = {name: path for name, path in found.items() if known.get(name) != "{} {}".format(*signature(path))}
+        lost = [(name,) for name in known.keys() - found.keys()]
+        if not changed and not lost:
+            return
+        with self._database:
+            self._database.executemany("DELETE FROM cells WHERE file = ?", lost)
+            for name, path in sorted(changed.items()):
+                try:
+                    self.put(path, read_cell(path))
+                except FormatError as error:
+                    self._database.execute("DELETE FROM cells WHERE file = ?", (name,))
+                    self.troubles.append(str(error))
+
+    def put(self, path: Path, cell: CellFile) -> None:
+        """Enter what the file of a cell holds."""
+        row = cell.row
+        values = [row.get(name) for name in COLUMNS]
+        facts = (path.name, *signature(path), cell.ended_ns, *values, json.dumps(row))
+        with self._database:
+            self._database.execute(f"REPLACE INTO cells VALUES ({', '.join('?' * len(facts))})", facts)
+            pair = row.get("made_by", ""), json.dumps(cell.provenance)
+            self._database.execute("INSERT OR IGNORE INTO provenance VALUES (?, ?)", pair)
+
+    def drop(self, name: str) -> None:
+        """Take a file out."""
+        with self._database:
+            self._database.execute("DELETE FROM cells WHERE file = ?", (name,))
+
+    def files_of(self, cell: str) -> list[tuple[str, str, str]]:
+        """Return file, key and status of the files of a cell, the latest first."""
+        return self._all("SELECT file, key, status FROM cells WHERE cell = ? ORDER BY ended_ns DESC", cell)
+
+    def finished(self, key: str) -> dict[str, Any] | None:
+        """Return the row of a finished cell, or None."""
+        found = self._all("SELECT row FROM cells WHERE key = ? AND status = 'done'", key)
+        return json.loads(found[0][0]) if found else None
+
+    def latest(self) -> Iterator[dict[str, Any]]:
+        """Yield the latest row of every cell, in the order of their names and replicates."""
+        for (text,) in self._all("SELECT row FROM latest ORDER BY rtrim(cell, '0123456789'), repeat"):
+            yield json.loads(text)
+
+    def provenance(self, name: str) -> dict[str, Any]:
+        """Return the provenance that rows call `name`; empty if there is none."""
+        found = self._all("SELECT text FROM provenance WHERE id = ?", name)
+        return json.loads(found[0][0]) if found else {}
+
+    def recording(self, path: Path, read: Callable[[Path], Mapping[str, Any]]) -> Mapping[str, Any]:
+        """Return digest, sensor and scene of a recording; `read` reads them if the file is not known as it is now."""
+        place = str(path.resolve())
+        size, modified_ns = signature(path)
+        found = self._all(
+            "SELECT digest, sensor, scene FROM recordings WHERE path = ? AND size = ? AND modified_ns = ?",
+            place, size, modified_ns,
+        )  # fmt: skip
+        if found:
+            return dict(zip(("digest", "sensor", "scene"), found[0], strict=True))
+        facts = read(path)
+        values = (place, size, modified_ns, facts["digest"], facts["sensor"], facts["scene"])
+        with self._database:
+            self._database.execute("REPLACE INTO recordings VALUES (?, ?, ?, ?, ?, ?)", values)
+        return facts
+
+    def close(self) -> None:
+        """Close the file."""
+        self._database.close()
+
+    def _all(self, query: str, *values: Any) -> list[Any]:
+        return self._database.execute(query, values).fetchall()
+
+
+def signature(path: Path) -> tuple[int, int]:
+    """Return size and time of modification [ns] of a file; zeros if there is none."""
+    try:
+        stat = path.stat()
+    except OSError:
+        return 0, 0
+    return stat.st_size, stat.st_mtime_ns
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    """Open the index; made anew if it is damaged or of another version, in memory if it cannot be written."""
+    if path.parent.is_dir():
+        for _ in range(2):
+            database = None
+            try:
+                database = sqlite3.connect(path, timeout=_LOCKED_S)
+                (version,) = database.execute("PRAGMA user_version").fetchone()
+                if version not in (0, VERSION):
+                    raise sqlite3.DatabaseError(f"version {version}")
+                database.execute("PRAGMA synchronous = OFF")  # what a power cut takes is read from the files again
+                database.executescript(_SCHEMA)
+                return database
+            except sqlite3.Error:
+                if database is not None:
+                    database.close()
+                try:
+                    path.unlink(missing_ok=True)
+                except OSError:
+                    break
+    database = sqlite3.connect(":memory:")
+    database.executescript(_SCHEMA)
+    return database

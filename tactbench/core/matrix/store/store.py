@@ -1,0 +1,231 @@
+"""A result folder: what a run writes into it, and what is read from it."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tactbench.core.errors import FolderError, FormatError
+from tactbench.core.files import replace_file, try_lock
+from tactbench.core.matrix.store.cell_file import CellFile, read_cell
+from tactbench.core.matrix.store.index import Index
+from tactbench.core.provenance.source import digest_of
+
+if TYPE_CHECKING:
+    from tactbench.core.samples import Answers
+
+Row = dict[str, Any]
+"""One cell, as `tactbench.core.spec.row.RowModel` describes it."""
+
+NAMING = ("cell", "repeat", "repeats")
+"""What a matrix calls a cell; its key covers everything else."""
+_TEXT_CHARACTERS = 2**16
+"""Of a log or a traceback that are kept: the last."""
+_FULL = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "the quota is used up",
+    errno.EFBIG: "a file would be larger than this process may write",
+}
+
+
+class Store:
+    """A result folder. Making one reads and writes nothing; :meth:`hold` makes the folder.
+
+    Parameters
+    ----------
+    folder
+        Where results lie, or will lie.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._index: Index | None = None
+        self._held = False
+        self._last_ns = 0
+        self._provenance: tuple[str, Mapping[str, Any]] = ("", {})
+
+    @contextmanager
+    def hold(self) -> Iterator[Store]:
+        """Keep the folder to this run: made if it is not there, locked until the end. Its holder may enter it again.
+
+        Raises
+        ------
+        FolderError
+            If another run holds it, or it cannot be made or written.
+        """
+        if self._held:
+            yield self
+            return
+        with writing(self.folder):
+            for part in ("recordings", "cells"):
+                (self.folder / part).mkdir(parents=True, exist_ok=True)
+            lock = os.open(self.folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            if try_lock(lock) is False:
+                raise FolderError(
+                    f"Another run is at work in {self.folder}.",
+                    hint="Wait until it ends, or give another folder with --out DIR.",
+                )
+            with writing(self.folder):
+                for left in (self.folder / "cells").glob(".*.partial"):  # of a run that was killed
+                    left.unlink()
+            self._held = True
+            yield self
+        finally:
+            self._held = False
+            os.close(lock)
+
+    @property
+    def _files(self) -> Index:
+        if self._index is None:
+            self._index = Index(self.folder)
+        return self._index
+
+    def begin(self, provenance: Mapping[str, Any]) -> str:
+        """Have cells that are written from now on carry this provenance, and return its id."""
+        self._provenance = digest_of(json.dumps(provenance, sort_keys=True))[:16], provenance
+        return self._provenance[0]
+
+    def finished(self, key: str) -> Row | None:
+        """Return the row of a finished cell by its key, or None."""
+        return self._files.finished(key)
+
+    def keep(
+        self, row: Mapping[str, Any], sections: Mapping[str, Any], answers: Mapping[str, Answers] | None = None
+    ) -> Row:
+        """Write the file of a cell that has ended, and return its row as it will be read.
+
+        Raises
+        ------
+        FolderError
+            If the disk refuses, or the folder is gone; what was finished before stays.
+        ValueError, TypeError
+            If the row is not plain data; nothing is written.
+        """
+        row = {name: _clipped(value) if name in ("log", "traceback") else value for name, value in row.items()}
+        row["made_by"] = self._provenance[0]
+        self._write(CellFile(row, sections, self._provenance[1], answers=answers or {}))
+        found: Row = json.loads(json.dumps(row))
+        return found
+
+    def reuse(self, row: Row) -> None:
+        """Note that a finished cell was found again, under the name it has in `row`: it is the latest of that name."""
+        latest = self._files.files_of(row["cell"])
+        known = self._files.finished(row["key"]) or {}
+        if not latest or latest[0][1] != row["key"] or any(known.get(name) != row[name] for name in NAMING):
+            cell = read_cell(self._path(row))
+            self._write(replace(cell, row={**cell.row, **{name: row[name] for name in NAMING}}))
+
+    def _write(self, cell: CellFile) -> None:
+        self._last_ns = max(time.time_ns(), self._last_ns + 1)
+        content = replace(cell, ended_ns=self._last_ns).content()
+        path = self._path(cell.row)
+        with writing(self.folder):
+            replace_file(path, content)
+            for name, key, status in self._files.files_of(cell.row["cell"]):
+                if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
+                    (path.parent / name).unlink(missing_ok=True)
+                    self._files.drop(name)
+        self._files.put(path, replace(cell, ended_ns=self._last_ns))
+
+    def _path(self, row: Mapping[str, Any]) -> Path:
+        """Return the file of a cell: named by its key, or by its name if it stopped before it had one."""
+        return self.folder / "cells" / f"{row.get('key') or digest_of(row['cell'])}.h5"
+
+    def write(self, name: str, text: str) -> Path:
+        """Write another file of results whole."""
+        path = self.folder / name
+        with writing(self.folder):
+            replace_file(path, text.encode())
+        return path
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What of this folder could not be used, in sentences."""
+        return tuple(self._files.troubles)
+
+    def rows(self) -> list[Row]:
+        """Return how every cell ended that ever did, the latest of each name, in the order of the names."""
+        return list(self._files.latest())
+
+    def cell(self, row: Mapping[str, Any]) -> CellFile:
+        """Return all that is kept of the cell of a row; raises FormatError if its file cannot be used."""
+        return read_cell(self._path(row))
+
+    def answers(self, key: str) -> dict[str, Answers]:
+        """Return what a finished cell answered, by role; nothing for a cell that is not there or cannot be read."""
+        path = self.folder / "cells" / f"{key}.h5"
+        try:
+            return dict(read_cell(path).answers) if path.is_file() else {}
+        except FormatError as error:
+            if str(error) not in self._files.troubles:
+                self._files.troubles.append(str(error))
+            return {}
+
+    def provenance(self, name: str) -> dict[str, Any]:
+        """Return which software computed a cell where, by the id in ``row["made_by"]``; empty if not known."""
+        return self._files.provenance(name)
+
+    def about(self, recording: Path) -> Mapping[str, Any]:
+        """Return content digest, sensor and scene of a recording; raises RecordingError if it cannot be read.
+
+        There is no scene where nobody planned it, for example that of an imported table.
+        """
+        return self._files.recording(recording, _read_recording)
+
+    def recordings(self, row: Mapping[str, Any]) -> list[tuple[str, Path | None]]:
+        """Return each recording that a row names, in its order, and its file, or None if it is not there."""
+        found = [(path, self.folder / path) for path in row["recordings"]]
+        return [(path, file if file.is_file() else None) for path, file in found]
+
+    def beside(self, path: Path) -> str:
+        """Return `path` relative to the folder where it lies inside, so that the folder may be moved."""
+        inside = path.is_relative_to(self.folder)
+        return str(path.relative_to(self.folder)) if inside else str(path.resolve())
+
+
+def _read_recording(path: Path) -> dict[str, Any]:
+    from tactbench.core.recording.reader import open_recording
+
+    with open_recording(path) as recording:
+        meta = recording.meta
+        scene = meta.scene.name if meta.scene else None
+        return {"digest": recording.verify(), "sensor": meta.sensor.name, "scene": scene}
+
+
+def _clipped(text: str) -> str:
+    return text if len(text) <= _TEXT_CHARACTERS else f"… {text[-_TEXT_CHARACTERS:]}"
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Turn what the system refuses while `folder` is written into a FolderError that says what to do."""
+    try:
+        yield
+    except OSError as error:
+        kept = "What was finished before is kept"
+        what = f"cannot be written: {_FULL.get(error.errno or 0) or error.strerror or error}"
+        hint = f"{kept}: check its permissions, or give another one with --out DIR."
+        if error.errno in _FULL:
+            hint = f"{kept}: make room, and the same command goes on from there."
+        elif error.errno in (errno.ENOENT, getattr(errno, "ESTALE", 0)):
+            what = "was removed or moved while it was being written"
+            hint = f"{kept} where it was moved to; give its new place as --out DIR."
+        raise FolderError(f"The folder {folder} {what}.", hint=hint) from error
+
+
+def sync_folder(folder: Path) -> None:
+    """Have the names in a folder survive a power cut, where the system can sync that."""
+    with suppress(OSError):
+        opened = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)
