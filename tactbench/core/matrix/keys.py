@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from tactbench.core.files import sha256
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.plugins.taking_part import taking_part
 from tactbench.core.provenance.source import Source, SourceDigests, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
@@ -46,7 +47,7 @@ class Keys:
     sources: SourceDigests = field(default_factory=SourceDigests)
     """Digests of the owners' packages."""
     _answers: dict[tuple[str, str], Fixed] = field(default_factory=dict)
-    _makers: dict[tuple[str, str, str, str | None], Fixed] = field(default_factory=dict)
+    _makers: dict[tuple[Any, ...], Fixed] = field(default_factory=dict)
     _data: dict[tuple[str, ...], str] = field(default_factory=dict)
 
     def of_cell(self, cell: Cell, data: Sequence[str]) -> str:
@@ -75,23 +76,24 @@ class Keys:
 
     def of_recording(self, sensor: str, rig: str, scene: Scene, role: Role, seed: int, rig_file: str = "") -> str:
         """Return the key of a recording that `rig` is to make of `scene`."""
-        made_by = self.maker(sensor, rig, rig_file, scene.indenter.shape)
+        made_by = self.maker(sensor, rig, rig_file, scene)
         return sha256(f"{made_by.digest} {_canonical([scene.model_dump(), role, seed])}")[:KEY_DIGITS]
 
-    def maker(self, sensor: str, rig: str, rig_file: str = "", shape: str | None = None) -> Fixed:
-        """Return what all recordings by one rig of one sensor share, with one `shape` of indenter if a scene names one.
+    def maker(self, sensor: str, rig: str, rig_file: str, scene: Scene) -> Fixed:
+        """Return what all recordings by one rig of one sensor share whose scenes name the same indenter and effects.
 
         What real devices gave is no less true once the code that read them has changed: of them it is sensor, rig and
         rig file alone, so that nobody has to press everything again.
         """
-        made = sensor, rig, rig_file, shape
+        shape = scene.indenter.shape
+        made = sensor, rig, rig_file, shape, scene.simulation.effects
         if made not in self._makers:
             devices = RigFile.model_validate_json(rig_file) if rig_file else None
             if devices is not None and not devices.emulated:
                 sections = {"sensor": {"name": sensor}, "rig": {"name": rig, "file": rig_file}}
                 return Fixed(sha256(_canonical(sections))[:KEY_DIGITS], sections)
             maker, carrier = self.registry.sensors.owned(sensor), self.registry.rigs.owned(rig)
-            effects = [self.registry.effects.owned(effect.name) for effect in self.registry.effects]
+            effects = taking_part(self.registry, maker.descriptor, scene)
             modules = [maker.module, carrier.module, carrier.descriptor.where]
             modules += [where for where in (maker.descriptor.transducer, maker.descriptor.driver) if where]
             modules += [] if devices is None else self._behind(devices)

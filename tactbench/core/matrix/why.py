@@ -34,7 +34,7 @@ def recording_entry(request: RecordingRequest, keys: Keys) -> Entry:
     """Return what went into a recording's key, for the book."""
     name = f"recording {request.sensor} {request.rig} {request.scene.name} {request.role} {request.seed}"
     scene = {"role": request.role, "seed": request.seed, "scene": request.scene.model_dump()}
-    maker = keys.maker(request.sensor, request.rig, request.rig_file, request.scene.indenter.shape)
+    maker = keys.maker(request.sensor, request.rig, request.rig_file, request.scene)
     return Entry(name, recording_key(request.path), scene, maker)
 
 
