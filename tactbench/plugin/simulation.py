@@ -16,6 +16,7 @@ from tactbench.core.plugins.interfaces import (
     Transducer,
     TransducerFactory,
 )
+from tactbench.core.plugins.taking_part import effect_names, rig_context
 from tactbench.core.samples import SkinGrid, SkinState
 from tactbench.core.spec.figure import RealFigure
 from tactbench.core.spec.rig import EffectDescriptor
@@ -58,7 +59,9 @@ __all__ = [
     "Transducer",
     "TransducerFactory",
     "Verdict",
+    "effect_names",
     "open_recording",
+    "rig_context",
 ]
 
 __getattr__ = on_demand(

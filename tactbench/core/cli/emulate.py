@@ -154,14 +154,13 @@ class Presser:
 
     def __post_init__(self) -> None:
         from tactbench.core.errors import UsageError
-        from tactbench.core.plugins.interfaces import RigContext
         from tactbench.core.plugins.registry import load_object
+        from tactbench.core.plugins.taking_part import rig_context
 
         descriptor = self.registry.rigs[self.physics]
         if not descriptor.simulated:
             raise UsageError(f"The rig {self.physics!r} is not simulated.", hint="Use twin.")
-        context = RigContext(effects=tuple(self.registry.effects), indenters=tuple(self.registry.indenters))
-        self._rig = load_object(descriptor.where)(context)
+        self._rig = load_object(descriptor.where)(rig_context(self.registry))
         self._drawn: dict[str, SceneSamples] = {}
 
     def draw(self, number: int) -> None:

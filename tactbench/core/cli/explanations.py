@@ -12,8 +12,8 @@ from tactbench.core.cli.screen import remark
 from tactbench.core.cost.task_score import in_unit, quick_estimator, task_score, with_all_effects
 from tactbench.core.errors import NotApplicable, UnknownNameError, UsageError
 from tactbench.core.leaderboard.names import METRIC_NAMES
-from tactbench.core.plugins.interfaces import RigContext
 from tactbench.core.plugins.registry import load_object
+from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.spec.scene import Simulation
 
 if TYPE_CHECKING:
@@ -66,8 +66,7 @@ def print_explanations(
         If the rig cannot simulate the sensor in any of the scenes.
     """
     sensor = registry.sensors[sensor_name]
-    context = RigContext(effects=tuple(registry.effects), indenters=tuple(registry.indenters))
-    rig: Explaining = load_object(registry.rigs[rig_name].where)(context)
+    rig: Explaining = load_object(registry.rigs[rig_name].where)(rig_context(registry))
     if not hasattr(rig, "explain"):
         raise UsageError(f"The rig {rig_name!r} does not explain its plans.", hint="Choose another with --rig.")
     scenes = _scenes(registry, task_name, scene_name, simulation)

@@ -18,7 +18,8 @@ SIMULATION = (
     click.option("--scenario", metavar="NAME",
                  help="A way of handling the sensor that its spec states by name; see `tactbench list scenarios`."),
     click.option("--effects", metavar="LIST",
-                 help="Effects to include or leave out whatever the plan says: +creep,-drift. +all, -all."),
+                 help="Effects to include or leave out whatever the plan says: +creep,-drift. +all, -all. Without a "
+                 "sign the plan decides: an effect of another package takes part only where it is named."),
     click.option("--rung", metavar="NAME", help="Rung of the ladder of contact solvers; see docs/twin.md."),
     click.option("--tolerance", type=click.FloatRange(min=0, min_open=True), metavar="X",
                  help="Largest error of a simulated channel, in its unit: the cheapest rung that keeps it."),
@@ -80,10 +81,8 @@ def simulation_of(
         )
     known = {name for effect in registry.effects for name in (effect.name, *effect.groups)} | {"all"}
     for word in change.get("effects", ()):
-        if word[0] not in "+-":
-            raise UsageError(f"--effects {word!r} lacks its sign.", hint=f"Write +{word} or -{word}.")
-        if word[1:] not in known:
-            raise UnknownNameError("effect", word[1:], sorted(known))
+        if word.lstrip("+-") not in known:
+            raise UnknownNameError("effect", word.lstrip("+-"), sorted(known))
     simulation = Simulation.model_validate({**(stated or Simulation()).model_dump(), **change})
     _check_nuisances(simulation, [registry.sensors[name].spec for name in sensors])
     return simulation

@@ -18,9 +18,10 @@ from tactbench.core.conformance.check import check, code_of, fail, skip
 from tactbench.core.conformance.driver import Lines, look_at
 from tactbench.core.conformance.press import FORCE_SHARE, pressing_channel
 from tactbench.core.conformance.subject import Subject
-from tactbench.core.conformance.trial_press import context_for, tiny_scene
+from tactbench.core.conformance.trial_press import tiny_scene
 from tactbench.core.errors import TactbenchError
 from tactbench.core.plugins.rig_files import load_rig_file
+from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.rig import SensorDescriptor
@@ -118,7 +119,7 @@ def _built(subject: Subject) -> tuple[_Kept, SensorDescriptor]:
     if file.rig != subject.name:
         skip(f"the rig file is for the rig {file.rig}")
     sensor = subject.registry.sensors[next(iter(file.sensors))]
-    context = context_for(subject, rig_file=file, operator=subject.operator)
+    context = rig_context(subject.registry, rig_file=file, operator=subject.operator)
     with code_of("where", subject.package):
         return _Kept(subject.code("where")(context)), sensor
 

@@ -16,12 +16,12 @@ from tactbench.core.conformance.trial_press import (
     SECONDS,
     TrialPress,
     carried_out,
-    context_for,
     pressed,
     simulated_sensors,
     tiny_scene,
 )
 from tactbench.core.errors import TactbenchError
+from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.samples import Quality
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -346,7 +346,7 @@ def rig_builds(subject: Subject) -> None:
 def _built(subject: Subject, *, usage: bool = False) -> Any:
     from tactbench.core.errors import UsageError
 
-    context = context_for(subject)
+    context = rig_context(subject.registry)
     with code_of("where", subject.package):
         try:
             return subject.code("where")(context)

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from tactbench.core.conformance.check import code_of, skip
 from tactbench.core.conformance.subject import Subject
 from tactbench.core.errors import NotApplicable
-from tactbench.core.plugins.interfaces import RigContext
 from tactbench.core.plugins.registry import load_object
+from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.samples import Block
 from tactbench.core.spec.profile import ForceRamp
 from tactbench.core.spec.quantity import assumed
 from tactbench.core.spec.recording import PlanEntry
-from tactbench.core.spec.rig import EffectDescriptor, RigDescriptor, SensorDescriptor
+from tactbench.core.spec.rig import RigDescriptor, SensorDescriptor
 from tactbench.core.spec.scene import Environment, Scene, Simulation
 from tactbench.core.spec.sensor import StreamSpec
 
@@ -97,31 +97,6 @@ def carried_out(rig: Any, descriptor: RigDescriptor, sensor: SensorDescriptor, s
     return TrialPress(scene, sensor, descriptor, streams, reference, plan, said, blocks)
 
 
-def effects_for(subject: Subject) -> tuple[EffectDescriptor, ...]:
-    """Return the effects that a check simulates with: those of this package and of the plugin's own distribution.
-
-    Another stranger's effect must not fail this one's check. Of an effect's siblings only those are taken that give it
-    what it consumes.
-    """
-    effects = subject.registry.effects
-    found = []
-    for owned in (effects.owned(name) for name in effects.names()):
-        own = owned.distribution == subject.distribution
-        if subject.kind == "effect":
-            consumed = set(subject.descriptor.consumes)
-            own = owned.descriptor.name == subject.name or (
-                own and bool(consumed.intersection(owned.descriptor.produces))
-            )
-        if owned.ours or own:
-            found.append(owned.descriptor)
-    return tuple(found)
-
-
-def context_for(subject: Subject, **devices: Any) -> RigContext:
-    """Return what a check builds a rig from: `effects_for` it, all indenters, and what it is told of devices."""
-    return RigContext(effects=effects_for(subject), indenters=tuple(subject.registry.indenters), **devices)
-
-
 def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     """Return the first simulated rig, built, those that come with this package before others."""
     registry = subject.registry
@@ -130,7 +105,7 @@ def simulated_rig(subject: Subject) -> tuple[Any, RigDescriptor]:
     if not simulated:
         skip("no simulated rig is installed")
     descriptor = simulated[0].descriptor
-    return load_object(descriptor.where)(context_for(subject)), descriptor
+    return load_object(descriptor.where)(rig_context(subject.registry)), descriptor
 
 
 def simulated_sensors(subject: Subject) -> Sequence[SensorDescriptor]:
@@ -160,7 +135,7 @@ def pressed(subject: Subject, seed: int = 1) -> TrialPress:
             skip("no sensor that can be simulated is installed")
         sensor = simulated_sensors(subject)[0]
         with code_of("where", subject.package):
-            rig = subject.code("where")(context_for(subject))
+            rig = subject.code("where")(rig_context(subject.registry))
     kinds = tuple(dict.fromkeys(channel.kind for channel in sensor.spec.channels()))
     scene = tiny_scene(observe=("taxel",) if "taxel" in kinds else kinds)
     with code_of(field, subject.package):
@@ -186,12 +161,14 @@ def first_that_goes(
 ) -> tuple[Any, RigDescriptor, SensorDescriptor, Scene, TrialPress] | None:
     """Return a rig, a sensor and a scene with which a simulation goes, and the press; None: none is applicable.
 
-    `asked` is an effect that is included by name; "" for none.
+    `asked` is an effect that is included by name, with those of its distribution that give it what it consumes as
+    candidates; "" for none.
     """
     rig, descriptor = simulated_rig(subject)
+    words = (*_giving_to(subject), f"+{asked}") if asked else ()
     for scene in scenes:
-        if asked:
-            scene = scene.model_copy(update={"simulation": Simulation(effects=(f"+{asked}",))})
+        if words:
+            scene = scene.model_copy(update={"simulation": Simulation(effects=words)})
         for sensor in simulated_sensors(subject):
             try:
                 with code_of(where, subject.package):
@@ -202,3 +179,11 @@ def first_that_goes(
                 raise
             return rig, descriptor, sensor, scene, made
     return None
+
+
+def _giving_to(subject: Subject) -> list[str]:
+    """Return the effects of an effect's own distribution that produce what it consumes."""
+    effects = subject.registry.effects
+    siblings = [one for one in map(effects.owned, effects.names()) if one.distribution == subject.distribution]
+    consumed = set(subject.descriptor.consumes)
+    return [one.descriptor.name for one in siblings if consumed.intersection(one.descriptor.produces)]

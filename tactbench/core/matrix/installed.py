@@ -7,8 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tactbench.core.errors import RigError, TactbenchError
-from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig, RigContext
+from tactbench.core.plugins.interfaces import Operator, ReplayRig, Rig
 from tactbench.core.plugins.registry import Registry, load_object
+from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.spec.rig_file import RigFile
 
 
@@ -31,13 +32,7 @@ def rig_of(
     descriptor = registry.rigs[name]
     if rig_file is not None:
         rig_file.checked_for(name)
-    context = RigContext(
-        effects=tuple(registry.effects),
-        indenters=tuple(registry.indenters),
-        recordings=recordings,
-        rig_file=rig_file,
-        operator=operator,
-    )
+    context = rig_context(registry, recordings=recordings, rig_file=rig_file, operator=operator)
     with failing_as(f"The rig {name!r} could not be built"):
         built: Rig | ReplayRig = load_object(descriptor.where)(context)
     if not (hasattr(built, "open") or hasattr(built, "recordings")):

@@ -13,6 +13,7 @@ from typing import Any
 
 from tactbench.core.matrix.plan import Cell, task_of
 from tactbench.core.plugins.registry import Registry
+from tactbench.core.plugins.taking_part import taking_part
 from tactbench.core.provenance.source import ANSWERING, RECORDING, digest_of, sources_of, versions
 from tactbench.core.spec.rig_file import RigFile
 from tactbench.core.spec.scene import Role, Scene
@@ -69,7 +70,7 @@ class Keys:
         What real devices gave stays true when the code that read them changes: of them it is sensor, rig and rig file
         alone, so that nobody has to press everything again.
         """
-        effects = taking_part(self.registry, sensor, scene)
+        effects = taking_part(self.registry, self.registry.sensors[sensor], scene)
         shape = scene.indenter.shape
         made = (sensor, rig, rig_file, str(shape), *(effect.descriptor.name for effect in effects))
         if made not in self._makers:

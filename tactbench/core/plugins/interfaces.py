@@ -236,7 +236,10 @@ class RigContext:
     """What a rig is built from: ``RigDescriptor.where`` is called with exactly this."""
 
     effects: tuple[EffectDescriptor, ...] = ()
-    """All installed effects; the twin plans with them."""
+    """The effects of tactbench itself: candidates for every scene."""
+    named_effects: tuple[EffectDescriptor, ...] = ()
+    """The installed effects of other packages: candidates where the sensor or the scene names them, see
+    :func:`tactbench.plugin.simulation.effect_names`."""
     indenters: tuple[IndenterDescriptor, ...] = ()
     """All installed shapes of indenters; the twin presses with them."""
     recordings: Path | None = None

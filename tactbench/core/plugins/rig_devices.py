@@ -9,10 +9,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tactbench.core.errors import PluginContractError, RigError, TactbenchError, UsageError
-from tactbench.core.plugins.interfaces import Operator, Rig, RigContext
+from tactbench.core.plugins.interfaces import Operator, Rig
 from tactbench.core.plugins.registry import Registry, load_object
+from tactbench.core.plugins.taking_part import rig_context
 from tactbench.core.spec.recording import Emulation, Scalar
-from tactbench.core.spec.rig import DeviceDescriptor, EffectDescriptor, SensorDescriptor
+from tactbench.core.spec.rig import DeviceDescriptor, SensorDescriptor
 from tactbench.core.spec.rig_file import FORCE, DeviceEntry, ForceEntry, NamedDevice, RigFile
 from tactbench.core.spec.sensor import ChannelSpec, StreamSpec
 
@@ -100,7 +101,7 @@ def with_sensor(file: RigFile, sensor: str) -> RigFile:
     return file.model_copy(update={"sensors": {sensor: file.sensors[sensor]}})
 
 
-def physics_of(file: RigFile, registry: Registry, effects: tuple[EffectDescriptor, ...]) -> Rig | None:
+def physics_of(file: RigFile, registry: Registry) -> Rig | None:
     """Build the simulated rig that moves a rig's emulated devices; None: it has none.
 
     Raises
@@ -115,7 +116,7 @@ def physics_of(file: RigFile, registry: Registry, effects: tuple[EffectDescripto
         raise UsageError(
             f"`physics: {descriptor.name}` in the rig file is no simulated rig.", hint="Use `physics: twin`."
         )
-    rig: Rig = load_object(descriptor.where)(RigContext(effects=effects, indenters=tuple(registry.indenters)))
+    rig: Rig = load_object(descriptor.where)(rig_context(registry))
     return rig
 
 

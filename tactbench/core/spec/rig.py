@@ -37,6 +37,9 @@ class SensorDescriptor(Frozen):
     """Options that the driver needs and only a real device's papers state, as they are of the emulated one: they hold
     where a rig file's entry of an emulated device leaves them out."""
 
+    effects: tuple[str, ...] = ()
+    """Names of effects of other packages, or of the sensor's own, that are considered wherever it is simulated."""
+
     @property
     def name(self) -> str:
         """The sensor's name."""

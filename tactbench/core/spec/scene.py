@@ -202,9 +202,10 @@ def _pairs(given: Any) -> Any:
 class Simulation(Frozen):
     """How a simulated rig is asked to carry out a scene; a real one ignores it."""
 
-    effects: tuple[Annotated[str, Field(pattern=r"^[+-][a-z][a-z0-9-]*$")], ...] = ()
-    """``+name`` includes an effect (or a group of them) whatever the plan would say, ``-name`` leaves it out; later
-    ones win. ``+all`` and ``-all`` are every effect."""
+    effects: tuple[Annotated[str, Field(pattern=r"^[+-]?[a-z][a-z0-9-]*$")], ...] = ()
+    """``+name`` includes an effect (or a group of them) whatever the plan would say, ``-name`` leaves it out, ``name``
+    lets the plan decide; later ones win. ``+all`` and ``-all`` are every candidate. An effect of another package is a
+    candidate only where it is named here or by the sensor."""
     rung: str | None = None
     """Name of a rung of the ladder of solvers; None: the default one."""
     tolerance: float | None = Field(default=None, gt=0)
@@ -288,10 +289,14 @@ class Scene(Frozen):
         return scene
 
     def simulated_as(self, simulation: Simulation) -> Scene:
-        """Return the scene as a simulated rig is asked to carry it out; raises as `with_nuisances`."""
+        """Return the scene as a simulated rig is asked to carry it out; raises as `with_nuisances`.
+
+        The scene's own words about effects stand before those of `simulation`.
+        """
         if simulation == Simulation():
             return self
-        return self.with_nuisances(dict(simulation.nuisances)).model_copy(update={"simulation": simulation})
+        every = simulation.model_copy(update={"effects": (*self.simulation.effects, *simulation.effects)})
+        return self.with_nuisances(dict(simulation.nuisances)).model_copy(update={"simulation": every})
 
 
 def _with(model: M, way: tuple[str, ...], given: Mapping[str, float]) -> M:

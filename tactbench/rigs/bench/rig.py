@@ -218,5 +218,5 @@ def build(context: RigContext) -> Bench:
             hint="Name a rig file with --rig-file FILE; `tactbench emulate biotac net-ft --write-rig-file FILE` makes "
             "one.",
         )
-    physics = physics_of(context.rig_file, load_registry(), context.effects)
+    physics = physics_of(context.rig_file, load_registry())
     return Bench(context.rig_file, context.operator, physics)

@@ -522,5 +522,5 @@ def build(context: RigContext) -> ParallelManipulator:
             hint="Name a rig file with --rig-file FILE; `tactbench rig check FILE` says what it would do.",
         )
     refuse(context.rig_file)
-    physics = physics_of(context.rig_file, load_registry(), context.effects)
+    physics = physics_of(context.rig_file, load_registry())
     return ParallelManipulator(context.rig_file, context.operator, physics)

@@ -92,7 +92,7 @@ def plan_scene(effects: Sequence[EffectDescriptor], scene: Scene, sensor: Sensor
 
 
 def _asked(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool]:
-    """Return what the scene asks for by name: effect -> whether it is included; later words win.
+    """Return what the scene asks for with a sign: effect -> whether it is included; later words win.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def _asked(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool]
     """
     asked: dict[str, bool] = {}
     for word in scene.simulation.effects:
-        name = word[1:]
+        name = word.lstrip("+-")
         meant = [effect.name for effect in effects if name in (effect.name, *effect.groups, "all")]
         if not meant:
             groups = sorted({group for effect in effects for group in effect.groups} | {"all"})
@@ -111,7 +111,8 @@ def _asked(effects: Sequence[EffectDescriptor], scene: Scene) -> dict[str, bool]
             )
         for found in meant:
             asked.pop(found, None)
-            asked[found] = word.startswith("+")
+            if word != name:
+                asked[found] = word.startswith("+")
     return asked
 
 

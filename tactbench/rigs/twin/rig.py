@@ -27,7 +27,7 @@ from tactbench.plugin import (
     Source,
     StreamSpec,
 )
-from tactbench.plugin.simulation import EffectDescriptor, Explained
+from tactbench.plugin.simulation import EffectDescriptor, Explained, effect_names
 from tactbench.rigs.twin.contact.stages import bare_skin
 from tactbench.rigs.twin.contact_point import contact_point
 from tactbench.rigs.twin.fidelity import DEFAULT, Fidelity
@@ -102,11 +102,13 @@ class Twin:
     Parameters
     ----------
     effects
-        All installed effects; a plan takes from them what a scene calls for.
+        Candidates for every scene; a plan takes from them what the scene calls for.
     fidelity
         How finely contacts are resolved.
     indenters
         All installed shapes of indenters.
+    named_effects
+        Candidates where the sensor or the scene names them.
     """
 
     def __init__(
@@ -114,10 +116,23 @@ class Twin:
         effects: Sequence[EffectDescriptor],
         fidelity: Fidelity = DEFAULT,
         indenters: Sequence[IndenterDescriptor] = (),
+        named_effects: Sequence[EffectDescriptor] = (),
     ) -> None:
         self.effects = tuple(effects)
+        self.named_effects = tuple(named_effects)
         self.fidelity = fidelity
         self.indenters = tuple(indenters)
+
+    def _candidates(self, sensor: SensorDescriptor, scene: Scene) -> Sequence[EffectDescriptor]:
+        names = effect_names(sensor, scene)
+        found = (*self.effects, *(effect for effect in self.named_effects if effect.name in names))
+        missing = set(sensor.effects).difference(effect.name for effect in found)
+        if missing:
+            raise NotApplicable(
+                f"{sensor.name} is simulated with the effects {', '.join(sorted(missing))}, which are not installed.",
+                hint="Install the package that brings them.",
+            )
+        return found
 
     def plan(self, sensor: SensorDescriptor, scene: Scene) -> Plan:
         """Return the plan of a scene without carrying it out.
@@ -131,7 +146,7 @@ class Twin:
                 hint="Declare a skin and a transducer in the sensor's plugin.",
             )
         shape_of(scene.indenter, self.indenters)  # what no rung could press is refused before anything is made
-        return plan_scene(self.effects, scene, handled(sensor, scene).spec)
+        return plan_scene(self._candidates(sensor, scene), scene, handled(sensor, scene).spec)
 
     @contextmanager
     def open(self, sensor: SensorDescriptor, scene: Scene, *, seed: int) -> Iterator[TwinAcquisition]:
@@ -151,12 +166,13 @@ class Twin:
         """Return the plan of a scene with the cost of each effect on this machine; see Explaining."""
         from tactbench.rigs.twin.costing import explained
 
-        return explained(self.effects, self.indenters, handled(sensor, scene), scene, self.plan(sensor, scene), rounds)
+        plan, candidates = self.plan(sensor, scene), self._candidates(sensor, scene)
+        return explained(candidates, self.indenters, handled(sensor, scene), scene, plan, rounds)
 
 
 def build(context: RigContext) -> Twin:
     """Return the twin with the installed effects and indenters."""
-    return Twin(context.effects, indenters=context.indenters)
+    return Twin(context.effects, indenters=context.indenters, named_effects=context.named_effects)
 
 
 def _acquisition(run: Synthesis, plan: Plan) -> TwinAcquisition:

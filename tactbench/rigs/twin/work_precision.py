@@ -23,7 +23,7 @@ from tactbench.plugin import (
     assumed,
     load_registry,
 )
-from tactbench.plugin.simulation import CostJob, CostPoint, CostStudy, EffectDescriptor, FluidBackedShell
+from tactbench.plugin.simulation import CostJob, CostPoint, CostStudy, EffectDescriptor, FluidBackedShell, rig_context
 from tactbench.rigs.twin.contact.pressing import pressed
 from tactbench.rigs.twin.contact.stages import READ_FROM_THE_SKIN, forget_tables, skin_under_load
 from tactbench.rigs.twin.fidelity import DEFAULT, RUNGS, Fidelity
@@ -57,7 +57,7 @@ def study(
     if sensor.spec.skin is None or sensor.transducer is None:
         raise RigError(f"{sensor.name} cannot be simulated.", hint="It needs a skin and a transducer in its plugin.")
     ways = list(_ways(sensor))
-    effects = tuple(load_registry().effects)
+    effects = rig_context(load_registry()).effects
     caps = ", ".join(f"{radius:g}" for radius in RADII_MM if math.isfinite(radius))
     return CostStudy(
         title=f"error against time per recording (caps of {caps} mm and flat, 5 N, 5000 samples)",

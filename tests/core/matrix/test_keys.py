@@ -12,7 +12,7 @@ from tactbench.core.matrix.keys import Keys
 from tactbench.core.matrix.plan import Cell
 from tactbench.core.plugins.registry import installed, load_registry
 from tactbench.core.provenance.source import versions
-from tactbench.core.spec.scene import Simulation
+from tactbench.core.spec.scene import Indenter, Scene, Simulation
 
 CELL = Cell("ideal", "force", "twin", "deployable", "session", "lasso", (("lambda_", 0.2),), False, 1, 3, 5)
 DATA = ("d1", "d2")
@@ -122,7 +122,10 @@ def test_the_code_of_a_tasks_own_features_is_in_the_key(tmp_path, monkeypatch):
 
 
 def test_who_brings_the_indenter_counts_where_a_scene_names_it(keys):
-    plain, line = keys.maker("ideal", "twin"), keys.maker("ideal", "twin", shape="cylinder")
+    def maker(shape=None):
+        return keys.maker("ideal", "twin", "", Scene(name="s", indenter=Indenter(shape=shape)))
+
+    plain, line = maker(), maker("cylinder")
     assert "indenter" not in plain.sections
     assert line.sections["indenter"]["where"] == "tactbench.rigs.twin.shapes:cylinder"
-    assert keys.maker("ideal", "twin", shape="nobody-has-it").digest == plain.digest
+    assert maker("nobody-has-it").digest == plain.digest

@@ -118,6 +118,8 @@ def test_a_scene_is_asked_as_a_simulation_says():
     assert asked.simulation.rung == "fine"
     assert asked.model_copy(update={"placement": SCENE.placement, "simulation": SCENE.simulation}) == SCENE
     assert SCENE.simulated_as(Simulation()) is SCENE
+    own = SCENE.model_copy(update={"simulation": Simulation(effects=("+creep",))})
+    assert own.simulated_as(Simulation(effects=("-drift",))).simulation.effects == ("+creep", "-drift")
 
 
 def test_what_nuisances_leave_out_is_zero():

@@ -4,10 +4,11 @@ import pytest
 from pydantic import ValidationError
 
 from tactbench.core.spec.scene import Simulation
-from tactbench.plugin import ForceRamp, NotApplicable, PluginContractError, Scene, UsageError, assumed
+from tactbench.plugin import ForceRamp, NotApplicable, PluginContractError, RigContext, Scene, UsageError, assumed
 from tactbench.plugin.simulation import EffectDescriptor, Slide
 from tactbench.rigs.twin import tactbench_effects
 from tactbench.rigs.twin.planner import plan_scene
+from tactbench.rigs.twin.rig import build
 
 EFFECTS = tactbench_effects()
 
@@ -91,6 +92,25 @@ def test_effects_are_included_and_left_out_as_asked(specs):
     assert plan["wander"].included
     assert plan["fluid-pressure"].included
     assert {name for name, entry in plan.items() if entry.asked} == {"warm-up", "offset", "wander", "fluid-pressure"}
+    assert _named(plan_scene(EFFECTS, _asking("-drift", "drift"), specs["biotac"]))["offset"].included
+
+
+def test_an_effect_of_another_package_is_planned_only_where_it_is_named(sensors):
+    other = EffectDescriptor(
+        name="other", title="other", where="x:y", produces=("disturbance",), groups=("drift",),
+        called_for="tactbench.rigs.twin.effects.called_for:converter",
+    )  # fmt: skip
+    twin = build(RigContext(effects=tuple(EFFECTS), named_effects=(other,)))
+    icub = sensors["icub"]
+    naming = icub.model_copy(update={"effects": ("other",)})
+    for sensor, words, included in [
+        (icub, (), None), (icub, ("+all", "-drift"), None), (icub, ("other",), True), (icub, ("-other",), False),
+        (naming, (), True), (naming, ("-drift",), False),
+    ]:  # fmt: skip
+        entry = _named(twin.plan(sensor, _asking(*words))).get("other")
+        assert (None if entry is None else entry.included) is included, words
+    with pytest.raises(NotApplicable, match="elsewhere, which are not installed"):
+        twin.plan(icub.model_copy(update={"effects": ("elsewhere",)}), _asking())
 
 
 def test_everything_can_be_asked_for(specs):
@@ -110,8 +130,6 @@ def test_leaving_out_what_is_observed_is_refused_by_name(specs):
         plan_scene(EFFECTS, _asking("-transduction"), specs["icub"])
 
 
-def test_a_scene_without_a_sign_is_no_scene():
-    with pytest.raises(ValidationError):
-        _asking("creep")
+def test_a_rung_and_a_tolerance_are_one_too_many():
     with pytest.raises(ValidationError, match="not both"):
         Simulation(rung="fine", tolerance=0.1)

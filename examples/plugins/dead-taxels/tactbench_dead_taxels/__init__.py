@@ -1,4 +1,4 @@
-"""A simulation effect: taxels that have died and stay where they were. Asked for by name: ``--effects +dead-taxels``."""
+"""A simulation effect: taxels that have died and stay where they were. With ``--effects +dead-taxels``."""
 
 from tactbench.plugin import hookimpl
 from tactbench.plugin.simulation import EffectDescriptor

@@ -54,7 +54,8 @@ class Spectrum:
         # Numpy's transforms are as quick as scipy's, whose package takes 40 ms to import.
         coefficients = np.fft.fft(np.fft.rfft(field), axis=0)
         coefficients *= self._forward
-        flat: FloatArray = coefficients.view(np.float64).reshape(-1)
+        # NumPy 1.26 returns the transform along the first axis in column order.
+        flat: FloatArray = np.ascontiguousarray(coefficients).view(np.float64).reshape(-1)
         return flat
 
     def field(self, vector: FloatArray) -> FloatArray:

@@ -20,12 +20,12 @@ from tactbench.plugin import (
     assumed,
     load_registry,
 )
-from tactbench.plugin.simulation import Environment, FluidBackedShell, Slide
+from tactbench.plugin.simulation import Environment, FluidBackedShell, Slide, rig_context
 from tactbench.rigs.twin.geometry import finger_surface_mm
 from tactbench.rigs.twin.likeness.evidence import LOADED_FROM, Evidence
 from tactbench.rigs.twin.likeness.plate import plate_gap_mm, plate_normal
 from tactbench.rigs.twin.likeness.pressing import Bench
-from tactbench.rigs.twin.rig import Twin
+from tactbench.rigs.twin.rig import Twin, build
 
 _REST_KINDS: tuple[ChannelKind, ...] = ("taxel", "dc_pressure", "ac_pressure")
 SEED = 3
@@ -79,7 +79,7 @@ def _long_rest(sensor: SensorDescriptor) -> Evidence:
 
 
 def _untouched(sensor: SensorDescriptor, *, recordings: int, duration_s: float, since_power_on_s: float) -> Evidence:
-    twin = Twin(tuple(load_registry().effects))
+    twin = build(rig_context(load_registry()))
     kinds = tuple(kind for kind in _REST_KINDS if kind == "taxel" or gives(sensor, kind))
     rest: list[FloatArray] = []
     pressure: list[FloatArray] = []
@@ -117,7 +117,7 @@ def _vibration_hz(sensor: SensorDescriptor) -> float | None:
 
 def _slide(sensor: SensorDescriptor) -> Evidence:
     """Slide a blunt cap lightly over the pad: speed, shape and force of the real slides are not known."""
-    twin = Twin(tuple(load_registry().effects))
+    twin = build(rig_context(load_registry()))
     (name,) = (channel.name for channel in sensor.spec.channels("ac_pressure"))
     scene = Scene(
         name="slide",
@@ -161,7 +161,7 @@ def gives(sensor: SensorDescriptor, kind: ChannelKind) -> bool:
     if not sensor.spec.channels(kind):
         return False
     try:
-        Twin(tuple(load_registry().effects)).explain(sensor, _untouched_scene("rest", (kind,)))
+        build(rig_context(load_registry())).explain(sensor, _untouched_scene("rest", (kind,)))
     except NotApplicable:
         return False
     return True

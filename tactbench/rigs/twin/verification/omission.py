@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tactbench.plugin import FloatArray, PlanEntry, RigContext, Scene, SensorDescriptor, TactbenchError, load_registry
-from tactbench.plugin.simulation import Check, Verdict
+from tactbench.plugin import FloatArray, PlanEntry, Scene, SensorDescriptor, TactbenchError, load_registry
+from tactbench.plugin.simulation import Check, Verdict, rig_context
 from tactbench.rigs.twin.fidelity import DEFAULT
 from tactbench.rigs.twin.preparation import carried_out
 from tactbench.rigs.twin.rig import Twin, build
@@ -22,7 +22,7 @@ _LAST = "converter"
 def checks() -> Sequence[Check]:
     """Return one check for every installed sensor and task whose scenes the twin can carry out."""
     registry = load_registry()
-    twin = build(RigContext(effects=tuple(registry.effects), indenters=tuple(registry.indenters)))
+    twin = build(rig_context(registry))
     assert isinstance(twin, Twin)
     found = []
     for sensor in registry.sensors:
