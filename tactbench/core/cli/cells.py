@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from tactbench.core.matrix.keys import Keys
     from tactbench.core.matrix.plan import Cell
     from tactbench.core.matrix.plan_recordings import RecordingRequest
-    from tactbench.core.matrix.recorded import Recorded
     from tactbench.core.matrix.store import Row, Store
     from tactbench.core.matrix.why import Explanation
     from tactbench.core.plugins.registry import Registry
@@ -24,8 +23,8 @@ class StoredCell:
     """One cell, as it is asked now and as it was answered."""
 
     store: Store
+    registry: Registry
     keys: Keys
-    recorded: Recorded
     cell: Cell
     row: Row | None
     """What the folder says of it."""
@@ -35,12 +34,9 @@ class StoredCell:
 
     def explain(self) -> Explanation:
         """Return whether its result would be reused, and what differs."""
-        from tactbench.core.matrix.key_book import book_of
         from tactbench.core.matrix.why import explain
 
-        known = str(self.row["key"]) if self.row is not None and self.row["status"] == "done" else ""
-        book = book_of(self.store.folder)
-        return explain(self.cell, self.paths, self.requests, self.keys, self.recorded, book, self.store, known)
+        return explain(self.cell, self.paths, self.keys, self.store, self.row)
 
 
 def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -> StoredCell:
@@ -65,7 +61,6 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
     from tactbench.core.matrix.keys import Keys
     from tactbench.core.matrix.naming import cell_of, meant
     from tactbench.core.matrix.plan_recordings import plan_run, request_key
-    from tactbench.core.matrix.recorded import Recorded
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.declared import declared_in, with_declared, with_declared_of
     from tactbench.core.plugins.registry import installed
@@ -73,7 +68,6 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
     if not out.is_dir():
         raise UsageError(f"There is no folder {out}.", hint="Name one that `tactbench run --out DIR` wrote.")
     store = Store(out)
-    recorded = Recorded(out / "cache" / "recordings.json")
     rows = {row["cell"]: row for row in store.rows()}
     registry = with_declared_of(installed(), rows.values())
     keys = Keys(registry)
@@ -90,7 +84,7 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
         else:
             cell = cell_of(row)
             paths, requests = _recordings_and_requests(cell, row, registry, keys, store)
-            return StoredCell(store, keys, recorded, cell, row, paths, requests)
+            return StoredCell(store, registry, keys, cell, row, paths, requests)
     selection = dict(options or {})
     if not selection["config"] and any(given in name for name in rows):
         given = meant(given, list(rows), known)
@@ -101,11 +95,11 @@ def find_cell(out: Path, given: str, options: Mapping[str, Any] | None = None) -
     if folder is not None:
         registry = with_declared(installed(), declared_in(folder))
         keys = Keys(registry)
-    cells, needed = plan_run(matrix, registry, keys, store, folder, recorded)
+    cells, needed = plan_run(matrix, registry, keys, store, folder)
     cell = {one.name: one for one in cells}[meant(given, [one.name for one in cells], known)]
     need = request_key(cell)
     paths, made = tuple(needed.paths.get(need, ())), tuple(needed.requests.get(need, ()))
-    return StoredCell(store, keys, recorded, cell, rows.get(cell.name), paths, made)
+    return StoredCell(store, registry, keys, cell, rows.get(cell.name), paths, made)
 
 
 def _given(option: str, value: Any) -> bool:
@@ -130,13 +124,13 @@ def recordings_of(row: Mapping[str, Any], store: Store) -> tuple[Path, ...]:
     Raises
     ------
     UsageError
-        If one of them may not be opened: a folder may come from a stranger.
+        If one of them is not there.
     """
     found = []
     for path, file in store.recordings(row):
         if file is None:
             raise UsageError(
-                f"The recording {path} is not there, or not as it was when the cell was answered.",
+                f"The recording {path} is not there.",
                 hint="Run the matrix again with --rig replay --recordings DIR.",
             )
         found.append(file)

@@ -158,7 +158,7 @@ def _keep(out: Path, checked: Subject, report: CheckReport) -> None:
     import tactbench
     from tactbench.core.cli.screen import remark
     from tactbench.core.leaderboard.levels import identity_of, write_level
-    from tactbench.core.matrix.store.disk import writing
+    from tactbench.core.matrix.store import writing
     from tactbench.core.provenance.gather import gather
 
     with writing(out):
@@ -167,7 +167,7 @@ def _keep(out: Path, checked: Subject, report: CheckReport) -> None:
             {
                 "level": report.level or "none", "ran": report.ran, "failed": len(report.failed),
                 "modes": list(report.modes), "kit": tactbench.__version__, "package": checked.package,
-                "identity": identity_of(checked.package, gather()),
+                "identity": identity_of(checked.package, gather(checked.registry)),
             },
         )  # fmt: skip
     remark(f"Level of {checked.name}: {path}")

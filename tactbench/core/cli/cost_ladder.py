@@ -69,14 +69,11 @@ def _store(out: Path, sensor: str, task: str) -> Store:
     again; what cannot be linked is.
     """
     from tactbench.core.matrix.store import Store
-    from tactbench.core.matrix.store.limits import is_key
 
     store = Store(out / "cost")
     rows = Store(out).rows() if (out / "cells").is_dir() else []
     finished_of = ("done", sensor, task)
-    finished = [
-        row for row in rows if (row["status"], row["sensor"], row["task"]) == finished_of and is_key(row["key"])
-    ]
+    finished = [row for row in rows if (row["status"], row["sensor"], row["task"]) == finished_of]
     cells = [Path("cells", f"{row['key']}.h5") for row in finished]
     recordings = [path.relative_to(out) for path in (out / "recordings" / sensor).glob("*.h5")]
     for path in (*cells, *recordings):

@@ -25,11 +25,11 @@ ENGINE = (
     click.option(
         "--engine",
         type=click.Choice(("in-process", "isolated", "dask")),
-        help="Where cells are carried out: each in a process of its own (the default), on a Dask cluster, or, a single "
-        "cell, in the process of the run.",
+        help="Where cells are carried out: in child processes (the default), on a Dask cluster, or in the process of the "
+        "run, without limits, for a debugger.",
     ),
     click.option(
-        "--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Cells at once."
+        "--jobs", type=click.IntRange(min=1), metavar="N", help="Processes at once. Default: one for each usable core."
     ),
     click.option(
         "--timeout",
@@ -42,7 +42,7 @@ ENGINE = (
         "--memory",
         type=click.IntRange(min=1),
         metavar="MB",
-        help="Memory that one cell, or one recording, may take beyond libraries and recordings that all share. "
+        help="Memory that one cell, or one recording, may take beyond the libraries that all share. "
         "Default: no limit; if the system runs out of it, cells are ended first.",
     ),
     click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler for --engine dask. Default: a local cluster."),

@@ -87,7 +87,7 @@ def command(
         scene = scene.simulated_as(simulation)
     if out.exists() and not replace:
         raise UsageError(f"{out} exists already.", hint="Give another name with --out, or replace it with --replace.")
-    provenance = gather()
+    provenance = gather(registry)
     try:
         with ExitStack() as stack:
             watch: Callable[[Block], None] | None = None

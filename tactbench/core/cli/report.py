@@ -23,14 +23,6 @@ if TYPE_CHECKING:
     help="Where page and figures are put; default: FOLDER/report.",
 )
 @click.option(
-    "--recordings",
-    type=click.Path(path_type=Path),
-    multiple=True,
-    metavar="DIR",
-    help="Recordings that lie elsewhere and may be opened; may be repeated. Needed only where they were changed since, "
-    "or the results are somebody else's.",
-)
-@click.option(
     "--open",
     "shown",
     type=click.Choice(("no", "yes")),
@@ -41,25 +33,20 @@ if TYPE_CHECKING:
 @click.option("--format", "shape", type=click.Choice(("table", "md", "json", "csv")), default="table",
               show_default=True, help="How the published numbers and ours are printed.")  # fmt: skip
 @click.pass_context
-def command(
-    ctx: click.Context, folder: Path, out: Path | None, recordings: tuple[Path, ...], shown: str, shape: str
-) -> None:
+def command(ctx: click.Context, folder: Path, out: Path | None, shown: str, shape: str) -> None:
     """Make one page of all results in FOLDER, which is what `run --out` wrote.
 
     The published numbers are printed beside ours.
     """
     keep_threads()
     from tactbench.core.cli.progress import progress
+    from tactbench.core.cli.results import opened
     from tactbench.core.cli.screen import remark
-    from tactbench.core.errors import UsageError
-    from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import load_registry
     from tactbench.core.report.making import make_report
     from tactbench.core.report.results import open_results
 
-    if not (folder / "index.jsonl").is_file():
-        raise UsageError(f"There are no results in {folder}.", hint="Make some with `tactbench run --out DIR`.")
-    store = Store(folder, recordings=recordings)
+    store = opened(folder)
     results = open_results(store, load_registry())
     for sentence in store.troubles:
         remark(f"{folder}: {sentence}")

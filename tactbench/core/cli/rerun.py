@@ -15,7 +15,7 @@ from tactbench.core.tables.text import json_text
 
 if TYPE_CHECKING:
     from tactbench.core.cli.cells import StoredCell
-    from tactbench.core.matrix.rerun import Again
+    from tactbench.core.matrix.rerun import Repeated
 
 
 @click.command(name="rerun")
@@ -56,7 +56,7 @@ def command(ctx: click.Context, cell: str, out: Path, shape: str) -> None:
     ctx.exit(0 if again.identical else 1)
 
 
-def _compute(found: StoredCell) -> Again:
+def _compute(found: StoredCell) -> Repeated:
     """Compute the cell; recordings of a simulation go where they are thrown away."""
     from tactbench.core.cli.cells import recordings_of
     from tactbench.core.cli.screen import remark
@@ -64,7 +64,6 @@ def _compute(found: StoredCell) -> Again:
     from tactbench.core.matrix.plan_recordings import request_key, requests_for
     from tactbench.core.matrix.rerun import compute_again
     from tactbench.core.matrix.store import Store
-    from tactbench.core.plugins.registry import installed
 
     row = found.row or {}
     try:
@@ -77,10 +76,10 @@ def _compute(found: StoredCell) -> Again:
         requests = []
         if found.requests:
             elsewhere = Store(Path(place))
-            made = requests_for([found.cell], installed(), found.keys, elsewhere, found.cell.simulation)
+            made = requests_for([found.cell], found.registry, found.keys, elsewhere, found.cell.simulation)
             requests = made[request_key(found.cell)]
         with redirect_stdout(sys.stderr):  # what a plugin prints is no result
-            return compute_again(found.cell, row, found.store, before or found.paths, requests, remark)
+            return compute_again(found.cell, row, found.store, found.registry, before or found.paths, requests, remark)
 
 
 def _text(facts: dict[str, Any]) -> str:

@@ -22,8 +22,7 @@ from tactbench.core.cli.tables import (
 from tactbench.core.cli.threads import keep_threads
 
 if TYPE_CHECKING:
-    from tactbench.core.matrix.engine import EngineName
-    from tactbench.core.matrix.run import Outcome
+    from tactbench.core.matrix.run import EngineName, Outcome
 
 _REASON_CHARACTERS = 200
 """Of a reason that are shown; the whole of it is in the row."""
@@ -47,7 +46,7 @@ def command(
     wide: bool,
     notes: bool,
     engine: EngineName | None,
-    jobs: int,
+    jobs: int | None,
     timeout: float | None,
     memory: int | None,
     scheduler: str | None,
@@ -68,13 +67,14 @@ def command(
     from tactbench.core.leaderboard.levels import with_levels
     from tactbench.core.leaderboard.side_by_side import compare
     from tactbench.core.leaderboard.table import build_table
-    from tactbench.core.matrix.engine import EngineChoice
-    from tactbench.core.matrix.run import run_matrix
+    from tactbench.core.matrix.run import EngineChoice, run_matrix
     from tactbench.core.matrix.store import Store
     from tactbench.core.plugins.registry import installed
-    from tactbench.core.pool.limits import Limits
+    from tactbench.core.pool import Limits, start_server
     from tactbench.core.statistics.replicates import over_replicates
 
+    if engine != "in-process":
+        start_server("tactbench.core.matrix.preloaded")  # imports libraries while this process plans
     tell_failed(installed())
     matrix, folder = requested_matrix(installed(), **selection)
     limits = Limits(  # what the options leave open, the matrix file says
@@ -120,7 +120,7 @@ def _farewell(outcome: Outcome, rows: Sequence[Mapping[str, Any]], folder: Path,
     of = f"{len(rows)} cells" if answers == len(rows) else f"{len(rows)} cells over their replicates"
     remark(f"\n{of}: {answers - outcome.computed} of {answers} answers were found finished, {outcome.computed} "
            f"computed now; {outcome.recorded} recordings made now.")  # fmt: skip
-    remark(f"Files: {folder}/leaderboard.html, .md, .csv, .json; scores.json; recordings/; cells/; run.json")
+    remark(f"Files: {folder}/leaderboard.html, .md, .csv, .json; results.sqlite; recordings/; cells/")
     tell_stopped(outcome.failures, folder)
     if shape == "table":
         _suggest(rows)

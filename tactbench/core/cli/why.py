@@ -52,14 +52,13 @@ def _facts(found: StoredCell, why: Explanation) -> dict[str, Any]:
         "answer": "hit" if why.hit else "miss",
         "key": why.key,
         "reasons": list(why.reasons),
-        "unknown": why.unknown,
         "status": row.get("status", "never run"),
         "reason": row.get("reason", ""),
         "signal": row.get("signal"),
         "traceback": row.get("traceback", ""),
         "log": row.get("log", ""),
         "stored_key": key,
-        "shard": str(folder / "cells" / f"{key}.h5") if done else None,
+        "file": str(folder / "cells" / f"{key}.h5") if done else None,
         "recordings": list(row.get("recordings", [])) if done else [],
         "simulation": row.get("simulation", {}),
         "score": row.get("score"),
@@ -160,8 +159,6 @@ def _text(facts: dict[str, Any]) -> str:
     lines += [f"  {reason}" for reason in facts["reasons"][:_REASONS]]
     if len(facts["reasons"]) > _REASONS:
         lines.append(f"  and {len(facts['reasons']) - _REASONS} more (--format json has all)")
-    if facts["unknown"]:
-        lines.append(f"  {facts['unknown']}")
     lines += ["", *_ended(facts), "", f"Try: {facts['try']}"]
     return "\n".join(lines)
 
@@ -173,7 +170,7 @@ def _ended(facts: dict[str, Any]) -> list[str]:
         recordings = f"{where}{f' and {more} more' if more > 0 else ''}"
         over = [f"over replicates: {facts['replicates'][0]}", *(f"  {part}" for part in facts["replicates"][1:])]
         one = ["this replicate:", *(f"  {part}" for part in facts["rests_on"])]
-        return [*over, *one, f"done: {facts['shard']}", f"recordings: {recordings}", *facts["provenance"]]
+        return [*over, *one, f"done: {facts['file']}", f"recordings: {recordings}", *facts["provenance"]]
     lines = [facts["status"] + (f": {facts['reason']}" if facts["reason"] else "")]
     if facts["signal"] is not None:
         lines.append(f"signal {facts['signal']}")

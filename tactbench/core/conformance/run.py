@@ -25,9 +25,7 @@ from tactbench.core.conformance.subject import Subject
 from tactbench.core.errors import CellStopped, UnknownNameError
 from tactbench.core.plugins.interfaces import Operator
 from tactbench.core.plugins.registry import PluginRow, Registry
-from tactbench.core.pool.in_process import InProcess
-from tactbench.core.pool.limits import Limits
-from tactbench.core.pool.pool import Pool
+from tactbench.core.pool import InProcess, Limits, Pool
 
 TIMEOUT_S = 30.0
 """Seconds that one check may take: the slowest of ours, a press on the largest skin, takes two."""
@@ -205,8 +203,8 @@ def run_checks(
             if blocked:
                 settle(CheckOutcome(name, "skipped", "", blocked))
         waiting = [name for name in waiting if name not in outcomes]
-        pool = _pool(isolated, timeout_s)
-        for name, given in pool.each(_Carrier(subject, _not_passed(outcomes), tuple(modes)), waiting):
+        carrier = _Carrier(subject, _not_passed(outcomes), tuple(modes))
+        for name, given in _carried_out(carrier, waiting, isolated, timeout_s):
             stopped = isinstance(given, BaseException)
             settle(_stopped(name, given, subject) if stopped else CheckOutcome(name, *given))  # type: ignore[arg-type, misc]
             if stopped:
@@ -227,11 +225,13 @@ def _not_passed(outcomes: Mapping[str, CheckOutcome]) -> tuple[str, ...]:
     return tuple(name for name, one in outcomes.items() if one.status != "passed")
 
 
-def _pool(isolated: bool, timeout_s: float) -> Pool | InProcess:
-    limits = Limits(timeout_s=timeout_s)
+def _carried_out(
+    work: Callable[[str], Any], names: Sequence[str], isolated: bool, timeout_s: float
+) -> Iterator[tuple[str, Any]]:
+    """Yield each name with what `work` made of it, all in one child process, or in this one."""
     if not isolated:
-        return InProcess(limits)
-    return Pool(1, limits, reuse=True)
+        return InProcess().each(work, names)
+    return Pool(1, Limits(timeout_s=timeout_s)).each(work, names, together=True)
 
 
 class _Carrier:
@@ -330,7 +330,7 @@ def _enough(kind: Kind, outcomes: Mapping[str, CheckOutcome]) -> CheckOutcome:
 
 def _expected(subject: Subject, isolated: bool, timeout_s: float) -> dict[str, str]:
     """Return the failures that a plugin expects, with its reasons; none where its module cannot be asked."""
-    for _, given in _pool(isolated, timeout_s).each(partial(_listed, subject.name), [subject.module]):
+    for _, given in _carried_out(partial(_listed, subject.name), [subject.module], isolated, timeout_s):
         if isinstance(given, Mapping):
             return dict(given)
     return {}

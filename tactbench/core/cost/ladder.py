@@ -13,10 +13,9 @@ from tactbench.core.cost.timed_estimators import TimedEstimator, timed_estimator
 from tactbench.core.errors import UsageError
 from tactbench.core.evaluation.dataset import load_dataset
 from tactbench.core.evaluation.metrics import metric_called
-from tactbench.core.matrix.engine import EngineChoice
 from tactbench.core.matrix.plan import plan_cells
 from tactbench.core.matrix.progress import Progress
-from tactbench.core.matrix.run import Outcome, run_matrix
+from tactbench.core.matrix.run import EngineChoice, Outcome, run_matrix
 from tactbench.core.matrix.store import Store
 from tactbench.core.plugins.registry import Registry
 from tactbench.core.spec.matrix import MatrixSpec
@@ -78,7 +77,7 @@ def climb(
             f"A ladder times answers to single rows; task {task.name!r} asks one of each recording.",
             hint="`tactbench run` tells fit time, latency and answer delay of its estimators.",
         )
-    outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress, files=False)
+    outcome = run_matrix(matrix, store, choice=choice, recordings=recordings, progress=progress)
     done = [row for row in outcome.rows if row["status"] == "done" and row["seed"] == matrix.seed]
     data = load_dataset(task, outcome.recordings[done[0]["cell"]]) if done else None
     answers = over_replicates(outcome.rows)

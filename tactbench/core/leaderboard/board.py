@@ -15,14 +15,13 @@ from dataclasses import replace
 from itertools import chain
 from typing import Any
 
-from tactbench.core.files import sha256
 from tactbench.core.leaderboard.blocks import Block
 from tactbench.core.leaderboard.columns import NUMERIC, Line
 from tactbench.core.leaderboard.names import LOWER_IS_BETTER, SIMULATED, Row, metric_name
 from tactbench.core.leaderboard.records import APART, GROUPS, TITLES
 from tactbench.core.leaderboard.table import Table
 from tactbench.core.leaderboard.view import full_grid
-from tactbench.core.matrix.store.sharing import PROVENANCE_DIGITS, canonical
+from tactbench.core.provenance.source import provenance_id
 from tactbench.core.spec.row import FORMAT
 from tactbench.core.tables.html import render
 from tactbench.core.tables.text import visible
@@ -120,21 +119,13 @@ def _head(table: Table, lines: Sequence[Line]) -> dict[str, Any]:
         "columns": [{"name": name, "numeric": name in NUMERIC} for name in table.columns],
         "times": [name for name in DURATIONS if name in table.columns],
         "notes": notes,
-        "provenance": [[_id(entry), plain(entry)] for entry in table.provenance],
+        "provenance": [[provenance_id(entry), plain(entry)] for entry in table.provenance],
     }  # fmt: skip
 
 
 def _is_simulated(block: Block) -> bool:
     """Return whether a block stands among simulated ones; a cell that was not begun does not know it of itself."""
     return SIMULATED in block.title.split(" · ")[2:] or any(line.row["simulated"] for line in block.lines)
-
-
-def _id(entry: Mapping[str, Any]) -> str:
-    """Return what rows call their provenance by (`made_by`); "" if it is no plain data."""
-    try:
-        return sha256(canonical(dict(entry)))[:PROVENANCE_DIGITS]
-    except (TypeError, ValueError, RecursionError):
-        return ""
 
 
 def _column(name: str, lines: Sequence[Line]) -> dict[str, Any]:

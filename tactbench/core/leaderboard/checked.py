@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from tactbench.core.matrix.store.rows import fault_in_row
-from tactbench.core.spec.row import JSON_KEYS, ReplicatedRow
+from pydantic import ValidationError
+
+from tactbench.core.spec.row import JSON_KEYS, ReplicatedRow, fault_in_scores
 
 Row = dict[str, Any]
 
@@ -43,8 +44,12 @@ def _fault(row: Row) -> str:
     lacking = [key for key in JSON_KEYS if key not in row and key != "key"]
     if lacking:
         return f"its row is of another version (it lacks {', '.join(lacking[:3])}); run it again"
-    fault = fault_in_row(row)
-    if fault:
+    try:
+        ReplicatedRow.model_validate(row)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        return f"its {'.'.join(map(str, first['loc']))}: {first['msg']}"
+    if fault := fault_in_scores(row):
         return fault
     for key, value in row.items():
         if type(value) is int and abs(value) >= _LARGEST and key != "seed":

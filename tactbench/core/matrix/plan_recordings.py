@@ -7,7 +7,14 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from tactbench.core.errors import MissingRecordingError, NotApplicable, RecordingError, TactbenchError, UnknownNameError, UsageError
+from tactbench.core.errors import (
+    MissingRecordingError,
+    NotApplicable,
+    RecordingError,
+    TactbenchError,
+    UnknownNameError,
+    UsageError,
+)
 from tactbench.core.evaluation.few_shot import shots
 from tactbench.core.matrix.installed import failing_as, rig_of
 from tactbench.core.matrix.keys import Keys

@@ -8,7 +8,6 @@ import random
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -65,12 +64,18 @@ _prepared: set[tuple[int, str, str]] = set()
 """By process: after a fork, memory pages are copied at first use, which a clock would count."""
 
 
-@lru_cache(maxsize=1)
 def dataset(task: TaskSpec, recordings: tuple[Path, ...]) -> Dataset:
-    """Return `recordings` as a task needs them; the cells of one piece of work share what is read."""
+    """Return `recordings` as a task needs them; cells in a row that need the same share what is read."""
     from tactbench.core.evaluation.dataset import load_dataset
 
-    return load_dataset(task, recordings)
+    if _last[:2] != [task, recordings]:
+        _last[:] = [task, recordings, load_dataset(task, recordings)]
+    found: Dataset = _last[2]
+    return found
+
+
+_last: list[Any] = []
+"""Task and recordings that were read last, and what came of them."""
 
 
 Solved = tuple[Row, "dict[str, Answers]"]

@@ -40,4 +40,3 @@ def fill_baselines(rows: Sequence[Row]) -> None:
             bars[group, timed] = best(known, default=None)
     for row in rows:
         row["baseline"] = bars.get((_group(row), row.get("looks_at") == "time"))
-

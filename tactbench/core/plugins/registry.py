@@ -283,15 +283,10 @@ def _described_in_children(points: Sequence[EntryPoint], timeout_s: float) -> di
     """Ask each plugin in a child process; return what it describes, or what stopped it, by name and module."""
     if not points:
         return {}
-    from tactbench.core.pool.limits import Limits
-    from tactbench.core.pool.pool import Pool
+    from tactbench.core.pool import Limits, Pool
 
-    pool = Pool(_AT_ONCE, Limits(timeout_s=timeout_s))
-    return dict(pool.each(_describe, [(point.name, point.value) for point in points]))
-
-
-_AT_ONCE = 4
-"""Plugins that are asked at the same time."""
+    pool = Pool(1, Limits(timeout_s=timeout_s))
+    return dict(pool.each(_describe, [(point.name, point.value) for point in points], together=True))
 
 
 REMARKS = "remarks"

@@ -39,8 +39,8 @@ MOST_LOG_BYTES = 2**24
 class Pool:
     """Up to `jobs` child processes, each for one piece of work.
 
-    A piece is a sequence of items that one process carries out in order. An item that raises, crashes, hangs or takes too
-    much memory has that error as its outcome; the items after it get a process of their own.
+    A piece is a sequence of items that one process carries out in order. An item that raises, crashes, hangs or takes
+    too much memory has that error as its outcome; the items after it get a process of their own.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Pool:
     def each(
         self, work: Callable[[T], R], items: Iterable[T], *, together: bool = False
     ) -> Iterator[tuple[T, R | BaseException]]:
-        """Carry out `work` for every item, each in a process of its own or all `together` in one, and yield outcomes."""
+        """Carry out `work` for every item, each in its own process or all `together` in one, and yield outcomes."""
         with self:
             every = list(items)
             for piece in [every] if together else [[item] for item in every]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import importlib.util
+import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from tactbench.core.files import sha256
 
@@ -27,7 +29,7 @@ RECORDING = (*_BOTH, "core/acquisition.py", "links", "devices")
 def source_digest(package: str, below: str = "") -> str:
     """Return the digest of the files of an importable package, or of one module or sub-package `below` it.
 
-    Every file counts, tables and compiled modules among them, by its place and bytes; byte code and hidden files do not.
+    Every file counts by its place and bytes, tables and compiled modules among them; byte code and hidden files do not.
     Nothing is imported. A package without a folder or file on disk has the digest of its name.
     """
     sha = hashlib.sha256(f"{package} {below}".encode())
@@ -78,6 +80,11 @@ def version_of(distribution: str) -> str:
         return importlib.metadata.version(distribution)
     except importlib.metadata.PackageNotFoundError:
         return "missing"
+
+
+def provenance_id(provenance: Mapping[str, Any]) -> str:
+    """Return what rows call a provenance by."""
+    return digest_of(json.dumps(provenance, sort_keys=True))[:16]
 
 
 def digest_of(text: str) -> str:

@@ -54,15 +54,14 @@ class Results:
         Raises
         ------
         DataError
-            If one lies outside the folder, was not allowed and does not hold what the row tells of.
+            If one is not there.
         """
         found = []
         for path, recording in self.store.recordings(row):
             if recording is None:
                 raise DataError(
-                    f"The recording {path} lies outside {self.store.folder}, and is not there any more, or not the one "
-                    f"that {row['cell']} was answered from: it is not opened.",
-                    hint="If you trust these results, allow its folder with `tactbench report --recordings DIR`.",
+                    f"The recording {path} that {row['cell']} was answered from is not there.",
+                    hint="Put it back, or run the cell again.",
                 )
             found.append(recording)
         return found

@@ -74,9 +74,7 @@ def read_cell(path: Path) -> CellFile:
         raise FormatError(f"{path} cannot be read: {error}.", hint="Run the cell again.") from error
     if _digest(text, tables) != digest:
         raise FormatError(f"{path} does not hold what was written: its digest differs.", hint="Run the cell again.")
-    answers = {
-        role: Answers(**{name: table[name].copy() for name in _COLUMNS}) for role, table in tables.items()
-    }
+    answers = {role: Answers(**{name: table[name].copy() for name in _COLUMNS}) for role, table in tables.items()}
     return CellFile(**json.loads(text), answers=answers)
 
 

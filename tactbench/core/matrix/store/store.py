@@ -16,7 +16,7 @@ from tactbench.core.errors import FolderError, FormatError
 from tactbench.core.files import replace_file, try_lock
 from tactbench.core.matrix.store.cell_file import CellFile, read_cell
 from tactbench.core.matrix.store.index import Index
-from tactbench.core.provenance.source import digest_of
+from tactbench.core.provenance.source import digest_of, provenance_id
 
 if TYPE_CHECKING:
     from tactbench.core.samples import Answers
@@ -90,7 +90,7 @@ class Store:
 
     def begin(self, provenance: Mapping[str, Any]) -> str:
         """Have cells that are written from now on carry this provenance, and return its id."""
-        self._provenance = digest_of(json.dumps(provenance, sort_keys=True))[:16], provenance
+        self._provenance = provenance_id(provenance), provenance
         return self._provenance[0]
 
     def finished(self, key: str) -> Row | None:
@@ -120,22 +120,22 @@ class Store:
         latest = self._files.files_of(row["cell"])
         known = self._files.finished(row["key"]) or {}
         if not latest or latest[0][1] != row["key"] or any(known.get(name) != row[name] for name in NAMING):
-            cell = read_cell(self._path(row))
+            cell = read_cell(self.file_of(row))
             self._write(replace(cell, row={**cell.row, **{name: row[name] for name in NAMING}}))
 
     def _write(self, cell: CellFile) -> None:
         self._last_ns = max(time.time_ns(), self._last_ns + 1)
         content = replace(cell, ended_ns=self._last_ns).content()
-        path = self._path(cell.row)
+        path = self.file_of(cell.row)
         with writing(self.folder):
             replace_file(path, content)
-            for name, key, status in self._files.files_of(cell.row["cell"]):
+            for name, _key, status in self._files.files_of(cell.row["cell"]):
                 if status != "done" and name != path.name:  # superseded; what was finished stays for other versions
                     (path.parent / name).unlink(missing_ok=True)
                     self._files.drop(name)
         self._files.put(path, replace(cell, ended_ns=self._last_ns))
 
-    def _path(self, row: Mapping[str, Any]) -> Path:
+    def file_of(self, row: Mapping[str, Any]) -> Path:
         """Return the file of a cell: named by its key, or by its name if it stopped before it had one."""
         return self.folder / "cells" / f"{row.get('key') or digest_of(row['cell'])}.h5"
 
@@ -157,7 +157,7 @@ class Store:
 
     def cell(self, row: Mapping[str, Any]) -> CellFile:
         """Return all that is kept of the cell of a row; raises FormatError if its file cannot be used."""
-        return read_cell(self._path(row))
+        return read_cell(self.file_of(row))
 
     def answers(self, key: str) -> dict[str, Answers]:
         """Return what a finished cell answered, by role; nothing for a cell that is not there or cannot be read."""

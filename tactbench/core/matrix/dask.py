@@ -1,0 +1,152 @@
+"""Cells on a Dask cluster: a client of the same `solve` that the run's own processes carry out.
+
+Workers need this run's versions and sources and see its files at the same paths. A worker carries each cell out in a
+child process, within the same limits.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from distributed import Client, KilledWorker, LocalCluster, as_completed  # noqa: TID253  (imported for this engine alone)
+from distributed.versions import VersionMismatchWarning  # noqa: TID253
+
+from tactbench.core.errors import Crashed, EngineError, UsageError
+from tactbench.core.matrix.solve import Job, check_content
+from tactbench.core.plugins.registry import installed
+from tactbench.core.pool import Limits, Pool
+from tactbench.core.pool.child import plain_error
+from tactbench.core.provenance.source import ANSWERING, sources_of, versions
+
+CONNECT_S = 10.0
+"""Seconds to wait for a scheduler."""
+GATHER_S = 60.0
+"""Seconds to wait for the first worker."""
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+class Dask:
+    """The engine; it connects when it is entered.
+
+    Parameters
+    ----------
+    jobs
+        Workers to start where there is no address; each carries out one cell at a time.
+    limits
+        What a cell may take.
+    scheduler
+        Address, as ``tcp://HOST:8786``; None: a scheduler and workers on this machine.
+    """
+
+    def __init__(self, jobs: int, limits: Limits, scheduler: str | None = None) -> None:
+        self._jobs, self._limits, self._scheduler = jobs, limits, scheduler
+        self._waiting: list[tuple[Callable[[Any], Any], Job]] = []
+
+    def __enter__(self) -> Dask:
+        """Connect, or start a cluster.
+
+        Raises
+        ------
+        UsageError
+            If no scheduler answers, or a worker's versions or sources differ from this run's.
+        """
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        self._cluster: LocalCluster | None = None
+        to: Any = self._scheduler
+        if to is None:
+            to = self._cluster = LocalCluster(
+                n_workers=self._jobs, threads_per_worker=1, host="127.0.0.1", memory_limit=0,
+                dashboard_address=None, silence_logs=logging.CRITICAL,
+            )  # fmt: skip
+        try:
+            with warnings.catch_warnings():  # versions that may change a number are compared below
+                warnings.simplefilter("ignore", VersionMismatchWarning)
+                self._client = Client(to, timeout=CONNECT_S, set_as_default=False)
+            self._client.wait_for_workers(1, timeout=GATHER_S)
+        except (OSError, ValueError) as error:
+            self._close_cluster()
+            raise UsageError(
+                f"No Dask scheduler with a worker answers at {self._scheduler}: {error}.",
+                hint="Start `dask scheduler` and `dask worker ADDRESS`, or leave --scheduler out for workers here.",
+            ) from error
+        threads = {name: os.environ[name] for name in _THREADS if name in os.environ}
+        here = environment()
+        for address, there in self._client.run(_prepared, threads).items():
+            differ = [f"{name} is {there.get(name)} there and {here[name]} here" for name in here
+                      if there.get(name) != here[name]]  # fmt: skip
+            if differ:
+                self.__exit__()
+                raise UsageError(
+                    f"The Dask worker at {address} cannot be used: {'; '.join(differ[:3])}.",
+                    hint="Start workers in the environment of this run, and stop the others.",
+                )
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Disconnect; what is under way is cancelled."""
+        self._waiting.clear()
+        with suppress(OSError, TimeoutError):
+            self._client.close(timeout=CONNECT_S)
+        self._close_cluster()
+
+    def _close_cluster(self) -> None:
+        if self._cluster is not None:
+            self._cluster.close(timeout=CONNECT_S)
+
+    def submit(self, work: Callable[[Any], Any], items: Sequence[Any]) -> None:
+        """Queue cells."""
+        self._waiting += [(work, item) for item in items]
+
+    def outcomes(self) -> Iterator[tuple[Any, Any]]:
+        """Yield every cell with its result or the error that stopped it, in the order in which they end."""
+        folder = str(Path.cwd())
+        of = {
+            self._client.submit(carry_out, work, job, folder, self._limits, pure=False, retries=0): job
+            for work, job in self._waiting
+        }
+        self._waiting.clear()
+        for future in as_completed(list(of), raise_errors=False):
+            try:
+                yield of[future], future.result()
+            except KilledWorker as error:
+                yield of[future], Crashed(f"Workers ended while they carried it out: {error}.")
+            except Exception as error:
+                lost = EngineError(
+                    f"The Dask cluster did not carry it out: {type(error).__name__}: {error}.",
+                    hint="Give the same command again: what was finished is kept.",
+                )
+                yield of[future], lost
+
+
+def carry_out(work: Callable[[Any], Any], job: Job, folder: str, limits: Limits) -> Any:
+    """Carry out one cell in a child process of this worker; return its result or the error that stopped it."""
+    try:
+        os.chdir(folder)
+        check_content(job)
+    except Exception as error:
+        return plain_error(error)
+    ((_, outcome),) = Pool(1, limits).each(work, [job])
+    return outcome
+
+
+def _prepared(threads: Mapping[str, str]) -> dict[str, str]:
+    """Prepare a worker for having child processes, and return its environment."""
+    multiprocessing.current_process().daemon = False  # a daemon of `multiprocessing` may have no children
+    os.environ.update(threads)
+    return environment()
+
+
+def environment() -> dict[str, str]:
+    """Return versions and digests of sources that may change a number."""
+    registry = installed()
+    owners = [registry.tasks.owned(name) for name in registry.tasks.names()]
+    modules = [owner.module for owner in owners]
+    modules += [registry.estimators.owned(name).module for name in registry.estimators.names()]
+    return {**versions(), **sources_of(modules, ANSWERING)}

@@ -1,0 +1,153 @@
+"""Result folders of several machines become one.
+
+The result is the union of the folders' cells, by name. Of two of one name
+
+- finished counts more than not finished; of two that did not finish, the one whose status stands first in
+  `tactbench.core.spec.status.STATUSES` is kept, then the one of the host with the smaller id;
+- two finished ones are equal if configuration, versions and source are, and what a seed decides agrees to a relative
+  1e-9: the one of the host with the smaller id is kept, whole, so that times of two hosts are not mixed;
+- anything else is a contradiction: nothing is written.
+
+Recordings of one name are taken from the folder whose cells are kept.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tactbench.core.errors import FolderError
+from tactbench.core.matrix.keys import differences
+from tactbench.core.matrix.store import Row, Store, writing
+from tactbench.core.matrix.store.store import sync_folder
+from tactbench.core.matrix.summary import SEED_DECIDES
+from tactbench.core.spec.status import STATUSES
+
+SAME_SCORE = 1e-9
+"""Relative difference of scores of the same cell on two kinds of processor: they add millions of terms in another
+order."""
+_SHOWN = 10
+"""Contradictions named in a message; the others are counted."""
+_DECIDES = ("configuration", "task", "estimator", "versions", "source")
+"""Sections of a key that two results of one name must share."""
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What was merged."""
+
+    rows: tuple[Row, ...]
+    recordings: int
+    left_out: tuple[str, ...]
+    """What could not be used, in sentences."""
+
+
+def merge(folders: Sequence[Path], out: Path, *, also: Callable[[Path], None] | None = None) -> Merged:
+    """Make `out` from all `folders`; nothing is left of it if anything goes wrong.
+
+    Parameters
+    ----------
+    folders
+        Result folders; they are only read.
+    out
+        A folder that does not exist yet.
+    also
+        Writes more files into the new folder, which it is given, before that gets its name.
+
+    Raises
+    ------
+    FolderError
+        If a folder holds no results, two contradict each other, or `out` exists or cannot be written.
+    """
+    if os.path.lexists(out):
+        raise FolderError(f"{out} exists already.", hint="Give --out a folder that does not; merging changes none.")
+    kept: dict[str, tuple[Row, Store]] = {}
+    against: list[str] = []
+    left_out: list[str] = []
+    for store in map(Store, folders):
+        rows = store.rows()
+        left_out += [f"{store.folder}: {trouble}" for trouble in store.troubles]
+        if not rows:
+            troubles = f" ({'; '.join(store.troubles)})" if store.troubles else ""
+            raise FolderError(f"There are no results in {store.folder}{troubles}.", hint="Name what `run --out` wrote.")
+        for row in rows:
+            other = kept.setdefault(row["cell"], (row, store))
+            if "done" == row["status"] == other[0]["status"] and (found := _contradiction(other, (row, store))):
+                against.append(f"{row['cell']} in {other[1].folder} and in {store.folder}: {found}")
+            kept[row["cell"]] = min(other, (row, store), key=lambda one: _order(one[0]))
+    if against:
+        more = f"; and {len(against) - _SHOWN} more" if len(against) > _SHOWN else ""
+        raise FolderError(
+            f"The folders contradict each other: {'; '.join(against[:_SHOWN])}{more}.",
+            hint="Nothing was written. Leave one of them out, or run the named cells again with the same version.",
+        )
+    with _made(out) as aside:
+        recordings: set[str] = set()
+        for row, store in kept.values():
+            shutil.copyfile(store.file_of(row), aside / "cells" / store.file_of(row).name)
+            for name in row["recordings"]:
+                if not Path(name).is_absolute() and (store.folder / name).is_file() and name not in recordings:
+                    recordings.add(name)
+                    _link(store.folder / name, aside / name)
+        if also is not None:
+            also(aside)
+    return Merged(tuple(row for row, _ in kept.values()), len(recordings), tuple(left_out))
+
+
+def _order(row: Row) -> tuple[int, str, str]:
+    return STATUSES.index(row["status"]), str(row["host"]), str(row["key"])
+
+
+def _contradiction(one: tuple[Row, Store], other: tuple[Row, Store]) -> str:
+    """Return in what two finished cells of one name differ that should be the same; empty if in nothing."""
+    parts = [{name: store.cell(row).sections.get(name) for name in _DECIDES} for row, store in (one, other)]
+    found = differences(*parts)
+    if found:
+        return found[0]
+    for name in SEED_DECIDES:
+        if not _same(one[0].get(name), other[0].get(name)):
+            return f"{name} {one[0].get(name)!r} and {other[0].get(name)!r}"[:200]
+    return ""
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Return whether two values of a row agree, numbers to a relative `SAME_SCORE`."""
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(_same(one[name], other[name]) for name in one)
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, float) or isinstance(other, float):
+        numbers = isinstance(one, int | float) and isinstance(other, int | float)
+        return numbers and math.isclose(one, other, rel_tol=SAME_SCORE, abs_tol=1e-12)
+    return bool(one == other)
+
+
+def _link(path: Path, target: Path) -> None:
+    """Put a recording, which never changes, at a second place: as a link where the disk can, else as a copy."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(path, target)
+    except OSError:
+        shutil.copyfile(path, target)
+
+
+@contextmanager
+def _made(out: Path) -> Iterator[Path]:
+    """Give a folder to fill, which becomes `out` when all went well and is removed when not."""
+    aside = out.absolute().with_name(f".{out.absolute().name}.{os.getpid()}.merging")
+    with writing(out):
+        try:
+            for part in ("cells", "recordings"):
+                (aside / part).mkdir(parents=True, exist_ok=True)
+            yield aside
+            aside.rename(out)
+            sync_folder(out.absolute().parent)
+        except BaseException:
+            shutil.rmtree(aside, ignore_errors=True)
+            raise
