@@ -25,8 +25,8 @@ ENGINE = (
     click.option(
         "--engine",
         type=click.Choice(("in-process", "isolated", "dask")),
-        help="Where cells are carried out: in child processes (the default), on a Dask cluster, or in the process of the "
-        "run, without limits, for a debugger.",
+        help="Where cells are carried out: in child processes (the default), on a Dask cluster, or in the run's "
+        "own process, without limits, for a debugger.",
     ),
     click.option(
         "--jobs", type=click.IntRange(min=1), metavar="N", help="Processes at once. Default: one for each usable core."

@@ -206,7 +206,7 @@ def run_checks(
         carrier = _Carrier(subject, _not_passed(outcomes), tuple(modes))
         for name, given in _carried_out(carrier, waiting, isolated, timeout_s):
             stopped = isinstance(given, BaseException)
-            settle(_stopped(name, given, subject) if stopped else CheckOutcome(name, *given))  # type: ignore[arg-type, misc]
+            settle(_stopped(name, given, subject) if stopped else CheckOutcome(name, *given))
             if stopped:
                 break  # what needs this check is not tried in another process
     here = _Carrier(subject, _not_passed(outcomes), tuple(modes))

@@ -106,8 +106,8 @@ def _order(row: Row) -> tuple[int, str, str]:
 
 def _contradiction(one: tuple[Row, Store], other: tuple[Row, Store]) -> str:
     """Return in what two finished cells of one name differ that should be the same; empty if in nothing."""
-    parts = [{name: store.cell(row).sections.get(name) for name in _DECIDES} for row, store in (one, other)]
-    found = differences(*parts)
+    first, second = ({name: store.cell(row).sections.get(name) for name in _DECIDES} for row, store in (one, other))
+    found = differences(first, second)
     if found:
         return found[0]
     for name in SEED_DECIDES:

@@ -188,8 +188,8 @@ def _from_replay(
         except RecordingError as error:
             broken[path] = error
     unreadable: dict[str, dict[Path, BaseException]] = {}
-    for path, error in broken.items():
-        unreadable.setdefault(_owner(path, matrix.sensors or list(scenes), registry), {})[path] = error
+    for path, why in broken.items():
+        unreadable.setdefault(_owner(path, matrix.sensors or list(scenes), registry), {})[path] = why
     known = sorted({*scenes, *unreadable})
     for name in matrix.sensors:
         if name not in known:

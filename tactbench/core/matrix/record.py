@@ -69,7 +69,7 @@ def recorder_for(requests: Sequence[RecordingRequest], registry: Registry) -> Re
         sensors=sensors,
         rigs=dict.fromkeys(request.rig for request in requests),
         effects=effects,
-        indenters=[shape for shape in shapes if shape in registry.indenters],
+        indenters=[shape for shape in shapes if shape is not None and shape in registry.indenters],
         profiles=registry.profiles.names(),
         devices=registry.devices.names(),
     )

@@ -69,13 +69,15 @@ def compute_again(
         recordings = tuple(request.path for request in requests) or tuple(paths)
         return solve(Job(cell, task, registry.estimators[cell.estimator], recordings, ()))
 
+    outcome: Any
     ((_, outcome),) = InProcess().each(again, [None])
     stopped = isinstance(outcome, BaseException)
     row = unanswered(cell, task, outcome, simulated=before["simulated"]) if stopped else outcome[0]
     names = ["status", "reason"]
     if not stopped and before["status"] == "done":
         names = [name for name in (*SEED_DECIDES, "unit") if name != "cell"]
-    found = differences(*({name: one.get(name) for name in names} for one in (before, row)))
+    old_row, new_row = ({name: one.get(name) for name in names} for one in (before, row))
+    found = differences(old_row, new_row)
     if made:
         old: Sections = {path.name: store.about(path)["digest"] for path in paths if path.exists()}
         found += differences(old, made, "recording ")

@@ -127,7 +127,7 @@ def solve(job: Job, concurrency: int = 1, progress: Callable[[str], None] | None
         "host": host_id(),
     }
     row["remarks"] += [*result.remarks, *([TIMED] if cell.timed else [])]
-    return json.loads(json.dumps(row, allow_nan=False)), dict(result.sets)
+    return json.loads(json.dumps(row, allow_nan=False)), {str(role): one for role, one in result.sets.items()}
 
 
 def check_content(job: Job) -> None:

@@ -227,7 +227,7 @@ class _Worker:
         if code >= 0:
             return Crashed(f"Its process ended with exit code {code} and gave no result.",
                            hint="Something in it calls os._exit or closes what is not its own.")  # fmt: skip
-        name = signal.Signals(-code).name if -code in iter(signal.Signals) else "unknown"
+        name = next((one.name for one in signal.Signals if one == -code), "unknown")
         hint = "What it printed last may say where."
         if name == "SIGKILL":
             hint = "If memory was short, run fewer at once (--jobs) or limit each (--memory MB)."
