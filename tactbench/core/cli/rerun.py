@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,29 +56,14 @@ def command(ctx: click.Context, cell: str, out: Path, shape: str) -> None:
 
 
 def _compute(found: StoredCell) -> Repeated:
-    """Compute the cell; recordings of a simulation go where they are thrown away."""
     from tactbench.core.cli.cells import recordings_of
-    from tactbench.core.cli.screen import remark
-    from tactbench.core.errors import TactbenchError
-    from tactbench.core.matrix.plan_recordings import request_key, requests_for
+    from tactbench.core.cli.progress import progress
     from tactbench.core.matrix.rerun import compute_again
-    from tactbench.core.matrix.store import Store
 
     row = found.row or {}
-    try:
-        before = recordings_of(row, found.store)
-    except TactbenchError:
-        if not found.requests:
-            raise
-        before = ()
-    with tempfile.TemporaryDirectory(prefix="tactbench-rerun-") as place:
-        requests = []
-        if found.requests:
-            elsewhere = Store(Path(place))
-            made = requests_for([found.cell], found.registry, found.keys, elsewhere, found.cell.simulation)
-            requests = made[request_key(found.cell)]
-        with redirect_stdout(sys.stderr):  # what a plugin prints is no result
-            return compute_again(found.cell, row, found.store, found.registry, before or found.paths, requests, remark)
+    paths = () if found.requests else recordings_of(row, found.store)
+    with redirect_stdout(sys.stderr), progress() as display:  # what a plugin prints is no result
+        return compute_again(found.cell, row, found.store, found.registry, paths, display)
 
 
 def _text(facts: dict[str, Any]) -> str:

@@ -142,7 +142,7 @@ def run_matrix(
         cells, plan = plan_run(matrix, registry, keys, store, recordings, choice.limits)
         provenance = gather(registry, seed=matrix.seed, engine=choice.name)
         store.begin(provenance)
-        run = _Run(store, registry, keys, plan, choice, operator, progress or Silence(), shown, cells)
+        run = Run(store, registry, keys, plan, choice, operator, progress or Silence(), shown, cells)
         run.carry_out([cell for cell in cells if cell.timed], alone=True)
         run.carry_out([cell for cell in cells if not cell.timed], alone=False)
     rows = tuple(run.rows[cell.name] for cell in cells)
@@ -152,7 +152,7 @@ def run_matrix(
 
 
 @dataclass
-class _Run:
+class Run:
     """What one run works with, and the rows so far."""
 
     store: Store
@@ -210,7 +210,7 @@ class _Run:
             self._submit_cells(engine, ready, at_once)
             for item, outcome in engine.outcomes():
                 if isinstance(item, Job):
-                    self._evaluated(item, outcome)
+                    self._evaluated(item, outcome, getattr(engine, "log", ""))
                     continue
                 self._recorded(item, outcome)
                 for need, paths in lacking.items():
@@ -302,14 +302,14 @@ class _Run:
             for piece in pieces.values():
                 engine.submit(work, piece)
 
-    def _evaluated(self, job: Job, outcome: Any) -> None:
+    def _evaluated(self, job: Job, outcome: Any, log: str) -> None:
         self.computed += 1
         if isinstance(outcome, BaseException):
             self._stopped(job.cell, job.task, outcome, counted=True)
             return
         row, answers = outcome
         key, sections = self._keys[job.cell.name]
-        row |= {"key": key, "recordings": [self.store.beside(Path(path)) for path in row["recordings"]]}
+        row |= {"key": key, "log": log, "recordings": [self.store.beside(Path(path)) for path in row["recordings"]]}
         if self.choice.limits.memory_mb is not None and not can_refuse_memory():
             row["remarks"].append(MEASURED_MEMORY)
         try:

@@ -57,6 +57,8 @@ class Pool:
 
     def __init__(self, jobs: int = 1, limits: Limits = UNLIMITED) -> None:
         self.jobs, self.limits = jobs, limits
+        self.log = ""
+        """What the item had printed whose outcome was yielded last, the end of it."""
         self._waiting: deque[tuple[Callable[[Any], Any], Sequence[Any]]] = deque()
         self._busy: list[_Worker] = []
 
@@ -89,7 +91,9 @@ class Pool:
                         yield item, plain_error(error)
             wait([source for worker in self._busy for source in worker.waits_on], POLL_S)
             for worker in list(self._busy):
-                yield from worker.poll()
+                for item, outcome in worker.poll():
+                    self.log = worker.log()
+                    yield item, outcome
                 if worker.over:
                     worker.end()
                     self._busy.remove(worker)

@@ -5,7 +5,6 @@ It holds no clock, no name of a person or host and no path: equal circumstances 
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import platform
 import re
@@ -41,7 +40,7 @@ def gather(registry: Registry, **circumstances: Any) -> dict[str, Any]:
         "cores": os.cpu_count(),
         "memory_mb": psutil.virtual_memory().total // 2**20,
         "host": host_id(),
-        "blas": _blas(),
+        "threads": next((os.environ[name] for name in _THREADS if name in os.environ), "as many as cores"),
         "plugins": list(_plugins(registry)),
         "distributions": {name: version_of(name) for name in (*RELEVANT, "h5py", "pydantic")},
         **circumstances,
@@ -91,18 +90,6 @@ def _commit(folder: Path) -> str:
     return found.stdout.strip()
 
 
-def _blas() -> dict[str, str]:
-    """Return name and version of numpy's BLAS and its number of threads, without importing numpy."""
-    found = None
-    with suppress(OSError, ImportError, ValueError):
-        spec = importlib.util.find_spec("numpy")
-        text = (Path(spec.origin).parent / "__config__.py").read_text() if spec and spec.origin else ""
-        found = re.search(r'"blas": \{\s*"name": "([^"]*)".*?"version": "([^"]*)"', text, re.DOTALL)
-    name, version = found.groups() if found else ("unknown", "")
-    threads = next((os.environ[variable] for variable in _THREADS if variable in os.environ), "as many as cores")
-    return {"name": name, "version": version, "threads": threads}
-
-
 def foot(several: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     """Return what stands under a table: which software made it on which machine, each said once.
 
@@ -125,9 +112,8 @@ def _software(one: Mapping[str, Any]) -> str:
     commit = f" ({state}{', with changes' if changes else ''})" if state else ""
     installed_versions = one.get("distributions", {})
     libraries = [f"{name} {installed_versions[name]}" for name in RELEVANT if name in installed_versions]
-    algebra = one.get("blas", {})
-    if algebra.get("version"):
-        libraries.append(f"BLAS {algebra.get('name')} {algebra['version']} (threads: {algebra.get('threads')})")
+    if "threads" in one:
+        libraries.append(f"BLAS threads: {one['threads']}")
     return f"tactbench {one['tactbench']}{commit}, Python {one.get('python', '?')}, {', '.join(libraries)}."
 
 
